@@ -12,7 +12,7 @@ PYTEST := $(PYTHON) -m pytest
 PYTEST_SHARED = $(PYTEST) -p no:benchmark --numprocesses auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder
 # An uncaught error on one rank ends all; ranks must not write one cache at a time.
 MPI_PYTEST := $(PYTHON) -m mpi4py -m pytest -p no:cacheprovider
-KERNELS := $(wildcard solver/kernels/*.cpp solver/kernels/*.hpp)
+KERNELS := $(wildcard solver/kernels/*/*.cpp solver/kernels/*/*.hpp)
 PARTS := meshgen solver mbs postproc cases
 RESULT := results/ambrosio2012
 SEED ?= 1

@@ -35,6 +35,7 @@ SANITIZED = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
 # Python's own flags let integers wrap around, which would pass for wanted.
 SANITIZED_FLAGS = [
     *("-O1", "-g", "-fno-omit-frame-pointer", "-fstrict-overflow", "-U_FORTIFY_SOURCE"),
+    "-D_GLIBCXX_ASSERTIONS",
     *SANITIZED,
 ]
 
@@ -148,8 +149,9 @@ setup(
     ext_modules=[
         Pybind11Extension(
             "catenary.solver.kernels.native",
-            sorted(glob(f"{KERNELS}/*.cpp")),
-            depends=sorted(glob(f"{KERNELS}/*.hpp")),
+            sorted(glob(f"{KERNELS}/*/*.cpp")),
+            depends=sorted(glob(f"{KERNELS}/*/*.hpp")),
+            include_dirs=[KERNELS],
             extra_compile_args=FLAGS,
             cxx_std=20,
         )

@@ -1,8 +1,30 @@
 """Kernels of the time loop, compiled from C++: what the extension offers, for type checkers."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
+
+class Kernel:
+    """A function over arrays and records; arrays are taken as they are, and written in place."""
+
+    def __call__(self, *arguments: Any) -> Any: ...
+    def bound(self, *first: Any) -> Bound:
+        """The function with its first arguments: a call gives the others."""
+
+class Bound:
+    """A kernel with its first arguments, which it keeps alive."""
+
+    def __call__(self, *later: Any) -> Any: ...
+
+RESERVE: np.dtype[np.void]
+
+predict: Kernel
+correct: Kernel
+displacements: Kernel
+velocities: Kernel
+reserves: Kernel
+energy_of_switching: Kernel
 
 class Layout:
     """How the unknowns of a station stand in lanes; see ``station_layout.Layout``."""

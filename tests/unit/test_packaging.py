@@ -79,7 +79,7 @@ def data_files() -> set[str]:
 
 def kernel_files() -> set[str]:
     """Sources and headers of the kernels, by their names in the checkout."""
-    return {str(path.relative_to(ROOT)) for path in ROOT.glob("solver/kernels/*.[ch]pp")}
+    return {str(path.relative_to(ROOT)) for path in ROOT.glob("solver/kernels/*/*.[ch]pp")}
 
 
 @pytest.fixture(scope="module")
@@ -161,7 +161,7 @@ def test_the_source_archive_can_build_the_wheel(sources: Path, tmp_path: Path) -
 
 def test_a_source_is_compiled_again_when_a_header_changes(sources: Path, tmp_path: Path) -> None:
     """Told by a compiler of the usual one's name, which writes down how it is called."""
-    (made,) = sources.glob(f"{OBJECTS}/*/solver/kernels/module.o")
+    (made,) = sources.glob(f"{OBJECTS}/*/solver/kernels/python/module.o")
     compiler = shlex.split(made.with_suffix(".command").read_text())[0]
     calls = tmp_path / "calls"
     (tmp_path / Path(compiler).name).write_text(f"""#!/bin/sh
@@ -175,12 +175,12 @@ echo >"$2"
         calls.write_text("")
         build = ("-I", "setup.py", "--quiet", "build_ext", "--build-lib", tmp_path / "lib")
         must(run(sys.executable, *build, cwd=sources, PATH=f"{tmp_path}:{os.environ['PATH']}"))
-        return "-c solver/kernels/module.cpp" in calls.read_text()
+        return "-c solver/kernels/python/module.cpp" in calls.read_text()
 
     assert not compiled()
-    (sources / "solver" / "kernels" / "of_nobody.hpp").write_text("")
+    (sources / "solver" / "kernels" / "base" / "of_nobody.hpp").write_text("")
     assert not compiled()
-    (sources / "solver" / "kernels" / "compiler.hpp").touch()
+    (sources / "solver" / "kernels" / "base" / "compiler.hpp").touch()
     assert compiled()
 
 

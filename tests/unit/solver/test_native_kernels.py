@@ -27,4 +27,5 @@ def test_the_stub_declares_what_the_extension_offers() -> None:
 
 
 def test_the_module_refuses_compilers_that_are_too_old() -> None:
-    assert '#include "compiler.hpp"' in (KERNELS / "module.cpp").read_text(encoding="utf-8")
+    module = (KERNELS / "python" / "module.cpp").read_text(encoding="utf-8")
+    assert '#include "base/compiler.hpp"' in module

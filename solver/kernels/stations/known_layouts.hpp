@@ -2,7 +2,7 @@
 // Layouts that kernels are compiled for: those of the shipped kinds of lines.
 #include <initializer_list>
 
-#include "layout.hpp"
+#include "stations/layout.hpp"
 
 namespace catenary {
 

@@ -1,4 +1,4 @@
-// The Python module catenary.solver.kernels.native.
+// What Python calls of lines whose unknowns stand in stations.
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
@@ -7,11 +7,10 @@
 #include <stdexcept>
 #include <string>
 
-#include "compiler.hpp"
-#include "line.hpp"
+#include "python/from_python.hpp"
+#include "stations/line.hpp"
 
-namespace py = pybind11;
-using namespace catenary;
+namespace catenary::python {
 
 namespace {
 
@@ -266,8 +265,7 @@ class Passes {
 
 }  // namespace
 
-PYBIND11_MODULE(native, m) {
-    m.doc() = "Kernels of the time loop, compiled from C++.";
+void offer_stations(py::module_& m) {
     py::class_<Layout>(m, "Layout")
         .def(py::init(&layout_of), py::arg("widths"), py::arg("own"), py::arg("beside"),
              py::arg("damped"), py::arg("sparse"), py::arg("general"), py::arg("strands"));
@@ -294,3 +292,5 @@ PYBIND11_MODULE(native, m) {
         .def("step", &Passes::step)
         .def_property_readonly("address", &Passes::address);
 }
+
+}  // namespace catenary::python

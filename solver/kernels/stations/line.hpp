@@ -15,7 +15,7 @@
 #include <string>
 #include <vector>
 
-#include "layout.hpp"
+#include "stations/layout.hpp"
 
 namespace catenary {
 

@@ -1,8 +1,8 @@
 #pragma once
 // All kernels for one target. A target is what a processor is told to be: files that include this
 // set it by a pragma, after the headers of the standard library.
-#include "known_layouts.hpp"
-#include "passes.hpp"
+#include "stations/known_layouts.hpp"
+#include "stations/passes.hpp"
 
 namespace catenary::CATENARY_TARGET {
 

@@ -6,7 +6,7 @@
 #include <type_traits>
 #include <utility>
 
-#include "layout.hpp"
+#include "stations/layout.hpp"
 
 namespace catenary::CATENARY_TARGET {
 

@@ -2,7 +2,7 @@
 // Products with blocks of stations whose layout is known when the kernels are compiled.
 #include <memory>
 
-#include "term_lists.hpp"
+#include "stations/term_lists.hpp"
 
 namespace catenary::CATENARY_TARGET {
 

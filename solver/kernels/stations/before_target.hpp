@@ -9,5 +9,5 @@
 #include <utility>
 #include <vector>
 
-#include "known_layouts.hpp"
-#include "line.hpp"
+#include "stations/known_layouts.hpp"
+#include "stations/line.hpp"

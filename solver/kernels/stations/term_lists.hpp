@@ -2,7 +2,7 @@
 // Products with blocks whose terms are known at run time only.
 #include <vector>
 
-#include "lanes.hpp"
+#include "stations/lanes.hpp"
 
 namespace catenary::CATENARY_TARGET {
 

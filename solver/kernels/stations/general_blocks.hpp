@@ -1,6 +1,6 @@
 #pragma once
 // Products with blocks of stations of any layout, found at run time.
-#include "term_lists.hpp"
+#include "stations/term_lists.hpp"
 
 namespace catenary::CATENARY_TARGET {
 

@@ -1,8 +1,8 @@
 #pragma once
 // The kernels of `line.hpp` for one kind of blocks.
-#include "general_blocks.hpp"
-#include "known_blocks.hpp"
-#include "line.hpp"
+#include "stations/general_blocks.hpp"
+#include "stations/known_blocks.hpp"
+#include "stations/line.hpp"
 
 namespace catenary::CATENARY_TARGET {
 

@@ -2,8 +2,8 @@
 #include <algorithm>
 #include <string>
 
-#include "known_layouts.hpp"
-#include "line.hpp"
+#include "stations/known_layouts.hpp"
+#include "stations/line.hpp"
 
 #define CATENARY_DECLARE(target)                                              \
     namespace catenary::target {                                              \

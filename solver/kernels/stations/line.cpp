@@ -1,4 +1,4 @@
-#include "line.hpp"
+#include "stations/line.hpp"
 
 #include <algorithm>
 #include <cstring>

@@ -1,0 +1,46 @@
+#pragma once
+// Arrays of others, which these do not own: std::span of one dimension, and more below. Bounds are
+// checked where _GLIBCXX_ASSERTIONS is defined, as by `make sanitize`.
+#include <cstdint>
+#include <span>
+
+namespace catenary {
+
+/// A table (rows, columns), row by row.
+template <class T>
+struct Array2 {
+    T* data = nullptr;
+    int64_t rows = 0, columns = 0;
+
+    std::span<T> operator[](int64_t row) const { return all().subspan(row * columns, columns); }
+    T& operator()(int64_t row, int64_t column) const { return (*this)[row][column]; }
+    std::span<T> all() const { return {data, static_cast<size_t>(rows * columns)}; }
+};
+
+/// Tables (n, rows, columns), one after another.
+template <class T>
+struct Array3 {
+    T* data = nullptr;
+    int64_t n = 0, rows = 0, columns = 0;
+
+    Array2<T> operator[](int64_t number) const {
+        return {all().subspan(number * rows * columns, rows * columns).data(), rows, columns};
+    }
+    T& operator()(int64_t number, int64_t row, int64_t column) const {
+        return (*this)[number](row, column);
+    }
+    std::span<T> all() const { return {data, static_cast<size_t>(n * rows * columns)}; }
+};
+
+/// How many numbers there are, as an index may count.
+template <class T>
+int64_t size(std::span<T> array) {
+    return static_cast<int64_t>(array.size());
+}
+/// Those from `begin` to `end`.
+template <class T>
+std::span<T> part(std::span<T> array, int64_t begin, int64_t end) {
+    return array.subspan(begin, end - begin);
+}
+
+}  // namespace catenary

@@ -1,0 +1,61 @@
+#pragma once
+// Links whose force is followed: droppers, and others that act one way. See switching_links.py.
+#include "motion/state.hpp"
+
+namespace catenary {
+
+/// What a link's reserve R = rest + stiffness e + damping e' is made of, with its stretch e: what
+/// is left until it switches [N]; and what a link does beyond.
+struct Reserve {
+    double rest, stiffness, damping;  ///< [N], [N/m], [N s/m], as long as it is as at rest
+    double place;                     ///< along the track [m]
+    double released;                  ///< what of -R > 0 is the compensation
+    double carried;                   ///< what of R is force: all of it, or nothing
+};
+
+/// n links: unknowns and weights of their direction, (n, m) each.
+struct Links {
+    Array2<const int64_t> unknowns;
+    Array2<const double> weights;
+    std::span<const Reserve> law;
+    CATENARY_RECORD(unknowns, weights, law)
+};
+
+/// What goes with links that switch: those from begin[d] to begin[d + 1] go with link d.
+struct Riders {
+    Links links;
+    std::span<const int64_t> begin;
+    CATENARY_RECORD(links, begin)
+};
+
+/// Reserve of a link [N].
+inline double reserve_of(int64_t link, const Links& links, const Motion& motion) {
+    const auto unknowns = links.unknowns[link];
+    const auto weights = links.weights[link];
+    double x = 0.0, y = 0.0, z = 0.0;
+    for (size_t k = 0; k < unknowns.size(); ++k) {
+        const int64_t at = unknowns[k];
+        x += weights[k] * motion.x[at];
+        y += weights[k] * motion.y[at];
+        z += weights[k] * motion.z[at];
+    }
+    const Reserve& law = links.law[link];
+    const auto& s = motion.shares;
+    const double stretch = s[0] * x + s[1] * y + s[2] * z, speed = s[3] * y + s[4] * z;
+    return law.rest + law.stiffness * stretch + law.damping * speed;
+}
+
+/// Fill in the reserves of links from `begin` to `end`.
+void reserves_within(const Motion& motion, const Links& links, int64_t begin, int64_t end,
+                     std::span<double> result);
+/// Fill in all reserves.
+void reserves(const Motion& motion, const Links& links, std::span<double> result);
+/// Fill in the forces of links from `begin` to `end` [N], positive where they pull.
+void forces_within(const Motion& motion, const Links& links, int64_t begin, int64_t end,
+                   std::span<double> result);
+/// What elastic energy lacks where links from `begin` to `end` have switched, and what goes with
+/// them [J], were they springs.
+double energy_of_switching(std::span<const double> displacement, const Links& links,
+                           const Riders& riders, int64_t begin, int64_t end);
+
+}  // namespace catenary
