@@ -35,7 +35,7 @@ endif
 .DEFAULT_GOAL := help
 # The targets share .venv and two cores: one after the other, also under make -j.
 .NOTPARALLEL:
-.PHONY: help setup setup-newest compile update-versions run check test test-studies test-unit \
+.PHONY: help setup setup-newest update-versions run check test test-studies test-unit \
     test-verification test-regression test-mpi test-ranks bench long-runs fuzz test-paraview test-readers sanitize lint types mypy format clean
 
 help: ## list the targets
@@ -46,12 +46,6 @@ setup: ## install what is needed, system packages included; quick when all is th
 
 setup-newest: ## the same with the newest packages that pyproject.toml allows; says what differs
 	@PYTHONPATH="$(PYTHONPATH)" bash .setup/setup.sh --newest
-
-compile: setup ## compile the loops of the shipped cases ahead, for an installation that others share
-	@work=$$(mktemp -d) && trap 'rm -rf "$$work"' EXIT && \
-	for case in $$(.venv/bin/catenary list | cut -d' ' -f1); do \
-	    .venv/bin/catenary run $$case --short --quiet -o "$$work/$$case" || exit 1; \
-	done
 
 update-versions: ## write what is installed into .setup/tested, from where make setup takes it
 	@.venv/bin/python -I .setup/versions.py write
@@ -126,7 +120,7 @@ test-readers: setup ## what other programs read of a run: versions of VTK and xa
 	done
 
 # GCC's sanitizers. The package is laid apart, with kernels that check each access and each operation,
-# and is found before the editable one; its Numba loops are kept apart too. The libraries that are loaded
+# and is found before the editable one. The libraries that are loaded
 # first are the one that replaces malloc, and the one whose exceptions it watches. A fault ends the tests,
 # with a report that pytest must not hold back.
 SANITIZED := $(CURDIR)/build/sanitized
@@ -135,7 +129,7 @@ SANITIZED_TESTS ?= $(addprefix tests/unit/solver/,test_station_passes.py test_va
 sanitize: setup ## tests with kernels that check memory and arithmetic; SANITIZED_TESTS="FILE..."
 	rm -rf $(SANITIZED)/package
 	$(PYTHON) -I setup.py --quiet build --build-lib $(SANITIZED)/package build_ext --sanitize
-	PYTHONPATH=$(SANITIZED)/package CATENARY_CACHE_DIR=$(SANITIZED)/loops PYTHONMALLOC=malloc \
+	PYTHONPATH=$(SANITIZED)/package PYTHONMALLOC=malloc \
 	    ASAN_OPTIONS=detect_leaks=0 UBSAN_OPTIONS=print_stacktrace=1 \
 	    LD_PRELOAD="$$(g++ -print-file-name=libasan.so) $$(g++ -print-file-name=libstdc++.so)" \
 	    $(PYTEST) -p no:benchmark --capture=sys --timeout=3000 $(SANITIZED_TESTS)

@@ -6,31 +6,20 @@ Source: EN 50318, annex (two masses); the benchmark of ten codes of 2015 (three 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
 
 import numpy as np
 from scipy import linalg
 
 from catenary.mbs.air.air_forces import ON_FRAME, ON_HEAD, AirForces
-from catenary.mbs.head import head_kernels
-from catenary.mbs.head.head_kernels import (
-    BASE,
-    BASE_VELOCITY,
-    FORCE,
-    HEAD_FORCE,
-    N_DRIVE,
-    PART,
-    Chain,
-    LinearStep,
-)
-from catenary.mbs.head.head_records import LAWFUL, LUMPED
+from catenary.mbs.head.drives import named
+from catenary.mbs.head.head_arrays import LinearStep, SprungMasses
 from catenary.mbs.head.laws import LawsInPlace, in_place
 from catenary.mbs.head.newmark_head import Raising, SteppedHead, parts_of
 from catenary.mbs.head.wire_crossing import CrossingPath
 from catenary.mbs.interface import HeadState
 from catenary.mbs.lumped_data import LumpedData, chain_matrix
 from catenary.mbs.vehicle.base_motion import BaseMotion
-from catenary.solver.base.kernels.bound import bound
+from catenary.solver.kernels import native
 
 # Half of the time over which the speed of a base that rises is found [s]: a half cosine of 0.1 s is
 # off by (pi 1e-5 / 0.1)^2 / 6, round-off by 1e-11.
@@ -97,14 +86,21 @@ class LumpedPantograph(SteppedHead):
         self._base_height = nominal_height + compression
         # A base that rises with the lift starts from where the chain was placed.
         self._tied, self._started_at = data.tied, self._base_height
-        carried = np.zeros(n)
-        carried[self._carrier] = 1.0
-        self._chain = Chain(self._masses, self._stiffness, self._damping, self._push, carried)
-        # A step is linear: new state = step @ state + drive * by_drive - by_force @ force, with
-        # the state (positions, velocities, accelerations).
+        if data.laws:
+            self._put_laws(self._in_place(data, pressing, nominal_height))
+            sprung = SprungMasses(self._masses, self._stiffness, self._damping, self._push)
+            arguments = self._arrays, sprung, self._law_arrays, self._carrier
+            self._step_by(native.LawfulChain(*arguments))
+        else:
+            self._step_by(native.LinearChain(self._arrays, self._linear_step()))
+
+    def _linear_step(self) -> LinearStep:
+        """A step without laws: new state = step @ state + drive * by_drive - by_force @ force, with
+        the state (positions, velocities, accelerations)."""
+        n = self._n
         one, none = np.eye(n), np.zeros((n, n))
         newmark = self._newmark
-        predict_position = np.hstack([one, dt * one, newmark.predict_position * one])
+        predict_position = np.hstack([one, newmark.dt * one, newmark.predict_position * one])
         predict_velocity = np.hstack([none, one, newmark.predict_velocity * one])
         inverse = np.ascontiguousarray(
             linalg.inv(
@@ -123,15 +119,7 @@ class LumpedPantograph(SteppedHead):
         )
         unit = np.vstack([newmark.position * inverse, newmark.velocity * inverse, inverse])
         by_drive = np.ascontiguousarray(unit[:, self._carrier])
-        self._of_step = LinearStep(step, by_drive, unit @ self._push, inverse)
-        self._drives = np.zeros(N_DRIVE)
-        common = newmark, self._arrays, self._drives
-        if data.laws:
-            self._put_laws(self._in_place(data, pressing, nominal_height))
-            arguments = self._chain, self._law_arrays, *common
-            self._step = bound(head_kernels.chain_step, *arguments, later=(0.0,))
-        else:
-            self._step = bound(head_kernels.linear_step, self._of_step, *common, later=(0.0,))
+        return LinearStep(step, by_drive, unit @ self._push, inverse)
 
     def lift(self, time: float) -> float:
         """Net lift on the last mass at ``time`` [N]: a half cosine up to the static force."""
@@ -150,46 +138,42 @@ class LumpedPantograph(SteppedHead):
     def predict(self, time: float) -> HeadState:
         """Strips at ``time`` [s] as affine functions of the contact forces in the coming step."""
         self._aim(time)
-        self._drives[FORCE] = self._drive(time)
+        force, now = self._drive(time), self._now
         if self._air is not None:
             on_head, on_frame, _ = self._air.now(time)
-            self._drives[FORCE] += on_frame
-            self._drives[HEAD_FORCE] = on_head
-        added = self.added_force
-        if added:
-            self._drives[PART] = max(self._part(time), 0.0)
+            force += on_frame
+            now["head_air"] = on_head
+        now["force"] = force
+        if self.added_force:
+            now["part"] = self._part(time)
         if self._laws.laws:
-            self._drives[BASE], self._drives[BASE_VELOCITY] = self._base_motion(time)
-        self._step(added)
+            now["base"], now["base_velocity"] = self._base_motion(time)
+        self.stepped.step(self._row)
         return self._head
 
     def fill_drives(self, times: Sequence[float], drives: np.ndarray) -> None:
         """Fill in the forces, and where the wire crosses; see `SteppedHead`."""
+        rows = named(drives)
         if self._base is None:
             constant = self._base_stiffness * self._base_height
-            drives[:, FORCE] = self._lift_full * parts_of(self._part, times) + constant
+            rows["force"] = self._lift_full * parts_of(self._part, times) + constant
         else:
-            drives[:, FORCE] = [self._drive(time) for time in times]
+            rows["force"] = [self._drive(time) for time in times]
         if self._tied and self._base is None:
             place, velocity = self._rise(np.asarray(times))
-            drives[:, FORCE] += self._base_stiffness * place + self._base_damping * velocity
+            rows["force"] += self._base_stiffness * place + self._base_damping * velocity
             if self._laws.laws:
-                drives[:, BASE], drives[:, BASE_VELOCITY] = place, velocity
-        drives[:, HEAD_FORCE] = 0.0
+                rows["base"], rows["base_velocity"] = place, velocity
         if self._air is not None:
             forces = self._air.at(times)
-            drives[:, FORCE] += forces[:, ON_FRAME]
-            drives[:, HEAD_FORCE] = forces[:, ON_HEAD]
+            rows["force"] += forces[:, ON_FRAME]
+            rows["head_air"] = forces[:, ON_HEAD]
         if self._laws.laws and self._base is not None:
-            drives[:, BASE : BASE_VELOCITY + 1] = [self._base_motion(time) for time in times]
+            motions = np.array([self._base_motion(time) for time in times])
+            rows["base"], rows["base_velocity"] = motions.T
         if self._control is not None:
-            drives[:, PART] = np.maximum(parts_of(self._part, times), 0.0)
+            rows["part"] = parts_of(self._part, times)
         self._fill_lateral(times, drives)
-
-    def record(self) -> dict[str, Any]:
-        """The pantograph as `head_records.fill_head` takes it."""
-        kind = {"model": LAWFUL if self._laws.laws else LUMPED}
-        return {**super().record(), **self._of_step._asdict(), **self._chain._asdict(), **kind}
 
     def base(self, time: float) -> float:
         """How far the vehicle has lifted the base [m]."""

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import os
+import stat
+import tempfile
+from collections.abc import Iterator
 from pathlib import Path
-
-from catenary.solver.base.kernels import loop_cache
 
 VARIABLE = "MPLCONFIGDIR"
 
@@ -15,8 +17,8 @@ def settle() -> None:
     """Set Matplotlib's variable, before it is imported, unless its default will do."""
     if VARIABLE in os.environ or _may_be_made(_default()):
         return
-    for base in loop_cache.bases():
-        if loop_cache.is_writable(base):
+    for base in _bases():
+        if _is_writable(base):
             os.environ[VARIABLE] = str(base / "matplotlib")
             return
     # It takes a temporary folder for this process; its warning is not needed.
@@ -34,3 +36,31 @@ def _may_be_made(path: Path) -> bool:
     """Whether a folder is there and can be written, or can be made."""
     there = next((one for one in (path, *path.parents) if one.exists()), None)
     return there is not None and there.is_dir() and os.access(there, os.W_OK | os.X_OK)
+
+
+def _bases() -> Iterator[Path]:
+    """Folders to try for what is kept between runs, the best first."""
+    if chosen := os.environ.get("XDG_CACHE_HOME"):
+        yield Path(chosen).absolute() / "catenary"
+    with contextlib.suppress(OSError):  # no folder for temporary files, or one of another user
+        temporary = Path(tempfile.gettempdir()) / f"catenary-{os.geteuid()}"
+        temporary.mkdir(mode=0o700, exist_ok=True)
+        if _is_private(temporary):
+            yield temporary
+
+
+def _is_private(path: Path) -> bool:
+    """Whether a folder is this user's and nobody else may write."""
+    status = path.lstat()
+    owned = status.st_uid == os.geteuid()
+    return owned and stat.S_ISDIR(status.st_mode) and not status.st_mode & 0o077
+
+
+def _is_writable(path: Path) -> bool:
+    """Whether files can be made in a folder, which is made if need be."""
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+        tempfile.TemporaryFile(dir=path).close()
+        return True
+    except OSError:
+        return False

@@ -6,7 +6,7 @@ import platform
 from importlib import metadata
 
 # Python packages that leave a record of their version, in the order in which they are printed.
-_PACKAGES = ("numpy", "scipy", "numba", "llvmlite", "gmsh", "meshio", "pydantic", "typer")
+_PACKAGES = ("numpy", "scipy", "gmsh", "meshio", "pydantic", "typer")
 
 
 def versions() -> dict[str, str]:

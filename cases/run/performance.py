@@ -1,4 +1,4 @@
-"""What a run cost: wall time of its phases and of compiling, and the work of its march."""
+"""What a run cost: wall time of its phases, and the work of its march."""
 
 from __future__ import annotations
 
@@ -7,41 +7,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from numba.core import event
-
 from catenary.postproc.record.progress import Progress
 from catenary.solver.base.petsc import PETSc
 from catenary.solver.time_loop.march import Outcome
-
-
-class CompiledLoops(event.Listener):
-    """Counts the loops that Numba compiles, and lets the progress of a run say so. Not collective.
-
-    Attributes
-    ----------
-    count : of loops compiled so far
-    spent : wall time of that [s]
-    """
-
-    def __init__(self, progress: Progress) -> None:
-        self.count, self.spent = 0, 0.0
-        self._progress = progress
-        self._depth, self._begin = 0, 0.0
-
-    def on_start(self, event: Any) -> None:
-        """A loop is compiled from here on, perhaps for another one that is."""
-        if self._depth == 0:
-            self._begin = time.perf_counter()
-        self._depth += 1
-        spent = self.spent + time.perf_counter() - self._begin
-        self._progress.waits_for_compiler(self.count, spent)
-
-    def on_end(self, event: Any) -> None:
-        """It is compiled."""
-        self._depth -= 1
-        self.count += 1
-        if self._depth == 0:
-            self.spent += time.perf_counter() - self._begin
 
 
 class Phases:
@@ -53,7 +21,6 @@ class Phases:
     def __init__(self, progress: Progress) -> None:
         self.wall: dict[str, float] = {}
         self.progress = progress
-        self._compiled = CompiledLoops(progress)
 
     @contextmanager
     def __call__(self, name: str) -> Iterator[None]:
@@ -62,18 +29,11 @@ class Phases:
         stage = PETSc.Log.Stage(name)
         stage.push()
         try:
-            with (
-                self.progress.phase(name),
-                event.install_listener("numba:compile", self._compiled),
-            ):
+            with self.progress.phase(name):
                 yield
         finally:
             stage.pop()
             self.wall[name] = time.perf_counter() - begin
-
-    def tell_compiled(self) -> None:
-        """Say how long loops were compiled, if that was long. Not collective."""
-        self.progress.compiled(self._compiled.count, self._compiled.spent)
 
 
 def performance(outcome: Outcome, phases: Phases, n_ranks: int) -> dict[str, Any]:

@@ -187,7 +187,6 @@ def _run(order: _Order, judge: Callable[[RunSize], None]) -> RunOutcome:
     outcome, n_unknowns = _marched(order, judge, phases)
     # The line is not needed any more: of a long one it is a gigabyte.
     give_back_long_line(n_unknowns)
-    phases.tell_compiled()
     order.tell(outcome.outcome)
     with phases("report"):
         result = _reported(order, outcome)

@@ -1,4 +1,4 @@
-"""Settings, gains and memory of a regulated lift as arrays, and what stands where in them."""
+"""Settings, gains and memory of a regulated lift, as kernels take them."""
 
 from __future__ import annotations
 
@@ -6,22 +6,47 @@ from typing import NamedTuple
 
 import numpy as np
 
-# What ``settings`` hold: 1 if the head's height is measured, 0 for the contact force; the wanted
-# value [m] or [N]; what a step takes of the difference to what is filtered [-]; step, time between
-# samples [s]; least and largest added force [N].
-HEIGHT, TARGET, PART, DT, SAMPLE, LEAST, MOST = range(7)
-N_SETTINGS = 7
-# What ``memory`` holds: the time [s]; when the next sample is [s]; what was measured, filtered;
-# the integral of the error [.. s]; the last sample's error; how many samples there were; the added
-# force that acts [N]; behind that forces that wait.
-TIME, NEXT, FILTERED, INTEGRAL, ERROR, SAMPLES, ACTING = range(7)
-WAITING = 7
+from catenary.solver.kernels import native
+
+_N_MEMORY = native.REGULATION_MEMORY.itemsize // 8
 
 
 class ControlArrays(NamedTuple):
-    """A controller's ``settings`` (N_SETTINGS,); ``gains`` (g, 4), rows of a measured value and the
-    gains of error, integral and rate there, straight in between; ``memory`` (WAITING + delay,)."""
+    """A controller; `solver/kernels/heads/regulation.hpp` says what the names stand for.
+
+    Attributes
+    ----------
+    settings : (1,) ``native.REGULATION``
+    gains : (g,) ``native.CONTROL_GAINS``
+    numbers : (k,) all that is remembered: ``memory``, and behind it forces that wait
+    """
 
     settings: np.ndarray
     gains: np.ndarray
-    memory: np.ndarray
+    numbers: np.ndarray
+
+    @property
+    def memory(self) -> np.ndarray:
+        """What has names of what is remembered, (1,) ``native.REGULATION_MEMORY``."""
+        return self.numbers[:_N_MEMORY].view(native.REGULATION_MEMORY)
+
+    @property
+    def waiting(self) -> np.ndarray:
+        """Forces that wait [N]."""
+        return self.numbers[_N_MEMORY:]
+
+
+def control_arrays(
+    settings: dict[str, float],
+    gains: tuple[tuple[float, float, float, float], ...],
+    n_delayed: int,
+    from_time: float,
+) -> ControlArrays:
+    """A controller before its first step, with a delay in samples and the first of these [s]."""
+    made = np.zeros(1, dtype=native.REGULATION)
+    for name, value in settings.items():
+        made[name] = value
+    numbers = np.zeros(_N_MEMORY + n_delayed)
+    control = ControlArrays(made, np.array(list(gains), dtype=native.CONTROL_GAINS), numbers)
+    control.memory["next"], control.memory["samples"] = from_time, -1.0
+    return control

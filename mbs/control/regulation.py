@@ -13,20 +13,7 @@ from typing import Protocol
 
 import numpy as np
 
-from catenary.mbs.control.control_arrays import (
-    DT,
-    HEIGHT,
-    LEAST,
-    MOST,
-    N_SETTINGS,
-    NEXT,
-    PART,
-    SAMPLE,
-    SAMPLES,
-    TARGET,
-    WAITING,
-    ControlArrays,
-)
+from catenary.mbs.control.control_arrays import ControlArrays, control_arrays
 
 
 @dataclass(frozen=True)
@@ -62,16 +49,18 @@ class Regulation:
         return round(self.delay / self.sample_time)
 
     def arrays(self, dt: float) -> ControlArrays:
-        """As compiled loops take it, for steps of ``dt`` [s] from time 0 on."""
-        settings = np.zeros(N_SETTINGS)
-        settings[HEIGHT], settings[TARGET] = float(self.of_height), self.target
+        """As kernels take it, for steps of ``dt`` [s] from time 0 on."""
         slow = self.filter_time > 0.0
-        settings[PART] = -math.expm1(-dt / self.filter_time) if slow else 1.0
-        settings[DT], settings[SAMPLE] = dt, self.sample_time
-        settings[LEAST], settings[MOST] = self.least, self.most
-        memory = np.zeros(WAITING + self.n_delayed)
-        memory[NEXT], memory[SAMPLES] = self.from_time, -1.0
-        return ControlArrays(settings, np.array(self.gains, dtype=float), memory)
+        settings = {
+            "of_height": float(self.of_height),
+            "target": self.target,
+            "part": -math.expm1(-dt / self.filter_time) if slow else 1.0,
+            "dt": dt,
+            "sample": self.sample_time,
+            "least": self.least,
+            "most": self.most,
+        }
+        return control_arrays(settings, self.gains, self.n_delayed, self.from_time)
 
 
 class Controller(Protocol):

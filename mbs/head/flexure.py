@@ -17,25 +17,17 @@ from typing import NamedTuple
 
 import numpy as np
 
+from catenary.mbs.head.head_arrays import SplineTables
+
 # Points of the tables of modes along half a wave of the highest one.
 _POINTS_A_WAVE = 100
 
 
-class ModeTables(NamedTuple):
-    """Shapes of m modes over the place on a strip, as `head_kernels.table_at` takes them.
-
-    ``mode_breaks`` (n,) [m], ``mode_coefficients`` (n - 1, m, 4).
-    """
-
-    mode_breaks: np.ndarray
-    mode_coefficients: np.ndarray
-
-
 class Bending(NamedTuple):
-    """Strips that bend: tables of their modes; the first coordinate, the modes of a strip being one
-    after the other; wires that may touch each strip."""
+    """Strips that bend: tables of their modes over the place on a strip [m]; the first coordinate,
+    the modes of a strip being one after the other; wires that may touch each strip."""
 
-    tables: ModeTables
+    tables: SplineTables
     first: int
     wires: int
 
@@ -73,13 +65,13 @@ def shapes(n_modes: int, length: float, places: np.ndarray) -> np.ndarray:
     return np.array(found)
 
 
-def mode_tables(n_modes: int, length: float) -> ModeTables:
+def mode_tables(n_modes: int, length: float) -> SplineTables:
     """The shapes as tables over the whole strip."""
     from scipy.interpolate import CubicSpline  # not loaded for strips that are rigid
 
     places = np.linspace(-0.5 * length, 0.5 * length, _POINTS_A_WAVE * (n_modes + 1) + 1)
     spline = CubicSpline(places, shapes(n_modes, length, places).T)
-    return ModeTables(places, np.ascontiguousarray(np.moveaxis(spline.c, 0, 2)))
+    return SplineTables(places, np.ascontiguousarray(np.moveaxis(spline.c, 0, 2)))
 
 
 @lru_cache(maxsize=32)

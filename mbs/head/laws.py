@@ -12,6 +12,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from catenary.solver.kernels import native
+
 
 @dataclass(frozen=True)
 class Law:
@@ -54,25 +56,19 @@ class Law:
 
 
 class LawArrays(NamedTuple):
-    """m laws on n coordinates; a law's extension is way @ coordinates + part * base - zero.
+    """m laws on n coordinates as kernels take them (`solver/kernels/heads/laws.hpp`).
 
     Attributes
     ----------
-    ways : (m, n)
-    of_rate : (m,) 1 for forces over the rate of the extension
-    by_base, zero : (m,) part of the base's height; where extensions count from [m]
-    first_point : (m + 1,) number of the first point of each law
-    points, forces : (k,) of all laws [m] or [m/s], [N]
+    ways : (m, n) the extension of each by each coordinate
+    law : (m,) ``native.HEAD_LAW``
+    points : (k,) ``native.HEAD_LAW_POINT`` of all laws
     pressed : (s,) contact forces of the latest step [N]
     """
 
     ways: np.ndarray
-    of_rate: np.ndarray
-    by_base: np.ndarray
-    zero: np.ndarray
-    first_point: np.ndarray
+    law: np.ndarray
     points: np.ndarray
-    forces: np.ndarray
     pressed: np.ndarray
 
 
@@ -94,17 +90,16 @@ class LawsInPlace:
     zero: np.ndarray
 
     def arrays(self, n_contacts: int) -> LawArrays:
-        """As compiled loops take them, with room for the forces of so many contacts."""
-        counts = [len(law.points) for law in self.laws]
+        """As kernels take them, with room for the forces of so many contacts."""
+        law = np.zeros(len(self.laws), dtype=native.HEAD_LAW)
+        counts = np.array([len(one.points) for one in self.laws], dtype=np.int64)
+        law["by_base"], law["zero"] = self.by_base, self.zero
+        law["of_rate"] = [one.of_rate for one in self.laws]
+        law["end"] = np.cumsum(counts)
+        law["begin"] = law["end"] - counts
+        points = [pair for one in self.laws for pair in zip(one.points, one.forces, strict=True)]
         return LawArrays(
-            self.ways,
-            np.array([float(law.of_rate) for law in self.laws]),
-            self.by_base,
-            self.zero,
-            np.concatenate([[0.0], np.cumsum(counts, dtype=float)]),
-            np.array([x for law in self.laws for x in law.points], dtype=float),
-            np.array([force for law in self.laws for force in law.forces], dtype=float),
-            np.zeros(n_contacts),
+            self.ways, law, np.array(points, dtype=native.HEAD_LAW_POINT), np.zeros(n_contacts)
         )
 
     def pull(

@@ -9,20 +9,23 @@ from typing import Any
 
 import numpy as np
 
-from catenary.mbs.control import control_kernels
-from catenary.mbs.control.control_arrays import ACTING, ControlArrays
+from catenary.mbs.control.control_arrays import ControlArrays
 from catenary.mbs.control.regulation import Controller, Regulation, Regulator
-from catenary.mbs.head import head_kernels
-from catenary.mbs.head.head_kernels import N_DRIVE, HeadArrays, NewmarkFactors
+from catenary.mbs.head.drives import N_DRIVE, drive_width, named
+from catenary.mbs.head.head_arrays import HeadArrays, NewmarkFactors
 from catenary.mbs.head.laws import LawsInPlace, in_place
 from catenary.mbs.head.strips import HeadParts
 from catenary.mbs.head.wire_crossing import CrossingPath
 from catenary.mbs.interface import HeadState
-from catenary.solver.base.kernels.bound import bound
+from catenary.solver.kernels import native
 
 
 class SteppedHead(ABC):
     """A head's strips on n coordinates, the head's own first, which a step advances together.
+
+    Attributes
+    ----------
+    stepped : what steps it, from Python and in the loop of kernels
 
     Parameters
     ----------
@@ -31,6 +34,8 @@ class SteppedHead(ABC):
     dt, beta, gamma : Newmark step [s] and parameters, those of the line
     lateral : where the wire crosses the strips, None if the head is not to roll
     """
+
+    stepped: native.Head
 
     def __init__(
         self,
@@ -45,7 +50,7 @@ class SteppedHead(ABC):
         self.strip_offsets = head.offsets
         # Where the wire crosses the strips of a head that cannot roll makes no difference.
         moves = head.roll >= 0 or head.bending is not None
-        self._n, self._roll, self._lateral = n, head.roll, lateral if moves else None
+        self._n, self._lateral = n, lateral if moves else None
         self._level = np.ones(n)
         self._level[: head.n] = head.level
         self._touch = np.zeros((2, s, n))
@@ -56,47 +61,44 @@ class SteppedHead(ABC):
         self._newmark = NewmarkFactors(
             dt, dt**2 * (0.5 - beta), dt * (1.0 - gamma), beta * dt**2, gamma * dt
         )
-        self._state, self._free = np.zeros((2, 3 * n))
-        self._by_force = np.zeros((3 * n, s))
+        self._state = np.zeros(3 * n)
         self._early = np.zeros((2, s))
         self._head = HeadState(s)
-        self._arrays = HeadArrays(
-            self._touch, self._state, self._free, self._by_force, self._head.numbers
-        )
-        self._extrapolate = bound(
-            head_kernels.extrapolate, self._newmark, self._arrays, self._early
-        )
-        self._take = bound(head_kernels.take, self._arrays, later=(np.zeros(s),))
+        roll = -1 if self._lateral is None else head.roll
+        self._arrays = HeadArrays(self._touch, self._state, self._head.numbers, self._newmark, roll)
+        # What the coming step depends on, and those of its numbers that have names.
+        self._row = np.zeros(drive_width(s))
+        self._now = named(self._row)
         self._laws: LawsInPlace = in_place((), (), n, ())
         self._law_arrays = self._laws.arrays(s)
-        self._bending = head.bending
-        if self._bending is not None:
-            tables, first, wires = self._bending
-            arguments = self._touch, *tables, first, wires
-            self._bend = bound(head_kernels.bend, *arguments, later=(np.zeros(s), np.zeros(s)))
+        self._bending = None if self._lateral is None else head.bending
         self._control: ControlArrays | None = None
         self._controller: Controller | None = None
-        self._added, self._time = 0.0, 0.0
+        self._time = 0.0
+
+    def _step_by(self, stepped: native.Head) -> None:
+        """Let this step it, which was made of its arrays."""
+        self.stepped = stepped
+        if self._bending is not None:
+            stepped.bend(self._bending)
 
     @property
     def by_hand(self) -> bool:
-        """Whether a controller of one's own regulates it, which no compiled loop calls."""
+        """Whether a controller of one's own regulates it, which no kernel calls."""
         return self._controller is not None
 
     def regulate(self, regulator: Regulator | None) -> None:
         """Let the lift be regulated from the start on; None leaves it as it is."""
         if isinstance(regulator, Regulation):
             self._control = regulator.arrays(self._newmark.dt)
-            arguments = self._control, self._arrays
-            example = (np.zeros(len(self.strip_offsets)),)
-            self._watch = bound(control_kernels.watch, *arguments, later=example)
+            self.stepped.regulate(self._control)
         elif regulator is not None:
             self._controller = regulator()
 
     @property
     def added_force(self) -> float:
         """What regulates the lift adds to the static force now [N]."""
-        return self._added if self._control is None else float(self._control.memory[ACTING])
+        return self.stepped.added_force
 
     def _put_laws(self, laws: LawsInPlace) -> None:
         """Let laws act that are not linear, on the coordinates of the head and what is below."""
@@ -135,34 +137,8 @@ class SteppedHead(ABC):
     def fill_drives(self, times: Sequence[float], drives: np.ndarray) -> None:
         """Fill in what steps to ``times`` [s] depend on besides the state, a row each.
 
-        ``drives`` (len(times), `head_records.drive_width`) is what ``record`` of a head is stepped
-        with.
+        ``drives`` (len(times), `drive_width`) is what the loop of kernels steps it with.
         """
-
-    def record(self) -> dict[str, Any]:
-        """The head as `head_records.fill_head` takes it; arrays are the head's own."""
-        control = self._control
-        watched = {} if control is None else control._asdict()
-        bends: dict[str, Any] = {"n_modes": 0}
-        if self._bending is not None and self._lateral is not None:
-            tables, first, wires = self._bending
-            points, m = tables.mode_coefficients.shape[:2]
-            bends = {"n_modes": m, "n_mode_breaks": points + 1, "first_mode": first, "wires": wires}
-            bends |= tables._asdict()
-        return {
-            **watched,
-            **bends,
-            **self._law_arrays._asdict(),
-            "n_laws": self._law_arrays.zero.size,
-            "n_points": self._law_arrays.points.size,
-            "n_gains": 0 if control is None else len(control.gains),
-            "n_memory": 0 if control is None else control.memory.size,
-            "n": self._n,
-            "s": len(self.strip_offsets),
-            "roll": -1 if self._lateral is None else self._roll,
-            **self._newmark._asdict(),
-            **self._arrays._asdict(),
-        }
 
     def _fill_lateral(self, times: Sequence[float], drives: np.ndarray) -> None:
         """Fill in what is known of where wires cross the strips of a head that rolls or bends."""
@@ -173,60 +149,53 @@ class SteppedHead(ABC):
     def extrapolate(self, time: float) -> tuple[np.ndarray, np.ndarray]:
         """Heights and velocities (s,) of the strips by Newmark's predictor (paper eq. 2.5)."""
         self._aim(time)
-        self._extrapolate()
+        self.stepped.extrapolate(self._row, self._early)
         return self._early[0], self._early[1]
 
     def advance(self, contact_force: np.ndarray) -> None:
         """Take the step predicted last with these contact forces (s,) [N]."""
-        self._take(contact_force)
-        if self._law_arrays.zero.size:
-            self._law_arrays.pressed[:] = contact_force
-        if self._control is not None:
-            self._watch(contact_force)
-        elif self._controller is not None:
+        self.stepped.advance(np.ascontiguousarray(contact_force, dtype=float))
+        if self._controller is not None:
             height = float((self._touch[0] @ self.position).mean())
             total = float(contact_force.sum())
-            self._added = float(self._controller.added_force(self._time, total, height))
+            added = self._controller.added_force(self._time, total, height)
+            self.stepped.added_force = float(added)
 
     def state(self) -> np.ndarray:
         """Positions, velocities and accelerations (3 n,); behind them the latest contact forces of
         a head with laws, and what regulates the lift remembers."""
         parts = [self._state]
-        if self._law_arrays.zero.size:
+        if self._laws.laws:
             parts.append(self._law_arrays.pressed)
         if self._control is not None:
-            parts.append(self._control.memory)
+            parts.append(self._control.numbers)
         elif self._controller is not None:
             own = np.asarray(self._controller.state(), dtype=float).ravel()
-            parts += [np.array([self._added]), own]
+            parts += [np.array([self.added_force]), own]
         return np.concatenate(parts)
 
     def restore(self, state: np.ndarray) -> None:
         """Continue from what ``state`` returned."""
         begin = self._state.size
         self._state[:] = state[:begin]
-        if self._law_arrays.zero.size:
+        if self._laws.laws:
             pressed = self._law_arrays.pressed
             pressed[:] = state[begin : begin + pressed.size]
             begin += pressed.size
         if self._control is not None:
-            self._control.memory[:] = state[begin:]
+            self._control.numbers[:] = state[begin:]
         elif self._controller is not None:
-            self._added = float(state[begin])
+            self.stepped.added_force = float(state[begin])
             self._controller.restore(np.array(state[begin + 1 :]))
 
     def _aim(self, time: float) -> None:
-        """Let the strips touch where the wire is at ``time`` [s]."""
+        """Let the strips touch where the wire is at ``time`` [s], the end of the coming step."""
         self._time = time
-        if self._lateral is None:
-            return
-        self._lateral.move_to(time)
-        place, rate = self._lateral.place, self._lateral.rate
-        if self._roll >= 0:
-            self._touch[0, :, self._roll] = place
-            self._touch[1, :, self._roll] = rate
-        if self._bending is not None:
-            self._bend(np.ascontiguousarray(place), np.ascontiguousarray(rate))
+        if self._lateral is not None:
+            self._lateral.move_to(time)
+            s = self._lateral.place.size
+            self._row[N_DRIVE : N_DRIVE + s] = self._lateral.place
+            self._row[N_DRIVE + s :] = self._lateral.rate
 
 
 def raised(time: float, raise_time: float) -> float:

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from catenary.mbs.vehicle import curves
 from catenary.mbs.vehicle.base_motion import BaseMotion
+from catenary.solver.kernels import native
 
 
 class CrossingPath(ABC):
@@ -65,18 +65,18 @@ class LateralPath(CrossingPath):
         speed: float,
         base: BaseMotion | None = None,
     ) -> None:
-        self._x = np.array(support_x, dtype=float)
-        self._y = np.array(stagger, dtype=float)
         self._start = start + np.array(offsets, dtype=float)
         self._along = self._start.copy()
         self._speed = speed
         self._base = base
         self.place, self.rate = np.zeros((2, len(offsets)))
+        course = np.array(support_x, dtype=float), np.array(stagger, dtype=float)
+        self._find = native.polyline_at.bound(*course, self._along, self.place, self.rate)
 
     def move_to(self, time: float) -> None:
         """Put ``place`` and ``rate`` to ``time`` [s]."""
         np.add(self._start, self._speed * time, out=self._along)
-        curves.polyline_at(self._x, self._y, self._along, self.place, self.rate)
+        self._find()
         self.rate *= self._speed
         if self._base is not None:
             sway = self._base.lateral(time)

@@ -18,7 +18,7 @@ from catenary.mbs.head.newmark_head import Raising
 from catenary.mbs.head.wire_crossing import CrossingPath
 from catenary.mbs.interface import HeadState
 from catenary.mbs.mechanism.pantograph_data import MultibodyData, stand
-from catenary.mbs.rigid import kernels
+from catenary.mbs.rigid.arrays import body_products
 from catenary.mbs.rigid.bodies import SPACE, Motion
 from catenary.mbs.rigid.forces import Force, Gravity, PointForce
 from catenary.mbs.rigid.joints import ORIGIN, PrescribedPoint, constant, steady
@@ -30,6 +30,7 @@ from catenary.mbs.time_steps.implicit_steps import Stepper
 from catenary.mbs.time_steps.step_solvers import StepSolver
 from catenary.mbs.vehicle.base_motion import BaseMotion
 from catenary.solver.base.errors import InputError, RunBroken
+from catenary.solver.kernels import native
 
 ARM, HEAD = "arm held at its place", "head moved from its place"
 # To how well a place without contact is found [m].
@@ -168,10 +169,12 @@ class FullPantograph:
         still = without_spins(standing.system, standing.motion)
         self._still = still.with_forces(*_blown(data, air))
         s, space = len(data.strips.contact_offsets), self._rest.numbers[SPACE]
-        self._touched = np.tile([space, space, self._rest.numbers[data.head]], (s, 1))
-        self._between = np.ones(s, dtype=bool)
-        self._upward, self._origins = np.tile([0.0, 0.0, 1.0], (s, 1)), np.zeros((s, 3))
-        self._points = np.zeros((s, 3))
+        # Heights of the points that touch the wire.
+        self._heights = np.zeros(s, dtype=native.BODY_PRODUCT)
+        self._heights["body"], self._heights["normal"] = space, (0.0, 0.0, 1.0)
+        self._heights["start"], self._heights["end"] = space, self._rest.numbers[data.head]
+        self._heights["between"] = True
+        self._points = self._heights["at_end"]
         self._points[:, 0] = data.strips.contact_offsets
         self._stepper = Stepper(system, dt, handling, self._pushed_down, substeps, beta, gamma)
         self._stepper.begin(standing.motion, 0.0)
@@ -344,18 +347,8 @@ class FullPantograph:
 
     def _touching(self, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
         """Heights (s,) above the base where the wire is on the strips, and gradients (s, 6 n)."""
-        height, gradient, _, _ = kernels.products(
-            motion.position,
-            motion.rotation,
-            motion.velocity,
-            motion.spin,
-            self._touched,
-            self._between,
-            self._upward,
-            self._origins,
-            self._points,
-        )
-        return height, gradient
+        found = body_products(motion, self._heights)
+        return found.value, found.jacobian
 
     def _pushed_down(self, motion: Motion) -> np.ndarray:
         """Generalised forces (6 n, s) of unit contact forces, downward."""

@@ -17,24 +17,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from catenary.mbs.air.air_forces import SQUARE, AirForces
-from catenary.mbs.head import head_kernels
-from catenary.mbs.head.head_kernels import (
-    ARM_AIR,
-    BASE,
-    BODIES_AIR,
-    HEAD_AIR,
-    LIFTED,
-    N_DRIVE,
-    WEIGHT,
-    ZERO,
-    RaisedHead,
-)
-from catenary.mbs.head.head_records import REDUCED
+from catenary.mbs.head.drives import named
+from catenary.mbs.head.head_arrays import MechanismArrays, SprungMasses
 from catenary.mbs.head.laws import Law, in_place
 from catenary.mbs.head.newmark_head import Raising, SteppedHead, parts_of
 from catenary.mbs.head.strips import ONE_STRIP, Strips, Turning, head_parts
@@ -43,7 +31,7 @@ from catenary.mbs.interface import HeadState
 from catenary.mbs.mechanism.reduction import ReducedMechanism
 from catenary.mbs.vehicle.base_motion import BaseMotion
 from catenary.solver.base.errors import RunBroken
-from catenary.solver.base.kernels.bound import bound
+from catenary.solver.kernels import native
 
 
 @dataclass(frozen=True)
@@ -109,22 +97,13 @@ class RaisingPantograph(SteppedHead):
         self._zero = data.head_offset + data.base_height
         self._masses = np.append(head.masses, 0.0)
         self._stiffness, self._damping = head.stiffness, head.damping
-        self._breaks, self._coefficients = data.frame.coefficients(carried=base is not None)
-        self._lowest, self._highest = float(self._breaks[0]), float(self._breaks[-1])
-        self._raised = RaisedHead(
-            self._masses,
-            self._stiffness,
-            self._damping,
-            self._push,
-            self._breaks,
-            self._coefficients,
-        )
-        self._drive = np.zeros(N_DRIVE)
-        self._drive[WEIGHT], self._drive[ZERO] = data.head_weight, self._zero
+        self._tables = data.frame.tables(carried=base is not None)
         head_number = int(np.flatnonzero(head.level)[-1])
         self._put_laws(in_place(data.laws, (head_number, head.n), self._n, data.rest))
-        arguments = self._raised, self._law_arrays, self._newmark, self._arrays, self._drive
-        self._step = bound(head_kernels.raising_step, *arguments, later=(0.0,))
+        sprung = SprungMasses(self._masses, self._stiffness, self._damping, self._push)
+        mechanism = MechanismArrays(self._tables, data.head_weight, self._zero)
+        self._raised = native.RaisedHead(self._arrays, sprung, self._law_arrays, mechanism)
+        self._step_by(self._raised)
 
     def predict(self, time: float) -> HeadState:
         """Strips at ``time`` [s] as affine functions of the contact forces in the coming step.
@@ -136,33 +115,22 @@ class RaisingPantograph(SteppedHead):
         """
         self._aim(time)
         self._move_base(time)
-        height = self._step(self.added_force if self._drive[LIFTED] > 0.0 else 0.0)
         # What is not a number is left to those who couple.
-        if height < self._lowest or height > self._highest:
-            raise self._data.frame.left(height, time)
+        if not self._raised.step(self._row):
+            raise self._data.frame.left(self._raised.height, time)
         return self._head
 
     def fill_drives(self, times: Sequence[float], drives: np.ndarray) -> None:
         """Fill in lift and base, and where the wire crosses; see `SteppedHead`."""
-        drives[:, :N_DRIVE] = self._drive
-        drives[:, LIFTED] = parts_of(self._part, times)
+        rows = named(drives)
+        rows["part"] = parts_of(self._part, times)
         if self._base is not None:
-            drives[:, BASE:HEAD_AIR] = [self._base.vertical(time) for time in times]
+            motions = np.array([self._base.vertical(time) for time in times])
+            rows["base"], rows["base_velocity"], rows["base_acceleration"] = motions.T
         if self._air is not None:
-            drives[:, HEAD_AIR:N_DRIVE] = self._blowing(self._air.at(times))
+            blown = self._blowing(self._air.at(times))
+            rows["head_air"], rows["arm_air"], rows["bodies_air"] = blown.T
         self._fill_lateral(times, drives)
-
-    def record(self) -> dict[str, Any]:
-        """The pantograph as `head_records.fill_head` takes it."""
-        return {
-            **super().record(),
-            "model": REDUCED,
-            "lowest": self._lowest,
-            "highest": self._highest,
-            "n_breaks": self._breaks.size,
-            "n_columns": self._coefficients.shape[1],
-            **self._raised._asdict(),
-        }
 
     def energy(self) -> float:
         """Kinetic energy in the line's frame, and elastic energy of the head's springs beyond its
@@ -216,40 +184,44 @@ class RaisingPantograph(SteppedHead):
 
     def _move_base(self, time: float) -> None:
         """Put lift and base to ``time`` [s]."""
-        self._drive[LIFTED] = self._part(time)
+        now = self._now
+        now["part"] = self._part(time)
         if self._base is not None:
-            self._drive[BASE:HEAD_AIR] = self._base.vertical(time)
+            moved = self._base.vertical(time)
+            now["base"], now["base_velocity"], now["base_acceleration"] = moved
         if self._air is not None:
-            self._drive[HEAD_AIR:] = self._blowing(self._air.now(time))
+            blown = self._blowing(self._air.now(time))
+            now["head_air"], now["arm_air"], now["bodies_air"] = blown
 
     def _blowing(self, forces: np.ndarray) -> np.ndarray:
-        """The last columns of a drive, from those of ``AirForces``, shape as these."""
+        """Forces on head, arm and bodies, from those of ``AirForces``, shape as these."""
         blown = forces.copy()
         blown[..., 0] += self._data.blown_head * forces[..., SQUARE]
         return blown
 
     def _acceleration(self, time: float) -> np.ndarray:
         self._move_base(time)
-        part, weight, zero, place, velocity, acceleration = self._drive[:HEAD_AIR]
+        now = self._now[()]
         (mass, lift, slowing, carried, *blown), (mass_slope, *_) = self._columns_at(
-            self.position[-1] - zero - place
+            self.position[-1] - self._zero - now["base"]
         )
-        speed = self.velocity[-1] - velocity
+        speed = self.velocity[-1] - now["base_velocity"]
         force = -self._stiffness @ self.position - self._damping @ self.velocity
-        force[-1] += part * (lift - weight) - slowing * speed - 0.5 * mass_slope * speed**2
-        force[-1] += (mass - carried) * acceleration
-        force += self._drive[HEAD_AIR] * self._push
-        force[-1] += self._drive[ARM_AIR] + self._drive[BODIES_AIR] * sum(blown)
+        lifting = now["part"] * (lift - self._data.head_weight)
+        force[-1] += lifting - slowing * speed - 0.5 * mass_slope * speed**2
+        force[-1] += (mass - carried) * now["base_acceleration"]
+        force += now["head_air"] * self._push
+        force[-1] += now["arm_air"] + now["bodies_air"] * sum(blown)
         if self._laws.laws:
-            force += self._laws.pull(self.position, self.velocity, (place, velocity))
+            base = float(now["base"]), float(now["base_velocity"])
+            force += self._laws.pull(self.position, self.velocity, base)
         masses = self._masses.copy()
         masses[-1] = mass
         return np.asarray(force / masses)
 
     def _columns_at(self, height: float) -> tuple[np.ndarray, np.ndarray]:
         """All columns of the mechanism's tables and their slopes at a height above the base [m]."""
-        if not self._lowest <= height <= self._highest:
+        breaks = self._tables.breaks
+        if not breaks[0] <= height <= breaks[-1]:
             raise self._data.frame.left(height)
-        values, slopes = np.empty((2, self._coefficients.shape[1]))
-        head_kernels.table_at(self._breaks, self._coefficients, height, values, slopes)
-        return values, slopes
+        return self._tables.at(height)

@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from catenary.mbs.head.head_arrays import SplineTables
 from catenary.mbs.rigid.bodies import Motion, Vector
 from catenary.mbs.rigid.forces import Force
 from catenary.mbs.rigid.joints import ORIGIN, PrescribedPoint
@@ -69,13 +70,9 @@ class ReducedMechanism:
             raise self.left(height)
         return self._table(height), self._slopes(height)
 
-    def coefficients(self, carried: bool) -> tuple[np.ndarray, np.ndarray]:
-        """Heights (n,) and, from each to the next, coefficients of the splines (n - 1, k, 4).
-
-        The second index stands for mass, lift, damping, carried mass (zero without ``carried``)
-        and, of a mechanism that meets the air, what that lifts; the third for powers, the highest
-        first.
-        """
+    def tables(self, carried: bool) -> SplineTables:
+        """Splines of mass, lift, damping, carried mass (zero without ``carried``) and, of a
+        mechanism that meets the air, what that lifts."""
         last = np.zeros_like(self.masses)
         if carried:
             if self.carried is None:
@@ -84,7 +81,7 @@ class ReducedMechanism:
         listed = [self.masses, self.lifts, self.dampings, last]
         columns = np.stack(listed if self.blown is None else [*listed, self.blown], axis=1)
         spline = CubicSpline(self.heights, columns)
-        return spline.x, np.ascontiguousarray(spline.c.transpose(1, 2, 0))
+        return SplineTables(spline.x, np.ascontiguousarray(spline.c.transpose(1, 2, 0)))
 
     def blown_at(self, height: float) -> float:
         """Upward force on the point by the air on the bodies at a height [m], 0 without air."""

@@ -1,1 +1,1 @@
-"""Rigid bodies, joints and forces in space, their arrays and kernels."""
+"""Rigid bodies, joints and forces in space, and their arrays."""

@@ -1,4 +1,4 @@
-"""Joints and forces of a system as arrays, so that compiled loops evaluate all of them at once.
+"""Joints and forces of a system as arrays, so that kernels evaluate all of them at once.
 
 Nearly all joints are made of scalar products of a vector fixed on one body with a vector between
 points of two others, or fixed on another; nearly all forces act along the line between two points.
@@ -13,7 +13,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from catenary.mbs.rigid import kernels
 from catenary.mbs.rigid.bodies import SPACE, Motion, Vector, rotation_matrix
 from catenary.mbs.rigid.forces import Actuator, BumpStop, Force, SpringDamper
 from catenary.mbs.rigid.joints import (
@@ -35,6 +34,7 @@ from catenary.mbs.rigid.joints import (
 )
 from catenary.mbs.rigid.kinematics import Quantity, cross, number_of
 from catenary.solver.base.errors import InputError
+from catenary.solver.kernels import native
 
 
 class Product(NamedTuple):
@@ -137,6 +137,15 @@ def _(joint: PrescribedAngle) -> list[Product] | None:
     return [Product(joint.i, normal, joint.j, unit(joint.normal_j))]
 
 
+def body_products(motion: Motion, rows: np.ndarray) -> Quantity:
+    """Scalar products of vectors of bodies, ``rows`` (m,) ``native.BODY_PRODUCT``."""
+    m = rows.size
+    value, rate, drift = np.empty((3, m))
+    found = Quantity(value, np.empty((m, 6 * motion.n_bodies)), rate, drift)
+    native.body_products(motion, rows, found)
+    return found
+
+
 class FlatRows:
     """Rows of several joints, evaluated together.
 
@@ -162,34 +171,24 @@ class FlatRows:
                 continue
             self._laws += [(len(flat) + k, row.law) for k, row in enumerate(rows) if row.law]
             flat += rows
-        names = [(row.body, row.start or SPACE, row.end) for row in flat]
-        self._bodies = np.array(
-            [[number_of(start, body) for body in each] for each in names], dtype=np.int64
-        ).reshape(-1, 3)
-        self._between = np.array([row.start is not None for row in flat], dtype=bool)
-        self._normals = _vectors([row.normal for row in flat])
-        self._starts = _vectors([row.at_start for row in flat])
-        self._ends = _vectors([row.at_end for row in flat])
+        self._rows = np.zeros(len(flat), dtype=native.BODY_PRODUCT)
+        self._rows["body"] = [number_of(start, row.body) for row in flat]
+        self._rows["start"] = [number_of(start, row.start or SPACE) for row in flat]
+        self._rows["end"] = [number_of(start, row.end) for row in flat]
+        self._rows["between"] = [row.start is not None for row in flat]
+        self._rows["normal"] = _vectors([row.normal for row in flat])
+        self._rows["at_start"] = _vectors([row.at_start for row in flat])
+        self._rows["at_end"] = _vectors([row.at_end for row in flat])
 
     def __call__(self, motion: Motion, time: float) -> Quantity:
         """Phi with its derivatives, m rows."""
-        found = kernels.products(
-            motion.position,
-            motion.rotation,
-            motion.velocity,
-            motion.spin,
-            self._bodies,
-            self._between,
-            self._normals,
-            self._starts,
-            self._ends,
-        )
+        found = body_products(motion, self._rows)
         for row, law in self._laws:
-            for part, number in zip((found[0], found[2], found[3]), law(time), strict=True):
+            for part, number in zip((found.value, found.rate, found.drift), law(time), strict=True):
                 part[row] -= number
         if not self._odd:
-            return Quantity(*found)
-        return self._with_odd(Quantity(*found), motion, time)
+            return found
+        return self._with_odd(found, motion, time)
 
     def _with_odd(self, found: Quantity, motion: Motion, time: float) -> Quantity:
         parts, begin = [], 0
@@ -255,6 +254,14 @@ def _(force: BumpStop) -> Line:
 LENGTH_STEP, RATE_STEP = 1e-7, 1e-6
 
 
+class LineGeometry(NamedTuple):
+    """Lengths (m,) of lines [m], their rates (m,) [m/s] and gradients (m, 6 n)."""
+
+    length: np.ndarray
+    rate: np.ndarray
+    gradient: np.ndarray
+
+
 class FlatLines:
     """Those of several forces that act along lines, evaluated together.
 
@@ -266,12 +273,11 @@ class FlatLines:
         found = [(force.name, line_of(force)) for force in forces]
         lines = [line for _, line in found if line is not None]
         self.names = tuple(name for name, line in found if line is not None)
-        self._bodies = np.array(
-            [[number_of(start, body) for body in (line.i, line.j)] for line in lines],
-            dtype=np.int64,
-        ).reshape(-1, 2)
-        self._starts = _vectors([line.at_i for line in lines])
-        self._ends = _vectors([line.at_j for line in lines])
+        self._rows = np.zeros(len(lines), dtype=native.BODY_LINE)
+        self._rows["i"] = [number_of(start, line.i) for line in lines]
+        self._rows["j"] = [number_of(start, line.j) for line in lines]
+        self._rows["at_i"] = _vectors([line.at_i for line in lines])
+        self._rows["at_j"] = _vectors([line.at_j for line in lines])
         constants = [(x.stiffness, x.free_length, x.damping, x.preload) for x in lines]
         columns = np.array(constants, dtype=float).reshape(-1, 4).T.copy()
         self._stiffness, self._free, self._damping, self._preload = columns
@@ -280,22 +286,17 @@ class FlatLines:
     def __len__(self) -> int:
         return len(self.names)
 
-    def geometry(self, motion: Motion) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Lengths (m,) [m], their rates (m,) [m/s] and gradients (m, 6 n).
+    def geometry(self, motion: Motion) -> LineGeometry:
+        """How the lines are in a motion.
 
         Raises InputError where the two points of a line coincide.
         """
-        found = kernels.lines(
-            motion.position,
-            motion.rotation,
-            motion.velocity,
-            motion.spin,
-            self._bodies,
-            self._starts,
-            self._ends,
-        )
-        if not found[0].all():
-            name = self.names[int(np.argmin(found[0]))]
+        m = self._rows.size
+        length, rate = np.empty((2, m))
+        found = LineGeometry(length, rate, np.empty((m, 6 * motion.n_bodies)))
+        native.body_lines(motion, self._rows, found)
+        if not length.all():
+            name = self.names[int(np.argmin(length))]
             raise InputError(f"Force {name!r}: its two points coincide, it has no direction.")
         return found
 

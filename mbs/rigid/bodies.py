@@ -11,8 +11,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from catenary.mbs.frame import SPACE
-from catenary.mbs.rigid import kernels
 from catenary.solver.base.errors import InputError
+from catenary.solver.kernels import native
 
 Vector = Sequence[float] | np.ndarray
 
@@ -20,8 +20,9 @@ Vector = Sequence[float] | np.ndarray
 def rotation_matrix(parameters: np.ndarray) -> np.ndarray:
     """Matrices from body to space axes of unit Euler parameters (..., 4), shape (..., 3, 3)."""
     rows = np.asarray(parameters, dtype=float)
-    matrices = kernels.rotation_matrices(np.ascontiguousarray(rows.reshape(-1, 4)))
-    return matrices.reshape(*rows.shape[:-1], 3, 3)
+    matrices = np.empty((*rows.shape[:-1], 3, 3))
+    native.rotation_matrices(np.ascontiguousarray(rows.reshape(-1, 4)), matrices.reshape(-1, 3, 3))
+    return matrices
 
 
 def quaternion_product(p: np.ndarray, r: np.ndarray) -> np.ndarray:
@@ -108,7 +109,7 @@ class Motion:
     rotation: np.ndarray = field(init=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "rotation", kernels.rotation_matrices(self.parameters))
+        object.__setattr__(self, "rotation", rotation_matrix(self.parameters))
 
     @property
     def n_bodies(self) -> int:
@@ -122,7 +123,7 @@ class Motion:
     def moved(self, displacement: np.ndarray) -> Motion:
         """The same velocities after a displacement (6 n,) [m, rad]."""
         position, parameters = self.position.copy(), self.parameters.copy()
-        kernels.move(position, parameters, displacement)
+        native.move_bodies(position, parameters, np.ascontiguousarray(displacement))
         return Motion(self.numbers, position, parameters, self.velocity, self.spin)
 
     def with_velocities(self, velocities: np.ndarray) -> Motion:

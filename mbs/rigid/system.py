@@ -19,7 +19,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy import linalg
 
-from catenary.mbs.rigid import kernels
 from catenary.mbs.rigid.arrays import FlatLines, FlatRows, line_of
 from catenary.mbs.rigid.bodies import Body, Motion, initial_motion
 from catenary.mbs.rigid.forces import Force
@@ -27,6 +26,7 @@ from catenary.mbs.rigid.joints import Joint
 from catenary.mbs.rigid.kinematics import Quantity
 from catenary.mbs.rigid.least_squares import least_squares
 from catenary.solver.base.errors import InputError, RunBroken
+from catenary.solver.kernels import native
 
 # A row of Phi_q that the rows before it explain but for this part of its length is redundant.
 DEPENDENT = 1e-8
@@ -67,7 +67,8 @@ def independent_rows(jacobian: np.ndarray) -> np.ndarray:
 
     Gram-Schmidt row by row, so that the first of several dependent rows is kept.
     """
-    return kernels.independent_rows(np.ascontiguousarray(jacobian), DEPENDENT)
+    found = native.independent_rows(np.ascontiguousarray(jacobian), DEPENDENT)
+    return np.array(found, dtype=np.int64)
 
 
 @dataclass(frozen=True)
@@ -148,7 +149,7 @@ class System:
 
     @cached_property
     def _inertia(self) -> np.ndarray:
-        return np.array([body.inertia for body in self.bodies], dtype=float)
+        return np.array([body.inertia for body in self.bodies], dtype=float).reshape(-1, 3)
 
     def generalised_forces(self, motion: Motion, time: float) -> np.ndarray:
         """g (6 n,) [N, N m]: all forces, and the gyroscopic moments -omega x J omega."""
@@ -156,7 +157,7 @@ class System:
         result = self.lines.pulls(length, rate, time) @ -gradient
         for force in self.other_forces:
             result += force.generalised(motion, time)
-        kernels.add_gyroscopic_moments(result, self._inertia, motion.spin)
+        native.add_gyroscopic_moments(result, self._inertia, motion.spin)
         return result
 
     def energy(self, motion: Motion) -> float:

@@ -7,14 +7,14 @@ all at once. Velocities and accelerations are derivatives of the same splines an
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import NamedTuple, Protocol
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
-from catenary.mbs.vehicle import curves
 from catenary.mbs.vehicle.motion_sources import Harmonic, Source, Table, VehicleMotion
 from catenary.mbs.vehicle.suspension import Vehicle, roof_course, transfer
+from catenary.solver.kernels import native
 
 # A spline of the track is followed in such steps [m].
 _FINE = 0.1
@@ -28,32 +28,15 @@ class Motion(NamedTuple):
     acceleration: float
 
 
-class _Course(Protocol):
-    """A function of one variable with two derivatives."""
-
-    def __call__(self, x: float) -> tuple[float, float, float]: ...
+# A function of one variable with two derivatives.
+_Course = Callable[[float], tuple[float, float, float]]
 
 
-class _Spline:
-    def __init__(self, points: Sequence[float] | np.ndarray, values: object) -> None:
-        from scipy.interpolate import CubicSpline  # not loaded for vehicles that stand still
+def _spline(points: Sequence[float] | np.ndarray, values: object) -> _Course:
+    from scipy.interpolate import CubicSpline  # not loaded for vehicles that stand still
 
-        spline = CubicSpline(points, values, bc_type="natural")
-        self._breaks = spline.x
-        self._coefficients = np.ascontiguousarray(spline.c.T)
-
-    def __call__(self, x: float) -> tuple[float, float, float]:
-        value, first, second = curves.spline_at(self._breaks, self._coefficients, x)
-        return value, first, second
-
-
-class _Sines:
-    def __init__(self, amplitudes: np.ndarray, rates: np.ndarray, phases: np.ndarray) -> None:
-        self._waves = (amplitudes, rates, phases)
-
-    def __call__(self, x: float) -> tuple[float, float, float]:
-        value, first, second = curves.sines_at(*self._waves, x)
-        return value, first, second
+    spline = CubicSpline(points, values, bc_type="natural")
+    return native.spline_at.bound(spline.x, np.ascontiguousarray(spline.c.T))
 
 
 class BaseMotion:
@@ -103,16 +86,16 @@ def _course(
     if isinstance(source, Harmonic):
         rate = 2.0 * np.pi * source.frequency
         waves = (np.array([v]) for v in (source.amplitude, rate, source.phase))
-        return _Sines(*waves), False
+        return native.sines_at.bound(*waves), False
     if isinstance(source, Table):
         if suspension is None or not source.along_track:
-            return _Spline(source.points, source.values), source.along_track
-        return _Spline(*_roof_course(source, direction, suspension, speed)), True
+            return _spline(source.points, source.values), source.along_track
+        return _spline(*_roof_course(source, direction, suspension, speed)), True
     amplitudes, wave_numbers, phases = source.waves(direction)
     if suspension is not None:
         passed = transfer(suspension, direction, wave_numbers, speed)
         amplitudes, phases = amplitudes * np.abs(passed), phases + np.angle(passed)
-    return _Sines(amplitudes, wave_numbers, phases), True
+    return native.sines_at.bound(amplitudes, wave_numbers, phases), True
 
 
 def _roof_course(

@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 
 from catenary.postproc.record.column_gather import ColumnGather
-from catenary.solver.base.kernels.bound import bound
-from catenary.solver.time_loop.views.row_kernels import take_extremes
+from catenary.solver.kernels import native
 
 
 class Extremes:
@@ -28,7 +27,6 @@ class Extremes:
         self._gather = ColumnGather(comm, self._owned, n_columns, 2)
         self._kept = np.empty((2, self._owned.size))
         self._kept[0], self._kept[1] = np.inf, -np.inf
-        self._take = bound(take_extremes, later=(np.zeros((0, 0)), 0, 0, 0, self._kept))
 
     def restore(self, whole: np.ndarray) -> None:
         """Continue from what ``whole`` gave, (2, n_columns), on any ranks. Not collective."""
@@ -46,7 +44,7 @@ class Extremes:
         columns : which of these have changed
         """
         begin, end, _ = columns.indices(self._owned.size)
-        self._take(rows, part.start, begin, end, self._kept)
+        native.take_extremes(rows, part.start, begin, end, self._kept)
 
     def whole(self) -> np.ndarray:
         """Smallest and largest value of all columns, (2, n_columns), on rank 0. Collective."""

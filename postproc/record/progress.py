@@ -24,8 +24,6 @@ logger = logging.getLogger("catenary.progress")
 
 # Wall time between two plain lines of a march, and from which a phase gets a line of its own [s].
 LINE_EVERY, LONG_PHASE = 10.0, 2.0
-# Why loops are compiled, and how long that takes; measured with ambrosio2012 on two cores.
-FIRST_RUN = "only for the first run of this kind of line, some 40 s on a free machine"
 # Wall time between two readings of the clock during a march, with a bar and without [s].
 _LOOK_AT_BAR, _LOOK_AT_LINES = 0.1, 1.0
 # Steps until the next reading grow at most by this factor.
@@ -55,13 +53,11 @@ class Progress:
         self._on_terminal = self._shows and self._stream.isatty()
         self._bar: Any = None
         self._next_look = _NEVER
-        self._phase, self._next_note = "", 0.0
 
     @contextmanager
     def phase(self, name: str) -> Iterator[None]:
         """Show the name of what is done inside, afterwards its wall time if that was long."""
         begin = self._clock()
-        self._phase = name
         if self._on_terminal:
             self._replace_line(f"{name} ...")
         try:
@@ -72,31 +68,6 @@ class Progress:
         spent = self._clock() - begin
         if self._shows and not self._on_terminal and spent >= LONG_PHASE and name != "march":
             logger.info("%s: %.1f s", name, spent)
-
-    def waits_for_compiler(self, count: int, spent: float) -> None:
-        """Say that loops are compiled: at once on a terminal, in a log where it takes long.
-
-        Parameters
-        ----------
-        count : of loops compiled so far
-        spent : wall time since the first of them [s]
-        """
-        if not self._shows:
-            return
-        so_far = f"{count} so far, {duration(spent)}"
-        if self._bar is not None:
-            self._bar.set_postfix_str(f"compiling loops, {so_far}")
-        elif self._on_terminal:
-            self._replace_line(f"{self._phase}: compiling loops, {so_far}; {FIRST_RUN}")
-        elif spent >= max(LONG_PHASE, self._next_note):
-            first = f"; {FIRST_RUN}" if self._next_note == 0.0 else ""
-            logger.info("%s: compiling loops, %s%s", self._phase, so_far, first)
-            self._next_note = spent + LINE_EVERY
-
-    def compiled(self, count: int, spent: float) -> None:
-        """Say how many loops were compiled in a wall time [s], if that was long."""
-        if self._shows and spent >= LONG_PHASE:
-            logger.info("compiled %d loops in %s; later runs load them", count, duration(spent))
 
     def start(self, stage: Stage) -> None:
         """Begin to watch a march."""

@@ -1,1 +1,1 @@
-"""Leaves that every layer may import: errors, ranks, compiled loops, aligned arrays."""
+"""Leaves that every layer may import: errors, ranks, aligned arrays."""

@@ -7,12 +7,20 @@ from typing import NamedTuple
 import numpy as np
 
 from catenary.meshgen.wires import Role
-from catenary.solver.contact import contact_kernels
-from catenary.solver.contact.contact_kernels import NODE, SLIP, TOUCH, WireShapes
 from catenary.solver.contact.running_surface import surface_samples
+from catenary.solver.kernels import native
+from catenary.solver.kernels.native import NODE, SLIP, TOUCH
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import Ownership
 from catenary.solver.statics.form_finding.equilibrium import Equilibrium
+
+
+class WireShapes(NamedTuple):
+    """What there is of contact wires: ``nodes`` (n,) of ``NODE`` wire by wire, and samples of their
+    running ``surface`` (m,) of ``SAMPLE``, ascending in each wire, none of a wire that has none."""
+
+    nodes: np.ndarray
+    surface: np.ndarray
 
 
 class Candidates(NamedTuple):
@@ -104,7 +112,7 @@ class ContactWires:
         """Places on a wire, or on wires (n,), at positions ``x`` (n,) [m], records of ``TOUCH``
         (n,)."""
         touches = self.on_wires(np.broadcast_to(wire, x.shape))
-        contact_kernels.locate(x, self.shapes, touches)
+        native.locate(np.ascontiguousarray(x, dtype=float), self.shapes, touches)
         return touches
 
     def rest_height(self, x: np.ndarray) -> np.ndarray:

@@ -4,19 +4,30 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from catenary.solver.base.kernels.bound import bound
 from catenary.solver.contact.line_response import Coupled
-from catenary.solver.contact.link_kernels import Followed
-from catenary.solver.integrators import state_kernels
 from catenary.solver.integrators.line_integrator import LineIntegrator
-from catenary.solver.integrators.state_kernels import Riders
+from catenary.solver.kernels import native
 from catenary.solver.linear.pieces.column_pieces import columns_of
 from catenary.solver.linear.unit_responses import ShortColumns
-from catenary.solver.model.switching_links import LinkArrays, LinkTable
+from catenary.solver.model.switching_links import LinkArrays, LinkTable, Riders
+
+
+class Followed(NamedTuple):
+    """Links that a rank follows, in the order along the track, as kernels take them: their
+    ``numbers`` (n,) in the line, ``links`` (``LinkArrays``) and ``reserve`` (n,) [N], as a free
+    step leaves it; which of them may switch, ``moving`` (2,); their ``riders``, of numbers
+    ``riding`` (m,)."""
+
+    numbers: np.ndarray
+    links: LinkArrays
+    reserve: np.ndarray
+    moving: np.ndarray
+    riders: Riders
+    riding: np.ndarray
 
 
 class FollowedLinks:
@@ -54,9 +65,6 @@ class FollowedLinks:
         self.reserve = np.zeros(self.numbers.size)
         self.moving = np.array([0, self.numbers.size], dtype=np.int64)
         self._line = line
-        self._energy = bound(
-            state_kernels.energy_of_switching, later=(np.zeros(0), self.links, self.riders, 0, 0)
-        )
         line.track_links(self.links, self.reserve)
 
     @property
@@ -79,14 +87,14 @@ class FollowedLinks:
 
     @cached_property
     def _find_reserve(self) -> Callable[[], None]:
-        return bound(state_kernels.reserves, self._line.motion.read, self.links, self.reserve)
+        return native.reserves.bound(self._line.motion.read, self.links, self.reserve)
 
     @cached_property
     def _across(self) -> tuple[np.ndarray, Callable[[], None]]:
         """Reserve of riders, and what finds it."""
         found = np.zeros(self.riding.size)
         motion = self._line.motion.read
-        return found, bound(state_kernels.reserves, motion, self.riders.links, found)
+        return found, native.reserves.bound(motion, self.riders.links, found)
 
     def compensation(self) -> np.ndarray:
         """Compensations of links, then of riders, in the line's present motion [N], (n + m,) (eq.
@@ -106,7 +114,8 @@ class FollowedLinks:
 
         ``displacement`` (n_local,) of the line [m]; of the links from ``begin`` to ``end``.
         """
-        return float(self._energy(displacement, self.links, self.riders, begin, end))
+        links = self.links, self.riders
+        return float(native.energy_of_switching(displacement, *links, begin, end))
 
     def loads(self, compensation: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
         """Local unknowns and forces of compensations (n,) [N] of all of them, or (n + m,) with

@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from catenary.solver.base.kernels.bound import bound
-from catenary.solver.contact import contact_kernels
-from catenary.solver.contact.contact_kernels import Answers, ContactWork, Gains
 from catenary.solver.contact.contact_wire import Candidates, ContactWires
-from catenary.solver.contact.crossing_kernels import no_sideways
+from catenary.solver.contact.contacts import Answers, Contacts, ContactWork, Gains, no_sideways
 from catenary.solver.contact.followed_links import FollowedLinks, LinkCoupling
 from catenary.solver.contact.line_response import LineResponse
-from catenary.solver.contact.wires_across import WiresAcross
+from catenary.solver.contact.wires_across import WiresAcross, sideways_of
 from catenary.solver.integrators.line_integrator import LineIntegrator
+from catenary.solver.kernels import native
 from catenary.solver.linear.pieces.column_pieces import columns_of
 from catenary.solver.linear.unit_responses import NO_COLUMNS, STRETCH, ShortColumns
 from catenary.solver.model.model import Model
@@ -32,10 +29,7 @@ class ForcesOnLine:
     links : FollowedLinks
     link_coupling : LinkCoupling, None if no link switches
     reach : how far from a force the line moves within a step [m]
-    placing : arguments of ``contact_kernels.place``
-    superposing, compensating, working : of ``superpose``, ``compensate`` and ``add_work`` after the
-        forces; ``working`` are those of ``begin_work``, too
-    crossing : of ``wires_across.find_across``
+    contacts : all that kernels work on
 
     Parameters
     ----------
@@ -78,31 +72,34 @@ class ForcesOnLine:
             self.link_coupling = LinkCoupling(comm, self.links, line)
             columns = self.link_coupling.columns
         n, n_local = candidates.place.size, line.ownership.n_local
-        self._contact_place = candidates.place
-        self._touches = self.wires.on_wires(candidates.wire, candidates.half_length)
-        self._answers = Answers(np.zeros((n, n_local)), np.zeros((n, n_local if uses_rate else 0)))
         reach += table.half_length.max(initial=0.0)
         self.reach = reach
-        self._gains = Gains(train_speed, line.position_factor, line.velocity_factor, reach)
-        touched = self._touches, self._answers
-        self.placing = candidates.place, self.wires.shapes, node_columns, *touched
-        self._place = bound(contact_kernels.place, *self.placing)
-        motion = line.motion.read, line.motion.gains
-        self._force = np.zeros(n)
-        self.superposing = self._answers, self._touches, *motion
-        self._superpose = bound(contact_kernels.superpose, self._force, *self.superposing)
-        self.compensating = (*columns[:4], *motion)
-        self.working = self._touches, line.motion.read, work
-        self._begin_work = bound(contact_kernels.begin_work, *self.working)
-        self._add_work = bound(contact_kernels.add_work, self._force, *self.working)
-        self._speed = float(train_speed)
-        self._across: WiresAcross | None = None
-        self.crossing: tuple[Any, ...]
-        self.crossing = line.motion.read, self._touches, no_sideways(), self._speed, across
-        if across.size:
-            place = self._touches, self._speed
-            self._across = WiresAcross(comm, model, form, self.wires, line, *place, across)
-            self.crossing = self._across.finding
+        self._across = WiresAcross(comm, across)
+        self._moves_across = across.size > 0
+        sideways = no_sideways()
+        if self._moves_across:
+            sideways = sideways_of(model, form, wires, line.ownership)
+        self.contacts = Contacts(
+            x=candidates.place,
+            touches=wires.on_wires(candidates.wire, candidates.half_length),
+            wires=wires.shapes,
+            columns=node_columns,
+            answers=Answers(np.zeros((n, n_local)), np.zeros((n, n_local if uses_rate else 0))),
+            gains=Gains(train_speed, line.position_factor, line.velocity_factor, reach),
+            motion=line.motion.read,
+            motion_gains=line.motion.gains,
+            followed=self.links.followed,
+            link_columns=columns,
+            work=work,
+            sideways=sideways,
+            across=self._across.share,
+        )
+        self._place = native.place.bound(self.contacts)
+        self._heights = native.heights.bound(self.contacts)
+        self._superpose = native.superpose.bound(self.contacts)
+        self._compensate = native.compensate.bound(self.contacts)
+        self._begin_work = native.begin_work.bound(self.contacts)
+        self._add_work = native.add_work.bound(self.contacts)
 
     def place(self) -> None:
         """Look where the contacts are now, and work out the line's answer to a unit force at
@@ -112,17 +109,17 @@ class ForcesOnLine:
 
     def locate(self) -> None:
         """Look where the contacts are now, for heights and loads only."""
-        contact_kernels.locate(self._contact_place, self.wires.shapes, self._touches)
+        native.locate(self.contacts.x, self.contacts.wires, self.contacts.touches)
         self._begin_work()
 
     def present(self) -> np.ndarray:
         """Whether the wire of each contact is on its strip, (n,) bool, where they were located."""
-        return np.asarray(self._touches["present"] > 0.0)
+        return np.asarray(self.presence > 0.0)
 
     @property
     def presence(self) -> np.ndarray:
         """(n,) 1 where the wire of a contact is on its strip, else 0; the records' own."""
-        presence: np.ndarray = self._touches["present"]
+        presence: np.ndarray = self.contacts.touches["present"]
         return presence
 
     def find_across(self) -> None:
@@ -130,8 +127,8 @@ class ForcesOnLine:
 
         Collective; does nothing if wires do not move sideways.
         """
-        if self._across is not None:
-            self._across.find()
+        if self._moves_across:
+            self._across.find(self.contacts)
 
     def heights(self, height: np.ndarray, rate: np.ndarray) -> None:
         """Fill in this rank's share of wire height [m] and its total rate [m/s] at each contact.
@@ -140,11 +137,6 @@ class ForcesOnLine:
         """
         self._heights(height, rate)
 
-    @cached_property
-    def _heights(self) -> Callable[[np.ndarray, np.ndarray], None]:
-        seen = self.line.motion.read, self._touches, self._speed
-        return bound(contact_kernels.heights, *seen, later=(self._force, self._force))
-
     def responder(self, response: LineResponse) -> Callable[[], None]:
         """What fills in this rank's share of the inner problem, after ``place`` and the free solve.
 
@@ -152,34 +144,20 @@ class ForcesOnLine:
         the links their reserve there, as a free step leaves them. Links are included if they may
         switch within the response's bounds.
         """
-        return bound(contact_kernels.respond, *self.responding(response))
-
-    def responding(self, response: LineResponse) -> tuple[Any, ...]:
-        """Arguments of ``contact_kernels.respond``."""
-        return (
-            self.line.motion.read,
-            self._touches,
-            self._gains,
-            self._answers,
-            response.bounds,
-            self.links.followed,
-            response.share,
-        )
+        return native.respond.bound(self.contacts, response.share)
 
     def superpose(
         self, contact_force: np.ndarray, links: np.ndarray, compensation: np.ndarray
     ) -> None:
         """Add the answer to contact forces (n,) and compensations (m,) [N] to the line's state."""
-        self._force[:] = contact_force
-        self._superpose()
+        self._superpose(contact_force)
         if links.size:
-            contact_kernels.compensate(links, compensation, *self.compensating)
-        self._add_work()
+            self._compensate(links, compensation)
+        self._add_work(contact_force)
 
     def add_work(self, contact_force: np.ndarray) -> None:
         """Add the work of contact forces (n,) [N] in a step whose end the line's state is."""
-        self._force[:] = contact_force
-        self._add_work()
+        self._add_work(contact_force)
 
     def loads(
         self, contact_force: np.ndarray, compensation: np.ndarray
@@ -187,7 +165,7 @@ class ForcesOnLine:
         """Local unknowns and forces of contacts (n,) and of all followed links' compensations."""
         if self.line.ownership.n_local == 0:
             return []
-        local, value = self._touches["local"], self._touches["value"]
+        local, value = self.contacts.touches["local"], self.contacts.touches["value"]
         pushed = contact_force[:, None] * value * self._free[local]
         return [(local.ravel(), pushed.ravel()), *self.links.loads(compensation)]
 

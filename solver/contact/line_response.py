@@ -1,7 +1,6 @@
 """The line's side of the small problem of a step, as a rank sends it.
 
-What travels between ranks stands in two arrays of numbers; kernels and Python take named views of
-them.
+What travels between ranks stands in two arrays of numbers; Python takes named views of them.
 """
 
 from __future__ import annotations
@@ -10,16 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-# What adds up over ranks besides answers: links with a row, wishes to stop, ranks that hold NaN or
-# infinity, links that there is no room for.
-FLAGS = np.dtype(
-    [
-        ("rows", np.float64),
-        ("stop", np.float64),
-        ("broken", np.float64),
-        ("missing", np.float64),
-    ]
-)
+from catenary.solver.kernels.native import FLAGS
+
+# What adds up over ranks besides answers.
 N_FLAGS = FLAGS.itemsize // 8
 
 
@@ -44,13 +36,15 @@ def affine(numbers: np.ndarray, n: int) -> Affine:
 
 
 class Rows(NamedTuple):
-    """Links that may switch, and how contacts and they act on each other; views of one array.
+    """Links that may switch, and how contacts and they act on each other: ``numbers``
+    (capacity, 2 + 3 n), which kernels take, and views of them.
 
     ``number`` (m,) of the link; ``reserve`` (m,) [N] without contact forces; for each contact
     ``reaction`` (m, n) [-], what a unit force there adds to the reserve, ``lift`` (m, n) [m/N] and
     ``rise`` (m, n) [m/(N s)], what a unit compensation takes off height and rate there.
     """
 
+    numbers: np.ndarray
     number: np.ndarray
     reserve: np.ndarray
     reaction: np.ndarray
@@ -61,7 +55,7 @@ class Rows(NamedTuple):
 def rows_of(numbers: np.ndarray, n: int) -> Rows:
     """Views of ``numbers`` (capacity, 2 + 3 n) for n contacts."""
     couplings = (numbers[:, 2 + k * n : 2 + (k + 1) * n] for k in range(3))
-    return Rows(numbers[:, 0], numbers[:, 1], *couplings)
+    return Rows(numbers, numbers[:, 0], numbers[:, 1], *couplings)
 
 
 class Bounds(NamedTuple):
@@ -92,13 +86,14 @@ class Coupled(NamedTuple):
 
 
 class Share(NamedTuple):
-    """What kernels fill in of a response: ``flags`` (1,) of ``FLAGS``, ``present`` (n,), 1 for a
-    contact whose wire is on its strip and else 0, ``line`` and ``rows``."""
+    """A response as kernels take it: ``flags`` (1,) of ``FLAGS``, ``present`` (n,), 1 for a contact
+    whose wire is on its strip and else 0, ``line`` and ``rows``, and the ``bounds`` of these."""
 
     flags: np.ndarray
     present: np.ndarray
     line: Affine
     rows: Rows
+    bounds: Bounds
 
 
 class LineResponse:
@@ -112,7 +107,7 @@ class LineResponse:
     early_height, early_rate : (n,) what the line's motion extrapolates to, or (0,) if not asked
     sent_rows : (capacity, 2 + 3 n) numbers of ``rows``
     rows : Rows, its views
-    share : Share, what kernels fill in
+    share : Share, all this as kernels take it
     bounds : Bounds; kept by reference
 
     Parameters
@@ -140,8 +135,8 @@ class LineResponse:
         self.sent_rows = np.zeros((capacity, 2 + 3 * n))
         self.rows = rows_of(self.sent_rows, n)
         self.present = np.ones(n)
-        self.share = Share(flags.view(FLAGS), self.present, self.line, self.rows)
         self.bounds = bounds or Bounds(*(np.full(size, np.inf) for size in (n, n, 1)))
+        self.share = Share(flags.view(FLAGS), self.present, self.line, self.rows, self.bounds)
 
     @property
     def count(self) -> int:

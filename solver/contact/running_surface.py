@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from catenary.meshgen.wires import Role
-from catenary.solver.contact.contact_kernels import SAMPLE
+from catenary.solver.kernels.native import SAMPLE
 from catenary.solver.model.model import Model
 
 # Samples to the shortest wave. A cubic with the heights and slopes of a sine at its ends is off by

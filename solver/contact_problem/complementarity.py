@@ -28,13 +28,12 @@ from typing import NamedTuple
 import numpy as np
 
 from catenary.solver.base.errors import NotConverged, RunBroken
-from catenary.solver.base.kernels.bound import bound
-from catenary.solver.contact.line_response import Affine, Coupled, LineResponse, affine
+from catenary.solver.contact.line_response import Affine, Coupled, LineResponse, Share, affine
 from catenary.solver.contact.train.head_states import Heads
-from catenary.solver.contact_problem import complementarity_kernels
-from catenary.solver.contact_problem.complementarity_kernels import SmallProblem, Unknowns
-from catenary.solver.contact_problem.law_tangents import LawInSteps
+from catenary.solver.contact_problem.dense_systems import Room, Signs, System, room_for
+from catenary.solver.contact_problem.law_tangents import LawInSteps, Tangents
 from catenary.solver.contact_problem.pivoting import pivot
+from catenary.solver.kernels import native
 
 # Mostly one or two rounds are needed; a set that cycles shows within a few.
 _MAX_ROUNDS = 30
@@ -48,6 +47,54 @@ _ROUNDING = 8.0 * np.finfo(float).eps
 NOT_FINITE = "it has no finite solution; try a smaller numerics.dt_s"
 # Links that the arrays have room for at first.
 _FIRST_ROOM = 32
+
+
+class Unknowns(NamedTuple):
+    """Room for the small problem with up to k unknowns: the contact forces, then compensations.
+
+    ``always`` and ``behind`` (k,) are ``Signs``, ``matrix`` (k, k), ``right`` and ``solution`` (k,)
+    a ``System``.
+    """
+
+    always: np.ndarray
+    behind: np.ndarray
+    matrix: np.ndarray
+    right: np.ndarray
+    solution: np.ndarray
+    room: Room
+
+
+class Depths(NamedTuple):
+    """Depths [m] and rates [m/s] of the gap at n contacts under forces, (n,) each."""
+
+    depth: np.ndarray
+    rate: np.ndarray
+
+
+class SmallProblem(NamedTuple):
+    """What kernels solve; see ``small_problem.hpp``.
+
+    Attributes
+    ----------
+    heads, gap : Affine of the heads at the contacts, and room for that of the depths
+    share : of the line, summed over ranks
+    pulls : whether forces of contacts whose wire is on the strip may have any sign
+    tangents : of the contact law
+    coupled : all links
+    unknowns : room for the problem, in which the solution is left
+    found : Depths under the solution
+    max_rounds : of the active-set iteration
+    """
+
+    heads: Affine
+    share: Share
+    gap: Affine
+    pulls: bool
+    tangents: Tangents
+    coupled: Coupled
+    unknowns: Unknowns
+    found: Depths
+    max_rounds: int
 
 
 class InnerSolution(NamedTuple):
@@ -74,15 +121,13 @@ class Gap:
     Attributes
     ----------
     affine : Affine of depths [m], their rates [m/s] without forces, and what forces take off them
-    found : (2, n) depths and rates under the forces looked at last
-    found_depth, found_rate : (n,) its rows
+    found : Depths under the forces looked at last
     line : whose answers these are
     """
 
     def __init__(self, n: int) -> None:
         self.affine = affine(np.zeros(2 * n * (1 + n)), n)
-        self.found = np.zeros((2, n))
-        self.found_depth, self.found_rate = self.found
+        self.found = Depths(*np.zeros((2, n)))
         self.line = LineResponse(n, 0)
 
     def put(self, line: LineResponse, heads: Heads) -> None:
@@ -94,10 +139,10 @@ class Gap:
             If one of them is no number; it would compare as out of contact and go unnoticed.
         """
         self.line = line
-        if not complementarity_kernels.subtract(heads.affine, line.line, line.present, self.affine):
+        if not native.subtract(heads.affine, line.line, line.present, self.affine):
             raise RunBroken(NOT_FINITE)
 
-    def under(self, force: np.ndarray, slack: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def under(self, force: np.ndarray, slack: np.ndarray) -> Depths:
         """Depths [m] and rates [m/s] under forces (n,) and compensations (m,) [N]; overwritten by
         the next call.
 
@@ -106,10 +151,9 @@ class Gap:
         RunBroken
             If one of them is no number: what was to give the forces has no solution.
         """
-        rows = self.line.rows
-        if not complementarity_kernels.under(self.affine, rows, force, slack, self.found):
+        if not native.under(self.affine, self.line.rows, force, slack, self.found):
             raise RunBroken(NOT_FINITE)
-        return self.found_depth, self.found_rate
+        return self.found
 
     def rounding(self, force: np.ndarray, slack: np.ndarray) -> np.ndarray:
         """What depths [m] and rates [m/s] of ``under`` may be wrong by, (2, n)."""
@@ -166,31 +210,25 @@ class InnerProblem:
         """Compensations (m,) [N] under given contact forces (n,) [N]."""
         n, m = self.law.n, line.count
         coupled = self.coupled
-        if not m or not complementarity_kernels.any_switched(line.rows, m, coupled, force):
+        if not m or not native.any_switched(line.rows, m, coupled, force):
             return np.zeros(m)
         if m > self._room:
             self._make_room(m)
-        _, behind, matrix, right, _ = self.unknowns
-        none = np.zeros(n)
-        complementarity_kernels.couple(line.rows, m, coupled, none, none, behind, matrix, right)
-        behind = behind[n : n + m]
-        right = right[n : n + m] - matrix[n : n + m, :n] @ force
-        matrix = matrix[n : n + m, n : n + m]
-        always, solution = np.zeros(m, dtype=bool), np.zeros(m)
-        rounds = complementarity_kernels.settle(
-            matrix, right, always, behind, solution, _MAX_ROUNDS
-        )
-        if rounds <= 0:
+        _, behind, matrix, right, _, room = self.unknowns
+        none, links = np.zeros(n), slice(n, n + m)
+        native.couple(line.rows, m, coupled, none, none, self.unknowns)
+        own = right[links] - matrix[links, :n] @ force
+        system = System(matrix[links, links].copy(), own, np.zeros(m))
+        signs = Signs(np.zeros(m, dtype=bool), behind[links])
+        if native.settle(system, signs, _MAX_ROUNDS, room) <= 0:
             self.pivoted = True
-            pivot(matrix, right, always, behind, solution)
-        return solution
+            pivot(system.matrix, own, *signs, system.solution)
+        return system.solution
 
     def covers(self, line: LineResponse, force: np.ndarray, slack: np.ndarray) -> bool:
         """Whether all links that have switched under forces (n,) and compensations (m,) [N] had a
         row."""
-        return not complementarity_kernels.leaves_out(
-            force, slack, line.rows, line.bounds, self.coupled
-        )
+        return not native.leaves_out(force, slack, line.rows, line.bounds, self.coupled)
 
     def _with_law(self, line: LineResponse, heads: Heads) -> InnerSolution:
         """Forces and compensations for a law that is not linear, by Newton's method."""
@@ -222,45 +260,40 @@ class InnerProblem:
         if self._bound_to[0] is not heads.affine or self._bound_to[1] is not line:
             # Mostly they are those of the step before.
             self._bound_to = heads.affine, line
-            self._solve = bound(complementarity_kernels.solve, self.problem(heads.affine, line))
+            self._solve = native.solve.bound(self.problem(heads.affine, line))
         rounds, size, finite, complete = self._solve()
-        _, behind, matrix, right, solution = self.unknowns
+        solution = self.unknowns.solution
         force = solution[:n]
         if rounds <= 0:
             self.pivoted = True
             rounds = self._pivot(size) - rounds
             links = line.rows, m, self.coupled
-            if size == n and m and complementarity_kernels.any_switched(*links, force):
+            if size == n and m and native.any_switched(*links, force):
                 # Contacts alone needed pivoting, too.
                 tangents, size = self.law.tangents, n + m
                 worth = tangents.by_depth, tangents.by_rate
-                complementarity_kernels.couple(*links, *worth, behind, matrix, right)
+                native.couple(*links, *worth, self.unknowns)
                 rounds += self._pivot(size)
             gap.under(force, solution[n:size])
             complete = self.covers(line, force, solution[n:size])
         elif not finite:
             raise RunBroken(NOT_FINITE)
         slack = solution[n:size]
-        depth, rate = gap.found_depth, gap.found_rate
-        return InnerSolution(force, slack, depth, rate, rounds, self.pivoted, complete)
+        return InnerSolution(force, slack, *gap.found, rounds, self.pivoted, complete)
 
     def _pivot(self, size: int) -> int:
         """Rounds that pivoting needs for the first ``size`` unknowns, whose solution it finds."""
-        always, behind, matrix, right, solution = self.unknowns
+        always, behind, matrix, right, solution, _ = self.unknowns
         whole = matrix[:size, :size].copy(), right[:size].copy()
         return pivot(*whole, always[:size], behind[:size], solution[:size])
 
     def problem(self, heads: Affine, line: LineResponse) -> SmallProblem:
-        """Arguments of the kernel; ``unknowns`` are others when more links need room."""
+        """What kernels solve; ``unknowns`` are others when more links need room."""
         return SmallProblem(
             heads=heads,
-            line=line.line,
+            share=line.share,
             gap=self.gap.affine,
-            present=line.present,
             pulls=self.law.pulls,
-            flags=line.share.flags,
-            rows=line.rows,
-            bounds=line.bounds,
             tangents=self.law.tangents,
             coupled=self.coupled,
             unknowns=self.unknowns,
@@ -275,6 +308,6 @@ class InnerProblem:
         always = np.zeros(size, dtype=bool)
         always[:n] = self.law.pulls
         behind = np.zeros(size, dtype=np.int64)
-        room = np.zeros((size, size)), np.zeros(size), np.zeros(size)
-        self.unknowns = Unknowns(always, behind, *room)
+        system = System(np.zeros((size, size)), *np.zeros((2, size)))
+        self.unknowns = Unknowns(always, behind, *system, room_for(size))
         self._bound_to = None, None

@@ -20,8 +20,8 @@ from catenary.solver.base.errors import NotConverged, RunBroken
 from catenary.solver.contact.line_response import Coupled, LineResponse
 from catenary.solver.contact.train.head_states import Heads
 from catenary.solver.contact_problem.complementarity import InnerProblem, InnerSolution
-from catenary.solver.contact_problem.complementarity_kernels import NOWHERE
 from catenary.solver.contact_problem.law_tangents import LawInSteps
+from catenary.solver.kernels.native import NOWHERE
 from catenary.solver.problem.problem import Numerics
 
 # Forces that grow beyond this [N] will not come back.

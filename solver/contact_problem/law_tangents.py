@@ -11,8 +11,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from catenary.solver.base.errors import RunBroken
-from catenary.solver.contact_problem import complementarity_kernels
-from catenary.solver.contact_problem.complementarity_kernels import Tangents
+from catenary.solver.kernels import native
 from catenary.solver.problem.contact_laws import HertzLaw, KinematicLaw, LinearLaw
 from catenary.solver.problem.problem import Problem
 from catenary.solver.problem.simulated import Simulated
@@ -22,6 +21,16 @@ _TOLERANCE = 1e-10
 # How well depths [m] and rates [m/s] are known: differences of heights of 5 m and of speeds of some
 # m/s, a few roundings of 4e-16 to 9e-16 each. No force is known better than that times the slope.
 _KNOWN = 5e-15
+
+
+class Tangents(NamedTuple):
+    """own f = offset + by_depth d + by_rate d' at n contacts, with depth d and rate d' of the gap
+    under forces f; (n,) each [-], [N], [N/m], [N s/m]."""
+
+    own: np.ndarray
+    offset: np.ndarray
+    by_depth: np.ndarray
+    by_rate: np.ndarray
 
 
 class ReportedForces(NamedTuple):
@@ -83,7 +92,7 @@ class LawInSteps(Protocol):
         """What of the forces (n,) of the latest step is to be recorded [N]."""
 
     def in_loop(self) -> ReportedForces | None:
-        """``accept`` and ``reported`` for a compiled loop, None if there is none for the law."""
+        """``accept`` and ``reported`` for a loop of kernels, None if there is none for the law."""
 
     def state(self) -> np.ndarray:
         """All that is remembered, as one array."""
@@ -157,17 +166,7 @@ class HertzInSteps(_Tangents):
 
     def linearise(self, depth: np.ndarray, rate: np.ndarray) -> None:
         """Tangents at depths and rates (n,)."""
-        law = self._law
-        complementarity_kernels.hertz(
-            depth,
-            rate,
-            self._speed,
-            law.stiffness,
-            law.exponent,
-            law.hysteresis,
-            self.tangents,
-            self._force,
-        )
+        native.linearise(self._law, depth, rate, self._speed, self.tangents, self._force)
 
     def force(self, depth: np.ndarray, rate: np.ndarray) -> np.ndarray:
         """The law (n,) [N]."""

@@ -14,8 +14,9 @@ from __future__ import annotations
 import numpy as np
 
 from catenary.solver.base.errors import NotConverged
-from catenary.solver.contact_problem import complementarity_kernels
+from catenary.solver.contact_problem.dense_systems import System, room_for
 from catenary.solver.contact_problem.simplicial_path import find_zero
+from catenary.solver.kernels import native
 
 # Shares go from 0 to 1; paths on a grid of some of that take the fewest steps.
 _FIRST_GRID = 0.25
@@ -91,13 +92,14 @@ def _pivot(
     master = np.arange(behind.size) - behind
     scale, alone = _ROUNDING * (1.0 + np.abs(right).max()), opposite == np.arange(behind.size)
     most = 20 * right.size + 100
+    system, room = System(matrix, right, solution), room_for(right.size)
     turned: list[int] = []
     seen: dict[bytes, int] = {}
     for rounds in range(1, most):
         since = seen.setdefault(acts.tobytes(), len(turned))
         if since < len(turned):  # each set has one that follows it, so they come again for ever
             return False, rounds, np.unique(turned[since:])
-        complementarity_kernels.solve_on(matrix, right, acts, solution)
+        native.solve_on(system, acts, room)
         residual = matrix @ solution - right
         free = residual < -scale  # while the other way acts, that one is wrong then, too
         wrong = np.where(acts, (solution < -scale) & ~always, free & (alone | ~acts[opposite]))

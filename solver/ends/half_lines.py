@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from catenary.solver.base.errors import InputError
-from catenary.solver.base.kernels.compiled import compiled
+from catenary.solver.kernels import native
 
 # Coupling over diagonal at which the rest of a half line is round-off, squared in another pass; and
 # the most passes: spans are 2^40 times as long then.
@@ -100,7 +100,8 @@ def chain_at(span: SpanMatrices, weights: np.ndarray) -> Chain:
     """Spans condensed at frequencies whose ``weights`` (n, 3) M, C and K have, complex."""
     m = span.corner.shape[1]
     taken = np.zeros((weights.shape[0], 2 * m, 2 * m), dtype=complex)
-    _condense(weights, span.bands, np.concatenate([span.start, span.end], axis=2), taken)
+    beside = np.concatenate([span.start, span.end], axis=2)
+    native.condense_spans(weights, span.bands, beside, taken)
     corner, across = (
         np.einsum("nw,wij->nij", weights, part) for part in (span.corner, span.across)
     )
@@ -131,51 +132,3 @@ def half_lines(chain: Chain) -> tuple[np.ndarray, np.ndarray]:
         if left.max() < _ROUND_OFF**2:
             return after, before
     raise InputError("what acts on one of its cross-sections does not fade along it")
-
-
-@compiled
-def _condense(weights, bands, beside, taken):
-    """Fill ``taken`` (n, k, k) with beside^T inverse(bands) beside, with ``weights`` (n, 3) of M, C
-    and K in each; see ``SpanMatrices``. L D L^T without pivots: with waves that fade, all leading
-    blocks are those of damped lines."""
-    n, width, k = bands.shape[1], bands.shape[2] - 1, beside.shape[2]
-    lower = np.empty((n, width + 1), dtype=np.complex128)
-    forth = np.empty((n, k), dtype=np.complex128)
-    begins = np.full(k, n)
-    for j in range(k):
-        for r in range(n):
-            if beside[0, r, j] != 0.0 or beside[1, r, j] != 0.0 or beside[2, r, j] != 0.0:
-                begins[j] = r
-                break
-    for z in range(weights.shape[0]):
-        of_mass, of_damping, of_stiffness = weights[z]
-        for r in range(n):
-            first = max(0, r - width)
-            pivot = 0j
-            for q in range(first, r + 1):
-                d = width - (r - q)
-                total = of_mass * bands[0, r, d] + of_damping * bands[1, r, d]
-                total += of_stiffness * bands[2, r, d]
-                for p in range(max(first, q - width), q):
-                    # lower holds L D; its diagonal 1 / D.
-                    total -= lower[r, width - (r - p)] * lower[q, width - (q - p)] * lower[p, width]
-                if q < r:
-                    lower[r, d] = total
-                else:
-                    pivot = total
-            lower[r, width] = 1.0 / pivot
-            for j in range(k):
-                if r < begins[j]:
-                    forth[r, j] = 0.0
-                    continue
-                right = of_mass * beside[0, r, j] + of_damping * beside[1, r, j]
-                right += of_stiffness * beside[2, r, j]
-                for q in range(max(first, begins[j]), r):
-                    right -= lower[r, width - (r - q)] * lower[q, width] * forth[q, j]
-                forth[r, j] = right
-            for i in range(k):
-                for j in range(i, k):
-                    taken[z, i, j] += forth[r, i] * lower[r, width] * forth[r, j]
-        for i in range(k):
-            for j in range(i):
-                taken[z, i, j] = taken[z, j, i]

@@ -16,16 +16,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import cached_property, partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from catenary.solver.base.kernels import aligned_arrays
-from catenary.solver.base.kernels.bound import bound
-from catenary.solver.integrators import alpha_kernels
-from catenary.solver.integrators.alpha_kernels import AlphaFactors
 from catenary.solver.integrators.line_integrator import LineIntegrator
 from catenary.solver.integrators.line_state import AlphaAhead, AlphaSteps
+from catenary.solver.kernels import native
 from catenary.solver.linear.pieces.operator_pieces import WantedPieces
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import Ownership
@@ -33,6 +31,33 @@ from catenary.solver.problem.integrator_parameters import Integration
 
 # Share of dt^2 below which the acceleration cannot be found from what a prediction takes from it.
 _LEAST_SHARE = 1e-3
+
+
+class AlphaFactors(NamedTuple):
+    """Factors of a step's predictions by the algorithm's accelerations.
+
+    With b the acceleration that balances the forces at the end of a step, the algorithm's is
+    a = p + r b, where p is known when the step begins.
+
+    Attributes
+    ----------
+    dt : step [s]
+    ratio : r
+    known_of_balanced, known_of_own : shares of b and a of the step before in p
+    position_of_own, position_of_known : what the displacement takes from a before and from p [s2]
+    velocity_of_own, velocity_of_known : what the velocity takes from both [s]
+    damping_on_stiffness : c, so that a product with K of d + c v gives elastic and damping forces
+    """
+
+    dt: float
+    ratio: float
+    known_of_balanced: float
+    known_of_own: float
+    position_of_own: float
+    position_of_known: float
+    velocity_of_own: float
+    velocity_of_known: float
+    damping_on_stiffness: float
 
 
 class GeneralizedAlphaLine(LineIntegrator):
@@ -102,8 +127,7 @@ class GeneralizedAlphaLine(LineIntegrator):
 
     @cached_property
     def _predict(self) -> Callable[[], None]:
-        return bound(
-            alpha_kernels.predict,
+        return native.predict_alpha.bound(
             self.displacement,
             self.velocity,
             self.acceleration,

@@ -18,11 +18,11 @@ from mpi4py import MPI
 from catenary.solver.base.kernels import aligned_arrays
 from catenary.solver.base.parallel import total
 from catenary.solver.base.petsc import PETSc
-from catenary.solver.integrators import state_kernels
 from catenary.solver.integrators.detour import LIBRARY, PARTS, Detour
 from catenary.solver.integrators.line_state import AlphaSteps, LineState, PredictedLineState, Steps
 from catenary.solver.integrators.loads.line_loads import LineLoads
 from catenary.solver.integrators.two_pass_step import StationPasses
+from catenary.solver.kernels import native
 from catenary.solver.linear.decay_length import reach
 from catenary.solver.linear.pieces.operator_pieces import WantedPieces
 from catenary.solver.linear.step_operators import LineOperators, Loads
@@ -212,7 +212,7 @@ class LineIntegrator(ABC):
             self.window.wake()
 
     def track_links(self, links: LinkArrays, reserve: np.ndarray) -> None:
-        """Fill ``reserve`` (n,) [N] at the end of each ``free_step``, see `state_kernels.reserves`.
+        """Fill ``reserve`` (n,) [N] at the end of each ``free_step``, see `switching_links`.
 
         The links stand in the order along the track. Without this there are none. Not collective.
         """
@@ -243,7 +243,7 @@ class LineIntegrator(ABC):
         self.predict()
         self.free_acceleration()
         self.correct()
-        state_kernels.reserves(self.motion.read, *self._links)
+        native.reserves(self.motion.read, *self._links)
 
     def free_acceleration(self) -> None:
         """Fill the acceleration from the predictions and loads. Collective.
@@ -278,7 +278,7 @@ class LineIntegrator(ABC):
 
     def correct(self) -> None:
         """Turn predictions into the new displacement and velocity."""
-        state_kernels.correct(
+        native.correct(
             self.displacement,
             self.velocity,
             self.acceleration,

@@ -14,11 +14,23 @@ from typing import NamedTuple
 
 import numpy as np
 
-from catenary.solver.integrators import state_kernels
+from catenary.solver.kernels import native
+
+
+class Motion(NamedTuple):
+    """x, y and z (n_local,) each, and their shares (5,), as kernels read the motion."""
+
+    x: np.ndarray
+    y: np.ndarray
+    z: np.ndarray
+    shares: np.ndarray
 
 
 class Steps(NamedTuple):
-    """What a step of Newmark's method is made of; see ``kernels.predict`` and ``correct``."""
+    """What a step of Newmark's method is made of: dt [s]; what an acceleration before the step adds
+    to the predictions of displacement [s2] and velocity [s]; what of the velocity products with K
+    read [s]; what the acceleration after it adds to both; and the part of damping on mass that the
+    acceleration lacks [1/s]."""
 
     dt: float
     predict_position: float
@@ -34,7 +46,7 @@ class LineState:
 
     Attributes
     ----------
-    read : x, y and z (n_local,) each, and their shares (5,), as kernels read the motion
+    read : Motion
     gains : (3,) what x, y and z gain from a unit of acceleration that is found later in the step
 
     Parameters
@@ -51,7 +63,7 @@ class LineState:
         gains: tuple[float, float],
     ) -> None:
         shares = np.array([1.0, 0.0, 0.0, 1.0, 0.0])
-        self.read = displacement, velocity, acceleration, shares
+        self.read = Motion(displacement, velocity, acceleration, shares)
         self.gains = np.array([*gains, 1.0])
 
     @property
@@ -116,14 +128,14 @@ class PredictedLineState(LineState):
     @property
     def displacement(self) -> np.ndarray:
         """At the end of the latest step (n_local,) [m]; overwritten when asked for again."""
-        state_kernels.displacements(self.read, self._shown)
+        native.displacements(self.read, 0, self._shown)
         return self._shown
 
     @property
     def velocity(self) -> np.ndarray:
         """At the end of the latest step (n_local,) [m/s]; a new array."""
         velocity = np.empty_like(self._shown)
-        state_kernels.velocities(self.read, velocity)
+        native.velocities(self.read, 0, velocity)
         return velocity
 
     def put(self, displacement: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray) -> None:

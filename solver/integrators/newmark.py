@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from catenary.solver.integrators import state_kernels
 from catenary.solver.integrators.line_integrator import LineIntegrator
 from catenary.solver.integrators.line_state import PredictedLineState, Steps
+from catenary.solver.kernels import native
 from catenary.solver.linear.pieces.operator_pieces import WantedPieces
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import Ownership
@@ -26,34 +26,24 @@ class NewmarkLine(LineIntegrator):
     ) -> None:
         dt, beta, gamma = numerics.dt, numerics.beta, numerics.gamma
         super().__init__(comm, model, ownership, beta * dt**2, gamma * dt, wanted)
-        self._dt = dt
-        self._predict_position = 0.5 * dt**2 * (1.0 - 2.0 * beta)
-        self._predict_velocity = dt * (1.0 - gamma)
-
-    def _ahead(self) -> tuple[PredictedLineState, Steps]:
-        steps = Steps(
-            self._dt,
-            self._predict_position,
-            self._predict_velocity,
+        self._steps = Steps(
+            dt,
+            0.5 * dt**2 * (1.0 - 2.0 * beta),
+            dt * (1.0 - gamma),
             self._alpha_share,
             self.position_factor,
             self.velocity_factor,
             self._beta_share,
         )
+
+    def _ahead(self) -> tuple[PredictedLineState, Steps]:
         operators, (shown, velocity, acceleration, _) = self.operators, self.motion.read
         if not self._proportional:
             velocity = operators.rate  # which products with C read
-        return PredictedLineState(operators.factor, velocity, acceleration, shown, steps), steps
+        ahead = operators.factor, velocity, acceleration, shown
+        return PredictedLineState(*ahead, self._steps), self._steps
 
     def predict(self) -> None:
         """Turn displacement and velocity into their predictions of eq. (2.5)."""
-        state_kernels.predict(
-            self.displacement,
-            self.velocity,
-            self.acceleration,
-            self.operators.factor,
-            self._dt,
-            self._predict_position,
-            self._predict_velocity,
-            self._alpha_share,
-        )
+        arrays = self.displacement, self.velocity, self.acceleration, self.operators.factor
+        native.predict(*arrays, self._steps)

@@ -8,24 +8,62 @@ wait for. Two chains of stations go side by side, each of which waits for itself
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from catenary.solver.base.kernels.pointers import HeldCall
-from catenary.solver.integrators.line_state import AlphaAhead, AlphaSteps, PredictedLineState, Steps
-from catenary.solver.integrators.two_pass_kernels import (
-    follow,
-    left_behind,
-    predict,
-    predict_velocities,
+from catenary.solver.integrators.line_state import (
+    AlphaAhead,
+    AlphaSteps,
+    Motion,
+    PredictedLineState,
+    Steps,
 )
 from catenary.solver.kernels import native
 from catenary.solver.linear.step_operators import ByStations
 from catenary.solver.model.switching_links import NO_LINKS, LinkArrays
-from catenary.solver.window.window_kernels import NO_WINDOW, WindowArrays
+from catenary.solver.window.window_arrays import WindowArrays
 
 # Unknowns of a stretch of the pass back, after which its droppers are looked at: large enough for
 # memory to be read ahead, 64 kB of each array, which a cache next to a processor holds.
 _STRETCH = 8192
+
+
+class PassArrays(NamedTuple):
+    """What passes read and fill: what products with K read, and those with C; loads of all that is
+    solved for, or none; accelerations of these; the motion of the rank's own stations; known
+    accelerations and predicted velocities of these, or none."""
+
+    factor: np.ndarray
+    velocity: np.ndarray
+    loads: np.ndarray
+    answer: np.ndarray
+    motion: Motion
+    known: np.ndarray
+    predicted: np.ndarray
+
+
+class Changes(NamedTuple):
+    """Numbers that take a state from one prediction to the next.
+
+    Attributes
+    ----------
+    dt, by_position, by_velocity : step [s], and what x and y gain from the acceleration
+    damping_share : part of damping on mass that the acceleration lacks [1/s]
+    known, velocity, balance : of the generalized-alpha method the shares of z and of the known
+        acceleration before a step in what is known in it, and in what the predicted velocity and z
+        get from both
+    by_mass : if not 0 products are with M, and this times what they read is added to the answer
+    """
+
+    dt: float
+    by_position: float
+    by_velocity: float
+    damping_share: float
+    known: tuple[float, float]
+    velocity: tuple[float, float]
+    balance: tuple[float, float]
+    by_mass: float
 
 
 class StationPasses:
@@ -33,7 +71,7 @@ class StationPasses:
 
     Attributes
     ----------
-    held : a step for compiled loops that take steps themselves, by its ``address``
+    native : what takes a step, for loops that take steps themselves
     factors : as given
     known : what the motion keeps besides x, y and z, or nothing
     by_mass : whether right-hand sides are made by M, as where that is shorter than by K
@@ -58,69 +96,69 @@ class StationPasses:
         product, factors, read, velocity, answer, by_mass = parts
         _, _, low, high, _ = factors.ends.tolist()
         self.by_mass, self.factors = by_mass != 0.0, factors
-        changes, known, predicted = changes_of(motion, steps, by_mass)
-        starts = factors.starts[low : high + 1] - factors.starts[low]
-        self._stretch = max(1, _STRETCH * (high - low) // max(1, int(starts[-1])))
-        self._place = low, high, self._stretch, starts
-        self._changes, self._motion = changes, (*motion.read, known, predicted)
+        changes = changes_of(motion, steps, by_mass)
+        known = predicted = np.zeros(0)
+        if isinstance(motion, AlphaAhead):
+            known, predicted = motion.known, motion.predicted
+        self._starts = factors.starts[low : high + 1] - factors.starts[low]
+        self._stretch = max(1, _STRETCH * (high - low) // max(1, int(self._starts[-1])))
         layouts = [
             (of_rows.native, of_factors.native)
             for of_rows, of_factors in zip(product.layout.parts, factors.layout.parts, strict=True)
         ]
-        arrays = read, velocity, loads, answer, *motion.read[:3], known
-        self.held = native.Passes(
-            *(layouts, product.stations.make_ups, product.native, factors.native), arrays, changes
-        )
-        self._window, self.known = NO_WINDOW, known
+        arrays = PassArrays(read, velocity, loads, answer, motion.read, known, predicted)
+        stations = layouts, product.stations.make_ups, product.arrays, factors.arrays
+        self.native = native.TwoPasses(*stations, arrays, changes)
+        self.known = known
         self.track_links(NO_LINKS, np.zeros(0))
 
     def track_links(self, links: LinkArrays, reserve: np.ndarray) -> None:
-        """Fill ``reserve`` on the way back, as ``LineIntegrator.track_links``."""
-        window, motion = self._window, self._motion
-        if window is NO_WINDOW:
-            stretch, ranges = self._stretch, left_behind(*self._place, links.unknowns)
-        else:
-            stretch, ranges = window.low.size, window.ranges
-        count = np.zeros(1, dtype=np.int64)
-        ahead = motion, self._changes, links, reserve, count, window
-        following = motion[:4], links, reserve, ranges, count
-        # Kept, as what the passes have is where these are.
-        self._around = HeldCall(predict, ahead), HeldCall(follow, following)
-        self.held.call(stretch, *(around.address for around in self._around))
+        """Fill ``reserve`` on the way back, as ``LineIntegrator.track_links``.
+
+        Links are looked at once the pass has left them behind, a stretch of stations at a time.
+        """
+        n_pairs = max(0, self._starts.size - 2) // 2
+        n_stretches = -(-n_pairs // self._stretch)
+        ranges = np.zeros((1 + max(1, n_stretches), 2), dtype=np.int64)
+        native.left_behind(self._starts, self._stretch, links.unknowns, ranges)
+        self.native.track(links, reserve, ranges, self._stretch)
 
     def open(self, window: WindowArrays, links: LinkArrays, reserve: np.ndarray) -> None:
         """Take steps of the stations in a window only from now on; links as in ``track_links``."""
-        self._window = window
-        self.track_links(links, reserve)
+        self.native.open(window)
+        self.native.track(links, reserve, window.ranges, window.low.size)
 
     def predict_velocities(self) -> None:
         """Fill in the rank's own part of what others read of it in a product with C. A step does
         so, too, but only after these have read."""
-        predict_velocities(self._motion, self._changes, 0, self._motion[0].size)
+        self.native.predict_velocities()
 
     def step(self) -> None:
         """Find the accelerations and what the next step starts from."""
-        self.held.step()
+        self.native.step()
 
 
-def changes_of(
-    motion: PredictedLineState, steps: Steps | AlphaSteps, by_mass: float
-) -> tuple[tuple[float, ...], np.ndarray, np.ndarray]:
-    """Numbers that take a state from one prediction to the next, the known acceleration, and the
-    array for predicted velocities."""
+def changes_of(motion: PredictedLineState, steps: Steps | AlphaSteps, by_mass: float) -> Changes:
+    """Numbers that take a state from one prediction to the next."""
     by_position, by_velocity, _ = map(float, motion.gains)
+    nothing = 0.0, 0.0
     if isinstance(steps, Steps):
         newmark = steps.dt, by_position, by_velocity, steps.damping_share
-        return (*newmark, *[0.0] * 6, by_mass), np.zeros(0), np.zeros(0)
-    assert isinstance(motion, AlphaAhead)
+        return Changes(*newmark, nothing, nothing, nothing, by_mass)
     of_balanced, of_known = steps.balance
 
     def from_kept(shares: tuple[float, float]) -> tuple[float, float]:
         """Shares of b and p as those of z and p."""
         return shares[0] / of_balanced, shares[1] - shares[0] * of_known / of_balanced
 
-    # z of the end of the step stands for its part of the coming prediction.
-    by_position += of_balanced
-    step = steps.dt, by_position, by_velocity, steps.damping_share
-    more = *from_kept(steps.known), *from_kept(steps.velocity), *steps.balance, by_mass
-    return tuple(map(float, (*step, *more))), motion.known, motion.predicted
+    return Changes(
+        dt=steps.dt,
+        # z of the end of the step stands for its part of the coming prediction.
+        by_position=by_position + of_balanced,
+        by_velocity=by_velocity,
+        damping_share=steps.damping_share,
+        known=from_kept(steps.known),
+        velocity=from_kept(steps.velocity),
+        balance=steps.balance,
+        by_mass=by_mass,
+    )

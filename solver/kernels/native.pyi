@@ -17,14 +17,132 @@ class Bound:
 
     def __call__(self, *later: Any) -> Any: ...
 
+spline_at: Kernel
+tables_at: Kernel
+sines_at: Kernel
+polyline_at: Kernel
+
+BODY_PRODUCT: np.dtype[np.void]
+BODY_LINE: np.dtype[np.void]
+
+rotation_matrices: Kernel
+move_bodies: Kernel
+add_gyroscopic_moments: Kernel
+body_products: Kernel
+body_lines: Kernel
+independent_rows: Kernel
+
+DRIVE: np.dtype[np.void]
+HEAD_LAW: np.dtype[np.void]
+HEAD_LAW_POINT: np.dtype[np.void]
+REGULATION: np.dtype[np.void]
+CONTROL_GAINS: np.dtype[np.void]
+REGULATION_MEMORY: np.dtype[np.void]
+
+class Head:
+    """A pantograph that steps by Newmark's method, of any model: ``HeadArrays`` and what the model
+    takes besides are kept, and read and written in place."""
+
+    first: int
+    """Number of its first contact among those of the train."""
+    added_force: float
+    """What regulates the lift adds to the static force now [N]; put for one without regulation."""
+    def bend(self, bending: object) -> None:
+        """Let strips bend, see ``flexure.Bending``."""
+
+    def regulate(self, regulation: object) -> None:
+        """Let the lift be regulated, see ``RegulationArrays``."""
+
+    def step(self, drive: np.ndarray) -> bool:
+        """Step without contact, with a row of a ``DRIVE`` and where wires are on the strips;
+        whether the head is where its model reaches."""
+
+    def advance(self, contact_force: np.ndarray) -> None:
+        """Make the state that under contact forces (s,) [N], after a step without."""
+
+    def extrapolate(self, drive: np.ndarray, early: np.ndarray) -> None:
+        """Fill in heights and velocities (2, s) of the strips by Newmark's predictor."""
+
+class LinearChain(Head):
+    """A chain of lumped masses on linear springs and dampers."""
+
+    def __init__(self, arrays: object, linear: object) -> None: ...
+
+class LawfulChain(Head):
+    """A chain of lumped masses with laws, driven at the coordinate ``carrier``."""
+
+    def __init__(self, arrays: object, masses: object, laws: object, carrier: int) -> None: ...
+
+class RaisedHead(Head):
+    """A head over a reduced mechanism, whose height is the last coordinate."""
+
+    def __init__(self, arrays: object, masses: object, laws: object, mechanism: object) -> None: ...
+    @property
+    def height(self) -> float:
+        """At which the mechanism's tables were taken in the latest step [m]."""
+
 RESERVE: np.dtype[np.void]
+NODE: np.dtype[np.void]
+SAMPLE: np.dtype[np.void]
+TOUCH: np.dtype[np.void]
+FLAGS: np.dtype[np.void]
+SLIP: float
+NOWHERE: float
+MEETING: np.dtype[np.void]
+FACTOR: np.dtype[np.void]
+SAMPLED_LOAD: np.dtype[np.void]
+END_MEMORY: np.dtype[np.void]
+MIDDLES: int
+NEAR: int
+
+middle_of: Kernel
+turn: Kernel
+eliminate: Kernel
+join: Kernel
+
+condense_spans: Kernel
+cut_out: Kernel
+bridge: Kernel
+add_waves: Kernel
+
+evaluate: Kernel
+recall: Kernel
+fourier_forth: Kernel
+
+step_error: Kernel
+accept_step: Kernel
+take_extremes: Kernel
+take_points: Kernel
 
 predict: Kernel
+predict_alpha: Kernel
 correct: Kernel
 displacements: Kernel
 velocities: Kernel
 reserves: Kernel
 energy_of_switching: Kernel
+
+locate: Kernel
+place: Kernel
+heights: Kernel
+find_across: Kernel
+respond: Kernel
+superpose: Kernel
+compensate: Kernel
+begin_work: Kernel
+add_work: Kernel
+move_contacts: Kernel
+write_outputs: Kernel
+
+subtract: Kernel
+any_switched: Kernel
+couple: Kernel
+solve_on: Kernel
+settle: Kernel
+under: Kernel
+leaves_out: Kernel
+solve: Kernel
+linearise: Kernel
 
 class Layout:
     """How the unknowns of a station stand in lanes; see ``station_layout.Layout``."""
@@ -40,32 +158,11 @@ class Layout:
         strands: Sequence[Sequence[int]],
     ) -> None: ...
 
-class Rows:
-    """Rows of a product; see ``StationProduct``. ``places`` has ``starts`` and ``make_up``."""
-
-    def __init__(
-        self, kinds: np.ndarray, numbers: np.ndarray, first: int, places: object
-    ) -> None: ...
-
-class Factors:
-    """Factors; see ``StationFactors``."""
-
-    def __init__(
-        self,
-        kinds: np.ndarray,
-        numbers: np.ndarray,
-        beside_kinds: np.ndarray,
-        besides: np.ndarray,
-        low: int,
-        ends: np.ndarray,
-        places: object,
-    ) -> None: ...
-
 class Products:
     """Products with rows of K, and C, of stations of each make-up."""
 
     def __init__(
-        self, layouts: Sequence[Layout], make_ups: Sequence[Sequence[int]], rows: Rows
+        self, layouts: Sequence[Layout], make_ups: Sequence[Sequence[int]], rows: object
     ) -> None: ...
     def multiply(
         self,
@@ -81,35 +178,68 @@ class Solves:
     """Solves with factors of stations of each make-up."""
 
     def __init__(
-        self, layouts: Sequence[Layout], make_ups: Sequence[Sequence[int]], factors: Factors
+        self, layouts: Sequence[Layout], make_ups: Sequence[Sequence[int]], factors: object
     ) -> None: ...
     def solve(self, right: np.ndarray, answer: np.ndarray) -> None:
         """Fill ``answer``, which may be ``right``."""
 
-class Passes:
-    """Steps in two passes; see ``StationPasses``. Arrays are kept, and read and written in place:
-    what products read of displacements and of velocities, loads, accelerations, x, y and z of the
-    motion, and its known acceleration."""
+class FreeSteps:
+    """Steps in two passes."""
+
+    def step(self) -> None:
+        """Take a step."""
+
+    def predict_velocities(self) -> None:
+        """Fill in the velocities that others read in products with C, if there are such."""
+
+class TwoPasses(FreeSteps):
+    """The same with what they are made of, see ``StationPasses``; arrays are kept, and read and
+    written in place."""
 
     def __init__(
         self,
         layouts: Sequence[tuple[Layout, Layout]],
         make_ups: Sequence[Sequence[int]],
-        rows: Rows,
-        factors: Factors,
-        arrays: Sequence[np.ndarray],
-        changes: Sequence[float],
+        rows: object,
+        factors: object,
+        arrays: object,
+        changes: object,
     ) -> None: ...
-    def call(self, stretch: int, ahead: tuple[int, int], following: tuple[int, int]) -> None:
-        """Call what is at these addresses before a step, and after each stretch of its pass back;
-        none if they are zero."""
+    def track(self, links: object, reserve: np.ndarray, ranges: np.ndarray, stretch: int) -> None:
+        """Fill ``reserve`` on the way back, taken in stretches of so many pairs of stations.
 
-    def step(self) -> None:
-        """Take a step."""
+        ``ranges`` (n + 1, 2) are the links behind each, see ``left_behind``.
+        """
+
+    def open(self, window: object) -> None:
+        """Take steps of the stations in a ``WindowArrays`` only from now on."""
+
+LEAST_STATIONS: int
+
+left_behind: Kernel
+turn_to: Kernel
+show: Kernel
+take_in: Kernel
+
+COUNTS: np.dtype[np.void]
+
+class Taken:
+    """How far a block of steps has come: steps that were taken; whether the next one is begun, up
+    to its free step; whether there is no room for the motion of the last one."""
 
     @property
-    def address(self) -> tuple[int, int]:
-        """What a compiled loop calls to take a step, and with what."""
+    def n_steps(self) -> int: ...
+    @property
+    def begun(self) -> bool: ...
+    @property
+    def is_full(self) -> bool: ...
+
+class Steps:
+    """Steps of the scheme ``one_solve`` on one rank, of ``StepParts`` and a ``Block`` of these."""
+
+    def __init__(self, parts: object, block: object) -> None: ...
+    def take(self, first: int, end: int) -> Taken:
+        """Take the steps of the block from number ``first`` on up to before ``end``."""
 
 def has_widths(widths: Sequence[int]) -> bool:
     """Whether kernels were compiled for stations with planes of these widths."""
@@ -122,3 +252,9 @@ def targets() -> list[str]:
 
 def set_target(name: str) -> bool:
     """Let what is made from now on use the kernels of one of these; whether there is such a one."""
+
+def flush_subnormals() -> int:
+    """Let this thread take subnormal numbers for zero, if it can; what it did before."""
+
+def restore_subnormals(before: int) -> None:
+    """Let it do what it did before."""

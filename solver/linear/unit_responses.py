@@ -14,7 +14,7 @@ from mpi4py import MPI
 from scipy import linalg
 
 from catenary.solver.base.errors import RunBroken
-from catenary.solver.base.kernels.compiled import compiled
+from catenary.solver.kernels import native
 from catenary.solver.linear.operator_bands import OperatorBands
 from catenary.solver.linear.stations.like_stations import LikeStations
 from catenary.solver.linear.stations.unique_rows import kinds_of
@@ -265,18 +265,21 @@ class UnitResponses:
         )
         answers = self._answers(bands, places.dofs[owned], places.weights[owned], first, last)
         begin = places.begin[owned] + self._ownership.first - first
-        starts = numbering.starts
-        window = np.stack([starts[places.first[owned]], starts[places.last[owned]]]) - first
-        return float(
-            cut_out(
-                answers,
-                window,
-                begin,
-                places.width[owned],
-                at[places.width[chosen] > 0],
-                data,
-            )
-        )
+        low, high = (numbering.starts[station[owned]] for station in (places.first, places.last))
+        width, to = places.width[owned], at[places.width[chosen] > 0]
+        cuts = Cuts(low - first, high - first, begin, width, to)
+        return float(native.cut_out(answers, cuts, data))
+
+
+class Cuts(NamedTuple):
+    """What is wanted of the answers of n places among unknowns of a stretch, (n,) each: it is to be
+    zero before ``low`` and from ``high`` on; ``at`` is where it goes."""
+
+    low: np.ndarray
+    high: np.ndarray
+    begin: np.ndarray
+    width: np.ndarray
+    at: np.ndarray
 
 
 class Places(NamedTuple):
@@ -326,29 +329,3 @@ def _stretches(x: np.ndarray, chosen: np.ndarray) -> list[np.ndarray]:
     while ends[-1] < at.size:
         ends.append(int(np.searchsorted(at, at[ends[-1]] + STRETCH, side="right")))
     return [order[begin:end] for begin, end in zip(ends[:-1], ends[1:], strict=True)]
-
-
-@compiled
-def cut_out(answers, window, begin, width, at, data):
-    """Put the part of each answer that is wanted into ``data``; what is outside of the ``window``
-    relative to the peak, at most.
-
-    Of each of n places ``answers`` (n k, m) has k rows; ``window`` (2, n) is where it is to be
-    zero outside of, ``begin`` and ``width`` (n,) what is wanted, and ``at`` (n,) where that goes.
-    """
-    each = answers.shape[0] // width.size
-    worst = 0.0
-    for i in range(width.size):
-        for k in range(each):
-            row = answers[i * each + k]
-            peak = leak = 0.0
-            for j in range(row.size):
-                here = abs(row[j])
-                peak = max(peak, here)
-                if j < window[0, i] or j >= window[1, i]:
-                    leak = max(leak, here)
-            if leak > worst * peak:
-                worst = leak / peak
-            for j in range(width[i]):
-                data[at[i] + k * width[i] + j] = row[begin[i] + j]
-    return worst

@@ -17,23 +17,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from catenary.solver.kernels import native
 from catenary.solver.model.links.leaning import swings_of_droppers
 from catenary.solver.model.links.links import BOTH, PUSHES, Links
 from catenary.solver.model.model import Model
 
-# Reserve at rest [N] and what it gains from stretch [N/m] and its rate [N s/m], as long as the link
-# is what it is at rest; place along the track [m]; what of -R > 0 is the compensation; what of R is
-# force: all of it of a link of K, nothing of an open one.
-RESERVE = np.dtype(
-    [
-        ("rest", np.float64),
-        ("stiffness", np.float64),
-        ("damping", np.float64),
-        ("place", np.float64),
-        ("released", np.float64),
-        ("carried", np.float64),
-    ]
-)
+# What a link's reserve is made of, and what it does beyond; see `kernels/motion/links.hpp`.
+RESERVE = native.RESERVE
 
 
 class LinkArrays(NamedTuple):
@@ -47,6 +37,14 @@ class LinkArrays(NamedTuple):
     def of(self, which: np.ndarray | slice) -> LinkArrays:
         """Some of them."""
         return LinkArrays(self.unknowns[which], self.weights[which], self.law[which])
+
+
+class Riders(NamedTuple):
+    """What goes with links that switch: ``links`` of m riders, of which those from ``begin[d]`` to
+    ``begin[d + 1]`` go with link d, ``begin`` (n + 1,)."""
+
+    links: LinkArrays
+    begin: np.ndarray
 
 
 NO_LINKS = LinkArrays(np.zeros((0, 2), np.int64), np.zeros((0, 2)), np.zeros(0, RESERVE))

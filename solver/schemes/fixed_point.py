@@ -13,9 +13,9 @@ from catenary.solver.base.parallel import on_root
 from catenary.solver.contact.forces_on_line import ForcesOnLine
 from catenary.solver.contact.train.head_states import Heads
 from catenary.solver.contact.train.pantographs import Pantographs
-from catenary.solver.contact_problem.complementarity_kernels import NOWHERE
 from catenary.solver.contact_problem.coupling import DIVERGED
 from catenary.solver.contact_problem.law_tangents import LawInSteps
+from catenary.solver.kernels.native import NOWHERE
 from catenary.solver.problem.problem import Numerics
 from catenary.solver.schemes.scheme import (
     Counters,

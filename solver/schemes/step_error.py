@@ -15,14 +15,38 @@ within a step, the force is wrong by k h f / (2 m omega) = sqrt(k D) f. Likewise
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from catenary.solver.base.kernels.bound import bound
-from catenary.solver.schemes import step_error_kernels
-from catenary.solver.schemes.step_error_kernels import Past, Tried
+from catenary.solver.kernels import native
 
 # Steps before this one that the estimate needs.
 _PAST = 3
+
+
+class Past(NamedTuple):
+    """The latest steps, oldest first.
+
+    Attributes
+    ----------
+    times : (3,) their ends [s]
+    depths : (3, n) of n contacts [m]
+    forces : (n,) at the end of the last [N]
+    """
+
+    times: np.ndarray
+    depths: np.ndarray
+    forces: np.ndarray
+
+
+class Tried(NamedTuple):
+    """A step that is judged, (n,) each; see ``StepError.of``."""
+
+    depth: np.ndarray
+    force: np.ndarray
+    stiffness: np.ndarray
+    compliance: np.ndarray
 
 
 class StepError:
@@ -33,8 +57,8 @@ class StepError:
         self._known = 0
         self._tried = Tried(*np.zeros((4, n)))
         arguments = self._tried, self._past
-        self._largest = bound(step_error_kernels.largest, *arguments, later=(0.0,))
-        self._remember = bound(step_error_kernels.remember, *arguments, later=(0.0,))
+        self._largest = native.step_error.bound(*arguments)
+        self._remember = native.accept_step.bound(*arguments)
 
     def of(
         self,

@@ -1,37 +1,30 @@
-"""Many steps of the scheme ``one_solve`` in one call, on one rank, as far as a loop can take them.
+"""Many steps of the scheme ``one_solve`` in one call, on one rank, as far as kernels can take them.
 
-A step whose forces the loop does not find, because an active set cycles, a link finds no room, or
+A step whose forces these do not find, because an active set cycles, a link finds no room, or
 something is no number, is finished by the scheme itself, from where the loop has left it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from catenary.mbs.head.head_records import drive_width
-from catenary.solver.base.kernels.bound import bound
-from catenary.solver.base.kernels.pointers import HeldCall, address_of
+from catenary.mbs.head.drives import drive_width
 from catenary.solver.base.petsc_events import event
+from catenary.solver.contact.contacts import Contacts
 from catenary.solver.contact.line_response import affine
-from catenary.solver.contact_problem.complementarity_kernels import SmallProblem
+from catenary.solver.contact.train.pantographs import Pantographs, TrainPlaces
+from catenary.solver.contact_problem.complementarity import SmallProblem
 from catenary.solver.contact_problem.coupling import Implicit
+from catenary.solver.contact_problem.law_tangents import ReportedForces
+from catenary.solver.integrators.loads.line_loads import LoadArguments
+from catenary.solver.kernels import native
 from catenary.solver.schemes.one_solve import OneSolve
 from catenary.solver.schemes.scheme import Scheme
-from catenary.solver.time_loop import step_kernels
-from catenary.solver.time_loop.step_kernels import (
-    FULL,
-    N_COUNTS,
-    REPEATED,
-    ROUNDS,
-    SLACK,
-    KeptMotions,
-    Steps,
-)
 from catenary.solver.time_loop.views.observers import StepView
-from catenary.solver.time_loop.views.step_views import Showing
+from catenary.solver.time_loop.views.step_views import Showing, Shown
 from catenary.solver.window.moving_columns import MovedStations
 from catenary.solver.window.moving_window import MOST_STEPS
 
@@ -42,6 +35,62 @@ _ROWS_OF_PART = 64
 # The same of motions that are kept. A step of a line of which not one fits takes far longer than
 # the end of a block.
 _MOTION_BYTES, _MOST_MOTIONS = 2**21, 16
+
+
+class KeptMotions(NamedTuple):
+    """What is kept of steps that the line goes on from, see ``ShownMotion``.
+
+    Attributes
+    ----------
+    motion_of : (n,) number of the motion that keeps a step, -1 if none does
+    numbers : (m,) room for displacements and velocities, one motion after another
+    stations : (k, 3) of each motion the stations that are kept, first and one after the last, and
+        where its numbers begin
+    used : (1,) how much of the room is
+    moved : ``ShownMotion.moved``
+    places : arrays that are kept with a motion
+    kept_places : (k, l) room for these
+    """
+
+    motion_of: np.ndarray
+    numbers: np.ndarray
+    stations: np.ndarray
+    used: np.ndarray
+    moved: np.ndarray
+    places: Sequence[np.ndarray]
+    kept_places: np.ndarray
+
+
+class StepParts(NamedTuple):
+    """What steps are made of; see `kernels/steps/steps.hpp`."""
+
+    speed: float
+    train: TrainPlaces
+    contacts: Contacts
+    free: native.TwoPasses
+    loads: Sequence[LoadArguments]
+    heads: Sequence[native.Head]
+    strips: np.ndarray
+    problem: SmallProblem
+    law: ReportedForces
+    lateral_place: np.ndarray
+    switched: np.ndarray
+    train_outputs: Pantographs
+    outputs: np.ndarray
+    shown: Shown
+    channels: Sequence[np.ndarray]
+
+
+class Block(NamedTuple):
+    """What a block of steps is told, and what it fills in; see `kernels/steps/steps.hpp`."""
+
+    times: np.ndarray
+    drives: np.ndarray
+    rows: np.ndarray
+    now: np.ndarray
+    behind: np.ndarray
+    kept: KeptMotions
+    counts: np.ndarray
 
 
 class CompiledSteps:
@@ -78,9 +127,6 @@ class CompiledSteps:
         self.most_motions = most if shows else 0
         # Where masses of the pantographs are, which is kept with a motion.
         self._place_arrays = scheme.pantographs.places()
-        taps = [
-            address_of(array) + 8 * at for array in self._place_arrays for at in range(array.size)
-        ]
         room = min(n_numbers * self.most_motions, _MOTION_BYTES // 8)
         self._kept = KeptMotions(
             motion_of=np.full(self.most, -1),
@@ -88,29 +134,27 @@ class CompiledSteps:
             stations=np.zeros((self.most_motions, 3), dtype=np.int64),
             used=np.zeros(1, dtype=np.int64),
             moved=showing.motion.moved,
-            taps=np.array(taps, dtype=np.int64),
-            tapped=np.zeros((self.most_motions, len(taps))),
+            places=self._place_arrays,
+            kept_places=np.zeros(
+                (self.most_motions, sum(array.size for array in self._place_arrays))
+            ),
         )
         pantographs, interaction = scheme.pantographs, scheme.interaction
         n = pantographs.n_contacts
-        records, passes = pantographs.records(), interaction.line.passes
+        heads, passes = pantographs.heads_in_loop(), interaction.line.passes
         law = scheme.coupling.law.in_loop()
-        assert records is not None and passes is not None and law is not None
-        self._free = passes.held
+        assert heads is not None and passes is not None and law is not None
+        self._free = passes.native
         loads = interaction.line.loads
         self._loads = loads if loads is not None and loads.changes else None
-        self._loading: HeldCall | None = None
-        if self._loads is not None:
-            self._loading = HeldCall(self._loads.kernel, self._loads.arguments)
-        self._records, self._law = records, law
-        self._heads = np.zeros(2 * n * (1 + n))
-        self._at_contacts = affine(self._heads, n)
+        self._heads, self._law = heads, law
+        self._strips = np.zeros(2 * n * (1 + n))
+        self._at_contacts = affine(self._strips, n)
         self._drives = np.zeros((self.most, pantographs.n, drive_width(pantographs.most_contacts)))
-        self._counts = np.zeros(N_COUNTS, dtype=np.int64)
-        self._bound_to: tuple[Any, Any] = None, None
-        self._bound: Callable[[int, int], tuple[int, bool]]
+        self._counts = np.zeros(1, dtype=native.COUNTS)
+        self._made_of: tuple[Any, Any] = None, None
+        self._steps: native.Steps
         self._event = event("Steps")
-        self._loop()  # compiled, or loaded, before the clock of a march starts
 
     def take(self, step: int, n_steps: int, kept: Sequence[int] = ()) -> None:
         """Take up to ``n_steps`` <= ``most`` steps after the one of number ``step``, one at least.
@@ -139,9 +183,9 @@ class CompiledSteps:
             if at < n_steps - 1:
                 self._kept.motion_of[at] = number
         scheme.pantographs.fill_drives(times.tolist(), self._drives[:n_steps])
-        is_full = False
         while self.taken < n_steps:
-            if self._take_on(n_steps):
+            begun, is_full = self._take_on(n_steps)
+            if begun:
                 time = float(times[self.taken])
                 scheme.finish(time, stop=False)
                 if self._shows:
@@ -150,7 +194,7 @@ class CompiledSteps:
                     self.rows[self.taken] = view.row
                     is_full = not self._keep_motion(int(self._kept.motion_of[self.taken]))
                 self.taken += 1
-            if is_full or self._counts[FULL]:
+            if is_full:
                 n_steps = self.taken
         self._moved.end(step + n_steps, n_steps)
         self._showing.follow(self._moved.now)
@@ -175,7 +219,7 @@ class CompiledSteps:
         last = first + 2 * int(starts[end] - starts[begin])
         motion = (begin, end), kept.numbers[first:last]
         time, row = float(self.times[at]), self.rows[at]
-        return self._showing.view_of_kept(step, time, row, motion, kept.tapped[number])
+        return self._showing.view_of_kept(step, time, row, motion, kept.kept_places[number])
 
     def _keep_motion(self, number: int) -> bool:
         """Keep the motion of a step as that of a number, none if below 0; whether there is room."""
@@ -191,66 +235,69 @@ class CompiledSteps:
         kept.stations[number] = *motion.moved, first
         kept.used[0] = last
         motion.moved[:] = columns.ends[:2]
-        kept.tapped[number] = np.concatenate(self._place_arrays)
+        kept.kept_places[number] = np.concatenate(self._place_arrays)
         return True
 
-    def _take_on(self, n_steps: int) -> bool:
-        """Go on with a block as far as the loop can; whether the scheme has to finish a step."""
+    def _take_on(self, n_steps: int) -> tuple[bool, bool]:
+        """Go on with a block as far as kernels can; whether the scheme has to finish a step, and
+        whether there is no room for the motion of the last one."""
         self._event.begin()
-        first, counts, counters = self.taken, self._counts, self._scheme.counters
-        counts[:] = 0
-        done, begun = self._loop()(first, n_steps)
-        counters.steps += done
-        counters.solves += done
-        counters.rounds += int(counts[ROUNDS])
-        counters.slack_dropper_steps += int(counts[SLACK])
-        counters.repeated_steps += int(counts[REPEATED])
-        self.taken += done
+        counters = self._scheme.counters
+        self._counts[:] = 0
+        taken = self._made_steps().take(self.taken, n_steps)
+        counters.steps += taken.n_steps
+        counters.solves += taken.n_steps
+        rounds, slack, repeated = self._counts[0].tolist()
+        counters.rounds += rounds
+        counters.slack_dropper_steps += slack
+        counters.repeated_steps += repeated
+        self.taken += taken.n_steps
         self._event.end()
-        return bool(begun)
+        return taken.begun, taken.is_full
 
-    def _loop(self) -> Callable[[int, int], tuple[int, bool]]:
-        """The compiled loop, on the arrays that the scheme has now."""
+    def _made_steps(self) -> native.Steps:
+        """What takes steps on the arrays that the scheme has now."""
         coupling = self._scheme.coupling
         assert isinstance(coupling, Implicit)
         share, unknowns = self._scheme.share, coupling.inner.unknowns
         # A step may exchange these arrays for larger ones.
-        if self._bound_to[0] is not share or self._bound_to[1] is not unknowns:
-            self._bound_to = share, unknowns
-            self._arguments = self._steps(coupling.inner.problem(self._at_contacts, share))
-            self._bound = bound(step_kernels.take, *self._arguments, later=(0, 0))
-        return self._bound
+        if self._made_of[0] is not share or self._made_of[1] is not unknowns:
+            self._made_of = share, unknowns
+            problem = coupling.inner.problem(self._at_contacts, share)
+            self._steps = native.Steps(self._parts(problem), self._block())
+        return self._steps
 
-    def _steps(self, problem: SmallProblem) -> tuple[Any, ...]:
-        """Arguments of the loop but its last two."""
-        scheme = self._scheme
-        pantographs, interaction = scheme.pantographs, scheme.interaction
-        steps = Steps(
+    def _parts(self, problem: SmallProblem) -> StepParts:
+        pantographs, interaction = self._scheme.pantographs, self._scheme.interaction
+        return StepParts(
             speed=float(pantographs.speed),
-            moving=pantographs.moving,
-            placing=interaction.placing,
-            free=self._free.address,
-            loading=(0, 0) if self._loading is None else self._loading.address,
-            clock=np.zeros(1) if self._loads is None else self._loads.clock,
-            records=self._records,
+            train=pantographs.places_along,
+            contacts=interaction.contacts,
+            free=self._free,
+            loads=[] if self._loads is None else [self._loads.arguments],
             heads=self._heads,
-            responding=interaction.responding(scheme.share),
+            strips=self._strips,
             problem=problem,
             law=self._law,
-            superposing=interaction.superposing,
-            compensating=interaction.compensating,
-            working=interaction.working,
-            crossing=interaction.crossing,
             lateral_place=pantographs.lateral_place,
             switched=np.zeros(problem.unknowns.right.size, dtype=np.int64),
-            ends=pantographs.ends,
-            of_step=pantographs.of_step,
+            train_outputs=pantographs,
             outputs=pantographs.outputs,
             shown=self._showing.shown,
-            taps=self._showing.layout.taps,
+            channels=self._showing.layout.copied,
         )
-        rows = self.rows, (self._moved.now, self._moved.behind)
-        return *steps, self.times, self._drives, *rows, self._kept, self._counts, self._shows
+
+    def _block(self) -> Block:
+        moved = self._moved
+        return Block(
+            times=self.times,
+            drives=self._drives,
+            rows=self.rows,
+            now=moved.now,
+            behind=moved.behind,
+            kept=self._kept,
+            counts=self._counts,
+        )
 
 
 def compiled_steps(
@@ -262,10 +309,8 @@ def compiled_steps(
     line = scheme.interaction.line
     if not isinstance(scheme.coupling, Implicit) or line.passes is None:
         return None
-    if not hasattr(step_kernels.take, "overloads"):
-        return None  # NUMBA_DISABLE_JIT
-    if scheme.coupling.law.in_loop() is None or scheme.pantographs.records() is None:
+    if scheme.coupling.law.in_loop() is None or scheme.pantographs.heads_in_loop() is None:
         return None
     if not showing.layout.in_loop:
-        return None  # a channel that is a function
+        return None  # as a channel is a function
     return CompiledSteps(scheme, showing, dt, shows)

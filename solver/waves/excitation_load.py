@@ -8,7 +8,6 @@ from __future__ import annotations
 import numpy as np
 from scipy import sparse
 
-from catenary.solver.base.kernels.compiled import compiled
 from catenary.solver.model.elements.shape_functions import shape_values
 from catenary.solver.model.loads import FieldLoad, Load, ShapeLoad, table
 from catenary.solver.model.model import Model
@@ -46,8 +45,9 @@ def load_of(excitation: Excitation, model: Model, interval: float) -> Load:
     return FieldLoad(unknowns, sparse.identity(unknowns.size, format="csr"), interval, fill)
 
 
-@compiled
-def spread(x, places, forces, first, loads):  # type: ignore[no-untyped-def]
+def spread(
+    x: np.ndarray, places: np.ndarray, forces: np.ndarray, first: int, loads: np.ndarray
+) -> None:
     """Add forces at single places to loads on deflections and slopes of nodes.
 
     Parameters
@@ -57,13 +57,11 @@ def spread(x, places, forces, first, loads):  # type: ignore[no-untyped-def]
     first : number of the unknown that the first column stands for: w and theta of each node in turn
     loads : (m, k) a row for each force [N], [N m]
     """
-    for i in range(places.size):
-        if places[i] < x[0] or places[i] > x[-1]:
-            continue
-        e = min(max(np.searchsorted(x, places[i], side="right") - 1, 0), x.size - 2)
-        length = x[e + 1] - x[e]
-        shares = shape_values((places[i] - x[e]) / length, length)
-        for j in range(4):
-            column = 2 * e + j - first
-            if 0 <= column < loads.shape[1]:
-                loads[i, column] += forces[i] * shares[j]
+    row = np.flatnonzero((places >= x[0]) & (places <= x[-1]))
+    element = np.clip(np.searchsorted(x, places[row], side="right") - 1, 0, x.size - 2)
+    length = x[element + 1] - x[element]
+    shares = shape_values((places[row] - x[element]) / length, length)
+    for j, share in enumerate(shares):
+        column = 2 * element + j - first
+        there = (column >= 0) & (column < loads.shape[1])
+        loads[row[there], column[there]] += (forces[row] * share)[there]

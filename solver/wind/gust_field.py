@@ -14,8 +14,8 @@ from collections.abc import Callable
 
 import numpy as np
 
+from catenary.solver.kernels import native
 from catenary.solver.problem.wind import Wind
-from catenary.solver.wind import gust_kernels
 from catenary.solver.wind.spectra import variance_below
 
 # Bands: below this frequency [Hz] so many to a factor of ten, from there on so wide [Hz].
@@ -82,7 +82,7 @@ class GustField:
             own = self._between(post)[:, begin - post * POSTS : end - post * POSTS]
             # A block of its own, as slices may be any part of a larger array.
             made = np.zeros((slices.shape[0], end - begin))
-            gust_kernels.add_waves(waves, np.ascontiguousarray(own), made)
+            native.add_waves(waves, np.ascontiguousarray(own), made)
             slices[:, begin - part.start : end - part.start] = made
             begin = end
 
@@ -113,7 +113,7 @@ class GustField:
             )
             steps = np.diff(self._points[first : stop + 1])
             ends = self._posts[post], self._posts[post + 1]
-            gust_kernels.bridge(*ends, self._rates, steps, normals, values[1:])
+            native.bridge(*ends, self._rates, steps, normals, values[1:])
         if stop == self._points.size - 1 and stop < (post + 1) * POSTS and stop > first:
             values = np.concatenate([values, self._posts[post + 1][None]])
         made = np.ascontiguousarray(values.T * np.tile(self._raised, 2)[:, None])

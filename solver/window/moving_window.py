@@ -9,15 +9,15 @@ from collections.abc import Sequence
 import numpy as np
 
 from catenary.solver.base.errors import RunBroken
+from catenary.solver.kernels import native
 from catenary.solver.linear.factors.station_factors import StationFactors
 from catenary.solver.linear.pieces.operator_pieces import OperatorPieces, WantedPieces
 from catenary.solver.model.loads import Load
 from catenary.solver.model.model import Model
 from catenary.solver.problem.problem import Problem
 from catenary.solver.problem.window import EXACT, WindowChoice
-from catenary.solver.window import window_kernels
 from catenary.solver.window.where_possible import why_no_window
-from catenary.solver.window.window_kernels import IS_FRESH, LEAST, STEP, WindowArrays
+from catenary.solver.window.window_arrays import IS_FRESH, STEP, WindowArrays
 
 logger = logging.getLogger(__name__)
 
@@ -25,6 +25,8 @@ logger = logging.getLogger(__name__)
 EVERY = 8
 # Steps between which what is ahead may be made.
 MOST_STEPS = 512
+# Stations of the smallest window.
+LEAST = native.LEAST_STATIONS
 # Stations around a window whose rows the energy reads.
 _AROUND = 192
 
@@ -73,13 +75,15 @@ class MovingWindow:
         station = np.searchsorted(starts, links.min(axis=1, initial=starts[-1]), side="right") - 1
         before = np.searchsorted(np.maximum.accumulate(station), np.arange(n + 1))
         moving_links[:] = 0, len(links)
-        fading = choice.fading * EVERY * dt
-        rule = [choice.by_motion, choice.spans_behind, choice.spans_ahead, fading]
         self.arrays = WindowArrays(
             state=np.array([0, 1], dtype=np.int64),
             every=EVERY,
             guard=max(1, int(np.ceil(reach / spacing))),
-            rule=np.array([*rule, float(choice.mode == EXACT)]),
+            by_motion=choice.by_motion,
+            spans_behind=choice.spans_behind,
+            spans_ahead=choice.spans_ahead,
+            fading=choice.fading * EVERY * dt,
+            is_exact=choice.mode == EXACT,
             peak=np.zeros(2),
             contacts=contacts,
             loaded=_places_of(model, model.loads),
@@ -93,7 +97,7 @@ class MovingWindow:
             edges=np.stack([factors.turning.begins, factors.turning.ends]),
             ends=factors.ends,
             kinds=factors.kinds,
-            turning=factors.turning.arrays,
+            turning=factors.turning,
             links=moving_links,
             ranges=np.zeros((2, 2), dtype=np.int64),
             known=known,
@@ -116,7 +120,7 @@ class MovingWindow:
                 "station: it reaches up to %.0f m further than its %s; take a smaller "
                 "mesh.elements_per_gap or numerics.dt_s",
                 further,
-                "motion asks for" if self.arrays.rule[0] > 0.0 else "spans",
+                "motion asks for" if self.arrays.by_motion > 0.0 else "spans",
             )
 
     def provide(self, way: float) -> None:
@@ -133,7 +137,7 @@ class MovingWindow:
         first, last = float(arrays.contacts.min()), float(arrays.contacts.max()) + way
         masts, n = arrays.masts, arrays.low.size
         spans = np.interp([first, last], masts, np.arange(masts.size))
-        spans += -arrays.rule[1], arrays.rule[2]
+        spans += -arrays.spans_behind, arrays.spans_ahead
         behind, ahead = np.interp(spans, np.arange(masts.size), masts)
         begin, end = 0, n
         if spans[0] > 0.0:
@@ -236,7 +240,7 @@ class MovingWindow:
 
     def _open(self, begin: int, end: int) -> None:
         """Make the window that from station ``begin`` to ``end``, and touch no motion."""
-        window_kernels.turn_to(self.arrays, begin, end)
+        native.turn_to(self.arrays, begin, end)
 
 
 def wanted_pieces(problem: Problem, model: Model, contacts: np.ndarray) -> WantedPieces | None:

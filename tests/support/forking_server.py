@@ -21,14 +21,14 @@ import sys
 from pathlib import Path
 
 PACKAGES = (
-    "gmsh", "jinja2", "matplotlib.backends.backend_agg", "matplotlib.figure", "meshio", "numba",
+    "gmsh", "jinja2", "matplotlib.backends.backend_agg", "matplotlib.figure", "meshio",
     "pydantic", "scipy.integrate", "scipy.interpolate", "scipy.optimize", "scipy.signal",
     "scipy.sparse.linalg", "tqdm", "typer",
     # Of the program, with what they import:
     "catenary.cases.cli.main", "catenary.cases.run.planning.file_sizes",
     "catenary.cases.run.scene_mesh", "catenary.cases.scene.load",
     "catenary.postproc.evaluate.filters", "catenary.solver.contact_problem.coupling",
-    "catenary.solver.statics.form_finding.equilibrium", "catenary.solver.time_loop.step_kernels",
+    "catenary.solver.statics.form_finding.equilibrium", "catenary.solver.kernels.native",
 )  # fmt: skip
 
 
@@ -61,7 +61,6 @@ for place in importlib.util.find_spec("petsc4py").submodule_search_locations:
 sys.modules["catenary.cases.scene.scene"].Scene.model_rebuild()  # put off until it is needed
 for panels in (1, 2, 3):
     importlib.import_module("blank_panels").blank(panels)
-sys.modules["numba"].njit(lambda number: number + 1)(1)  # loads what all compiled loops need
 gc.freeze()
 for line in sys.stdin:
     request = json.loads(line)

@@ -11,10 +11,10 @@ Nothing of it is the library's: joints and multipliers do not occur, only the ta
 
 from __future__ import annotations
 
+import cmath
 from collections.abc import Callable
 
 import numpy as np
-from numba import njit
 from scipy.integrate import solve_ivp
 from scipy.optimize import fsolve
 
@@ -25,36 +25,35 @@ INERTIAS = np.array([10.43, 7.76, 0.46, 1.50, 0.01, 0.23])
 H = 1e-30
 
 
-@njit(cache=True)
 def _meet(x1, z1, x2, z2, r1, r2, side):
     """Where circles around two points meet, on one side of the line between them."""
     dx, dz = x2 - x1, z2 - z1
     d2 = dx * dx + dz * dz
     along = (r1 * r1 - r2 * r2 + d2) / (2.0 * d2)
-    across = side * np.sqrt(r1 * r1 / d2 - along * along)
+    across = side * cmath.sqrt(r1 * r1 / d2 - along * along)
     return x1 + along * dx - across * dz, z1 + along * dz + across * dx
 
 
-@njit(cache=True)
 def _aim(lx, lz, x, z):
     """Cosine and sine of the turn that brings a local vector to a direction of equal length."""
     l2 = lx * lx + lz * lz
     return (lx * x + lz * z) / l2, (lx * z - lz * x) / l2
 
 
-@njit(cache=True)
 def bodies(a, s):
     """x, z, cosine and sine (counter-clockwise in x-z) of the six bodies (6, 4), complex."""
     out = np.zeros((6, 4), dtype=np.complex128)
-    c, n = np.cos(a), np.sin(a)
+    c, n = cmath.cos(a), cmath.sin(a)
     # The lower arm's hinge is its point (0.820, 0).
     x, z = 0.200 - 0.820 * c, 0.132 - 0.820 * n
     out[0] = np.array([x, z, c, n])
     elbow_x, elbow_z = x - 0.820 * c, z - 0.820 * n
     # Upper arm: from the elbow (-1.014, 0) to the lower link's ball (-1.187, -0.126).
     lx, lz = -1.187 + 1.014, -0.126
-    length = np.sqrt(1.303**2 + 0.025**2)
-    ball_x, ball_z = _meet(-0.259, 0.0, elbow_x, elbow_z, length, np.sqrt(lx * lx + lz * lz), 1.0)
+    length = cmath.sqrt(1.303**2 + 0.025**2)
+    ball_x, ball_z = _meet(
+        -0.259, 0.0, elbow_x, elbow_z, length, cmath.sqrt(lx * lx + lz * lz), 1.0
+    )
     cu, nu = _aim(lx, lz, ball_x - elbow_x, ball_z - elbow_z)
     out[1] = np.array([elbow_x + 1.014 * cu, elbow_z + 1.014 * nu, cu, nu])
     top_x, top_z = elbow_x + 2.028 * cu, elbow_z + 2.028 * nu
@@ -72,34 +71,31 @@ def bodies(a, s):
     return out
 
 
-@njit(cache=True)
 def lengths(a, s):
     """Raising spring, actuator, each of the two head springs (3,), complex."""
     out = np.zeros(3, dtype=np.complex128)
     p = bodies(a, s)
     x = p[0, 0] + 0.870 * p[0, 2] + 0.136 * p[0, 3]
     z = p[0, 1] + 0.870 * p[0, 3] - 0.136 * p[0, 2]
-    out[0] = np.sqrt((x + 0.259) ** 2 + z**2)
-    out[1] = np.sqrt((x - 0.483) ** 2 + (z - 0.125) ** 2)
+    out[0] = cmath.sqrt((x + 0.259) ** 2 + z**2)
+    out[1] = cmath.sqrt((x - 0.483) ** 2 + (z - 0.125) ** 2)
     # From the arm's centre to 0.010 above the head's.
     out[2] = 0.020 + s
     return out
 
 
-@njit(cache=True)
 def _jacobian(a, s):
     """d (x, z, turn) / d (a, s) of all bodies, (18, 2)."""
     out = np.zeros((18, 2))
     for k in range(2):
-        p = bodies(a + 1j * H * (1 - k), s + 1j * H * k)
+        p = bodies(a + 1j * H * (1 - k), s + 1j * H * k).tolist()
         for b in range(6):
-            out[3 * b, k] = p[b, 0].imag / H
-            out[3 * b + 1, k] = p[b, 1].imag / H
-            out[3 * b + 2, k] = (p[b, 2].real * p[b, 3].imag - p[b, 3].real * p[b, 2].imag) / H
+            out[3 * b, k] = p[b][0].imag / H
+            out[3 * b + 1, k] = p[b][1].imag / H
+            out[3 * b + 2, k] = (p[b][2].real * p[b][3].imag - p[b][3].real * p[b][2].imag) / H
     return out
 
 
-@njit(cache=True)
 def acceleration(a, s, da, ds, push, wire, masses, inertias):
     """a'' and s'' with an actuator of ``push`` [N] and ``wire`` [N] downward on the head."""
     jacobian = _jacobian(a, s)

@@ -16,7 +16,7 @@ import pytest
 
 pytestmark = pytest.mark.process
 
-BACKENDS = {"gmsh", "h5py", "matplotlib", "meshio", "mpi4py", "numba", "petsc4py", "scipy", "tqdm"}
+BACKENDS = {"gmsh", "h5py", "matplotlib", "meshio", "mpi4py", "petsc4py", "scipy", "tqdm"}
 # One process runs all command lines, one after the other, and prints the exit code of each with
 # the packages that are loaded by then.
 PROGRAM = """
@@ -75,12 +75,12 @@ def test_help_loads_no_arrays() -> None:
 
 
 def test_a_sound_case_loads_what_it_is_checked_with() -> None:
-    """So that the names above are those of modules; a lumped pantograph needs no compiled loop."""
+    """So that the names above are those of modules."""
     (_, lumped), (_, mechanism) = run_all(["check en50318_2002", "check ambrosio2012"])
     assert "scipy" in lumped
     unused = BACKENDS - {"scipy"}
     assert not unused & set(lumped)
-    assert not (unused - {"numba"}) & set(mechanism)
+    assert not unused & set(mechanism)
 
 
 # Prints the modules that are loaded when the march of a run begins, and at the end of the run.
@@ -126,7 +126,7 @@ def test_a_run_loads_filters_and_pictures_after_its_march(tmp_path: Path) -> Non
     )
     code, begun, ended = json.loads(done.stdout.splitlines()[-1])
     assert code == 0, done.stderr
-    assert {"numba", "petsc4py", "h5py"} <= set(begun)
+    assert {"petsc4py", "h5py"} <= set(begun)
     assert not (REPORTED | NEVER | OF_OTHERS) & set(begun)
     assert {"catenary.solver.schemes.one_solve", "catenary.mbs.lumped"} <= set(begun)
     assert REPORTED <= set(ended)

@@ -39,7 +39,7 @@ def test_quiet_and_verbose_exclude_each_other() -> None:
     assert "--quiet and --verbose exclude each other" in done.output
 
 
-@pytest.mark.parametrize("library", ["PETSc", "MPI", "HDF5", "numba", "h5py", "mpi4py", "gmsh"])
+@pytest.mark.parametrize("library", ["PETSc", "MPI", "HDF5", "h5py", "mpi4py", "gmsh"])
 def test_version_names_the_libraries(library: str) -> None:
     done = invoke("--version")
     assert done.exit_code == 0
@@ -76,7 +76,7 @@ def test_the_shell_is_offered_what_fits(typed: str, offered: list[str]) -> None:
 
 @pytest.mark.process
 def test_too_low_a_limit_of_memory_is_one_sentence() -> None:
-    """OpenBLAS would try for ever to get memory, and llvmlite end in a traceback."""
+    """OpenBLAS would try for ever to get memory."""
     program = "from catenary.cases.cli.main import main; main()"
     bash = f"ulimit -v 450000; exec \"$0\" -c '{program}' report x"
     words = ["bash", "-c", bash, sys.executable]

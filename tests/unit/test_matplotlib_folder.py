@@ -10,7 +10,6 @@ from pathlib import Path
 import pytest
 
 from catenary.cases.process import matplotlib_folder
-from catenary.solver.base.kernels import loop_cache
 
 
 @pytest.fixture(autouse=True)
@@ -30,20 +29,23 @@ def test_a_home_that_can_be_written_is_left_alone(
     assert matplotlib_folder.VARIABLE not in os.environ
 
 
-def test_without_a_home_it_is_beside_the_loops(
+def test_without_a_home_it_is_in_a_folder_of_the_program(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "file").touch()
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "file"))
-    monkeypatch.setenv(loop_cache.VARIABLE, str(tmp_path / "kept"))
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "kept"))
     matplotlib_folder.settle()
-    assert os.environ[matplotlib_folder.VARIABLE] == str(tmp_path / "kept" / "matplotlib")
+    assert os.environ[matplotlib_folder.VARIABLE] == str(
+        tmp_path / "kept" / "catenary" / "matplotlib"
+    )
 
 
 def test_without_any_folder_it_is_silent(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "file").touch()
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "file"))
-    monkeypatch.setenv(loop_cache.VARIABLE, str(tmp_path / "file" / "x"))
+    monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
+    monkeypatch.setattr(matplotlib_folder.tempfile, "gettempdir", lambda: str(tmp_path / "file"))
     matplotlib_folder.settle()
     assert matplotlib_folder.VARIABLE not in os.environ
     assert not logging.getLogger("matplotlib").isEnabledFor(logging.WARNING)

@@ -168,7 +168,7 @@ def test_a_row_ends_with_what_stands_elsewhere(monkeypatch: pytest.MonkeyPatch) 
     layout = layout_of(array, monkeypatch)
     assert layout.columns == {"two": slice(2, 4), "more": slice(4, 7)}
     assert layout.width == 7 and layout.in_loop
-    assert (layout.taps - array.ctypes.data).tolist() == [0, 8, 16]
+    assert len(layout.copied) == 1 and np.shares_memory(layout.copied[0], array)
     row = np.zeros(7)
     array += 1.0
     layout.fill(row)

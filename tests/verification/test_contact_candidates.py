@@ -23,8 +23,8 @@ from catenary.mbs.lumped import LumpedPantograph
 from catenary.mbs.lumped_data import LumpedData
 from catenary.meshgen.mesh import LineMesh
 from catenary.solver.base.errors import InputError
-from catenary.solver.contact import contact_kernels
 from catenary.solver.contact.contact_wire import ContactWires
+from catenary.solver.kernels import native
 from catenary.solver.model.partition import distribute
 from catenary.solver.problem.contact_laws import LinearLaw
 from catenary.solver.problem.problem import Damping, Problem
@@ -198,7 +198,7 @@ def test_a_wire_beside_the_strip_is_not_touched() -> None:
     model, form = find_form(problem, mesh)
     wires = ContactWires(model, form, distribute(model, 1, 0))
     touches = wires.on_wires(np.array([0, 1, 1]), np.array([0.8, 0.8, 1.0]))
-    contact_kernels.locate(np.full(3, 17.0), wires.shapes, touches)
+    native.locate(np.full(3, 17.0), wires.shapes, touches)
     assert touches["present"].tolist() == [1.0, 0.0, 1.0]
     assert not touches["value"][1].any() and not touches["whole_slope"][1].any()
     place = problem.train.placements[0]

@@ -46,10 +46,10 @@ def test_tables_hold_the_shapes_between_their_points() -> None:
     """Cubic splines: (pi / 100)^4 5 / 384 of the highest wave, some more at the ends."""
     tables = mode_tables(4, LENGTH)
     y = np.linspace(-0.5 * LENGTH, 0.5 * LENGTH, 977)
-    i = np.clip(np.searchsorted(tables.mode_breaks, y, side="right") - 1, 0, None)
-    i = np.minimum(i, tables.mode_breaks.size - 2)
-    d = y - tables.mode_breaks[i]
-    c = tables.mode_coefficients[i]
+    i = np.clip(np.searchsorted(tables.breaks, y, side="right") - 1, 0, None)
+    i = np.minimum(i, tables.breaks.size - 2)
+    d = y - tables.breaks[i]
+    c = tables.coefficients[i]
     found = ((c[..., 0].T * d + c[..., 1].T) * d + c[..., 2].T) * d + c[..., 3].T
     check("shapes", found, shapes(4, LENGTH, y), within=2e-7)
 

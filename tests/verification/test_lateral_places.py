@@ -117,7 +117,7 @@ def test_a_head_rolls_under_the_moving_place_of_the_wire() -> None:
     head = run._pantographs.models[0]  # noqa: SLF001  (an angle is no channel)
 
     def look(view: StepView) -> np.ndarray:
-        angles.append(float(head.position[head._roll]))  # noqa: SLF001
+        angles.append(float(head.position[head._arrays.roll]))  # noqa: SLF001
         return np.concatenate([view.lateral_place, view.strip_force])
 
     history.watch = look

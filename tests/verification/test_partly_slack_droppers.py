@@ -27,9 +27,9 @@ from small_lines import WHOLE, ac_simple_line, mesh_of, numerics, problem_of, tr
 
 from catenary.solver.contact.line_response import Coupled, LineResponse
 from catenary.solver.contact.train.head_states import Heads
-from catenary.solver.contact_problem import complementarity_kernels
 from catenary.solver.contact_problem.complementarity import InnerProblem
 from catenary.solver.contact_problem.law_tangents import LinearInSteps
+from catenary.solver.kernels import native
 from catenary.solver.model.links.leaning import swings_of_droppers
 from catenary.solver.problem.contact_laws import LinearLaw
 from catenary.solver.statics.form_finding.equilibrium import find_form
@@ -153,14 +153,14 @@ def test_one_dropper_among_many_has_its_share(monkeypatch: pytest.MonkeyPatch) -
         few.coupling,
     )
     reserve[few.reserve.size :: 6] = -1.0  # each second one is slack
-    solves, solve_on = 0, complementarity_kernels.solve_on
+    solves, solve_on = 0, native.solve_on
 
-    def counted(*arguments: np.ndarray) -> None:
+    def counted(*arguments: object) -> None:
         nonlocal solves
         solves += 1
         solve_on(*arguments)
 
-    monkeypatch.setattr(complementarity_kernels, "solve_on", counted)
+    monkeypatch.setattr(native, "solve_on", counted)
     slack, pivoted = Step(reserve, coupling, few.riders).solve()
     assert pivoted
     print(f"solves: {solves}")

@@ -132,7 +132,7 @@ def test_the_force_stays_within_its_limits_and_the_integral_does_not_wind_up() -
     _, added, one = closed_loop(regulation, 2000)
     assert added.max() == 25.0
     assert one._control is not None
-    one._control.settings[1] = 100.0  # a target below
+    one._control.settings["target"] = 100.0  # a target below
     zero = HEIGHT - FORCE / WIRE
     for number in range(2001, 2400):
         head = one.predict(DT * number)

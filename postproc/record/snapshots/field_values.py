@@ -17,8 +17,8 @@ from catenary.postproc.record.snapshots.field_kinds import (
     FieldKind,
 )
 from catenary.postproc.record.snapshots.field_layout import Slots
+from catenary.solver.kernels import native
 from catenary.solver.model.axial_elements import rows_in_curve, slope_rows
-from catenary.solver.time_loop.views.row_kernels import take_points
 
 
 @dataclass(frozen=True)
@@ -63,20 +63,25 @@ class FieldValues:
         ndarray, as its type in the file, (n,) or (n, components)
         """
         rows = slice(first, first + len(known.dropper_force))
-        shown = [kind.values_of(points[rows]) for points in (slots.first, slots.count)]
-        result = np.empty((int(shown[1].sum()), kind.components), dtype=kind.number)
+        shown = [
+            kind.values_of(points[rows]).astype(np.int64) for points in (slots.first, slots.count)
+        ]
+        taken = np.empty(int(shown[1].sum()))
+        result = np.empty((taken.size, kind.components), dtype=kind.number)
         for component, (values, columns) in enumerate(self._components(kind, slots.block, known)):
             if values is None:
                 result[:, component] = 0.0
             else:
-                take_points(values, columns.astype(np.int64), *shown, result, component)
+                of_rows = np.ascontiguousarray(values, dtype=float)
+                native.take_points(of_rows, columns.astype(np.int64), *shown, taken)
+                result[:, component] = taken
         return result if kind.components > 1 else result[:, 0]
 
     def _components(
         self, kind: FieldKind, block: Block, known: Gathered
     ) -> list[tuple[np.ndarray | None, np.ndarray]]:
         """Of each component its values (rows, k), None where it is zero, and which of these the
-        points of a block take, see ``take_points``."""
+        points of a block take: zero where that is below zero."""
         if kind.of_droppers:
             force = known.dropper_force
             values = force if kind.name == "dropper_force" else np.sign(force)

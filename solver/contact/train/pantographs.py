@@ -5,13 +5,12 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
 
 from catenary.mbs.build import Operation, has_joints, make_pantograph, steady_forces
-from catenary.mbs.head.head_kernels import N_DRIVE
-from catenary.mbs.head.head_records import HEAD, fill_head
+from catenary.mbs.head.drives import N_DRIVE
 from catenary.mbs.head.newmark_head import SteppedHead
 from catenary.mbs.head.wire_crossing import CrossingPath, FollowedPath, LateralPath, SeveralPaths
 from catenary.mbs.interface import Pantograph
@@ -19,23 +18,37 @@ from catenary.mbs.lowering import LoweredPantograph
 from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.roll import roll_of
 from catenary.mbs.vehicle.base_motion import BaseMotion
-from catenary.solver.base.kernels.bound import bound
 from catenary.solver.base.parallel import on_root
-from catenary.solver.contact.contact_kernels import ContactWork
 from catenary.solver.contact.contact_wire import Candidates, ContactWires
-from catenary.solver.contact.train import output_kernels
+from catenary.solver.contact.contacts import no_work
 from catenary.solver.contact.train.air_around import airflow
 from catenary.solver.contact.train.head_states import Heads
-from catenary.solver.contact.train.output_kernels import Ends
-from catenary.solver.contact.train.place_kernels import move_contacts
-from catenary.solver.contact.train.raked_strips import leads_of
+from catenary.solver.contact.train.raked_strips import Leads, leads_of
+from catenary.solver.kernels import native
 from catenary.solver.problem.contact_laws import ContactLaw, KinematicLaw
-from catenary.solver.problem.problem import Numerics, Placement, Problem
+from catenary.solver.problem.problem import Placement, Problem
 from catenary.solver.problem.simulated import Simulated
 from catenary.solver.statics.elasticity import Elasticity
 
 if TYPE_CHECKING:
     from catenary.mbs.mechanism.full_pantograph import FullPantograph
+
+
+class StripEnds(NamedTuple):
+    """Which contacts a strip has, and which strips a pantograph: numbers of the first ones, and of
+    all; ``of_strip`` (n_strips + 1,), ``of_pantograph`` (n_pantographs + 1,)."""
+
+    of_strip: np.ndarray
+    of_pantograph: np.ndarray
+
+
+class TrainPlaces(NamedTuple):
+    """Contacts and then pantographs along the track [m]: at the ``start``, ``now``; ``leads`` of
+    contacts on raked strips."""
+
+    start: np.ndarray
+    now: np.ndarray
+    leads: Leads
 
 
 class Pantographs:
@@ -66,13 +79,11 @@ class Pantographs:
     lateral_place : (n_contacts,) then, else (0,): where wires are on the strips, to the left of
         their middle [m], NaN where a wire is not on its strip; rank 0
     lateral_displacement : the last of ``across``
-    outputs : ``position`` and all these of the latest step one after another; ``of_step`` is the
-        part that a step fills after its forces are known
+    outputs : ``position`` and all these of the latest step one after another
     speed : of the train [m/s]
-    moving : start and places of contacts and pantographs and leads of contacts on raked strips, see
-        ``move_contacts``
+    places_along : TrainPlaces
     reach : how far contacts are behind and ahead of their pantographs at most [m], all ranks
-    ends : Ends, contacts of each strip and strips of each pantograph
+    ends : StripEnds, contacts of each strip and strips of each pantograph
     work : of the contact forces on this rank's part of the line
 
     Raises
@@ -96,7 +107,7 @@ class Pantographs:
         offsets = [placement.data.strip_offsets for placement in train.placements]
         counts, n_wires = [len(own) for own in offsets], wires.n_wires
         of_strip, of_pantograph = np.arange(sum(counts) + 1), np.cumsum([0, *counts])
-        self.ends = Ends(n_wires * of_strip.astype(np.int64), of_pantograph.astype(np.int64))
+        self.ends = StripEnds(n_wires * of_strip.astype(np.int64), of_pantograph.astype(np.int64))
         self._contacts = [
             slice(int(a), int(b)) for a, b in itertools.pairwise(n_wires * of_pantograph)
         ]
@@ -104,12 +115,12 @@ class Pantographs:
         half_length = [placement.data.strips.half_length for placement in train.placements]
         # Places of contacts and of pantographs move together, in one sum.
         self.n_contacts = n_wires * strip_start.size
-        self._all_start = np.concatenate([np.repeat(strip_start, n_wires), self._start])
+        all_start = np.concatenate([np.repeat(strip_start, n_wires), self._start])
         shares = self.n * n_wires if n_wires > 1 else 0
         sizes = (self.n, 3 * self.n, strip_start.size, shares, self.n)
         endless = np.full(self.n_contacts, np.inf)
         places_and_outputs = np.zeros(self.n_contacts + sum(sizes))
-        self._all_places = places_and_outputs[: self._all_start.size]
+        all_places = places_and_outputs[: all_start.size]
         self.candidates = Candidates(
             places_and_outputs[: self.n_contacts],
             np.tile(np.arange(n_wires), strip_start.size),
@@ -120,8 +131,8 @@ class Pantographs:
             placement.data.strips.rake * simulated.raked_strips for placement in train.placements
         ]
         leads = leads_of(wires, self.candidates.wire, np.repeat(np.repeat(rake, counts), n_wires))
-        self.moving = self._all_start, self._all_places, leads
-        self._move = bound(move_contacts, *self.moving, later=(0.0,))
+        self.places_along = TrainPlaces(all_start, all_places, leads)
+        self._move = native.move_contacts.bound(self.places_along)
         self.reach = (
             max(0.0, -min(map(min, offsets))) + max(0.0, -leads.lead.min(initial=0.0)),
             max(0.0, max(map(max, offsets))) + leads.lead.max(initial=0.0),
@@ -132,11 +143,13 @@ class Pantographs:
         self.constraint_violation = parts[-1]
         self.move_to(0.0)
         self.contact_force, self.head_height, self.wire_height = forces.reshape(3, self.n)
-        self.of_step = self.outputs[self.n : -self.n]
         self.wire_height[:] = wires.rest_height(self._start)
         self.head_height[:] = self.wire_height - train.start_below
+        self._write_outputs = native.write_outputs.bound(self)
         self._heads = Heads(self.n_contacts)
-        self.work = _no_work(self.n_contacts, problem.numerics)
+        numerics = problem.numerics
+        gamma = numerics.gamma if numerics.integrator == "newmark" else 0.5
+        self.work = no_work(self.n_contacts, gamma, numerics.dt)
         self.across = np.zeros((3, self.n_contacts if simulated.lateral else 0))
         self.lateral_displacement = self.across[2]
         self.lateral_place = np.zeros(self.lateral_displacement.size)
@@ -215,9 +228,7 @@ class Pantographs:
                 model.advance(contact_force[strips])
         if self.joints_in_loop:
             self.measure_joints()
-        output_kernels.write_outputs(
-            contact_force, reported, self._heads.affine, depth, self.ends, self.of_step
-        )
+        self._write_outputs(contact_force, reported, self._heads.affine, depth)
 
     def places(self) -> list[np.ndarray]:
         """Where masses and bodies of each pantograph are now, see `Pantograph.places`; rank 0."""
@@ -227,19 +238,20 @@ class Pantographs:
         """Heights of the pantographs' bases at ``time`` [s], see `Pantograph.base`; rank 0 [m]."""
         return [model.base(time) for model in self.models]
 
-    def records(self) -> np.ndarray | None:
-        """The heads as a compiled loop steps them, None if it cannot step one of them."""
-        records = np.zeros(self.n, dtype=HEAD)
-        for record, model, strips in zip(records, self.models, self._contacts, strict=True):
+    def heads_in_loop(self) -> list[native.Head] | None:
+        """The heads as the loop of kernels steps them, None if it cannot step one of them."""
+        heads = []
+        for model, strips in zip(self.models, self._contacts, strict=True):
             if not isinstance(model, SteppedHead) or model.by_hand:
                 return None
-            fill_head(record, {**model.record(), "first": strips.start})
-        return records
+            model.stepped.first = strips.start
+            heads.append(model.stepped)
+        return heads
 
     def fill_drives(self, times: Sequence[float], drives: np.ndarray) -> None:
-        """Fill in what heads of ``records`` depend on in steps to ``times`` [s].
+        """Fill in what ``heads_in_loop`` depend on in steps to ``times`` [s].
 
-        ``drives`` (len(times), n, `head_records.drive_width`).
+        ``drives`` (len(times), n, `drives.drive_width`).
         """
         for number, model in enumerate(self.models):
             assert isinstance(model, SteppedHead)
@@ -388,12 +400,3 @@ def nominal_height_rule(
         return mean + above
 
     return height
-
-
-def _no_work(n_contacts: int, numerics: Numerics) -> ContactWork:
-    """Work of contact forces before the first step."""
-    gamma = numerics.gamma if numerics.integrator == "newmark" else 0.5
-    weights = np.array([1.0 - gamma, gamma, numerics.dt])
-    local, values = np.zeros((n_contacts, 4), dtype=np.int64), np.zeros((n_contacts, 4))
-    force, before, ahead = np.zeros((3, n_contacts))
-    return ContactWork(np.zeros(1), force, local, values, before, ahead, weights)

@@ -3,11 +3,28 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from catenary.solver.contact.contact_wire import ContactWires
-from catenary.solver.contact.train.place_kernels import Leads
+
+
+class Leads(NamedTuple):
+    """How far contacts are ahead of the middle of their raked strips, as kernels take it.
+
+    Attributes
+    ----------
+    contact : (m,) int, numbers of the contacts of raked strips, none for a train without them
+    first : (m + 1,) int, where the points of each begin
+    middle : (k,) places of the strip's middle along the track [m], ascending for each contact
+    lead : (k,) how far the contact is ahead of it [m], straight in between
+    """
+
+    contact: np.ndarray
+    first: np.ndarray
+    middle: np.ndarray
+    lead: np.ndarray
 
 
 def leads_of(wires: ContactWires, wire: np.ndarray, rake: np.ndarray) -> Leads:

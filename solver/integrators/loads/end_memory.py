@@ -9,16 +9,44 @@ Audio Eng. Soc. 43, 1995): log(n)^2 numbers a step, and each is there when its s
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from mpi4py import MPI
 
 from catenary.solver.base.errors import InputError
 from catenary.solver.integrators.line_state import AlphaAhead, LineState
-from catenary.solver.integrators.loads import memory_kernels
+from catenary.solver.kernels import native
 from catenary.solver.linear.halo import Subdomain
 from catenary.solver.model.loads import MemoryLoad
+
+# Lags below this are summed one by one; a power of two.
+NEAR = native.NEAR
+
+
+class MemoryTables(NamedTuple):
+    """What all ends of a rank remember, one after another: where the parts of each begin is in
+    ``ends``, see ``memories.hpp``."""
+
+    ends: np.ndarray
+    past: np.ndarray
+    sums: np.ndarray
+    near: np.ndarray
+    spectra: np.ndarray
+    room: np.ndarray
+    turns: np.ndarray
+
+
+class Memories(NamedTuple):
+    """All ends' unknowns ``into`` loads and of their ``own`` among accelerations, and the latter as
+    ``shares`` (2,) of two arrays, the ``latest`` and the ``known`` ones."""
+
+    into: np.ndarray
+    own: np.ndarray
+    latest: np.ndarray
+    known: np.ndarray
+    shares: np.ndarray
+    tables: MemoryTables
 
 
 class EndMemories:
@@ -27,7 +55,7 @@ class EndMemories:
     Attributes
     ----------
     places : (k,) among what the rank solves for, where its own memories act
-    arguments : of ``memory_kernels.remember`` but the first two, for the arrays of a motion
+    arguments : what kernels know of them, for the arrays of a motion
 
     Parameters
     ----------
@@ -50,9 +78,7 @@ class EndMemories:
         self.places = np.concatenate(
             [np.zeros(0, np.int64), *(load.unknowns - domain.low for load in mine)]
         )
-        self._tables = memory_kernels.tables_of(
-            [(load.numbers(load.n_steps + 1), load.dt) for load in mine]
-        )
+        self._tables = tables_of([(load.numbers(load.n_steps + 1), load.dt) for load in mine])
         self._own = self.places + domain.low - domain.first
         self.read(None)
         self._requests: list[MPI.Prequest] = []
@@ -72,7 +98,7 @@ class EndMemories:
             latest = known = motion.read[2]
             shares = np.array([1.0, 0.0])
         places = self.places.astype(np.int64), self._own.astype(np.int64)
-        self.arguments = (places, (latest, known, shares), self._tables)
+        self.arguments = Memories(*places, latest, known, shares, self._tables)
 
     def share(self) -> None:
         """Send the forces to ranks that solve for them, too. Collective among these."""
@@ -119,7 +145,7 @@ class EndMemories:
                 rows = self._past_of(number)
                 rows[:] = 0.0
                 rows[:, :n] = past[first:last, :n]
-        memory_kernels.recall(self._tables, n)
+        native.recall(self._tables, n)
 
     def destroy(self) -> None:
         """Free the messages."""
@@ -129,8 +155,9 @@ class EndMemories:
 
     def _past_of(self, number: int) -> np.ndarray:
         """Rows of one of the rank's own ends, the array itself."""
-        m, n, _, at = self._tables[0][number, :4]
-        return self._tables[2][at : at + m * n].reshape(m, n)
+        end = self._tables.ends[number]
+        m, n, at = end["width"], end["n_steps"], end["past"]
+        return self._tables.past[at : at + m * n].reshape(m, n)
 
     def _connect(self, domain: Subdomain, owns: list[bool]) -> None:
         """Set up messages from owners to others that solve for an end. Collective."""
@@ -153,10 +180,59 @@ class EndMemories:
                     self._requests.append(comm.Recv_init(buffer, source=rank, tag=number))
 
 
-def _none() -> tuple[Any, ...]:
-    nowhere = np.zeros(0, dtype=np.int64)
-    still = np.zeros(0), np.zeros(0), np.array([1.0, 0.0])
-    return (nowhere, nowhere), still, memory_kernels.tables_of([])
+def tables_of(ends: list[tuple[np.ndarray, float]]) -> MemoryTables:
+    """Tables of ends with numbers Q (n, m, m) of all lags, and the time step [s] of each."""
+    table = np.zeros(len(ends), dtype=native.END_MEMORY)
+    near, spectra = [np.zeros(0)], [np.zeros(0, dtype=complex)]
+    sizes = np.zeros(4, dtype=np.int64)
+    largest = max((_levels_of(numbers.shape[0]) for numbers, _ in ends), default=0)
+    longest = NEAR << max(largest - 1, 0)
+    turns = np.ones(2 * longest, dtype=complex)
+    half = 1
+    while half <= longest:
+        turns[half : 2 * half] = np.exp(-1j * np.pi * np.arange(half) / half)
+        half *= 2
+    widest = 0
+    for e, (numbers, dt) in enumerate(ends):
+        n, m, _ = numbers.shape
+        levels = _levels_of(n)
+        widest = max(widest, m)
+        table[e] = m, n, levels, *sizes, 0, dt
+        padded = np.zeros((NEAR << levels, m, m))
+        padded[: min(n, NEAR << levels)] = numbers[: NEAR << levels]
+        padded[0] = 0.0
+        near.append(padded[:NEAR].transpose(1, 2, 0).ravel())
+        size = 0
+        for level in range(levels):
+            length = NEAR << level
+            part = np.zeros((m, m, 2 * length))
+            part[:, :, :length] = padded[length : 2 * length].transpose(1, 2, 0)
+            paired = part[0::2].astype(complex)
+            paired[: m // 2] += 1j * part[1::2]
+            for row in paired.reshape(-1, 2 * length):
+                native.fourier_forth(row, turns)
+            # The transform back is divided here.
+            spectra.append(paired.ravel() / (2 * length))
+            size += paired.size
+        sizes += (m * n, m * n, near[-1].size, size)
+    room = np.zeros((widest + 1, turns.size), dtype=complex)
+    past, sums = np.zeros(sizes[0]), np.zeros(sizes[1])
+    return MemoryTables(
+        table, past, sums, np.concatenate(near), np.concatenate(spectra), room, turns
+    )
+
+
+def _levels_of(n: int) -> int:
+    """Doubles of NEAR, itself included, that are lags of n steps."""
+    levels = 0
+    while NEAR << levels < n:
+        levels += 1
+    return levels
+
+
+def _none() -> Memories:
+    nowhere, nothing = np.zeros(0, dtype=np.int64), np.zeros(0)
+    return Memories(nowhere, nowhere, nothing, nothing, np.array([1.0, 0.0]), tables_of([]))
 
 
 # What a line without memories has for ``EndMemories.arguments``.

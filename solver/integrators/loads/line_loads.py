@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from mpi4py import MPI
 from scipy import sparse
 
 from catenary.solver.base.kernels import aligned_arrays
-from catenary.solver.base.kernels.bound import bound
 from catenary.solver.integrators.line_state import LineState
-from catenary.solver.integrators.loads import load_kernels
-from catenary.solver.integrators.loads.end_memory import NO_MEMORIES, EndMemories
+from catenary.solver.integrators.loads.end_memory import NO_MEMORIES, EndMemories, Memories
+from catenary.solver.kernels import native
 from catenary.solver.linear.halo import Subdomain
 from catenary.solver.model.loads import (
     CONSTANT,
@@ -26,6 +25,38 @@ from catenary.solver.model.loads import (
 
 # What samples of a load may take [B], and the most slices that are made at once.
 _BYTES, _MOST_SLICES = 2**24, 512
+
+
+class Changing(NamedTuple):
+    """Places that change with factors, their terms as rows of a sparse matrix, and the factors with
+    their numbers; see ``loads.hpp``, as for the next two."""
+
+    places: np.ndarray
+    begins: np.ndarray
+    terms: np.ndarray
+    forces: np.ndarray
+    factors: np.ndarray
+    numbers: np.ndarray
+
+
+class Sampled(NamedTuple):
+    """Loads whose forces are made ahead, side by side."""
+
+    loads: np.ndarray
+    times: np.ndarray
+    places: np.ndarray
+    samples: np.ndarray
+
+
+class LoadArguments(NamedTuple):
+    """All loads, whose ``values`` are to be those at ``clock`` (1,) [s]; ``constant`` stays."""
+
+    clock: np.ndarray
+    values: np.ndarray
+    constant: np.ndarray
+    changing: Changing
+    sampled: Sampled
+    memories: Memories
 
 
 class LineLoads:
@@ -45,9 +76,8 @@ class LineLoads:
     memories : of ends that go on, None if there are none
     values : (domain.size,) their sum at the latest time [N], [N m]
     changes : whether they change with time
-    clock : (1,) the time that ``kernel`` reads [s]
-    kernel, arguments : the compiled function that fills ``values``, and what it is called with, for
-        compiled loops, which ``cover`` the times of their steps before
+    arguments : what the kernel that fills ``values`` is called with, once its clock is set and the
+        time is ``cover``ed
     """
 
     def __init__(
@@ -58,7 +88,6 @@ class LineLoads:
         comm: Any = MPI.COMM_SELF,
     ) -> None:
         self.values = aligned_arrays.zeros(domain.size, 1)
-        self.clock = np.zeros(1)
         free = np.ones(domain.size, dtype=bool)
         free[held[(held >= domain.low) & (held < domain.high)] - domain.low] = False
         constant = np.zeros(domain.size)
@@ -83,13 +112,10 @@ class LineLoads:
         self.values[:] = constant
         sampled = _side_by_side(self._sampled)
         remembered = np.zeros(0, np.int64) if self.memories is None else self.memories.places
-        changing, rows = _rows_of(shapes, np.concatenate([sampled[3], remembered]))
-        self.changes = bool(changing.size)
-        functions = _functions_of([load for load, _, _ in shapes])
-        self.kernel: Any = load_kernels.evaluate_held
-        self._own = (
-            *(self.clock, self.values, constant, changing.astype(np.int64)),
-            *(rows, functions, sampled),
+        changing = _changing_of(shapes, np.concatenate([sampled.places, remembered]))
+        self.changes = bool(changing.places.size)
+        self.arguments = LoadArguments(
+            np.zeros(1), self.values, constant, changing, sampled, NO_MEMORIES
         )
         self.read(None)
 
@@ -97,15 +123,14 @@ class LineLoads:
         """Let forces that remember a motion take it from here. Not collective."""
         if self.memories is not None:
             self.memories.read(motion)
-        remembered = NO_MEMORIES if self.memories is None else self.memories.arguments
-        self.arguments = (*self._own, remembered)
-        self._evaluate = bound(load_kernels.evaluate, *self.arguments) if self.changes else None
+            self.arguments = self.arguments._replace(memories=self.memories.arguments)
+        self._evaluate = native.evaluate.bound(self.arguments) if self.changes else None
 
     def at(self, time: float) -> None:
         """Make ``values`` those at a time [s]. Collective with forces that remember a motion."""
         if self._evaluate is not None:
             self.cover(np.array([time]))
-            self.clock[0] = time
+            self.arguments.clock[0] = time
             self._evaluate()
         if self.memories is not None:
             self.memories.share()
@@ -186,42 +211,39 @@ class _Sampled:
         return int(np.searchsorted(wanted, end - 1))
 
 
-def _rows_of(
+def _changing_of(
     shapes: list[tuple[ShapeLoad, np.ndarray, np.ndarray]], others: np.ndarray
-) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """Places that change, those of ``others`` too, and of each the terms and their forces."""
+) -> Changing:
+    """What changes with ``shapes``, each with its places and forces there, and ``others``."""
     at = np.concatenate([np.zeros(0, np.int64), *(places for _, places, _ in shapes)])
     term = np.repeat(np.arange(len(shapes)), [places.size for _, places, _ in shapes])
     forces = np.concatenate([np.zeros(0), *(values for _, _, values in shapes)])
-    changing = np.unique(np.concatenate([at, others]))
+    places = np.unique(np.concatenate([at, others])).astype(np.int64)
     matrix = sparse.coo_matrix(
-        (forces, (np.searchsorted(changing, at), term)), shape=(changing.size, len(shapes))
+        (forces, (np.searchsorted(places, at), term)), shape=(places.size, len(shapes))
     ).tocsr()
     begins, terms = matrix.indptr.astype(np.int64), matrix.indices.astype(np.int64)
-    return changing, (begins, terms, matrix.data)
+    numbers = [load.factor.numbers for load, _, _ in shapes]
+    ends = np.cumsum([0, *(own.size for own in numbers)])
+    factors = np.zeros(len(shapes), dtype=native.FACTOR)
+    factors["kind"] = [load.factor.kind for load, _, _ in shapes]
+    factors["begin"], factors["end"] = ends[:-1], ends[1:]
+    all_numbers = np.concatenate([np.zeros(0), *numbers])
+    return Changing(places, begins, terms, matrix.data, factors, all_numbers)
 
 
-def _functions_of(shapes: list[ShapeLoad]) -> tuple[np.ndarray, ...]:
-    """Kinds, begins, numbers and room for the factors of shapes."""
-    parts = [load.factor.numbers for load in shapes]
-    kinds = np.array([load.factor.kind for load in shapes], dtype=np.int64)
-    begins = np.cumsum([0, *(part.size for part in parts)], dtype=np.int64)
-    return kinds, begins, np.concatenate([np.zeros(0), *parts]), np.zeros(kinds.size)
-
-
-def _side_by_side(loads: list[_Sampled]) -> tuple[np.ndarray, ...]:
-    """Bounds, counts, times, places and samples of all, in arrays that each then works in."""
+def _side_by_side(loads: list[_Sampled]) -> Sampled:
+    """All of them, in arrays that each then works in."""
     places = np.concatenate([np.zeros(0, np.int64), *(load.places for load in loads)])
     times = np.concatenate([np.zeros(0), *(load.times for load in loads)])
-    held = np.zeros(len(loads), dtype=np.int64)
     samples = np.zeros(sum(load.samples.size for load in loads))
-    bounds = np.zeros((len(loads), 4), dtype=np.int64)
+    table = np.zeros(len(loads), dtype=native.SAMPLED_LOAD)
     place = begin = at = 0
     for number, load in enumerate(loads):
-        bounds[number] = place, place + load.places.size, begin, at
+        table[number] = place, place + load.places.size, begin, at, 0
         shape, size = load.samples.shape, load.samples.size
         load.times = times[begin : begin + load.times.size]
         load.samples = samples[at : at + size].reshape(shape)
-        load.held = held[number : number + 1]
+        load.held = table["held"][number : number + 1]
         place, begin, at = place + load.places.size, begin + load.times.size, at + size
-    return bounds, held, times, places, samples
+    return Sampled(table, times, places, samples)

@@ -4,6 +4,9 @@
 
 namespace catenary {
 
+/// Far more than the round-off of a position, far less than an element [m].
+inline constexpr double kSlip = 1e-6;
+
 /// A node of a contact wire. As short as can be, since a line has very many.
 struct Node {
     double x, y;       ///< along the track and across it [m]

@@ -21,15 +21,33 @@ void predict(std::span<double> displacement, std::span<double> velocity,
 
 CATENARY_FOR_TARGETS
 void correct(std::span<double> displacement, std::span<double> velocity,
-             std::span<double> acceleration, const Newmark& steps) {
-    const Newmark s = steps;
+             std::span<double> acceleration, double position_factor, double velocity_factor,
+             double damping_share) {
     // Long lines wait for memory: what does not change is not written.
-    const bool writes = s.damping_share != 0.0;
+    const bool writes = damping_share != 0.0;
     for (size_t i = 0; i < displacement.size(); ++i) {
-        const double v = velocity[i], a = acceleration[i] - s.damping_share * v;
+        const double v = velocity[i], a = acceleration[i] - damping_share * v;
         if (writes) acceleration[i] = a;
-        velocity[i] = v + s.velocity_factor * a;
-        displacement[i] += s.position_factor * a;
+        velocity[i] = v + velocity_factor * a;
+        displacement[i] += position_factor * a;
+    }
+}
+
+CATENARY_FOR_TARGETS
+void predict_alpha(std::span<double> displacement, std::span<double> velocity,
+                   std::span<const double> balanced, std::span<double> known,
+                   std::span<double> work, const Alpha& by) {
+    const Alpha s = by;
+    for (size_t i = 0; i < displacement.size(); ++i) {
+        const double b = balanced[i], a = known[i] + s.ratio * b;
+        const double p = s.known_of_balanced * b + s.known_of_own * a;
+        const double d =
+            displacement[i] + s.dt * velocity[i] + s.position_of_own * a + s.position_of_known * p;
+        const double v = velocity[i] + s.velocity_of_own * a + s.velocity_of_known * p;
+        known[i] = p;
+        displacement[i] = d;
+        velocity[i] = v;
+        work[i] = -(d + s.damping_on_stiffness * v);
     }
 }
 

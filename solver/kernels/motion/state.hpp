@@ -33,7 +33,26 @@ void predict(std::span<double> displacement, std::span<double> velocity,
 /// New displacement and velocity from predictions and acceleration (eq. 2.6). The acceleration
 /// still lacks -`damping_share` v, the part of damping on mass.
 void correct(std::span<double> displacement, std::span<double> velocity,
-             std::span<double> acceleration, const Newmark& steps);
+             std::span<double> acceleration, double position_factor, double velocity_factor,
+             double damping_share);
+
+/// Factors of a step's predictions by the accelerations of the generalized-alpha method. With b the
+/// acceleration that balances the forces at the end of a step, the algorithm's is a = p + r b,
+/// where p is known when the step begins.
+struct Alpha {
+    double dt, ratio;                           ///< [s], r
+    double known_of_balanced, known_of_own;     ///< shares of b and a before in p
+    double position_of_own, position_of_known;  ///< of a before and p in the displacement [s2]
+    double velocity_of_own, velocity_of_known;  ///< and in the velocity [s]
+    double damping_on_stiffness;                ///< c of d + c v
+    CATENARY_RECORD(dt, ratio, known_of_balanced, known_of_own, position_of_own, position_of_known,
+                    velocity_of_own, velocity_of_known, damping_on_stiffness)
+};
+/// Predictions in place from b and p of the step before. `known` becomes the p of this step, and
+/// `work` -(d + c v).
+void predict_alpha(std::span<double> displacement, std::span<double> velocity,
+                   std::span<const double> balanced, std::span<double> known,
+                   std::span<double> work, const Alpha& by);
 
 /// Fill in displacements, velocities, of the unknowns from `begin` on.
 void displacements(const Motion& motion, int64_t begin, std::span<double> result);

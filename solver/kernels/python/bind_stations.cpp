@@ -7,30 +7,14 @@
 #include <stdexcept>
 #include <string>
 
+#include "motion/two_passes.hpp"
 #include "python/from_python.hpp"
-#include "stations/line.hpp"
+#include "stations/elimination.hpp"
+#include "stations/records.hpp"
 
 namespace catenary::python {
 
 namespace {
-
-template <class T>
-using Array = py::array_t<T, py::array::c_style>;
-
-/// An array that is taken as it is: a copy would not be what others read and write.
-template <class T>
-Array<T> as_is(const py::object& given, const char* name) {
-    if (!py::isinstance<Array<T>>(given))
-        throw py::type_error(std::string(name) +
-                             " is no contiguous array of the type that kernels take");
-    return py::reinterpret_borrow<Array<T>>(given);
-}
-
-/// Numbers of an array that is kept alive by whoever asks; null if it has none.
-template <class T>
-const T* in(const Array<T>& array) {
-    return array.size() ? array.data() : nullptr;
-}
 
 Widths widths_of(const std::vector<int>& given) {
     if (given.empty() || given.size() > kMostPlanes)
@@ -69,66 +53,6 @@ Layout layout_of(const std::vector<int>& widths, const std::vector<int>& own,
     return layout;
 }
 
-/// Where stations stand: starts and make-ups, both empty if all are alike.
-struct PlacesOf {
-    Array<int64_t> starts;
-    Array<uint8_t> make_up;
-    Places places() const { return {in(starts), in(make_up)}; }
-};
-PlacesOf places_of(const py::object& given) {
-    return {as_is<int64_t>(given.attr("starts"), "starts"),
-            as_is<uint8_t>(given.attr("make_up"), "make_up")};
-}
-
-/// Rows of a product, see `StationProduct`.
-struct Rows {
-    Array<int32_t> kinds;
-    Array<double> numbers;
-    int64_t first;
-    PlacesOf places;
-
-    Rows(const py::object& kinds_, const py::object& numbers_, int64_t first_,
-         const py::object& places_)
-        : kinds(as_is<int32_t>(kinds_, "kinds")),
-          numbers(as_is<double>(numbers_, "numbers")),
-          first(first_),
-          places(places_of(places_)) {}
-};
-/// Factors, see `StationFactors`.
-struct Factors {
-    Array<int32_t> kinds;
-    Array<double> numbers;
-    Array<int32_t> beside_kinds;
-    Array<double> besides;
-    int64_t low;
-    Array<int64_t> ends;
-    PlacesOf places;
-
-    Factors(const py::object& kinds_, const py::object& numbers_, const py::object& beside_kinds_,
-            const py::object& besides_, int64_t low_, const py::object& ends_,
-            const py::object& places_)
-        : kinds(as_is<int32_t>(kinds_, "kinds")),
-          numbers(as_is<double>(numbers_, "numbers")),
-          beside_kinds(as_is<int32_t>(beside_kinds_, "beside_kinds")),
-          besides(as_is<double>(besides_, "besides")),
-          low(low_),
-          ends(as_is<int64_t>(ends_, "ends")),
-          places(places_of(places_)) {
-        if (ends.size() != 5) throw py::value_error("factors have five ends");
-    }
-};
-
-void put(const Rows& rows, Work& work) {
-    work.product.rows = {in(rows.kinds), in(rows.numbers)};
-    work.product.first = rows.first;
-    work.product.places = rows.places.places();
-}
-void put(const Factors& factors, Work& work) {
-    work.factored.inverse = {in(factors.kinds), in(factors.numbers)};
-    work.factored.beside = {in(factors.beside_kinds), in(factors.besides)};
-    work.factored.places = factors.places.places();
-}
-
 using Layouts = std::vector<Layout>;
 using MakeUps = std::vector<std::vector<int>>;
 
@@ -149,32 +73,34 @@ Line line_of(size_t n, const MakeUps& make_ups, KernelsOf kernels_of_make_up) {
 /// Products with rows of K, and -C.
 class Products {
   public:
-    Products(const Layouts& layouts, const MakeUps& make_ups, Rows rows)
+    Products(const Layouts& layouts, const MakeUps& make_ups, const py::object& rows)
         : line_(line_of(layouts.size(), make_ups,
                         [&](size_t k) { return kernels_of_rows(layouts[k]); })),
-          rows_(std::move(rows)) {
-        put(rows_, work_);
+          rows_(From<ProductArrays>::convert(rows, "rows", kept_)) {
+        work_.product = rows_.product();
         // Stations of the result stand as those of what is multiplied.
-        const int64_t n = rows_.kinds.size();
-        if (work_.product.places.starts) {
-            starts_.assign(rows_.places.starts.data() + rows_.first,
-                           rows_.places.starts.data() + rows_.first + n);
-            for (auto& start : starts_) start -= rows_.places.starts.data()[rows_.first];
-            work_.factored.places = {starts_.data(), rows_.places.make_up.data() + rows_.first};
+        const int64_t n = size(rows_.kinds), first = rows_.first;
+        if (!rows_.sections.starts.empty()) {
+            const auto starts = rows_.sections.starts.subspan(first, n);
+            starts_.assign(starts.begin(), starts.end());
+            for (auto& start : starts_) start -= starts[0];
+            work_.factored.places = {starts_.data(), &rows_.sections.make_up[first]};
         }
         line_.set_runs(work_, n, 0);
     }
     void multiply(int64_t begin, int64_t end, const py::object& factor, const py::object& velocity,
                   const py::object& result) {
-        if (begin < 0 || end > rows_.kinds.size()) throw py::value_error("no such rows");
-        work_.product.factor = as_is<double>(factor, "factor").data();
-        work_.product.velocity = as_is<double>(velocity, "velocity").data();
-        line_.multiply(work_, begin, end, as_is<double>(result, "result").mutable_data());
+        if (begin < 0 || end > size(rows_.kinds)) throw py::value_error("no such rows");
+        Kept kept;
+        work_.product.factor = numbers_of<const double>(factor, "factor", 1, kept);
+        work_.product.velocity = numbers_of<const double>(velocity, "velocity", 1, kept);
+        line_.multiply(work_, begin, end, numbers_of<double>(result, "result", 1, kept));
     }
 
   private:
+    Kept kept_;
     Line line_;
-    Rows rows_;
+    ProductArrays rows_;
     Work work_;
     std::vector<int64_t> starts_;
 };
@@ -182,90 +108,89 @@ class Products {
 /// Solves with factors.
 class Solves {
   public:
-    Solves(const Layouts& layouts, const MakeUps& make_ups, Factors factors)
+    Solves(const Layouts& layouts, const MakeUps& make_ups, const py::object& factors)
         : line_(line_of(layouts.size(), make_ups,
                         [&](size_t k) { return kernels_of_factors(layouts[k]); })),
-          factors_(std::move(factors)) {
-        put(factors_, work_);
-        line_.set_runs(work_, factors_.kinds.size(), 0);
+          factors_(From<FactorArrays>::convert(factors, "factors", kept_)) {
+        work_.factored = factors_.factored();
+        line_.set_runs(work_, size(factors_.kinds), 0);
     }
     void solve(const py::object& right, const py::object& answer) {
-        work_.right = as_is<double>(right, "right").data();
-        work_.answer = as_is<double>(answer, "answer").mutable_data();
-        line_.solve(work_, factors_.kinds.size(), factors_.ends.data()[4]);
+        Kept kept;
+        work_.right = numbers_of<const double>(right, "right", 1, kept);
+        work_.answer = numbers_of<double>(answer, "answer", 1, kept);
+        line_.solve(work_, size(factors_.kinds), factors_.at().middle);
     }
 
   private:
+    Kept kept_;
     Line line_;
-    Factors factors_;
+    FactorArrays factors_;
     Work work_;
 };
 
-/// Steps in two passes, for compiled loops and from Python.
-class Passes {
+/// Steps in two passes, and what they are made of.
+class HeldPasses : public TwoPasses {
   public:
-    Passes(const std::vector<std::pair<Layout, Layout>>& layouts, const MakeUps& make_ups,
-           Rows rows, Factors factors, const std::vector<py::object>& arrays,
-           const std::array<double, 11>& changes)
-        : line_(line_of(layouts.size(), make_ups,
-                        [&](size_t k) { return kernels_of(layouts[k].first, layouts[k].second); })),
-          rows_(std::move(rows)),
-          factors_(std::move(factors)) {
-        if (arrays.size() != 8) throw py::value_error("passes take eight arrays");
-        for (const auto& array : arrays)
-            arrays_.push_back(as_is<double>(array, "an array of the passes"));
-        put(rows_, work_);
-        put(factors_, work_);
-        auto at = [&](int number) {
-            auto& array = arrays_[number];
-            return array.size() ? array.mutable_data() : nullptr;
-        };
-        work_.product.factor = at(0);
-        work_.product.velocity = at(1);
-        work_.loads = at(2);
-        work_.answer = at(3);
-        const auto& c = changes;
-        work_.motion = {at(4),
-                        at(5),
-                        at(6),
-                        at(7),
-                        {c[0], c[1], c[2], c[3], {c[4], c[5]}, {c[6], c[7]}, {c[8], c[9]}, c[10]}};
-        line_.set_runs(work_, factors_.kinds.size(), factors_.low);
+    HeldPasses(const std::vector<std::pair<Layout, Layout>>& layouts, const MakeUps& make_ups,
+               const py::object& rows, const py::object& factors, const py::object& arrays,
+               const py::object& changes, Kept kept = {})
+        : TwoPasses(
+              line_of(layouts.size(), make_ups,
+                      [&](size_t k) { return kernels_of(layouts[k].first, layouts[k].second); }),
+              From<ProductArrays>::convert(rows, "rows", kept),
+              From<FactorArrays>::convert(factors, "factors", kept),
+              From<PassArrays>::convert(arrays, "arrays", kept),
+              From<Changes>::convert(changes, "changes", kept)),
+          kept_(std::move(kept)) {}
+    void track(const py::object& links, const py::object& reserve, const py::object& ranges,
+               int64_t stretch) {
+        Kept kept;
+        TwoPasses::track(From<Links>::convert(links, "links", kept),
+                         From<std::span<double>>::convert(reserve, "reserve", kept),
+                         From<Array2<const int64_t>>::convert(ranges, "ranges", kept), stretch);
+        of_links_ = std::move(kept);
     }
-    /// What is called before both passes, and after each `stretch` of the pass back.
-    void call(int64_t stretch, std::pair<size_t, size_t> ahead,
-              std::pair<size_t, size_t> following) {
-        stretch_ = std::max<int64_t>(1, stretch);
-        ahead_ = call_of(ahead);
-        following_ = call_of(following);
-    }
-    void step() {
-        line_.step(work_, *reinterpret_cast<const Ends*>(factors_.ends.data()), stretch_, ahead_,
-                   following_);
-    }
-    std::pair<size_t, size_t> address() {
-        return {reinterpret_cast<size_t>(&Passes::take), reinterpret_cast<size_t>(this)};
+    void open(const py::object& window) {
+        Kept kept;
+        TwoPasses::open(From<Window>::convert(window, "window", kept));
+        of_window_ = std::move(kept);
     }
 
   private:
-    static Call call_of(const std::pair<size_t, size_t>& address) {
-        return {reinterpret_cast<void (*)(void*)>(address.first),
-                reinterpret_cast<void*>(address.second)};
-    }
-    static void take(void* passes) { static_cast<Passes*>(passes)->step(); }
-
-    Line line_;
-    Rows rows_;
-    Factors factors_;
-    std::vector<Array<double>> arrays_;
-    Work work_;
-    int64_t stretch_ = 1;
-    Call ahead_, following_;
+    Kept kept_, of_links_, of_window_;
 };
+
+/// An array of numbers that were made for it.
+template <class T>
+py::object given_away(std::vector<T> numbers, std::vector<py::ssize_t> shape) {
+    auto own = std::make_unique<std::vector<T>>(std::move(numbers));
+    T* const data = own->data();
+    py::capsule keeper(own.release(),
+                       [](void* made) { delete static_cast<std::vector<T>*>(made); });
+    return py::array_t<T>(std::move(shape), data, keeper);
+}
+
+py::tuple eliminated(std::span<const int32_t> kinds, const StationBlocks& blocks, bool from_end) {
+    Eliminated found = eliminate(kinds, blocks, from_end);
+    const auto m = static_cast<py::ssize_t>(found.kinds.size()), b = blocks.own.rows;
+    const auto n = static_cast<py::ssize_t>(found.numbers.size());
+    return py::make_tuple(given_away(std::move(found.factors), {m, 3, b, b}),
+                          given_away(std::move(found.kinds), {m}),
+                          given_away(std::move(found.numbers), {n}));
+}
 
 }  // namespace
 
 void offer_stations(py::module_& m) {
+    m.attr("MIDDLES") = kMiddles;
+    PYBIND11_NUMPY_DTYPE(Meeting, kind, before, after);
+    m.attr("MEETING") = py::dtype::of<Meeting>();
+    offer(m, "middle_of", middle_of, "A station where elimination may end, near a middle.");
+    offer(m, "turn", turn, "Let elimination end at another station.");
+    offer(m, "eliminate", eliminated,
+          "Factors of stations eliminated from one end, their kinds, and which each station has.");
+    offer(m, "join", join, "Fill in factors of stations where elimination from both ends meets.");
     py::class_<Layout>(m, "Layout")
         .def(py::init(&layout_of), py::arg("widths"), py::arg("own"), py::arg("beside"),
              py::arg("damped"), py::arg("sparse"), py::arg("general"), py::arg("strands"));
@@ -275,22 +200,25 @@ void offer_stations(py::module_& m) {
     m.def("has_strands", &has_strands, py::arg("factors"));
     m.def("targets", &targets);
     m.def("set_target", &set_target, py::arg("name"));
-    py::class_<Rows>(m, "Rows").def(py::init<py::object, py::object, int64_t, py::object>());
-    py::class_<Factors>(m, "Factors")
-        .def(py::init<py::object, py::object, py::object, py::object, int64_t, py::object,
-                      py::object>());
     py::class_<Products>(m, "Products")
-        .def(py::init<Layouts, MakeUps, Rows>())
+        .def(py::init<Layouts, MakeUps, py::object>())
         .def("multiply", &Products::multiply);
     py::class_<Solves>(m, "Solves")
-        .def(py::init<Layouts, MakeUps, Factors>())
+        .def(py::init<Layouts, MakeUps, py::object>())
         .def("solve", &Solves::solve);
-    py::class_<Passes>(m, "Passes")
-        .def(py::init<std::vector<std::pair<Layout, Layout>>, MakeUps, Rows, Factors,
-                      std::vector<py::object>, std::array<double, 11>>())
-        .def("call", &Passes::call)
-        .def("step", &Passes::step)
-        .def_property_readonly("address", &Passes::address);
+    py::class_<TwoPasses>(m, "FreeSteps")
+        .def("step", &TwoPasses::step)
+        .def("predict_velocities", py::overload_cast<>(&TwoPasses::predict_velocities));
+    py::class_<HeldPasses, TwoPasses>(m, "TwoPasses")
+        .def(py::init([](const std::vector<std::pair<Layout, Layout>>& layouts,
+                         const MakeUps& make_ups, const py::object& rows, const py::object& factors,
+                         const py::object& arrays, const py::object& changes) {
+            return std::make_unique<HeldPasses>(layouts, make_ups, rows, factors, arrays, changes);
+        }))
+        .def("track", &HeldPasses::track)
+        .def("open", &HeldPasses::open);
+    offer(m, "left_behind", left_behind,
+          "Fill in which links the pass back has left behind with each stretch.");
 }
 
 }  // namespace catenary::python

@@ -102,6 +102,14 @@ struct From<Array3<T>> {
         return {numbers, array.shape(0), array.shape(1), array.shape(2)};
     }
 };
+template <class T>
+struct From<Array4<T>> {
+    static Array4<T> convert(py::handle given, const std::string& name, Kept& kept) {
+        T* numbers = numbers_of<T>(given, name, 4, kept);
+        auto array = py::reinterpret_borrow<py::array>(given);
+        return {numbers, array.shape(0), array.shape(1), array.shape(2), array.shape(3)};
+    }
+};
 /// An object of a bound class, which is kept alive.
 template <class T>
 struct From<T*> {
@@ -164,6 +172,8 @@ class BoundFunction : public Bound {
         if constexpr (std::is_void_v<R>) {
             std::apply(run, values_);
             return py::none();
+        } else if constexpr (std::is_base_of_v<py::object, R>) {
+            return std::apply(run, values_);
         } else {
             return py::cast(std::apply(run, values_));
         }

@@ -166,9 +166,8 @@ void Line::solve(const Work& work, int64_t n, int64_t middle) const {
     while (a.left + b.left > 0) go_on(work, false, a, b, n);
 }
 
-void Line::step(const Work& work, const Ends& ends, int64_t stretch, Call ahead,
-                Call following) const {
-    ahead();
+void Line::step(const Work& work, const Ends& ends, int64_t stretch, Around& around) const {
+    around.before();
     // They may have been moved.
     const auto [begin, end, low, high, middle] = ends;
     const Station met = forth(work, begin, end, middle);
@@ -180,9 +179,9 @@ void Line::step(const Work& work, const Ends& ends, int64_t stretch, Call ahead,
         go_on(work, false, a, b, stretch);
         const int64_t done = std::min(middle - 1 - a.next, b.next - middle - 1);
         for (; (followed + 1) * stretch <= done && (followed + 1) * stretch < pairs; ++followed)
-            following();
+            around.after_stretch();
     }
-    following();
+    around.after_stretch();
 }
 
 }  // namespace catenary

@@ -10,11 +10,13 @@
 // the motion on from one prediction to the next (Newmark; Chung and Hulbert, 1993). So the state is
 // read from memory once in each pass. Two chains go side by side, from both ends: each waits for
 // itself only.
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <string>
 #include <vector>
 
+#include "base/record.hpp"
 #include "stations/layout.hpp"
 
 namespace catenary {
@@ -54,12 +56,14 @@ struct Ends {
 /// What takes a state from one prediction to the next; see `changes_of`.
 struct Changes {
     double dt, by_position, by_velocity, damping_share;
-    double known[2], velocity[2], balance[2];  ///< of the generalized-alpha method
+    /// Of the generalized-alpha method: shares of z and of the known acceleration.
+    std::array<double, 2> known, velocity, balance;
     double by_mass;
+    CATENARY_RECORD(dt, by_position, by_velocity, damping_share, known, velocity, balance, by_mass)
 };
 
 /// Motion of a rank's own stations: arrays begin at station `low` of all that is solved for.
-struct Motion {
+struct StationMotion {
     double *x = nullptr, *y = nullptr, *z = nullptr, *known = nullptr;
     Changes changes{};
 };
@@ -79,7 +83,7 @@ struct Work {
     const double* loads = nullptr;  ///< of all that is solved for, or none
     const double* right = nullptr;  ///< right-hand side of a solve that makes no product
     double* answer = nullptr;
-    Motion motion;
+    StationMotion motion;
 };
 
 /// Unknowns of a station in the order of its make-up.
@@ -133,13 +137,12 @@ std::vector<std::string> targets();
 /// Choose one of these; whether there is such a one.
 bool set_target(const std::string& name);
 
-/// A function that compiled loops call with what it works on.
-struct Call {
-    void (*function)(void*) = nullptr;
-    void* with = nullptr;
-    void operator()() const {
-        if (function) function(with);
-    }
+/// What else is done along with a step: before both passes, and after stretches of the pass back.
+class Around {
+  public:
+    virtual ~Around() = default;
+    virtual void before() = 0;
+    virtual void after_stretch() = 0;
 };
 
 /// A line whose stations are of one or of several make-ups.
@@ -153,8 +156,8 @@ class Line {
     void set_runs(const Work&, int64_t n, int64_t low);
     void multiply(const Work&, int64_t begin, int64_t end, double* result) const;
     void solve(const Work&, int64_t n, int64_t middle) const;
-    /// Both passes. `ahead` is called before, `following` after each `stretch` of the pass back.
-    void step(const Work&, const Ends&, int64_t stretch, Call ahead, Call following) const;
+    /// Both passes, the pass back in stretches of so many pairs of stations.
+    void step(const Work&, const Ends&, int64_t stretch, Around&) const;
 
   private:
     const Run& run_of(int64_t station) const {

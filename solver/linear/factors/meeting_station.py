@@ -6,10 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from catenary.solver.base.kernels.compiled import compiled
+from catenary.solver.kernels import native
 
 # Where elimination may end at several places, it may at every so many stations.
-MIDDLES = 16
+MIDDLES = native.MIDDLES
 # Sum of the eigenvalues of S^-1 A - 1 where steps of a part of the line may end.
 _SOFTENED = 1.0
 
@@ -26,31 +26,9 @@ class Turning(NamedTuple):
     begins: np.ndarray
     ends: np.ndarray
 
-    @property
-    def arrays(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """What ``turn`` reads."""
-        return self.to_end, self.to_start, self.here
-
     def place(self, low: int, high: int) -> int:
         """A station where it may end, near the middle from ``low`` to ``high``."""
-        return int(middle_of(low, high))
-
-
-@compiled
-def middle_of(low, high):
-    """A station where elimination may end, near the middle from ``low`` to ``high``."""
-    return (low + high) // 2 // MIDDLES * MIDDLES
-
-
-@compiled
-def turn(kinds, turning, before, middle):
-    """Let elimination end at ``middle`` in place of ``before``."""
-    to_end, to_start, here = turning
-    for i in range(before, middle):
-        kinds[i] = to_end[i]
-    for i in range(middle + 1, before + 1):
-        kinds[i] = to_start[i]
-    kinds[middle] = here[middle // MIDDLES]
+        return int(native.middle_of(low, high))
 
 
 def softened(whole: np.ndarray, eliminated: np.ndarray) -> np.ndarray:

@@ -17,15 +17,14 @@ from scipy.sparse import csgraph
 
 from catenary.solver.base.petsc import PETSc
 from catenary.solver.kernels import native
-from catenary.solver.linear.factors.elimination import eliminate_stations, join
+from catenary.solver.linear.factors.elimination import StationBlocks, eliminate_stations
 from catenary.solver.linear.factors.meeting_station import (
     MIDDLES,
     Turning,
     edges,
     softened,
-    turn,
 )
-from catenary.solver.linear.stations.sections import Sections
+from catenary.solver.linear.stations.sections import Places, Sections
 from catenary.solver.linear.stations.station_layout import Layout
 from catenary.solver.linear.stations.station_products import kinds_by_make_up
 from catenary.solver.linear.stations.station_rows import StationRows, rows_of
@@ -37,6 +36,18 @@ LARGE = 2**19
 NARROW = 4
 # Where factors do not keep the matrix's own blocks.
 NO_BESIDES = np.zeros(0, dtype=np.int32), np.zeros(0)
+
+
+class FactorArrays(NamedTuple):
+    """What kernels read of ``StationFactors``."""
+
+    kinds: np.ndarray
+    blocks: np.ndarray
+    beside_kinds: np.ndarray
+    besides: np.ndarray
+    low: int
+    ends: np.ndarray
+    sections: Places
 
 
 class StationFactors:
@@ -59,7 +70,7 @@ class StationFactors:
     turning : what may move the place where elimination ends, None if it stays
     n_stations, n_kinds : in the matrix, and how many have different factors
     stations : Sections
-    native : the same as kernels read it
+    arrays : FactorArrays
     """
 
     def __init__(
@@ -82,14 +93,14 @@ class StationFactors:
         middle = (low + high) // 2 if turning is None else turning.place(low, high)
         self.ends = np.array([0, kinds.size, low, high, middle], dtype=np.int64)
         if turning is not None:
-            turn(kinds, turning.arrays, kinds.size - 1, middle)
+            native.turn(kinds, turning, kinds.size - 1, middle)
         numbers = self.kinds, self.blocks, self.beside_kinds, self.besides
-        self.native = native.Factors(*numbers, low, self.ends, stations.places())
+        self.arrays = FactorArrays(*numbers, low, self.ends, stations.places())
 
     @cached_property
     def _solves(self) -> native.Solves:
         layouts = [part.native for part in self.layout.parts]
-        return native.Solves(layouts, self.stations.make_ups, self.native)
+        return native.Solves(layouts, self.stations.make_ups, self.arrays)
 
     def solve(self, right: np.ndarray, answer: np.ndarray) -> None:
         """Make ``answer`` that to ``right``, of all unknowns, perhaps the same array."""
@@ -283,8 +294,9 @@ class FoundFactors(NamedTuple):
         kinds, blocks, n = rows.kinds, rows.blocks, rows.kinds.size
         meeting = np.arange(0, n, MIDDLES) if middle is None else np.array([middle])
         first, last = (n, 0) if middle is None else (middle, middle + 1)
-        before = eliminate_stations(kinds[:first], blocks, from_end=False)
-        behind = eliminate_stations(kinds[last:], blocks, from_end=True)
+        matrix = StationBlocks(*blocks)
+        before = eliminate_stations(kinds[:first], matrix, from_end=False)
+        behind = eliminate_stations(kinds[last:], matrix, from_end=True)
         # The stations that the middle joins, one more at each end that is none.
         earlier = np.concatenate([[-1], before.numbers])[meeting]
         later = np.concatenate([behind.numbers, [-1]])[meeting + 1 - last]
@@ -292,7 +304,8 @@ class FoundFactors(NamedTuple):
             np.stack([kinds[meeting], earlier, later], axis=1), axis=0, return_inverse=True
         )
         here = np.zeros((len(triples), *before.factors.shape[1:]))
-        join(triples, blocks, before.factors, behind.factors, here)
+        meetings = np.ascontiguousarray(triples).view(native.MEETING)[:, 0]
+        native.join(meetings, matrix, before.factors, behind.factors, here)
         n_before, n_behind = len(before.factors), len(behind.factors)
         parts = [before.numbers, n_before + behind.numbers, n_before + n_behind + at_middle.ravel()]
         numbers = np.concatenate(parts if middle is None else [parts[0], parts[2], parts[1]])

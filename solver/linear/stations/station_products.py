@@ -10,14 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy import sparse
 
 from catenary.solver.base.kernels import aligned_arrays
 from catenary.solver.kernels import native
-from catenary.solver.linear.stations.sections import Sections
+from catenary.solver.linear.stations.sections import Places, Sections
 from catenary.solver.linear.stations.station_layout import (
     MOST_LANES,
     MOST_PLANES,
@@ -119,6 +119,15 @@ def kinds_by_make_up(
     return begins, aligned_arrays.copy(np.concatenate(numbers)), n_kinds, count
 
 
+class ProductArrays(NamedTuple):
+    """What kernels read of a ``StationProduct``."""
+
+    kinds: np.ndarray
+    blocks: np.ndarray
+    first: int
+    sections: Places
+
+
 class StationProduct:
     """Products with rows of K, and C if the layout is damped. Not collective.
 
@@ -132,7 +141,7 @@ class StationProduct:
     first : station in the factor of the first row; the factor has one before and one after all
         rows, which is zero where the line ends
     n_kinds : how many rows are different
-    native : the same as kernels read it
+    arrays : ProductArrays
     """
 
     def __init__(
@@ -146,12 +155,12 @@ class StationProduct:
     ) -> None:
         self.layout, self.stations, self.kinds = layout, stations, kinds
         self.blocks, self.first, self.n_kinds = blocks, first, n_kinds
-        self.native = native.Rows(kinds, blocks, first, stations.places())
+        self.arrays = ProductArrays(kinds, blocks, first, stations.places())
 
     @cached_property
     def _products(self) -> native.Products:
         layouts = [part.native for part in self.layout.parts]
-        return native.Products(layouts, self.stations.make_ups, self.native)
+        return native.Products(layouts, self.stations.make_ups, self.arrays)
 
     def multiply(
         self, factor: np.ndarray, result: np.ndarray, velocity: np.ndarray | None = None

@@ -1,15 +1,14 @@
-"""Hermite functions of an element as compiled loops take them: values and slopes at a place."""
+"""Hermite functions of elements: values and slopes at places."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from catenary.solver.base.kernels.compiled import compiled
+_Place = float | np.ndarray
 
 
-@compiled
-def shape_values(xi, length):  # type: ignore[no-untyped-def]
-    """Hermite functions N at ``xi`` in [0, 1], shape (4,): w(x) = N @ unknowns [m]."""
+def shape_values(xi: _Place, length: _Place) -> np.ndarray:
+    """Hermite functions N at ``xi`` in [0, 1], shape (4,) or (4, n): w(x) = N @ unknowns [m]."""
     square, cube = xi * xi, xi * xi * xi
     return np.array(
         [
@@ -21,9 +20,9 @@ def shape_values(xi, length):  # type: ignore[no-untyped-def]
     )
 
 
-@compiled
-def shape_slopes(xi, length):  # type: ignore[no-untyped-def]
-    """Derivatives N' of the Hermite functions along x, shape (4,): dw/dx = N' @ unknowns [-]."""
+def shape_slopes(xi: _Place, length: _Place) -> np.ndarray:
+    """Derivatives N' of the Hermite functions along x, shape (4,) or (4, n): dw/dx = N' @ unknowns
+    [-]."""
     square = xi * xi
     return np.array(
         [

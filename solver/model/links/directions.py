@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from catenary.solver.model.elements.shape_functions import shape_values
 from catenary.solver.model.links.links import Direction
 
 if TYPE_CHECKING:
@@ -31,19 +32,14 @@ def at_places(
 
     By the Hermite functions of the element there, in a ``plane`` of deflection and slope.
     """
-    # Compiled loops are not loaded by a check of a scene, which places no link within an element.
-    from catenary.solver.model.elements.shape_functions import shape_values
-
     nodes = model.mesh.wires[wire]
     at = model.mesh.x(nodes)
     element = np.clip(np.searchsorted(at, x) - 1, 0, at.size - 2)
     length = np.diff(at)[element]
-    weights = [
-        shape_values(xi, h) for xi, h in zip((x - at[element]) / length, length, strict=True)
-    ]
+    weights = shape_values((x - at[element]) / length, length).T
     ends = nodes[element[:, None] + [0, 1]]
     unknowns = np.stack([model.dofs(ends, name) for name in plane], axis=2).reshape(-1, 4)
-    return Direction(unknowns, np.reshape(weights, (-1, 4)))
+    return Direction(unknowns, np.ascontiguousarray(weights))
 
 
 def difference(upper: Direction, lower: Direction) -> Direction:

@@ -10,7 +10,6 @@ from collections.abc import Callable
 
 import numpy as np
 
-from catenary.solver.base.kernels.pointers import address_of
 from catenary.solver.time_loop.views.channels import CHANNELS, Channel, Sources
 
 
@@ -21,8 +20,8 @@ class RowLayout:
     ----------
     columns : name of a channel -> its part of a row
     width : numbers of a row
-    taps : (k,) addresses of the numbers behind the first ones, for a compiled loop
-    in_loop : whether a compiled loop can fill a row; not if a channel is a function
+    copied : arrays (n,) that stand behind the first numbers, one after another
+    in_loop : whether copies fill a row; not if a channel is a function
 
     Parameters
     ----------
@@ -40,7 +39,7 @@ class RowLayout:
         self._copied: list[tuple[slice, np.ndarray]] = []
         self._called: list[tuple[slice, Callable[[], np.ndarray]]] = []
         self.width = shown.size
-        addresses: list[int] = []
+        self.copied: list[np.ndarray] = []
         for channel in CHANNELS.values():
             assert channel.values is not None
             values = channel.values(sources)
@@ -50,14 +49,12 @@ class RowLayout:
                 part = slice(self.width, self.width + array.size)
                 self.width = part.stop
                 if isinstance(values, np.ndarray):
-                    start = _address(channel, array)
-                    addresses += [start + 8 * number for number in range(array.size)]
+                    self.copied.append(_in_a_row(channel, array))
                     self._copied.append((part, array))
                 else:
                     self._called.append((part, values))
             self.columns[channel.name] = part
         self.in_loop = not self._called
-        self.taps = np.array(addresses, dtype=np.int64)
 
     def fill(self, row: np.ndarray) -> None:
         """Fill in what stands behind the first numbers of a row."""
@@ -67,13 +64,11 @@ class RowLayout:
             row[part] = values()
 
 
-def _address(channel: Channel, array: np.ndarray) -> int:
-    try:
-        return address_of(array)
-    except ValueError as error:
-        raise ValueError(f"the values of channel {channel.name} are no contiguous doubles") from (
-            error
-        )
+def _in_a_row(channel: Channel, array: np.ndarray) -> np.ndarray:
+    """The numbers of an array as they are in memory."""
+    if array.dtype != np.float64 or not array.flags.c_contiguous:
+        raise ValueError(f"the values of channel {channel.name} are no contiguous doubles")
+    return array.reshape(-1)
 
 
 def _part_of(shown: np.ndarray, sources: Sources, array: np.ndarray) -> slice | None:

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from catenary.solver.base.kernels import aligned_arrays
-from catenary.solver.base.kernels.bound import bound
-from catenary.solver.integrators import state_kernels
 from catenary.solver.integrators.line_integrator import LineIntegrator
+from catenary.solver.kernels import native
 from catenary.solver.window.moving_columns import Columns, widen
 
 
@@ -36,8 +35,7 @@ class ShownMotion:
         self._displacement, self._velocity = (array[pad : pad + n] for array in self.padded)
         self.moved = np.array([0, columns.n_stations])
         self.changed = self.moved.copy()
-        arrays = self._displacement, self._velocity
-        self._read = bound(state_kernels.motion_within, line.motion.read, later=(0, 0, *arrays))
+        self._motion = line.motion.read
 
     def late(self, *, followed: bool) -> None:
         """Say that the line stands at the step to be shown, all of it if nobody has ``followed``
@@ -88,7 +86,8 @@ class ShownMotion:
         if not self._is_late:
             return
         begin, end = self._columns.starts[self.moved].tolist()
-        self._read(begin, end, self._displacement, self._velocity)
+        native.displacements(self._motion, begin, self._displacement[begin:end])
+        native.velocities(self._motion, begin, self._velocity[begin:end])
         widen(self.changed, *self.moved.tolist())
         self.moved[:] = self._columns.ends[:2]
         self._is_late = False

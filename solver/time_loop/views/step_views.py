@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from catenary.meshgen.mesh import DROPPERS
-from catenary.solver.base.kernels.bound import bound
 from catenary.solver.base.parallel import total
 from catenary.solver.contact.followed_links import FollowedLinks
 from catenary.solver.contact.forces_on_line import ForcesOnLine
 from catenary.solver.contact.train.pantographs import Pantographs
-from catenary.solver.integrators import state_kernels
+from catenary.solver.integrators.line_state import Motion
+from catenary.solver.kernels import native
 from catenary.solver.model.gauges import Gauges, gauges_of
 from catenary.solver.model.switching_links import NO_LINKS, LinkArrays, padded
 from catenary.solver.problem.watched_links import GAUGES
@@ -32,10 +32,30 @@ from catenary.solver.time_loop.views.line_energy import LineEnergy
 from catenary.solver.time_loop.views.observers import Stage, StepView
 from catenary.solver.time_loop.views.row_layout import RowLayout
 from catenary.solver.time_loop.views.shown_motion import ShownMotion
-from catenary.solver.window.moving_columns import MovingColumns, columns_of
+from catenary.solver.window.moving_columns import Columns, MovingColumns, columns_of
 
 # Channels of the first tables of ``Shown.columns``.
 _OF_COLUMNS = ("arm_uplift", "dropper_force")
+
+
+class Shown(NamedTuple):
+    """What is shown of a rank's part of the line at the end of a step.
+
+    Attributes
+    ----------
+    motion : Motion
+    arms : (k,) int, unknowns of vertical displacement at steady arms
+    droppers, others : links, all but droppers
+    other_force : (m,) room for the forces of the latter [N]
+    columns : of arms, droppers and others
+    """
+
+    motion: Motion
+    arms: np.ndarray
+    droppers: LinkArrays
+    others: LinkArrays
+    other_force: np.ndarray
+    columns: Columns
 
 
 class Showing:
@@ -49,7 +69,7 @@ class Showing:
 
     Attributes
     ----------
-    shown : first argument of ``state_kernels.show``
+    shown : Shown
     layout : of a row of a view
     motion : ShownMotion
     checkpoints : Checkpoints
@@ -104,7 +124,7 @@ class Showing:
         self._energy = LineEnergy(self._line, interaction.links, load, columns)
         self.motion = ShownMotion(self._line, columns, self._energy.pad)
         n = columns.n_stations
-        self._show = bound(state_kernels.show, self.shown, uplift, tension, 0, n)
+        self._show = native.show.bound(self.shown, uplift, tension, 0, n)
 
     def _new_view(self) -> StepView:
         """The view of all steps, whose step, time and row are set for each."""
@@ -125,7 +145,7 @@ class Showing:
 
     def _what_is_shown(
         self, droppers: LinkArrays, others: LinkArrays, other_force: np.ndarray
-    ) -> state_kernels.Shown:
+    ) -> Shown:
         """Where a row's values of the line come from, and which change with which stations."""
         window = self._line.window
         columns = columns_of(
@@ -133,9 +153,7 @@ class Showing:
             self._line.ownership.n_local,
             None if window is None else window.stations,
         )
-        return state_kernels.Shown(
-            self._line.motion.read, self._arm_rows, droppers, others, other_force, columns
-        )
+        return Shown(self._line.motion.read, self._arm_rows, droppers, others, other_force, columns)
 
     def stage(self, dt: float, start_time: float, n_steps: int) -> Stage:
         """What stays the same for the whole run."""

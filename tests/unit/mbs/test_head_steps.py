@@ -1,4 +1,4 @@
-"""The compiled steps against the formulas they stand for, written out with NumPy."""
+"""Steps against the formulas they stand for, written out with NumPy."""
 
 from __future__ import annotations
 

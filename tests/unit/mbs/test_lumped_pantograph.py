@@ -37,12 +37,6 @@ def moving(data: LumpedData) -> LumpedPantograph:
     return pantograph
 
 
-@pytest.fixture(scope="module", autouse=True)
-def compiled() -> None:
-    """Compiling takes longer than any example may."""
-    moving(LumpedData((10.0,), (100.0,), (10.0,)))
-
-
 @given(chains, st.floats(-500.0, 500.0))
 def test_prediction_is_what_the_step_does_for_any_force(data: LumpedData, force: float) -> None:
     pantograph = moving(data)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from catenary.postproc.record.progress import FIRST_RUN, Progress, duration
+from catenary.postproc.record.progress import Progress, duration
 from catenary.solver.base.parallel import set_up_logging
 from catenary.solver.time_loop.views.observers import Stage
 
@@ -122,36 +122,6 @@ def test_a_terminal_shows_phases_and_a_bar(log: list[str]) -> None:
     march(progress, clock, 2000, 1e-3)
     assert "2.00/2.00 s simulated" in screen.getvalue() and "x real time" in screen.getvalue()
     assert not log
-
-
-def test_a_log_tells_of_loops_that_are_compiled(log: list[str]) -> None:
-    """Where it takes long: what is quick, as in most runs, leaves no line."""
-    clock = Clock()
-    progress = Progress(RANK_0, io.StringIO(), clock)
-    with progress.phase("prepare solver"):
-        for count, spent in enumerate((0.0, 1.5, 2.5, 6.0, 13.0)):
-            progress.waits_for_compiler(count, spent)
-    progress.compiled(5, 14.0)
-    assert log == [
-        f"prepare solver: compiling loops, 2 so far, 2 s; {FIRST_RUN}",
-        "prepare solver: compiling loops, 4 so far, 13 s",
-        "compiled 5 loops in 14 s; later runs load them",
-    ]
-    progress.compiled(1, 0.5)
-    assert len(log) == 3
-
-
-def test_a_terminal_shows_at_once_that_loops_are_compiled(log: list[str]) -> None:
-    clock, screen = Clock(), Terminal()
-    progress = Progress(RANK_0, screen, clock)
-    with progress.phase("prepare solver"):
-        progress.waits_for_compiler(0, 0.0)
-        assert "prepare solver: compiling loops, 0 so far, 0 s; only for the" in screen.getvalue()
-    with progress.phase("march"):
-        progress.start(stage(2000))
-        progress.waits_for_compiler(3, 7.0)
-        assert "compiling loops, 3 so far, 7 s" in screen.getvalue()
-        progress.finish("done")
 
 
 @pytest.mark.parametrize(("rank", "quiet"), [(0, True), (1, False)])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -35,7 +34,6 @@ from catenary.solver.problem.contact_laws import KinematicLaw, LinearLaw
 from catenary.solver.problem.problem import Placement, Problem
 from catenary.solver.schemes.one_solve import OneSolve
 from catenary.solver.time_loop import march as time_loop
-from catenary.solver.time_loop import step_kernels
 from catenary.solver.time_loop.march import Outcome
 from catenary.solver.time_loop.views.observers import Stage, StepView
 
@@ -340,9 +338,3 @@ def test_loads_that_change_with_time_are_taken_in_the_loop(
     without = Rows()
     run(scene, mesh, without)
     assert np.nanmax(np.abs(np.array(without.rows) - np.array(rows.rows))) > 1.0
-
-
-def test_the_loop_takes_its_parts_in_the_order_in_which_they_are_made() -> None:
-    parts = step_kernels.Steps._fields
-    taken = tuple(inspect.signature(step_kernels.take.py_func).parameters)
-    assert taken[: len(parts)] == parts

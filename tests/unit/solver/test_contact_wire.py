@@ -10,8 +10,8 @@ import pytest
 from measuring import march
 from small_lines import HANGING, WHOLE, ac_simple_line, mesh_of, numerics, problem_of, train
 
-from catenary.solver.contact import contact_kernels
 from catenary.solver.contact.contact_wire import ContactWires
+from catenary.solver.kernels import native
 from catenary.solver.model.partition import distribute
 from catenary.solver.statics.form_finding.equilibrium import find_form
 
@@ -40,7 +40,7 @@ def test_places_are_found_from_wherever_a_contact_was_before(wire: ContactWires)
     for x in (0.0, 110.0, 3.0, wire.x[7], wire.x[-1] + 1.0, wire.x[-1], wire.x[6], -1.0):
         place = np.array([x])
         moved = wire.touches(np.array([57.0]))
-        contact_kernels.locate(place, wire.shapes, moved)
+        native.locate(place, wire.shapes, moved)
         assert moved.tobytes() == wire.touches(place).tobytes()
         expected = np.clip(np.searchsorted(wire.x, x) - 1, 0, wire.x.size - 2)
         assert moved["element"][0] == expected

@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from mpi4py import MPI
 
 from catenary.solver.base.errors import InputError
 from catenary.solver.integrators.line_state import LineState
-from catenary.solver.integrators.loads import memory_kernels
-from catenary.solver.integrators.loads.end_memory import EndMemories
+from catenary.solver.integrators.loads.end_memory import NEAR
 from catenary.solver.integrators.loads.line_loads import LineLoads
-from catenary.solver.integrators.loads.memory_kernels import NEAR
 from catenary.solver.linear.halo import Subdomain
 from catenary.solver.model.loads import MemoryLoad, ShapeLoad
 
@@ -66,21 +63,19 @@ def test_a_past_is_recalled_to_the_last_bit() -> None:
     found: list[np.ndarray] = []
     kept = np.zeros(0)
     for restored in (False, True):
-        values = np.zeros(12)
-        memories = EndMemories(MPI.COMM_SELF, memory, domain, values)
+        loads = LineLoads(memory, domain, NOBODY)
         motion = LineState(*np.zeros((3, 12)), (1.0, 1.0))
-        memories.read(motion)
-        clock = np.zeros(1)
+        loads.read(motion)
+        memories = loads.memories
+        assert memories is not None
         if restored:
             memories.recall(kept, at)
         for step in range(at + 1 if restored else 0, n + 1):
             motion.acceleration[:] = past[step - 1]
-            clock[0] = step * DT
-            values[:] = 0.0
-            memory_kernels.remember(clock, values, *memories.arguments)
+            loads.at(step * DT)
             if step == at:
                 kept = memories.past()
-        found.append(values.copy())
+        found.append(loads.values.copy())
     np.testing.assert_array_equal(found[0], found[1])
     with pytest.raises(InputError, match="the past of the line's ends"):
         memories.recall(kept[:-1], at)

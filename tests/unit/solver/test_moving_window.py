@@ -15,6 +15,7 @@ from catenary.cases.scene.convert.problem import problem_of as scene_problem
 from catenary.cases.scene.load import load_scene
 from catenary.meshgen.mesh import LineMesh
 from catenary.solver.base.errors import InputError
+from catenary.solver.kernels import native
 from catenary.solver.linear.factors import meeting_station, station_factors
 from catenary.solver.problem.ends import Fixed, Periodic
 from catenary.solver.problem.incidents import DropperBreak
@@ -25,7 +26,6 @@ from catenary.solver.time_loop import march as time_loop
 from catenary.solver.time_loop.views.observers import Stage, StepView
 from catenary.solver.window.moving_columns import MovedStations, columns_of
 from catenary.solver.window.where_possible import refuse_window
-from catenary.solver.window.window_kernels import take_in
 
 LINE = ac_simple_line(12)
 SPEED, START = 70.0, 330.0
@@ -179,7 +179,7 @@ def test_a_row_is_out_of_date_where_anything_moved_since_it_was_filled() -> None
     moved.begin(0)
     assert moved.behind.tolist() == [[0, 10], [0, 10]] and moved.now.tolist() == [0, 2]
     ends[:] = 1, 4
-    take_in(moved.now, ends)
+    native.take_in(moved.now, ends)
     moved.end(1, 1)
     assert moved.behind.tolist() == [[0, 4], [0, 10]]
     moved.begin(1)

@@ -6,11 +6,9 @@ import numpy as np
 import pytest
 from repeating_line import layout, line, widths_of
 
-from catenary.solver.base.kernels.bound import bound
-from catenary.solver.base.kernels.pointers import call_once
-from catenary.solver.integrators import state_kernels
 from catenary.solver.integrators.line_state import LineState, PredictedLineState, Steps
 from catenary.solver.integrators.two_pass_step import StationPasses
+from catenary.solver.kernels import native
 from catenary.solver.linear.factors import station_factors as module
 from catenary.solver.linear.factors.station_factors import station_factors
 from catenary.solver.linear.stations.station_products import station_product
@@ -65,12 +63,12 @@ def compare(
 
     read, force, solution = others.copy(), np.zeros(b * n), answer.copy()
     expected = displacement.copy(), velocity.copy(), solution[own]
-    state_kernels.predict(*expected, read[b:-b][own], *STEPS[:4])
+    native.predict(*expected, read[b:-b][own], STEPS)
     product.multiply(read, force)
     if loaded:
         force += loads
     factors.solve(force, solution)
-    state_kernels.correct(*expected, *STEPS[4:])
+    native.correct(*expected, *STEPS[4:])
 
     # Links at every third station, whose ends may be at different ones.
     upper = np.arange(0, n_own, 3)
@@ -89,30 +87,6 @@ def compare(
     passes.step()
     found = motion.displacement, motion.velocity, answer[own], tension
     plain = LineState(*expected, (0.0, 0.0)).read
-    state_kernels.reserves(plain, links, pulls)
+    native.reserves(plain, links, pulls)
     for one, other in zip(found, (*expected, pulls), strict=True):
         assert np.abs(one - other).max(initial=0.0) < ROUND_OFF * np.abs(other).max(initial=1.0)
-
-
-def test_a_compiled_loop_takes_the_same_steps_with_kernel_and_arguments() -> None:
-    matrix = line(20)
-    product = station_product(matrix, 0, layout(matrix))
-    factors = station_factors(matrix, layout(matrix))
-    assert product is not None and factors is not None
-    states = []
-    for by_kernel in (False, True):
-        start = np.cos(np.arange(80.0))
-        read, answer, shown = np.zeros(88), np.zeros(80), np.zeros(80)
-        motion = PredictedLineState(read[4:-4], np.zeros(80), answer, shown, STEPS)
-        motion.put(start, 2.0 * start, 3.0 * start)
-        passes = StationPasses(
-            ByStations(product, factors, read, read, answer, 0.0), np.zeros(0), motion, STEPS
-        )
-        by_address = bound(call_once, passes.held.address)
-        for _ in range(3):
-            if by_kernel:
-                by_address()
-            else:
-                passes.step()
-        states.append(motion.displacement.copy())
-    assert np.array_equal(*states)

@@ -1,0 +1,113 @@
+"""All that the contacts of a rank work on, as kernels take it; see ``kernels/contact``."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from catenary.solver.contact.contact_wire import WireShapes
+from catenary.solver.contact.followed_links import Followed
+from catenary.solver.integrators.line_state import Motion
+from catenary.solver.linear.unit_responses import ShortColumns
+
+
+class Sideways(NamedTuple):
+    """Unknowns (v, theta_z) of the contact wires' nodes on a rank: their numbers ``local``
+    (n_nodes, 2), 0 where another rank owns them; whether this one does, ``owned``; what they are at
+    ``rest``, lateral places [m] and slopes [-]. Without rows where no lateral motion is
+    simulated."""
+
+    local: np.ndarray
+    owned: np.ndarray
+    rest: np.ndarray
+
+
+class Across(NamedTuple):
+    """Of the wires at n contacts: lateral ``place`` [m], its total ``rate`` [m/s], and displacement
+    ``moved`` [m]; empty where no lateral motion is simulated."""
+
+    place: np.ndarray
+    rate: np.ndarray
+    moved: np.ndarray
+
+
+def no_sideways() -> Sideways:
+    """Of a line without lateral motion."""
+    nothing = np.zeros((0, 2))
+    return Sideways(nothing.astype(np.int64), nothing.astype(bool), nothing)
+
+
+class Answers(NamedTuple):
+    """The line's accelerations by a unit force at each of n contacts.
+
+    ``by_force`` (n, n_local); their derivatives along the track, ``slope`` of the same shape, or
+    without columns where no law needs rates.
+    """
+
+    by_force: np.ndarray
+    slope: np.ndarray
+
+
+class Gains(NamedTuple):
+    """What answers are worth within a step: of an acceleration ``position`` [s2] and ``velocity``
+    [s]; the ``train_speed`` [m/s] of the convective part of rates; how far off links answer to a
+    force, ``reach`` [m]."""
+
+    train_speed: float
+    position: float
+    velocity: float
+    reach: float
+
+
+class ContactWork(NamedTuple):
+    """Work of n contact forces on the line, summed step by step; see ``contacts.hpp``.
+
+    ``total`` (1,) [J]; ``force`` (n,) [N] after the step before; ``local`` and ``value`` (n, 4) of
+    the contacts then; ``before`` and ``ahead`` (n,) [m/s]; shares p and q, and the step [s].
+    """
+
+    total: np.ndarray
+    force: np.ndarray
+    local: np.ndarray
+    value: np.ndarray
+    before: np.ndarray
+    ahead: np.ndarray
+    share_before: float
+    share_after: float
+    dt: float
+
+
+def no_work(n_contacts: int, share_after: float, dt: float) -> ContactWork:
+    """Work of contact forces before the first step."""
+    local, value = np.zeros((n_contacts, 4), dtype=np.int64), np.zeros((n_contacts, 4))
+    force, before, ahead = np.zeros((3, n_contacts))
+    shares = 1.0 - share_after, share_after
+    return ContactWork(np.zeros(1), force, local, value, before, ahead, *shares, dt)
+
+
+class Contacts(NamedTuple):
+    """Of n contacts.
+
+    Attributes
+    ----------
+    x : (n,) where they are along the track [m]
+    touches : (n,) records of ``TOUCH``
+    columns : columns of A^-1 for the nodes of the ``wires``
+    motion, motion_gains : of the line, see ``LineState``
+    link_columns : of A^-1 for compensations of all links of the line
+    """
+
+    x: np.ndarray
+    touches: np.ndarray
+    wires: WireShapes
+    columns: np.ndarray
+    answers: Answers
+    gains: Gains
+    motion: Motion
+    motion_gains: np.ndarray
+    followed: Followed
+    link_columns: ShortColumns
+    work: ContactWork
+    sideways: Sideways
+    across: Across

@@ -1,0 +1,17 @@
+#pragma once
+// Products of complex numbers without regard to what is infinite, as loops of vectors have them.
+#include <complex>
+
+namespace catenary {
+
+using Complex = std::complex<double>;
+
+inline Complex product(Complex one, Complex other) {
+    return {one.real() * other.real() - one.imag() * other.imag(),
+            one.real() * other.imag() + one.imag() * other.real()};
+}
+inline Complex product(Complex one, double other) {
+    return {one.real() * other, one.imag() * other};
+}
+
+}  // namespace catenary

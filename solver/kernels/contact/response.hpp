@@ -1,0 +1,65 @@
+#pragma once
+// A rank's share of the small problem of a step: what the line answers to contacts and links.
+#include "contact/affine.hpp"
+#include "contact/contacts.hpp"
+
+namespace catenary {
+
+/// What adds up over ranks besides answers.
+struct Flags {
+    double rows;     ///< links with a row
+    double stop;     ///< wishes to stop
+    double broken;   ///< ranks that hold NaN or infinity
+    double missing;  ///< links that there is no room for
+};
+
+/// Links that may switch, in a table (capacity, 2 + 3 n) for n contacts, and how contacts and they
+/// act on each other.
+struct LinkRows {
+    Array2<double> numbers;
+
+    int64_t capacity() const { return numbers.rows; }
+    int64_t n_contacts() const { return (numbers.columns - 2) / 3; }
+    /// The link's number in the line.
+    int64_t number(int64_t k) const { return static_cast<int64_t>(numbers(k, 0)); }
+    void put_number(int64_t k, int64_t number) const {
+        numbers(k, 0) = static_cast<double>(number);
+    }
+    /// Its reserve without contact forces [N].
+    double& reserve(int64_t k) const { return numbers(k, 1); }
+    /// What a unit force at contact i adds to its reserve [-].
+    double& reaction(int64_t k, int64_t i) const { return numbers(k, 2 + i); }
+    /// What its unit compensation takes off height [m/N] and rate [m/(N s)] there.
+    double& lift(int64_t k, int64_t i) const { return numbers(k, 2 + n_contacts() + i); }
+    double& rise(int64_t k, int64_t i) const { return numbers(k, 2 + 2 * n_contacts() + i); }
+    CATENARY_RECORD(numbers)
+};
+
+/// Within which forces whatever switches has a row: contacts that all push up to `push` (n,) and
+/// pull up to `pull` (n,) [N], 0 of those that only push, and compensations elsewhere that take up
+/// to `loss` (1,) [N] off a reserve.
+struct Bounds {
+    std::span<double> push, pull, loss;
+    CATENARY_RECORD(push, pull, loss)
+};
+
+/// What a rank fills in, or the sum of all ranks: `flags` (1,), `present` (n,), 1 for a contact
+/// whose wire is on its strip and else 0, heights of the line, and rows of links.
+struct Share {
+    std::span<Flags> flags;
+    std::span<double> present;
+    Affine line;
+    LinkRows rows;
+    Bounds bounds;
+    CATENARY_RECORD(flags, present, line, rows, bounds)
+};
+
+/// Fill in a rank's share; the motion is that without forces of contacts and of links that switch.
+void respond(const Contacts& contacts, const Share& share);
+
+/// Number of links that may switch within the bounds of a share, riders included; a row each, as
+/// far as they fit, those of riders behind those of their masters. Contacts touch those within
+/// reach. -1 if a reserve is not finite.
+int64_t watch(const Contacts& contacts, const Share& share);
+
+}  // namespace catenary

@@ -1,0 +1,44 @@
+#pragma once
+// Small dense systems, of which some rows and columns act.
+#include "base/arrays.hpp"
+#include "base/record.hpp"
+
+namespace catenary {
+
+/// matrix x = right of m unknowns, the length of `right`; the matrix may have more of both.
+struct System {
+    Array2<double> matrix;
+    std::span<double> right, solution;
+    CATENARY_RECORD(matrix, right, solution)
+};
+
+/// Of m unknowns: which may have any sign; of a rider's how many rows its master's is before it,
+/// which it acts with, 0 of others.
+struct Signs {
+    std::span<bool> always;
+    std::span<int64_t> behind;
+    CATENARY_RECORD(always, behind)
+};
+
+/// Room to solve for up to k unknowns: `factors` (k, k), the others (k,).
+struct Room {
+    Array2<double> factors;
+    std::span<int64_t> acting, order;
+    std::span<double> left, change;
+    std::span<bool> acts;
+    CATENARY_RECORD(factors, acting, order, left, change, acts)
+};
+
+/// Solve the rows and columns that act by elimination with pivoting; the others are zero.
+///
+/// Rows may differ by orders of magnitude, as those of contacts with a law of impact and of
+/// droppers do: elimination leaves the round-off of the largest in all. One refinement makes what
+/// is left small beside the terms of each row (R. D. Skeel, Math. Comp. 35 (1980) 817-832).
+void solve_on(const System& system, std::span<const bool> acts, const Room& room);
+
+/// Active-set iteration for x = max(0, x - (matrix x - right)), freely for `always`, and freely
+/// with another before it for those `behind` one. Returns the rounds needed, which are not positive
+/// if the set did not settle.
+int64_t settle(const System& system, const Signs& signs, int64_t max_rounds, const Room& room);
+
+}  // namespace catenary

@@ -1,0 +1,27 @@
+#pragma once
+// The forces of a step on one rank, as far as they are found without help.
+#include "contact_problem/small_problem.hpp"
+
+namespace catenary {
+
+/// What is counted over steps, as in `schemes.Counters`.
+struct Counts {
+    int64_t rounds;    ///< of the active-set iteration
+    int64_t slack;     ///< links that slacken, step by step
+    int64_t repeated;  ///< steps for which bounds were too small
+};
+
+/// In place of a number of compensations: forces are left to others; bounds were too small.
+inline constexpr int64_t kLeft = -1, kTooSmall = -2;
+
+/// Find contact forces and compensations of the step to `time` [s], into the solution of the
+/// problem; `switched` takes the numbers of the links with a compensation.
+///
+/// Returns the number of these, `kTooSmall` or `kLeft`.
+int64_t find_forces(double time, const SmallProblem& problem, const ReportedForces& law,
+                    std::span<int64_t> switched, Counts& counts);
+
+/// Double the bounds of what may switch.
+void widen(const Bounds& bounds);
+
+}  // namespace catenary

@@ -1,0 +1,151 @@
+#include "contact_problem/small_problem.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace catenary {
+
+namespace {
+
+/// Put right-hand side and matrix of the contact forces when no link has switched.
+void press(const Affine& gap, const Tangents& tangents, const Unknowns& unknowns) {
+    const auto& [own, offset, by_depth, by_rate] = tangents;
+    const auto& [depth, rate, by_force, rate_by_force] = gap;
+    for (int64_t i = 0; i < size(depth); ++i) {
+        unknowns.right[i] = offset[i] + by_depth[i] * depth[i] + by_rate[i] * rate[i];
+        for (int64_t j = 0; j < size(depth); ++j)
+            unknowns.matrix(i, j) = by_depth[i] * by_force(i, j) + by_rate[i] * rate_by_force(i, j);
+        unknowns.matrix(i, i) += own[i];
+    }
+}
+
+}  // namespace
+
+bool subtract(const Affine& heads, const Affine& line, std::span<const double> present,
+              const Affine& gap) {
+    double total = 0.0;
+    for (int64_t i = 0; i < size(gap.place); ++i) {
+        const bool there = present[i] != 0.0;
+        gap.place[i] = there ? heads.place[i] - line.place[i] : kNowhere;
+        gap.rate[i] = there ? heads.rate[i] - line.rate[i] : 0.0;
+        total += gap.place[i] + gap.rate[i];
+        for (int64_t j = 0; j < size(gap.place); ++j) {
+            gap.by_force(i, j) = present[i] * (heads.by_force(i, j) + line.by_force(i, j));
+            gap.rate_by_force(i, j) =
+                present[i] * (heads.rate_by_force(i, j) + line.rate_by_force(i, j));
+            total += gap.by_force(i, j) + gap.rate_by_force(i, j);
+        }
+    }
+    return std::isfinite(total);
+}
+
+bool any_switched(const LinkRows& rows, int64_t count, const Coupled& coupled,
+                  std::span<const double> force) {
+    for (int64_t d = 0; d < count; ++d) {
+        if (coupled.behind[rows.number(d)] > 0) continue;
+        double value = rows.reserve(d);
+        for (int64_t i = 0; i < size(force); ++i) value += rows.reaction(d, i) * force[i];
+        if (value < 0.0) return true;
+    }
+    return false;
+}
+
+void couple(const LinkRows& rows, int64_t count, const Coupled& coupled,
+            std::span<const double> by_depth, std::span<const double> by_rate,
+            const Unknowns& unknowns) {
+    const auto& band = coupled.band;
+    const auto& matrix = unknowns.matrix;
+    const int64_t n = size(by_depth), half = band.columns / 2;
+    for (int64_t d = 0; d < count; ++d) {
+        const int64_t row = n + d, number = rows.number(d);
+        const double released = coupled.released[number];
+        unknowns.behind[row] = coupled.behind[number];
+        unknowns.right[row] = -released * rows.reserve(d);
+        for (int64_t i = 0; i < n; ++i) {
+            matrix(row, i) = released * rows.reaction(d, i);
+            matrix(i, row) = -(by_depth[i] * rows.lift(d, i) + by_rate[i] * rows.rise(d, i));
+        }
+        for (int64_t e = 0; e < count; ++e) {
+            const int64_t other = rows.number(e), offset = number - other + half;
+            const bool near = 0 <= offset && offset < band.columns;
+            matrix(row, n + e) = near ? -released * band(other, offset) : 0.0;
+        }
+        matrix(row, row) += 1.0;
+    }
+}
+
+bool under(const Affine& gap, const LinkRows& rows, std::span<const double> force,
+           std::span<const double> compensation, const Depths& found) {
+    double total = 0.0;
+    for (int64_t i = 0; i < size(force); ++i) {
+        double depth = gap.place[i], rate = gap.rate[i];
+        for (int64_t j = 0; j < size(force); ++j) {
+            depth -= gap.by_force(i, j) * force[j];
+            rate -= gap.rate_by_force(i, j) * force[j];
+        }
+        for (int64_t k = 0; k < size(compensation); ++k) {
+            depth += rows.lift(k, i) * compensation[k];
+            rate += rows.rise(k, i) * compensation[k];
+        }
+        found.depth[i] = depth;
+        found.rate[i] = rate;
+        total += depth + rate;
+    }
+    return std::isfinite(total);
+}
+
+bool leaves_out(std::span<const double> force, std::span<const double> compensation,
+                const LinkRows& rows, const Bounds& bounds, const Coupled& coupled) {
+    const auto& [band, released, slackens, behind, drop] = coupled;
+    const int64_t half = band.columns / 2, n = size(drop), m = size(compensation);
+    if (n == 0) return false;
+    for (size_t i = 0; i < force.size(); ++i)
+        if (force[i] > bounds.push[i] || -force[i] > bounds.pull[i]) return true;
+    for (int64_t k = 0; k < m; ++k) {
+        if (compensation[k] == 0.0) continue;
+        const int64_t e = rows.number(k), end = std::min(n, e + half + 1);
+        for (int64_t d = std::max<int64_t>(0, e - half); d < end; ++d)
+            if (released[d] > 0.0 && behind[d] == 0)
+                drop[d] += compensation[k] * band(e, d - e + half);
+    }
+    for (int64_t k = 0; k < m; ++k) drop[rows.number(k)] = 0.0;
+    double largest = 0.0;
+    for (int64_t k = 0; k < m; ++k) {
+        if (compensation[k] == 0.0) continue;
+        const int64_t e = rows.number(k), end = std::min(n, e + half + 1);
+        for (int64_t d = std::max<int64_t>(0, e - half); d < end; ++d) {
+            largest = std::max(largest, drop[d]);
+            drop[d] = 0.0;
+        }
+    }
+    return largest > bounds.loss[0];
+}
+
+Solved solve(const SmallProblem& problem) {
+    const auto& [heads, share, gap, pulls, tangents, coupled, unknowns, found, max_rounds] =
+        problem;
+    const auto& rows = share.rows;
+    const int64_t n = size(gap.place), count = static_cast<int64_t>(share.flags[0].rows);
+    bool finite = subtract(heads, share.line, share.present, gap);
+    for (int64_t i = 0; i < n; ++i) {
+        unknowns.always[i] = pulls && share.present[i] != 0.0;
+        unknowns.behind[i] = 0;
+    }
+    press(gap, tangents, unknowns);
+    const auto force = unknowns.solution.first(n);
+    auto settled = [&](int64_t of) {
+        return settle(unknowns.system(of), unknowns.signs(of), max_rounds, unknowns.room);
+    };
+    int64_t rounds = settled(n), used = n;
+    if (rounds > 0 && any_switched(rows, count, coupled, force)) {
+        couple(rows, count, coupled, tangents.by_depth, tangents.by_rate, unknowns);
+        used = n + count;
+        rounds = settled(used);
+    }
+    const auto compensation = part(unknowns.solution, n, used);
+    finite = under(gap, rows, force, compensation, found) && finite;
+    const bool complete = !leaves_out(force, compensation, rows, share.bounds, coupled);
+    return {rounds, used, finite, complete};
+}
+
+}  // namespace catenary

@@ -1,0 +1,167 @@
+// What all pantographs share that step by Newmark's method.
+#include "heads/head.hpp"
+
+#include <limits>
+#include <stdexcept>
+
+namespace catenary {
+
+Head::Head(const HeadArrays& arrays)
+    : arrays_(arrays),
+      n_(arrays.touch.columns),
+      n_strips_(arrays.touch.rows),
+      free_(3 * n_),
+      by_force_(3 * n_ * n_strips_) {
+    if (arrays.touch.n != 2 || size(arrays.state) != 3 * n_ ||
+        size(arrays.out) != 2 * n_strips_ * (1 + n_strips_) || arrays.roll >= n_)
+        throw std::invalid_argument("arrays of a head have other shapes than its strips");
+}
+
+void Head::bend(const Bending& bending) {
+    const int64_t m = bending.tables.coefficients.rows;
+    if (bending.first < 0 || bending.wires < 1 ||
+        bending.first + (n_strips_ / bending.wires) * m > n_)
+        throw std::invalid_argument("a head has fewer coordinates than its strips have modes");
+    bending_ = bending;
+    shapes_.resize(m);
+    slopes_.resize(m);
+}
+
+bool Head::step(std::span<const double> drive) {
+    const DriveRow<const double> row{drive, n_strips_};
+    aim(drive);
+    return step_free(row.drive());
+}
+
+void Head::aim(std::span<const double> drive) {
+    const DriveRow<const double> row{drive, n_strips_};
+    if (arrays_.roll >= 0) {
+        const auto place = row.place(), rate = row.rate();
+        for (int64_t j = 0; j < n_strips_; ++j) {
+            arrays_.touch(0, j, arrays_.roll) = place[j];
+            arrays_.touch(1, j, arrays_.roll) = rate[j];
+        }
+    }
+    if (bending_) bend_at(row.place(), row.rate());
+}
+
+void Head::bend_at(std::span<const double> place, std::span<const double> rate) {
+    const int64_t m = static_cast<int64_t>(shapes_.size());
+    for (int64_t j = 0; j < n_strips_; ++j) {
+        tables_at(bending_->tables, place[j], shapes_, slopes_);
+        const int64_t at = bending_->first + (j / bending_->wires) * m;
+        for (int64_t k = 0; k < m; ++k) {
+            arrays_.touch(0, j, at + k) = shapes_[k];
+            arrays_.touch(1, j, at + k) = slopes_[k] * rate[j];
+        }
+    }
+}
+
+void Head::respond(Array2<const double> inverse) {
+    const Array2<const double> touch{arrays_.touch.data, n_strips_, n_};
+    const Array2<const double> moving{touch.data + n_strips_ * n_, n_strips_, n_};
+    const Array2<double> by = by_force();
+    for (int64_t j = 0; j < n_strips_; ++j)
+        for (int64_t i = 0; i < n_; ++i) {
+            double answer = 0.0;
+            for (int64_t k = 0; k < n_; ++k) answer += inverse(i, k) * touch(j, k);
+            by(i, j) = newmark().position * answer;
+            by(n_ + i, j) = newmark().velocity * answer;
+            by(2 * n_ + i, j) = answer;
+        }
+    for (int64_t i = 0; i < n_strips_; ++i) {
+        double height = 0.0, velocity = 0.0;
+        for (int64_t k = 0; k < n_; ++k) {
+            height += touch(i, k) * free_[k];
+            velocity += touch(i, k) * free_[n_ + k] + moving(i, k) * free_[k];
+        }
+        arrays_.out[i] = height;
+        arrays_.out[n_strips_ + i] = velocity;
+        for (int64_t j = 0; j < n_strips_; ++j) {
+            height = velocity = 0.0;
+            for (int64_t k = 0; k < n_; ++k) {
+                height += touch(i, k) * by(k, j);
+                velocity += touch(i, k) * by(n_ + k, j) + moving(i, k) * by(k, j);
+            }
+            const int64_t at = 2 * n_strips_ + i * n_strips_ + j;
+            arrays_.out[at] = height;
+            arrays_.out[at + n_strips_ * n_strips_] = velocity;
+        }
+    }
+}
+
+void Head::advance(std::span<const double> contact_force) {
+    const Array2<double> by = by_force();
+    for (int64_t i = 0; i < 3 * n_; ++i) {
+        double value = free_[i];
+        for (int64_t j = 0; j < n_strips_; ++j) value -= contact_force[j] * by(i, j);
+        arrays_.state[i] = value;
+    }
+    remember(contact_force);
+    if (regulation_) catenary::regulate(*regulation_, measured(contact_force));
+}
+
+/// What a controller sees at the end of a step: mean height of the strips, or their force.
+double Head::measured(std::span<const double> contact_force) const {
+    const bool of_height = regulation_->settings.front().of_height != 0.0;
+    double total = 0.0;
+    for (int64_t j = 0; j < n_strips_; ++j) {
+        if (!of_height) {
+            total += contact_force[j];
+            continue;
+        }
+        for (int64_t k = 0; k < n_; ++k)
+            total += arrays_.touch(0, j, k) * arrays_.state[k] / static_cast<double>(n_strips_);
+    }
+    return total;
+}
+
+void Head::extrapolate(std::span<const double> drive, Array2<double> early) {
+    aim(drive);
+    const auto q = position(), v = velocity(), a = acceleration();
+    for (int64_t i = 0; i < n_strips_; ++i) {
+        double height = 0.0, speed = 0.0;
+        for (int64_t k = 0; k < n_; ++k) {
+            const double place = q[k] + newmark().dt * v[k] + newmark().predict_position * a[k];
+            const double own = arrays_.touch(0, i, k);
+            height += own * place;
+            speed += own * (v[k] + newmark().predict_velocity * a[k]);
+            speed += arrays_.touch(1, i, k) * place;
+        }
+        early(0, i) = height;
+        early(1, i) = speed;
+    }
+}
+
+void Head::cross(std::span<double> drive, const Across& across, std::span<const Touch> touches,
+                 std::span<double> place) const {
+    const DriveRow<double> row{drive, n_strips_};
+    const auto on_strip = row.place(), rate = row.rate();
+    for (int64_t j = 0; j < n_strips_; ++j) {
+        const int64_t contact = first_ + j;
+        on_strip[j] += across.place[contact];
+        rate[j] += across.rate[contact];
+        place[contact] = touches[contact].present != 0.0 ? on_strip[j]
+                                                         : std::numeric_limits<double>::quiet_NaN();
+    }
+}
+
+bool Head::predict(std::span<const double> drive, std::span<double> numbers, int64_t n_contacts) {
+    const bool within = step(drive);
+    const int64_t s = n_strips_, n = n_contacts;
+    const Array2<double> by_height{numbers.data() + 2 * n, n, n};
+    const Array2<double> by_velocity{by_height.data + n * n, n, n};
+    const auto out = arrays_.out;
+    for (int64_t i = 0; i < s; ++i) {
+        numbers[first_ + i] = out[i];
+        numbers[n + first_ + i] = out[s + i];
+        for (int64_t j = 0; j < s; ++j) {
+            const int64_t at = 2 * s + i * s + j;
+            by_height(first_ + i, first_ + j) = out[at];
+            by_velocity(first_ + i, first_ + j) = out[at + s * s];
+        }
+    }
+    return within;
+}
+
+}  // namespace catenary

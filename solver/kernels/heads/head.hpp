@@ -1,0 +1,131 @@
+#pragma once
+// What all pantographs share that step by Newmark's method: state, strips, contact.
+//
+// A pantograph has n coordinates and s strips. Its state are positions, velocities and
+// accelerations one after the other (3 n,).
+#include <optional>
+#include <vector>
+
+#include "base/curves.hpp"
+#include "contact/across.hpp"
+#include "contact/touch.hpp"
+#include "heads/drive.hpp"
+#include "heads/regulation.hpp"
+
+namespace catenary {
+
+/// Factors of Newmark's formulas, the same for all coordinates.
+struct NewmarkFactors {
+    double dt;                                  ///< step [s]
+    double predict_position, predict_velocity;  ///< dt^2 (1/2 - beta) [s2], dt (1 - gamma) [s]
+    double position, velocity;                  ///< beta dt^2 [s2], gamma dt [s]
+    CATENARY_RECORD(dt, predict_position, predict_velocity, position, velocity)
+};
+
+/// Arrays of a head.
+struct HeadArrays {
+    Array3<double> touch;     ///< (2, s, n) by how much each coordinate raises each strip, and how
+                              ///< fast that changes
+    std::span<double> state;  ///< (3 n,) at the end of the latest step
+    std::span<double> out;    ///< (2 s + 2 s^2,) heights and velocities of the strips without
+                              ///< contact, and both matrices of compliance, row by row
+    NewmarkFactors newmark;
+    int64_t roll;  ///< coordinate of the head's roll, -1 without it
+    CATENARY_RECORD(touch, state, out, newmark, roll)
+};
+
+/// Strips that bend, see mbs/head/flexure.py.
+struct Bending {
+    SplineTables tables;  ///< of m modes over the place on a strip [m]
+    int64_t first;        ///< coordinate of the first strip's first mode, the others behind it
+    int64_t wires;        ///< that may touch each strip
+    CATENARY_RECORD(tables, first, wires)
+};
+
+/// A head's strips on n coordinates, which a step advances together.
+class Head {
+  public:
+    /// Throws std::invalid_argument if shapes do not agree.
+    explicit Head(const HeadArrays& arrays);
+    virtual ~Head() = default;
+    Head(const Head&) = delete;
+    Head& operator=(const Head&) = delete;
+
+    int64_t n() const { return n_; }
+    int64_t n_strips() const { return n_strips_; }
+    /// Number of its first contact among those of the train.
+    int64_t first() const { return first_; }
+    void set_first(int64_t contact) { first_ = contact; }
+
+    /// Let strips bend.
+    void bend(const Bending& bending);
+    /// Let the lift be regulated.
+    void regulate(const Regulation& regulation) { regulation_ = regulation; }
+    /// What regulates the lift adds to the static force now [N].
+    double added_force() const {
+        return regulation_ ? regulation_->memory.front().acting : added_force_;
+    }
+    /// Put that of a controller that no kernel knows.
+    void set_added_force(double force) { added_force_ = force; }
+
+    /// Step without contact, with a row of a `Drive`: fills `out`. Whether the head is where its
+    /// model reaches.
+    bool step(std::span<const double> drive);
+    /// Make the state that under contact forces (s,) [N], after a step without.
+    void advance(std::span<const double> contact_force);
+    /// Heights and velocities (2, s) of the strips by Newmark's predictor (paper eq. 2.5).
+    void extrapolate(std::span<const double> drive, Array2<double> early);
+
+    /// Add to a row where wires are across the track at the train's n contacts, and note in `place`
+    /// (n,) where they are on the strips then, NaN where none is there.
+    void cross(std::span<double> drive, const Across& across, std::span<const Touch> touches,
+               std::span<double> place) const;
+    /// `step`, whose results are put into the train's `numbers` (2 n + 2 n^2,).
+    bool predict(std::span<const double> drive, std::span<double> numbers, int64_t n_contacts);
+    /// `advance` with forces at all contacts of the train.
+    void move(std::span<const double> force) { advance(part(force, first_, first_ + n_strips_)); }
+
+  protected:
+    /// Fill `free()` and call `respond`.
+    virtual bool step_free(const Drive& drive) = 0;
+    /// Remember the latest contact forces.
+    virtual void remember(std::span<const double>) {}
+    /// Fill in what contact forces do to accelerations that come by `inverse` (n, n) of a matrix.
+    void respond(Array2<const double> inverse);
+    /// What the regulated lift adds to a force, of which a part acts.
+    double added(const Drive& drive) const {
+        const double force = added_force();
+        return force != 0.0 && drive.part > 0.0 ? drive.part * force : 0.0;
+    }
+
+    const NewmarkFactors& newmark() const { return arrays_.newmark; }
+    Array2<const double> touch() const { return {arrays_.touch.data, n_strips_, n_}; }
+    std::span<const double> position() const { return state_part(arrays_.state, 0); }
+    std::span<const double> velocity() const { return state_part(arrays_.state, 1); }
+    std::span<const double> acceleration() const { return state_part(arrays_.state, 2); }
+    std::span<const double> state() const { return arrays_.state; }
+    /// The state (3 n,) of the coming step without contact.
+    std::span<double> free() { return free_; }
+
+  private:
+    template <class Number>
+    std::span<Number> state_part(std::span<Number> state, int64_t number) const {
+        return part(state, number * n_, (number + 1) * n_);
+    }
+    /// Let the strips touch where wires are.
+    void aim(std::span<const double> drive);
+    void bend_at(std::span<const double> place, std::span<const double> rate);
+    double measured(std::span<const double> contact_force) const;
+    Array2<double> by_force() { return {by_force_.data(), 3 * n_, n_strips_}; }
+
+    HeadArrays arrays_;
+    int64_t n_, n_strips_, first_ = 0;
+    double added_force_ = 0.0;
+    std::vector<double> free_;
+    std::vector<double> by_force_;  ///< (3 n, s) what a unit of each contact force takes off it
+    std::optional<Bending> bending_;
+    std::vector<double> shapes_, slopes_;  ///< room for modes
+    std::optional<Regulation> regulation_;
+};
+
+}  // namespace catenary

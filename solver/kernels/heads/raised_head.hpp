@@ -1,0 +1,32 @@
+#pragma once
+// A head over a reduced mechanism, whose height is the last coordinate. See
+// mbs/mechanism/reduced_pantograph.py.
+#include "heads/sprung_head.hpp"
+
+namespace catenary {
+
+struct ReducedMechanism {
+    SplineTables tables;  ///< mass [kg], lift [N], damping [N s/m], carried mass [kg] and, of some,
+                          ///< what the air lifts [N], over the mechanism's height [m]
+    double weight;        ///< of the head [N]
+    double zero;          ///< the coordinate where the mechanism's height is zero [m]
+    CATENARY_RECORD(tables, weight, zero)
+};
+
+class RaisedHead : public SprungHead {
+  public:
+    RaisedHead(const HeadArrays& arrays, const SprungMasses& masses, const HeadLaws& laws,
+               const ReducedMechanism& mechanism);
+    /// Height at which the tables were taken in the latest step [m].
+    double height() const { return height_; }
+
+  protected:
+    /// Whether that height is within the tables; what is not a number is left to those who couple.
+    bool step_free(const Drive& drive) override;
+
+  private:
+    ReducedMechanism mechanism_;
+    double height_ = 0.0;
+};
+
+}  // namespace catenary

@@ -1,0 +1,41 @@
+#pragma once
+// Heads whose matrix is made anew in each step: chains with laws, and heads over a mechanism.
+#include <vector>
+
+#include "heads/head.hpp"
+#include "heads/laws.hpp"
+
+namespace catenary {
+
+/// Masses on linear springs and dampers.
+struct SprungMasses {
+    std::span<const double> masses;           ///< (n,)
+    Array2<const double> stiffness, damping;  ///< (n, n)
+    std::span<const double> push;  ///< (n,) what an upward force on the strips' middle does to each
+                                   ///< coordinate
+    CATENARY_RECORD(masses, stiffness, damping, push)
+};
+
+class SprungHead : public Head {
+  public:
+    SprungHead(const HeadArrays& arrays, const SprungMasses& masses, const HeadLaws& laws);
+
+  protected:
+    /// Predict (paper eq. 2.5), and put force and matrix of springs, dampers, masses and the air.
+    void begin(const Drive& drive);
+    /// Add laws, find accelerations, and fill in what a step is asked for.
+    void finish(const Drive& drive);
+    void remember(std::span<const double> contact_force) override;
+
+    std::span<const double> predicted() const { return position_; }
+    std::span<const double> predicted_velocity() const { return velocity_; }
+    std::span<double> force() { return force_; }
+    Array2<double> matrix() { return {matrix_.data(), n(), n()}; }
+
+  private:
+    SprungMasses masses_;
+    SettlingLaws laws_;
+    std::vector<double> position_, velocity_, force_, matrix_;
+};
+
+}  // namespace catenary

@@ -1,0 +1,14 @@
+#pragma once
+// Spans condensed to what they share with those beside them. See half_lines.py.
+#include "base/arrays.hpp"
+#include "base/complex.hpp"
+
+namespace catenary {
+
+/// Fill `taken` (n, k, k) with beside^T inverse(bands) beside, with `weights` (n, 3) of M, C and K
+/// in each; see `SpanMatrices`. L D L^T without pivots: with waves that fade, all leading blocks
+/// are those of damped lines.
+void condense_spans(Array2<const Complex> weights, Array3<const double> bands,
+                    Array3<const double> beside, Array3<Complex> taken);
+
+}  // namespace catenary

@@ -1,0 +1,75 @@
+// Loads in time, evaluated.
+#include "loads/loads.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace catenary {
+
+namespace {
+
+/// A function of time of this kind.
+double value_at(double time, int64_t kind, std::span<const double> numbers) {
+    if (kind == kConstant) return numbers[0];
+    if (kind == kTable) {
+        const size_t n = numbers.size() / 2;
+        const auto times = numbers.first(n), values = numbers.subspan(n);
+        if (time <= times[0]) return values[0];
+        if (time >= times[n - 1]) return values[n - 1];
+        const auto i = std::lower_bound(times.begin(), times.end(), time) - times.begin();
+        const double share = (time - times[i - 1]) / (times[i] - times[i - 1]);
+        return (1.0 - share) * values[i - 1] + share * values[i];
+    }
+    double total = numbers[0];
+    for (size_t i = 1; i + 2 < numbers.size(); i += 3) {
+        const double frequency = numbers[i], amplitude = numbers[i + 1], phase = numbers[i + 2];
+        total += amplitude * std::cos(frequency * time + phase);
+    }
+    return total;
+}
+
+/// Fill in what changes by factors.
+void put_changing(double time, const Changing& changing, std::span<const double> constant,
+                  std::span<double> values) {
+    for (Factor& factor : changing.factors)
+        factor.value =
+            value_at(time, factor.kind, part(changing.numbers, factor.begin, factor.end));
+    for (int64_t j = 0; j < size(changing.places); ++j) {
+        const int64_t place = changing.places[j];
+        double total = constant[place];
+        for (int64_t e = changing.begins[j]; e < changing.begins[j + 1]; ++e)
+            total += changing.factors[changing.terms[e]].value * changing.forces[e];
+        values[place] = total;
+    }
+}
+
+/// Add what is linear in time between slices.
+void add_samples(double time, const Sampled& sampled, std::span<double> values) {
+    for (const SampledLoad& load : sampled.loads) {
+        const int64_t n = load.last - load.first;
+        const auto places = sampled.places.subspan(load.first, n);
+        const auto times = sampled.times.subspan(load.times, load.held);
+        const int64_t after = std::upper_bound(times.begin(), times.end(), time) - times.begin();
+        const int64_t i = std::max<int64_t>(0, after - 1);
+        const auto here = sampled.samples.subspan(load.samples + i * n, n);
+        if (i + 1 == load.held || times[i] >= time) {
+            for (int64_t j = 0; j < n; ++j) values[places[j]] += here[j];
+            continue;
+        }
+        const auto then = sampled.samples.subspan(load.samples + (i + 1) * n, n);
+        const double share = (time - times[i]) / (times[i + 1] - times[i]);
+        for (int64_t j = 0; j < n; ++j)
+            values[places[j]] += (1.0 - share) * here[j] + share * then[j];
+    }
+}
+
+}  // namespace
+
+void evaluate(const Loads& loads) {
+    const double time = loads.clock[0];
+    put_changing(time, loads.changing, loads.constant, loads.values);
+    add_samples(time, loads.sampled, loads.values);
+    remember(time, loads.values, loads.memories);
+}
+
+}  // namespace catenary

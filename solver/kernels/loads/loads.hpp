@@ -1,0 +1,55 @@
+#pragma once
+// Loads in time on what a rank solves for. See line_loads.py.
+#include "loads/memories.hpp"
+
+namespace catenary {
+
+/// Kinds of `TimeFunction`.
+enum : int64_t { kConstant, kTable, kHarmonics };
+
+/// A function of time, with what it is at the latest time. Its numbers are those from `begin` to
+/// `end`, see `TimeFunction`.
+struct Factor {
+    int64_t kind, begin, end;
+    double value;
+};
+
+/// Forces that change: `constant` and, at each place that changes, terms of factors. These are rows
+/// of a sparse matrix, from begins[j] to begins[j + 1] for place j.
+struct Changing {
+    std::span<const int64_t> places, begins, terms;
+    std::span<const double> forces;  ///< of a unit of its factor [N], [N m]
+    std::span<Factor> factors;
+    std::span<const double> numbers;  ///< of all factors
+    CATENARY_RECORD(places, begins, terms, forces, factors, numbers)
+};
+
+/// A load made ahead in slices, linear in time between them: its places are those from `first` to
+/// `last`, its times and its samples, slice by slice, those that begin there; `held` slices are.
+struct SampledLoad {
+    int64_t first, last, times, samples, held;
+};
+
+/// Such loads, side by side.
+struct Sampled {
+    std::span<const SampledLoad> loads;
+    std::span<const double> times;  ///< [s]
+    std::span<const int64_t> places;
+    std::span<const double> samples;  ///< [N], [N m]
+    CATENARY_RECORD(loads, times, places, samples)
+};
+
+/// All loads of a rank: `values` are their sum at the time clock[0] [s].
+struct Loads {
+    std::span<double> clock, values;
+    std::span<const double> constant;  ///< what stays, as `values`
+    Changing changing;
+    Sampled sampled;
+    Memories memories;
+    CATENARY_RECORD(clock, values, constant, changing, sampled, memories)
+};
+
+/// Make `values` those at the time of the clock.
+void evaluate(const Loads& loads);
+
+}  // namespace catenary

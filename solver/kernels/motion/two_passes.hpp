@@ -1,0 +1,62 @@
+#pragma once
+// Free steps of a rank's part of a line in two passes, with links that are looked at on the way
+// back and a window that follows the train. See stations/line.hpp for the passes.
+#include <optional>
+
+#include "motion/links.hpp"
+#include "motion/window.hpp"
+#include "stations/records.hpp"
+
+namespace catenary {
+
+/// What passes read and fill.
+struct PassArrays {
+    std::span<double> factor;            ///< what products with K read, see `ProductArrays`
+    std::span<double> velocity;          ///< the same of products with C; may be empty
+    std::span<const double> loads;       ///< [N] of all that is solved for; may be empty
+    std::span<double> answer;            ///< accelerations of all that is solved for
+    Motion motion;                       ///< of the rank's own unknowns
+    std::span<double> known, predicted;  ///< known accelerations, predicted velocities, or nothing
+    CATENARY_RECORD(factor, velocity, loads, answer, motion, known, predicted)
+};
+
+class TwoPasses : private Around {
+  public:
+    TwoPasses(Line line, const ProductArrays& rows, const FactorArrays& factors,
+              const PassArrays& arrays, const Changes& changes);
+
+    /// Fill `reserve` on the way back, which is taken in stretches of so many pairs of stations:
+    /// `ranges` (n + 1, 2) are the links behind each, see `left_behind`.
+    void track(const Links& links, std::span<double> reserve, Array2<const int64_t> ranges,
+               int64_t stretch);
+    /// Take steps of the stations in a window only from now on.
+    void open(const Window& window) { window_ = window; }
+    /// Fill in the velocities that others read in products with C, if there are such.
+    void predict_velocities() { predict_velocities(0, size(arrays_.motion.x)); }
+    void step();
+
+  private:
+    void before() override;
+    void after_stretch() override;
+    void predict_velocities(int64_t begin, int64_t end);
+
+    Line line_;
+    FactorArrays factors_;
+    PassArrays arrays_;
+    Changes changes_;
+    Work work_;
+    Links links_{};
+    std::span<double> reserve_;
+    Array2<const int64_t> ranges_;
+    int64_t stretch_ = 1, n_followed_ = 0;
+    std::optional<Window> window_;
+};
+
+/// Links that the pass back has left behind with each stretch: those from the first of both numbers
+/// of `ranges` (n_stretches + 1, 2) to the second have all their `unknowns` (n, m) among what is
+/// known by then. Unknowns of the rank's n_own stations begin at `starts` (n_own + 1,), so that few
+/// links wait for the next stretch. The last stretch is all that is left.
+void left_behind(std::span<const int64_t> starts, int64_t stretch, Array2<const int64_t> unknowns,
+                 Array2<int64_t> ranges);
+
+}  // namespace catenary

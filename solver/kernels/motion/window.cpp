@@ -1,0 +1,189 @@
+// A window that follows the train.
+#include "motion/window.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace catenary {
+
+namespace {
+
+/// Looks from one search for the largest motion to the next, once it has grown for as many.
+constexpr int64_t kPeakEvery = 64;
+/// Shares of a window that fade, of what is behind the train and of what is ahead.
+constexpr double kBehind = 0.85, kAhead = 0.6;
+
+/// The first number that is not below x, and the first that is above.
+int64_t not_below(std::span<const double> ascending, double x) {
+    return std::lower_bound(ascending.begin(), ascending.end(), x) - ascending.begin();
+}
+int64_t above(std::span<const double> ascending, double x) {
+    return std::upper_bound(ascending.begin(), ascending.end(), x) - ascending.begin();
+}
+
+/// Span in which a place [m] is, as a number with a fraction.
+double span_of(std::span<const double> masts, double x) {
+    const int64_t i = std::clamp<int64_t>(above(masts, x) - 1, 0, size(masts) - 2);
+    return i + (x - masts[i]) / (masts[i + 1] - masts[i]);
+}
+/// Place [m] of a number with a fraction of spans; beyond the line if there are not as many.
+double place_of_span(std::span<const double> masts, double number) {
+    const int64_t i =
+        std::clamp<int64_t>(static_cast<int64_t>(std::floor(number)), 0, size(masts) - 2);
+    return masts[i] + (number - i) * (masts[i + 1] - masts[i]);
+}
+
+/// Find the largest motion in the window.
+void find_peak(const Window& window, const Motion& motion) {
+    double largest_x = 0.0, largest_y = 0.0;
+    for (int64_t i = window.starts[window.at().begin]; i < window.starts[window.at().end]; ++i) {
+        largest_x = std::max(largest_x, std::abs(motion.x[i]));
+        largest_y = std::max(largest_y, std::abs(motion.y[i]));
+    }
+    window.peak[0] = largest_x;
+    window.peak[1] = largest_y;
+}
+
+/// Whether any of the stations from `begin` to `end` moves, or holds what is no number.
+bool moves(const Window& window, const Motion& motion, int64_t begin, int64_t end) {
+    const double of_x = window.by_motion * window.peak[0], of_y = window.by_motion * window.peak[1];
+    begin = std::max(begin, window.at().begin);
+    end = std::max(begin, std::min(end, window.at().end));
+    for (int64_t i = window.starts[begin]; i < window.starts[end]; ++i)
+        if (!(std::abs(motion.x[i]) <= of_x && std::abs(motion.y[i]) <= of_y)) return true;
+    return false;
+}
+
+struct Range {
+    int64_t begin, end;
+};
+
+/// Stations that move, at least those of `least`.
+Range follow_motion(const Window& window, const Motion& motion, Range least) {
+    const int64_t guard = window.guard;
+    int64_t low = window.at().begin, high = window.at().end;
+    if (moves(window, motion, low, low + guard)) {
+        low = std::max<int64_t>(0, low - guard);
+    } else {
+        while (low + guard <= least.begin && !moves(window, motion, low + guard, low + 2 * guard))
+            low += guard;
+    }
+    if (moves(window, motion, high - guard, high)) {
+        high = std::min(window.n_stations(), high + guard);
+    } else {
+        while (high - guard >= least.end && !moves(window, motion, high - 2 * guard, high - guard))
+            high -= guard;
+    }
+    return {std::min(low, least.begin), std::max(high, least.end)};
+}
+
+/// Bring the stations from `begin` to `end` to rest.
+void rest(const Window& window, const Motion& motion, int64_t begin, int64_t end) {
+    for (int64_t i = window.starts[begin]; i < window.starts[std::max(begin, end)]; ++i) {
+        motion.x[i] = window.is_exact ? 0.0 : displacement_at(i, motion) / motion.shares[0];
+        motion.y[i] = motion.z[i] = 0.0;
+        if (!window.known.empty()) window.known[i] = 0.0;
+    }
+}
+
+/// Make the window that from station `begin` to `end`; what leaves it comes to rest.
+void move(const Window& window, const Motion& motion, int64_t begin, int64_t end) {
+    const Ends before = window.at();
+    rest(window, motion, before.begin, std::min(begin, before.end));
+    rest(window, motion, std::max(end, before.begin), before.end);
+    turn_to(window, begin, end);
+}
+
+/// Damping at a share `into` of the way into what fades, in terms of its scale: it grows as the
+/// potential does that sends back least (D. E. Manolopoulos, J. Chem. Phys. 117, 2002), as far as
+/// that is finite.
+double damping(double into) {
+    constexpr double c = 2.62206, taken = 0.98;
+    constexpr double a = 1.0 - 16.0 / (c * c * c), b = (1.0 - 17.0 / (c * c * c)) / (c * c);
+    const double x = taken * c * into;
+    return a * x - b * x * x * x + 4.0 / ((c - x) * (c - x)) - 4.0 / ((c + x) * (c + x));
+}
+
+/// Let the velocity of a station decay, by so much for little; it stays where it is.
+void slow_down(const Window& window, const Motion& motion, int64_t station, double decay) {
+    const double loss = decay / (1.0 + decay);
+    const auto& shares = motion.shares;
+    for (int64_t i = window.starts[station]; i < window.starts[station + 1]; ++i) {
+        const double change = -loss * velocity_at(i, motion);
+        motion.y[i] += change;
+        motion.x[i] -= shares[1] / shares[0] * change;
+    }
+}
+
+/// Slow down the outer part of what is behind the place `first` and ahead of `last` [m].
+///
+/// Waves whose group velocity is nearly the train's stay there for long. In its frame their
+/// envelope obeys Schroedinger's equation, i a_t = -D / 2 a_xx, and damping that begins at once
+/// sends them back, however little it is: so it grows, by as much as the length lets it.
+void fade(const Window& window, const Motion& motion, double first, double last) {
+    const int64_t begin = window.at().begin, end = window.at().end;
+    const auto &low = window.low, &high = window.high;
+    const double behind = kBehind * (first - low[begin]), ahead = kAhead * (high[end - 1] - last);
+    for (int64_t i = begin; begin > 0 && i < end && high[i] < low[begin] + behind; ++i) {
+        const double into = 1.0 - (high[i] - low[begin]) / behind;
+        slow_down(window, motion, i, window.fading / (behind * behind) * damping(into));
+    }
+    for (int64_t i = end - 1;
+         end < window.n_stations() && i >= begin && low[i] > high[end - 1] - ahead; --i) {
+        const double into = 1.0 - (high[end - 1] - low[i]) / ahead;
+        slow_down(window, motion, i, window.fading / (ahead * ahead) * damping(into));
+    }
+}
+
+}  // namespace
+
+bool look(const Window& window, const Motion& motion) {
+    auto& state = *reinterpret_cast<WindowState*>(window.state.data());
+    const int64_t step = state.step++;
+    if (step % window.every) return false;
+    const bool is_fresh = state.is_fresh != 0;
+    state.is_fresh = 0;
+    double first = window.loaded[0], last = window.loaded[1];
+    for (double contact : window.contacts) {
+        first = std::min(first, contact);
+        last = std::max(last, contact);
+    }
+    Range range{not_below(window.high, first - window.margin),
+                above(window.low, last + window.margin)};
+    if (window.by_motion > 0.0) {
+        const int64_t looks = step / window.every;
+        if (is_fresh || looks < kPeakEvery || looks % kPeakEvery == 0) find_peak(window, motion);
+        range = follow_motion(window, motion, range);
+    } else {
+        const auto& masts = window.masts;
+        const double behind = place_of_span(masts, span_of(masts, first) - window.spans_behind),
+                     ahead = place_of_span(masts, span_of(masts, last) + window.spans_ahead);
+        range.begin = std::min(range.begin, not_below(window.high, behind));
+        range.end = std::max(range.end, above(window.low, ahead));
+    }
+    const int64_t end = window.edges(
+        1, std::min(window.n_stations(), std::max(range.end, range.begin + kLeastStations)));
+    const int64_t begin =
+        window.edges(0, std::max<int64_t>(0, std::min(range.begin, end - kLeastStations)));
+    move(window, motion, begin, end);
+    if (window.fading > 0.0) fade(window, motion, first, last);
+    return is_fresh;
+}
+
+void turn_to(const Window& window, int64_t begin, int64_t end) {
+    Ends& ends = window.at();
+    const int64_t middle = middle_of(begin, end), n = window.n_stations();
+    turn(window.kinds, window.turning, ends.middle, middle);
+    ends = {begin, end, begin, end, middle};
+    // What a link that switches moves stays within the window; those at its ends do not switch.
+    const int64_t inner = begin > 0 ? std::min(begin + window.guard, n) : begin,
+                  outer = end < n ? std::max(end - window.guard, inner) : end;
+    const int64_t first = window.links_before[inner], last = window.links_before[outer];
+    window.links[0] = first;
+    window.links[1] = last;
+    // The pass back looks at all links at its end.
+    std::ranges::fill(window.ranges.all(), first);
+    window.ranges(1, 1) = last;
+}
+
+}  // namespace catenary

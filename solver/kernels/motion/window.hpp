@@ -1,0 +1,54 @@
+#pragma once
+// A window of moving stations that follows the train. Stations outside of it are at rest: no step
+// reads or writes them, but for the ones beside it, which are held where they are.
+#include "motion/state.hpp"
+#include "stations/line.hpp"
+#include "stations/meeting_station.hpp"
+
+namespace catenary {
+
+struct WindowState {
+    int64_t step;      ///< steps taken
+    int64_t is_fresh;  ///< whether the whole line is still alive
+};
+
+struct Window {
+    std::span<int64_t> state;  ///< of `WindowState`
+    int64_t every, guard;      ///< steps between two looks, and stations that are looked at
+    /// Share of the largest motion below which stations rest, 0 if spans decide; these spans.
+    double by_motion, spans_behind, spans_ahead;
+    double fading;                      ///< how much fades at a look [m2], see `fade`
+    bool is_exact;                      ///< whether what rests is made zero, or stays where it is
+    std::span<double> peak;             ///< largest of x and y of the motion
+    std::span<const double> contacts;   ///< where they are [m]
+    std::span<const double> loaded;     ///< first and last place with a load [m]
+    double margin;                      ///< how far around a step and what switches in it reach [m]
+    std::span<const double> masts;      ///< where spans end [m]
+    std::span<const double> low, high;  ///< where stations begin and end [m]
+    std::span<const int64_t> starts;    ///< (n + 1,) first unknown of each
+    std::span<const int64_t> links_before;  ///< (n + 1,) how many links stand before each
+    Array2<const int64_t>
+        edges;                 ///< (2, n + 1) where a window that is to begin, or end, there does
+    std::span<int64_t> ends;   ///< of `Ends`
+    std::span<int32_t> kinds;  ///< of factors
+    Turning turning;
+    std::span<int64_t> links;  ///< the first link that may switch and the one after the last
+    Array2<int64_t> ranges;    ///< (2, 2) the same for the pass back, see `left_behind`
+    std::span<double> known;   ///< what the motion keeps besides x, y and z, or nothing
+    CATENARY_RECORD(state, every, guard, by_motion, spans_behind, spans_ahead, fading, is_exact,
+                    peak, contacts, loaded, margin, masts, low, high, starts, links_before, edges,
+                    ends, kinds, turning, links, ranges, known)
+
+    int64_t n_stations() const { return size(low); }
+    Ends& at() const { return *reinterpret_cast<Ends*>(ends.data()); }
+};
+
+/// Stations of the smallest window.
+constexpr int64_t kLeastStations = 64;
+
+/// Let the window follow contacts and motion, at some steps; whether it was the first look.
+bool look(const Window& window, const Motion& motion);
+/// Let steps take on the stations from `begin` to `end`, and links between these move.
+void turn_to(const Window& window, int64_t begin, int64_t end);
+
+}  // namespace catenary

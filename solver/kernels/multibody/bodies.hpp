@@ -1,0 +1,47 @@
+#pragma once
+// Rigid bodies in space: where n bodies are and how they move, the frame at rest being one more.
+#include "base/arrays.hpp"
+#include "base/record.hpp"
+#include "multibody/vectors.hpp"
+
+namespace catenary {
+
+/// See `Motion` of mbs/rigid/bodies.py.
+struct BodyMotion {
+    Array2<const double> position;  ///< (n + 1, 3) [m]
+    Array3<const double> rotation;  ///< (n + 1, 3, 3) from body to space axes
+    Array2<const double> velocity;  ///< (n + 1, 3) [m/s], in space axes
+    Array2<const double> spin;      ///< (n + 1, 3) [rad/s], in body axes
+    CATENARY_RECORD(position, rotation, velocity, spin)
+
+    int64_t n_bodies() const { return position.rows - 1; }
+    /// A vector in body axes, in space axes.
+    Vector3 turned(int64_t body, const Vector3& local) const;
+    /// The angular velocity in space axes.
+    Vector3 turning(int64_t body) const;
+};
+
+/// A point fixed on a body: arm from the body's centre, and the point's place, velocity and
+/// centripetal acceleration.
+struct PointOnBody {
+    Vector3 arm, place, velocity, inward;
+};
+PointOnBody point_on(const BodyMotion& motion, int64_t body, const Vector3& local);
+
+/// Add to a row (6 n,) the gradient of (velocity of a body's centre) . `way`; the frame has none.
+void add_shift(const BodyMotion& motion, int64_t body, const Vector3& way, double sign,
+               std::span<double> row);
+/// Add that of (angular velocity of a body) . `way`, in body axes.
+void add_moment(const BodyMotion& motion, int64_t body, const Vector3& way, double sign,
+                std::span<double> row);
+
+/// Fill in matrices (n, 3, 3) from body to space axes of unit Euler parameters (n, 4).
+void rotation_matrices(Array2<const double> parameters, Array3<double> rotation);
+/// Displace bodies in place by `step` (6 n,): translations, then turns in body axes. Euler
+/// `parameters` (n + 1, 4) are normalised after the turn; `position` is (n + 1, 3).
+void move_bodies(Array2<double> position, Array2<double> parameters, std::span<const double> step);
+/// Add -omega x J omega to generalised forces (6 n,) in place; `inertia` (n, 3), `spin` (n + 1, 3).
+void add_gyroscopic_moments(std::span<double> force, Array2<const double> inertia,
+                            Array2<const double> spin);
+
+}  // namespace catenary

@@ -1,0 +1,121 @@
+// What Python calls of pantographs' heads, which it makes and keeps.
+#include "heads/lawful_chain.hpp"
+#include "heads/linear_chain.hpp"
+#include "heads/raised_head.hpp"
+#include "python/from_python.hpp"
+
+namespace catenary::python {
+
+namespace {
+
+/// What a head's arrays belong to.
+struct Keeper {
+    Kept kept;
+};
+
+/// A head that keeps them alive.
+template <class Model>
+class HeldHead : public Model, public Keeper {
+  public:
+    template <class... Parts>
+    explicit HeldHead(Kept&& owners, Parts&&... parts)
+        : Model(std::forward<Parts>(parts)...), Keeper{std::move(owners)} {}
+};
+
+/// Makes a model from records.
+template <class Model, class... Records>
+std::unique_ptr<Model> make(const std::pair<const char*, py::object> (&given)[sizeof...(Records)]) {
+    Kept kept;
+    size_t next = 0;
+    auto convert = [&]<class Record>(std::type_identity<Record>) {
+        const auto& [name, value] = given[next++];
+        return From<Record>::convert(value, name, kept);
+    };
+    std::tuple<Records...> records{convert(std::type_identity<Records>())...};
+    return std::apply(
+        [&](auto&... record) -> std::unique_ptr<Model> {
+            return std::make_unique<HeldHead<Model>>(std::move(kept), record...);
+        },
+        records);
+}
+
+/// A record that a head takes besides, whose arrays it keeps alive.
+template <class Record>
+Record taken(Head& head, const py::object& given, const char* name) {
+    return From<Record>::convert(given, name, dynamic_cast<Keeper&>(head).kept);
+}
+
+/// Numbers that a call reads, `n` or more.
+std::span<const double> numbers(const py::object& given, const char* name, int64_t n) {
+    Kept kept;
+    const auto found = From<std::span<const double>>::convert(given, name, kept);
+    if (size(found) < n) throw py::value_error(std::string(name) + " has too few numbers");
+    return found;
+}
+std::span<const double> row(const Head& head, const py::object& drive) {
+    return numbers(drive, "drive", kDrive + 2 * head.n_strips());
+}
+
+void extrapolate(Head& head, const py::object& drive, const py::object& early) {
+    Kept kept;
+    const auto table = From<Array2<double>>::convert(early, "early", kept);
+    if (table.rows != 2 || table.columns != head.n_strips())
+        throw py::value_error("early has other strips than its head");
+    head.extrapolate(row(head, drive), table);
+}
+
+}  // namespace
+
+void offer_heads(py::module_& m) {
+    PYBIND11_NUMPY_DTYPE(Drive, force, part, base, base_velocity, base_acceleration, head_air,
+                         arm_air, bodies_air);
+    PYBIND11_NUMPY_DTYPE(HeadLaw, by_base, zero, of_rate, begin, end);
+    PYBIND11_NUMPY_DTYPE(HeadLawPoint, at, force);
+    PYBIND11_NUMPY_DTYPE(RegulationSettings, of_height, target, part, dt, sample, least, most);
+    PYBIND11_NUMPY_DTYPE(ControlGains, measured, of_error, of_integral, of_rate);
+    PYBIND11_NUMPY_DTYPE(RegulationMemory, time, next, filtered, integral, error, samples, acting);
+    m.attr("DRIVE") = py::dtype::of<Drive>();
+    m.attr("HEAD_LAW") = py::dtype::of<HeadLaw>();
+    m.attr("HEAD_LAW_POINT") = py::dtype::of<HeadLawPoint>();
+    m.attr("REGULATION") = py::dtype::of<RegulationSettings>();
+    m.attr("CONTROL_GAINS") = py::dtype::of<ControlGains>();
+    m.attr("REGULATION_MEMORY") = py::dtype::of<RegulationMemory>();
+    py::class_<Head>(m, "Head")
+        .def_property("first", &Head::first, &Head::set_first)
+        .def_property("added_force", &Head::added_force, &Head::set_added_force)
+        .def("bend",
+             [](Head& head, const py::object& bending) {
+                 head.bend(taken<Bending>(head, bending, "bending"));
+             })
+        .def("regulate",
+             [](Head& head, const py::object& regulation) {
+                 head.regulate(taken<Regulation>(head, regulation, "regulation"));
+             })
+        .def("step",
+             [](Head& head, const py::object& drive) { return head.step(row(head, drive)); })
+        .def("advance",
+             [](Head& head, const py::object& contact_force) {
+                 head.advance(numbers(contact_force, "contact_force", head.n_strips()));
+             })
+        .def("extrapolate", &extrapolate);
+    py::class_<LinearChain, Head>(m, "LinearChain")
+        .def(py::init([](const py::object& arrays, const py::object& linear) {
+            return make<LinearChain, HeadArrays, LinearStep>(
+                {{"arrays", arrays}, {"linear", linear}});
+        }));
+    py::class_<LawfulChain, Head>(m, "LawfulChain")
+        .def(py::init([](const py::object& arrays, const py::object& masses, const py::object& laws,
+                         const py::object& carrier) {
+            return make<LawfulChain, HeadArrays, SprungMasses, HeadLaws, int64_t>(
+                {{"arrays", arrays}, {"masses", masses}, {"laws", laws}, {"carrier", carrier}});
+        }));
+    py::class_<RaisedHead, Head>(m, "RaisedHead")
+        .def(py::init([](const py::object& arrays, const py::object& masses, const py::object& laws,
+                         const py::object& mechanism) {
+            return make<RaisedHead, HeadArrays, SprungMasses, HeadLaws, ReducedMechanism>(
+                {{"arrays", arrays}, {"masses", masses}, {"laws", laws}, {"mechanism", mechanism}});
+        }))
+        .def_property_readonly("height", &RaisedHead::height);
+}
+
+}  // namespace catenary::python

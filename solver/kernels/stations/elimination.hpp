@@ -1,0 +1,37 @@
+#pragma once
+// Block elimination of a line, station by station. See elimination.py.
+#include <vector>
+
+#include "base/arrays.hpp"
+#include "base/record.hpp"
+
+namespace catenary {
+
+/// Blocks of a symmetric matrix in a row of stations, of each kind of station: those that join it
+/// to the one before, its own, and those that join it to the one after, (k, b, b) each.
+struct StationBlocks {
+    Array3<const double> before, own, after;
+    CATENARY_RECORD(before, own, after)
+};
+
+/// Stations after elimination from one end.
+struct Eliminated {
+    std::vector<double> factors;   ///< (m, 3, b, b), see elimination.py
+    std::vector<int32_t> kinds;    ///< (m,) kind of station that each factor is of
+    std::vector<int32_t> numbers;  ///< (n,) the factor of each station
+};
+
+/// Eliminate stations of these `kinds` one after the other, from the first or from the last on.
+Eliminated eliminate(std::span<const int32_t> kinds, const StationBlocks& blocks, bool from_end);
+
+/// Where elimination from both ends meets: the kind of the station, and the factors of those before
+/// and after it, -1 if there is none.
+struct Meeting {
+    int64_t kind, before, after;
+};
+
+/// Fill in factors (m, 3, b, b) of meetings, whose neighbours have those `before` and `after`.
+void join(std::span<const Meeting> meetings, const StationBlocks& blocks,
+          Array4<const double> before, Array4<const double> after, Array4<double> factors);
+
+}  // namespace catenary

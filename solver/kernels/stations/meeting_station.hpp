@@ -1,0 +1,23 @@
+#pragma once
+// Where elimination from both ends meets, and how it moves. See meeting_station.py.
+#include "base/arrays.hpp"
+#include "base/record.hpp"
+
+namespace catenary {
+
+/// Where elimination may end at several places, it may at every so many stations.
+constexpr int64_t kMiddles = 16;
+
+/// Kinds of stations by where elimination ends: of each where that is further on, and where it is
+/// before; of each station at which it may end, one of kMiddles.
+struct Turning {
+    std::span<const int32_t> to_end, to_start, here;
+    CATENARY_RECORD(to_end, to_start, here)
+};
+
+/// A station where elimination may end, near the middle from `low` to `high`.
+int64_t middle_of(int64_t low, int64_t high);
+/// Let elimination end at `middle` in place of `before`.
+void turn(std::span<int32_t> kinds, const Turning& turning, int64_t before, int64_t middle);
+
+}  // namespace catenary

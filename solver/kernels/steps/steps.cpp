@@ -1,0 +1,101 @@
+// Steps of the scheme `one_solve`.
+#include "steps/steps.hpp"
+
+namespace catenary {
+
+Taken Steps::take(int64_t first, int64_t end) {
+    const KeptMotions& kept = block_.kept;
+    const bool shows = block_.rows.rows > 0;
+    for (int64_t number = first; number < end; ++number) {
+        begin(number);
+        const int64_t n_compensations = predict_heads(number) ? find_forces(number) : kLeft;
+        if (n_compensations < 0) return {number - first, true, false};
+        finish(n_compensations);
+        if (!shows) continue;
+        show(number);
+        const int64_t motion = kept.motion_of[number];
+        if (motion >= 0 && !keep(kept, motion, parts_.shown.motion, parts_.shown.columns))
+            return {number + 1 - first, false, true};
+    }
+    return {end - first, false, false};
+}
+
+/// Move the contacts, and take the line's step without forces there.
+void Steps::begin(int64_t number) {
+    const double time = block_.times[number];
+    move_contacts(parts_.train, parts_.speed * time);
+    place(parts_.contacts);
+    begin_work(parts_.contacts);
+    for (const Loads& loads : parts_.loads) {
+        loads.clock[0] = time;
+        evaluate(loads);
+    }
+    parts_.free->step();
+    take_in(block_.now, parts_.shown.columns.ends);
+    take_in(block_.kept.moved, parts_.shown.columns.ends);
+}
+
+/// Take the heads' steps without contact; whether all are where their models reach.
+bool Steps::predict_heads(int64_t number) {
+    const auto drives = block_.drives[number];
+    const int64_t n_contacts = size(parts_.problem.found.depth);
+    if (!parts_.lateral_place.empty()) {
+        find_across(parts_.contacts);
+        for (size_t h = 0; h < parts_.heads.size(); ++h)
+            parts_.heads[h]->cross(drives[h], parts_.contacts.across, parts_.contacts.touches,
+                                   parts_.lateral_place);
+    }
+    bool within = true;
+    for (size_t h = 0; h < parts_.heads.size(); ++h)
+        within &= parts_.heads[h]->predict(drives[h], parts_.strips, n_contacts);
+    return within;
+}
+
+/// Find the contact forces; returns what `catenary::find_forces` does, but never that bounds were
+/// too small.
+int64_t Steps::find_forces(int64_t number) {
+    const SmallProblem& problem = parts_.problem;
+    Counts& counts = block_.counts[0];
+    while (true) {
+        respond(parts_.contacts, problem.share);
+        const int64_t n = catenary::find_forces(block_.times[number], problem, parts_.law,
+                                                parts_.switched, counts);
+        if (n != kTooSmall) return n;
+        widen(problem.share.bounds);
+        ++counts.repeated;
+    }
+}
+
+/// Add what the forces do to line and heads.
+void Steps::finish(int64_t n_compensations) {
+    const SmallProblem& problem = parts_.problem;
+    const int64_t n = size(problem.found.depth);
+    const std::span<const double> solution = problem.unknowns.solution, force = solution.first(n);
+    superpose(parts_.contacts, force);
+    if (n_compensations)
+        compensate(parts_.contacts, parts_.switched.first(n_compensations),
+                   solution.subspan(n, n_compensations));
+    add_work(parts_.contacts, force);
+    for (Head* head : parts_.heads) head->move(force);
+    write_outputs(parts_.train_outputs, force, parts_.law.reported, problem.heads,
+                  problem.found.depth);
+}
+
+/// Fill in a row: what pantographs show, the line, and further channels.
+void Steps::show(int64_t number) {
+    std::span<double> row = block_.rows[number];
+    auto next = [&row](size_t n) {
+        const auto first = row.first(n);
+        row = row.subspan(n);
+        return first;
+    };
+    const Shown& shown = parts_.shown;
+    std::ranges::copy(parts_.outputs, next(parts_.outputs.size()).begin());
+    const auto uplift = next(shown.arms.size()), tension = next(shown.droppers.law.size());
+    const auto behind = block_.behind[number];
+    catenary::show(shown, uplift, tension, std::min(block_.now[0], behind[0]),
+                   std::max(block_.now[1], behind[1]));
+    copy_all(parts_.channels, row);
+}
+
+}  // namespace catenary

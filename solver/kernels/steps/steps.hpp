@@ -1,0 +1,73 @@
+#pragma once
+// Steps of the scheme `one_solve` on one rank: a step of the line without contact, the small
+// problem of contact forces and switching links, and what both do to line and pantographs.
+#include "contact/outputs.hpp"
+#include "contact/response.hpp"
+#include "contact/train_places.hpp"
+#include "contact_problem/forces.hpp"
+#include "heads/head.hpp"
+#include "loads/loads.hpp"
+#include "motion/shown.hpp"
+#include "motion/two_passes.hpp"
+
+namespace catenary {
+
+/// What steps are made of.
+struct StepParts {
+    double speed;              ///< of the train [m/s]
+    TrainPlaces train;         ///< where its contacts are
+    Contacts contacts;         ///< what they work on
+    TwoPasses* free;           ///< the line's step without contact
+    std::vector<Loads> loads;  ///< those that change with time, or none
+    std::vector<Head*> heads;  ///< of the pantographs
+    std::span<double> strips;  ///< all strips as functions of the forces, see `Head::predict`
+    SmallProblem problem;      ///< of a step's forces
+    ReportedForces law;        ///< which forces the contact law reports
+    std::span<double> lateral_place;  ///< (n,) where wires are on the strips [m], or nothing
+    std::span<int64_t> switched;      ///< room for the numbers of links with a compensation
+    TrainOutputs train_outputs;       ///< what a step fills in of the following
+    std::span<const double> outputs;  ///< what pantographs show
+    Shown shown;                      ///< what the line shows
+    std::vector<std::span<const double>> channels;  ///< what further channels show
+    CATENARY_RECORD(speed, train, contacts, free, loads, heads, strips, problem, law, lateral_place,
+                    switched, train_outputs, outputs, shown, channels)
+};
+
+/// What a block of steps is told, and what it fills in.
+struct Block {
+    std::span<const double> times;  ///< (n,) at their ends [s]
+    Array3<double> drives;          ///< (n, n_heads, width) a row for each head, see `Drive`
+    Array2<double> rows;            ///< (n, width) what each step shows; none if nobody looks
+    std::span<int64_t> now;         ///< stations that move in this block, first and last + 1
+    Array2<const int64_t> behind;   ///< (n, 2) of each row those that moved since it was filled
+    KeptMotions kept;
+    std::span<Counts> counts;  ///< (1,)
+    CATENARY_RECORD(times, drives, rows, now, behind, kept, counts)
+};
+
+/// How far a block of steps has come.
+struct Taken {
+    int64_t n_steps;  ///< that were taken
+    /// Whether the next one is begun: up to its free step, as its forces are left to others.
+    bool begun;
+    bool is_full;  ///< whether there is no room for the motion of the last one
+};
+
+class Steps {
+  public:
+    Steps(StepParts parts, Block block) : parts_(std::move(parts)), block_(std::move(block)) {}
+    /// Take the steps of the block from number `first` on up to before `end`.
+    Taken take(int64_t first, int64_t end);
+
+  private:
+    void begin(int64_t number);
+    bool predict_heads(int64_t number);
+    int64_t find_forces(int64_t number);
+    void finish(int64_t n_compensations);
+    void show(int64_t number);
+
+    StepParts parts_;
+    Block block_;
+};
+
+}  // namespace catenary

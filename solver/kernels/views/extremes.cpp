@@ -1,0 +1,23 @@
+// Extremes, row by row.
+#include "views/extremes.hpp"
+
+#include "base/targets.hpp"
+
+namespace catenary {
+
+CATENARY_FOR_TARGETS
+void take_extremes(Array2<const double> rows, int64_t first, int64_t begin, int64_t end,
+                   Array2<double> kept) {
+    const auto smallest = part(kept[0], begin, end), largest = part(kept[1], begin, end);
+    for (int64_t i = 0; i < rows.rows; ++i) {
+        const auto row = part(rows[i], first + begin, first + end);
+        // Written at any rate, so that it becomes a loop of vector instructions.
+        for (size_t j = 0; j < row.size(); ++j) {
+            const double value = row[j], low = smallest[j], high = largest[j];
+            smallest[j] = value < low ? value : low;
+            largest[j] = value > high ? value : high;
+        }
+    }
+}
+
+}  // namespace catenary

@@ -1,0 +1,42 @@
+"""A run of a user who has no home and may not write where the program is installed."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import pytest
+
+NOBODY = ("setpriv", "--reuid=65534", "--regid=65534", "--clear-groups")
+
+
+@pytest.mark.process
+@pytest.mark.skipif(
+    os.geteuid() != 0 or not shutil.which("setpriv"), reason="another user takes root and setpriv"
+)
+def test_a_user_without_home_and_without_write_access() -> None:
+    if subprocess.run([*NOBODY, "test", "-r", __file__], check=False).returncode:
+        pytest.skip("another user cannot read this checkout")
+    with tempfile.TemporaryDirectory() as folder:
+        Path(folder).chmod(0o777)
+        run_as_nobody(Path(folder))
+
+
+def run_as_nobody(folder: Path) -> None:
+    program = "from catenary.cases.cli.main import main; main()"
+    words = ["run", "en50318_2002", "--short", "--quiet", "-o", str(folder / "run")]
+    done = subprocess.run(
+        [*NOBODY, sys.executable, "-c", program, *words],
+        env={"HOME": "/nonexistent", "TMPDIR": str(folder)},
+        cwd="/",
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    assert done.returncode == 0 and not done.stderr, done.stderr
+    assert (folder / "run" / "summary.json").is_file()
