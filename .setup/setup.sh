@@ -77,8 +77,8 @@ is_current() {
 
 # What the kernels are compiled from; their order and names too.
 fingerprint_of_kernels() {
-    printf '%s\n' solver/kernels/*.[ch]pp
-    cat setup.py solver/kernels/*.[ch]pp | cksum
+    printf '%s\n' solver/kernels/*/*.[ch]pp
+    cat setup.py solver/kernels/*/*.[ch]pp | cksum
 }
 
 kernels_are_current() {
