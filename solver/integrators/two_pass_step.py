@@ -8,6 +8,7 @@ wait for. Two chains of stations go side by side, each of which waits for itself
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -20,6 +21,8 @@ from catenary.solver.integrators.line_state import (
     Steps,
 )
 from catenary.solver.kernels import native
+from catenary.solver.linear.factors.station_factors import FactorArrays
+from catenary.solver.linear.stations.station_products import ProductArrays
 from catenary.solver.linear.step_operators import ByStations
 from catenary.solver.model.switching_links import NO_LINKS, LinkArrays
 from catenary.solver.window.window_arrays import WindowArrays
@@ -66,6 +69,26 @@ class Changes(NamedTuple):
     by_mass: float
 
 
+class PassParts(NamedTuple):
+    """What passes are made of besides layouts; ``make_ups`` as in ``Sections``."""
+
+    make_ups: Sequence[Sequence[int]]
+    rows: ProductArrays
+    factors: FactorArrays
+    arrays: PassArrays
+    changes: Changes
+
+
+class TrackedLinks(NamedTuple):
+    """Links that are looked at on the way back, which is taken in stretches of so many pairs of
+    stations; ``ranges`` (n + 1, 2) are the links behind each."""
+
+    links: LinkArrays
+    reserve: np.ndarray
+    ranges: np.ndarray
+    stretch: int
+
+
 class StationPasses:
     """Takes free steps. Not collective.
 
@@ -103,12 +126,11 @@ class StationPasses:
         self._starts = factors.starts[low : high + 1] - factors.starts[low]
         self._stretch = max(1, _STRETCH * (high - low) // max(1, int(self._starts[-1])))
         layouts = [
-            (of_rows.native, of_factors.native)
-            for of_rows, of_factors in zip(product.layout.parts, factors.layout.parts, strict=True)
+            [part.native for part in layout.parts] for layout in (product.layout, factors.layout)
         ]
         arrays = PassArrays(read, velocity, loads, answer, motion.read, known, predicted)
-        stations = layouts, product.stations.make_ups, product.arrays, factors.arrays
-        self.native = native.TwoPasses(*stations, arrays, changes)
+        stations = product.stations.make_ups, product.arrays, factors.arrays
+        self.native = native.TwoPasses(*layouts, PassParts(*stations, arrays, changes))
         self.known = known
         self.track_links(NO_LINKS, np.zeros(0))
 
@@ -121,12 +143,12 @@ class StationPasses:
         n_stretches = -(-n_pairs // self._stretch)
         ranges = np.zeros((1 + max(1, n_stretches), 2), dtype=np.int64)
         native.left_behind(self._starts, self._stretch, links.unknowns, ranges)
-        self.native.track(links, reserve, ranges, self._stretch)
+        self.native.track(TrackedLinks(links, reserve, ranges, self._stretch))
 
     def open(self, window: WindowArrays, links: LinkArrays, reserve: np.ndarray) -> None:
         """Take steps of the stations in a window only from now on; links as in ``track_links``."""
         self.native.open(window)
-        self.native.track(links, reserve, window.ranges, window.low.size)
+        self.native.track(TrackedLinks(links, reserve, window.ranges, window.low.size))
 
     def predict_velocities(self) -> None:
         """Fill in the rank's own part of what others read of it in a product with C. A step does

@@ -197,19 +197,10 @@ class TwoPasses(FreeSteps):
     written in place."""
 
     def __init__(
-        self,
-        layouts: Sequence[tuple[Layout, Layout]],
-        make_ups: Sequence[Sequence[int]],
-        rows: object,
-        factors: object,
-        arrays: object,
-        changes: object,
+        self, rows: Sequence[Layout], factors: Sequence[Layout], parts: object
     ) -> None: ...
-    def track(self, links: object, reserve: np.ndarray, ranges: np.ndarray, stretch: int) -> None:
-        """Fill ``reserve`` on the way back, taken in stretches of so many pairs of stations.
-
-        ``ranges`` (n + 1, 2) are the links behind each, see ``left_behind``.
-        """
+    def track(self, links: object) -> None:
+        """Look at ``TrackedLinks`` on the way back."""
 
     def open(self, window: object) -> None:
         """Take steps of the stations in a ``WindowArrays`` only from now on."""

@@ -63,10 +63,15 @@ class Head {
     void regulate(const Regulation& regulation) { regulation_ = regulation; }
     /// What regulates the lift adds to the static force now [N].
     double added_force() const {
-        return regulation_ ? regulation_->memory.front().acting : added_force_;
+        return added_force_ + (regulation_ ? regulation_->memory.front().acting : 0.0);
     }
     /// Put that of a controller that no kernel knows.
     void set_added_force(double force) { added_force_ = force; }
+
+    /// What bends, and what regulates the lift, if anything does.
+    const std::optional<Bending>& bending() const { return bending_; }
+    const std::optional<Regulation>& regulation() const { return regulation_; }
+    const HeadArrays& arrays() const { return arrays_; }
 
     /// Step without contact, with a row of a `Drive`: fills `out`. Whether the head is where its
     /// model reaches.

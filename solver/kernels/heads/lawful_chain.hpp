@@ -9,6 +9,7 @@ class LawfulChain : public SprungHead {
     /// `carrier` is the coordinate that is driven.
     LawfulChain(const HeadArrays& arrays, const SprungMasses& masses, const HeadLaws& laws,
                 int64_t carrier);
+    int64_t carrier() const { return carrier_; }
 
   protected:
     bool step_free(const Drive& drive) override;

@@ -42,6 +42,7 @@ class SettlingLaws {
   public:
     SettlingLaws(const HeadLaws& laws, int64_t n);
     bool any() const { return !laws_.law.empty(); }
+    const HeadLaws& laws() const { return laws_; }
     /// Add the laws to a step's `force` (n,) and `matrix` (n, n), and invert the latter in place.
     ///
     /// Each law is taken along the segment of its table in which the step ends under the contact

@@ -16,6 +16,7 @@ struct LinearStep {
 class LinearChain : public Head {
   public:
     LinearChain(const HeadArrays& arrays, const LinearStep& linear);
+    const LinearStep& linear() const { return linear_; }
 
   protected:
     bool step_free(const Drive& drive) override;

@@ -17,6 +17,7 @@ class RaisedHead : public SprungHead {
   public:
     RaisedHead(const HeadArrays& arrays, const SprungMasses& masses, const HeadLaws& laws,
                const ReducedMechanism& mechanism);
+    const ReducedMechanism& mechanism() const { return mechanism_; }
     /// Height at which the tables were taken in the latest step [m].
     double height() const { return height_; }
 

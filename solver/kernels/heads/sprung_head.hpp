@@ -19,6 +19,8 @@ struct SprungMasses {
 class SprungHead : public Head {
   public:
     SprungHead(const HeadArrays& arrays, const SprungMasses& masses, const HeadLaws& laws);
+    const SprungMasses& masses() const { return masses_; }
+    const HeadLaws& laws() const { return laws_.laws(); }
 
   protected:
     /// Predict (paper eq. 2.5), and put force and matrix of springs, dampers, masses and the air.

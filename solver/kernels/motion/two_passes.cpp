@@ -2,6 +2,7 @@
 #include "motion/two_passes.hpp"
 
 #include <algorithm>
+#include <stdexcept>
 
 #include "base/targets.hpp"
 
@@ -11,6 +12,18 @@ namespace {
 
 double* in(std::span<double> numbers) {
     return numbers.empty() ? nullptr : numbers.data();
+}
+
+Line line_of(const std::vector<std::pair<Layout, Layout>>& layouts,
+             const std::vector<std::vector<int>>& make_ups) {
+    std::vector<std::unique_ptr<Kernels>> kernels;
+    for (const auto& [rows, factors] : layouts) {
+        kernels.push_back(kernels_of(rows, factors));
+        if (!kernels.back())
+            throw std::invalid_argument("no kernels take stations of these layouts");
+    }
+    if (make_ups.size() < kernels.size()) throw std::invalid_argument("a make-up is missing");
+    return Line(std::move(kernels), make_ups);
 }
 
 CATENARY_FOR_TARGETS
@@ -23,45 +36,38 @@ void add_up(std::span<double> result, const double* velocity, const double* late
 
 }  // namespace
 
-TwoPasses::TwoPasses(Line line, const ProductArrays& rows, const FactorArrays& factors,
-                     const PassArrays& arrays, const Changes& changes)
-    : line_(std::move(line)), factors_(factors), arrays_(arrays), changes_(changes) {
-    work_.product = rows.product();
+TwoPasses::TwoPasses(PassParts parts)
+    : parts_(std::move(parts)), line_(line_of(parts_.layouts, parts_.make_ups)) {
+    const PassArrays& arrays = parts_.arrays;
+    work_.product = parts_.rows.product();
     work_.product.factor = in(arrays.factor);
     work_.product.velocity = in(arrays.velocity);
-    work_.factored = factors.factored();
+    work_.factored = parts_.factors.factored();
     work_.loads = arrays.loads.empty() ? nullptr : arrays.loads.data();
     work_.answer = in(arrays.answer);
     const Motion& m = arrays.motion;
-    work_.motion = {in(m.x), in(m.y), in(m.z), in(arrays.known), changes};
-    line_.set_runs(work_, size(factors.kinds), factors.low);
-}
-
-void TwoPasses::track(const Links& links, std::span<double> reserve, Array2<const int64_t> ranges,
-                      int64_t stretch) {
-    links_ = links;
-    reserve_ = reserve;
-    ranges_ = ranges;
-    stretch_ = std::max<int64_t>(1, stretch);
+    work_.motion = {in(m.x), in(m.y), in(m.z), in(arrays.known), parts_.changes};
+    line_.set_runs(work_, size(parts_.factors.kinds), parts_.factors.low);
 }
 
 void TwoPasses::step() {
-    line_.step(work_, factors_.at(), stretch_, *this);
+    line_.step(work_, parts_.factors.at(), std::max<int64_t>(1, tracked_.stretch), *this);
 }
 
 void TwoPasses::predict_velocities(int64_t begin, int64_t end) {
-    end = std::min(end, size(arrays_.predicted));
+    const PassArrays& arrays = parts_.arrays;
+    end = std::min(end, size(arrays.predicted));
     if (begin >= end) return;
-    add_up(part(arrays_.predicted, begin, end), &arrays_.motion.y[begin], &arrays_.motion.z[begin],
-           &arrays_.known[begin], changes_.velocity);
+    add_up(part(arrays.predicted, begin, end), &arrays.motion.y[begin], &arrays.motion.z[begin],
+           &arrays.known[begin], parts_.changes.velocity);
 }
 
 void TwoPasses::before() {
+    const Motion& motion = parts_.arrays.motion;
     n_followed_ = 0;
-    int64_t begin = 0, end = size(arrays_.motion.x);
+    int64_t begin = 0, end = size(motion.x);
     if (window_) {
-        if (look(*window_, arrays_.motion))
-            reserves_within(arrays_.motion, links_, 0, size(reserve_), reserve_);
+        if (look(*window_, motion)) reserves(motion, tracked_.links, tracked_.reserve);
         begin = window_->starts[window_->at().begin];
         end = window_->starts[window_->at().end];
     }
@@ -69,10 +75,12 @@ void TwoPasses::before() {
 }
 
 void TwoPasses::after_stretch() {
-    const auto before = ranges_[n_followed_], now = ranges_[n_followed_ + 1];
+    const auto [links, reserve, ranges, stretch] = tracked_;
+    const Motion& motion = parts_.arrays.motion;
+    const auto before = ranges[n_followed_], now = ranges[n_followed_ + 1];
     ++n_followed_;
-    reserves_within(arrays_.motion, links_, now[0], before[0], reserve_);
-    reserves_within(arrays_.motion, links_, before[1], now[1], reserve_);
+    reserves_within(motion, links, now[0], before[0], reserve);
+    reserves_within(motion, links, before[1], now[1], reserve);
 }
 
 void left_behind(std::span<const int64_t> starts, int64_t stretch, Array2<const int64_t> unknowns,

@@ -20,35 +20,53 @@ struct PassArrays {
     CATENARY_RECORD(factor, velocity, loads, answer, motion, known, predicted)
 };
 
+/// A line of stations with what steps of it are made of.
+struct PassParts {
+    std::vector<std::pair<Layout, Layout>> layouts;  ///< of rows and factors, for each make-up
+    std::vector<std::vector<int>> make_ups;          ///< see `Line`
+    ProductArrays rows;
+    FactorArrays factors;
+    PassArrays arrays;
+    Changes changes;
+    CATENARY_RECORD(layouts, make_ups, rows, factors, arrays, changes)
+};
+
+/// Links that are looked at on the way back, which is taken in stretches of so many pairs of
+/// stations: `ranges` (n + 1, 2) are the links behind each, see `left_behind`.
+struct TrackedLinks {
+    Links links;
+    std::span<double> reserve;  ///< [N], filled
+    Array2<const int64_t> ranges;
+    int64_t stretch = 1;
+    CATENARY_RECORD(links, reserve, ranges, stretch)
+};
+
 class TwoPasses : private Around {
   public:
-    TwoPasses(Line line, const ProductArrays& rows, const FactorArrays& factors,
-              const PassArrays& arrays, const Changes& changes);
+    /// Throws std::invalid_argument if there are no kernels for a layout.
+    explicit TwoPasses(PassParts parts);
 
-    /// Fill `reserve` on the way back, which is taken in stretches of so many pairs of stations:
-    /// `ranges` (n + 1, 2) are the links behind each, see `left_behind`.
-    void track(const Links& links, std::span<double> reserve, Array2<const int64_t> ranges,
-               int64_t stretch);
+    void track(const TrackedLinks& tracked) { tracked_ = tracked; }
     /// Take steps of the stations in a window only from now on.
     void open(const Window& window) { window_ = window; }
     /// Fill in the velocities that others read in products with C, if there are such.
-    void predict_velocities() { predict_velocities(0, size(arrays_.motion.x)); }
+    void predict_velocities() { predict_velocities(0, size(parts_.arrays.motion.x)); }
     void step();
+
+    const PassParts& parts() const { return parts_; }
+    const TrackedLinks& tracked() const { return tracked_; }
+    const std::optional<Window>& window() const { return window_; }
 
   private:
     void before() override;
     void after_stretch() override;
     void predict_velocities(int64_t begin, int64_t end);
 
+    PassParts parts_;
     Line line_;
-    FactorArrays factors_;
-    PassArrays arrays_;
-    Changes changes_;
     Work work_;
-    Links links_{};
-    std::span<double> reserve_;
-    Array2<const int64_t> ranges_;
-    int64_t stretch_ = 1, n_followed_ = 0;
+    TrackedLinks tracked_{};
+    int64_t n_followed_ = 0;
     std::optional<Window> window_;
 };
 

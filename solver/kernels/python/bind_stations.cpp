@@ -132,23 +132,25 @@ class Solves {
 /// Steps in two passes, and what they are made of.
 class HeldPasses : public TwoPasses {
   public:
-    HeldPasses(const std::vector<std::pair<Layout, Layout>>& layouts, const MakeUps& make_ups,
-               const py::object& rows, const py::object& factors, const py::object& arrays,
-               const py::object& changes, Kept kept = {})
-        : TwoPasses(
-              line_of(layouts.size(), make_ups,
-                      [&](size_t k) { return kernels_of(layouts[k].first, layouts[k].second); }),
-              From<ProductArrays>::convert(rows, "rows", kept),
-              From<FactorArrays>::convert(factors, "factors", kept),
-              From<PassArrays>::convert(arrays, "arrays", kept),
-              From<Changes>::convert(changes, "changes", kept)),
-          kept_(std::move(kept)) {}
-    void track(const py::object& links, const py::object& reserve, const py::object& ranges,
-               int64_t stretch) {
+    HeldPasses(PassParts parts, Kept kept) : TwoPasses(std::move(parts)), kept_(std::move(kept)) {}
+    static std::unique_ptr<HeldPasses> made(const Layouts& rows, const Layouts& factors,
+                                            const py::object& parts) {
         Kept kept;
-        TwoPasses::track(From<Links>::convert(links, "links", kept),
-                         From<std::span<double>>::convert(reserve, "reserve", kept),
-                         From<Array2<const int64_t>>::convert(ranges, "ranges", kept), stretch);
+        auto convert = [&]<class Record>(const char* name, Record& record) {
+            record = From<Record>::convert(parts.attr(name), name, kept);
+        };
+        PassParts found;
+        for (size_t k = 0; k < rows.size(); ++k) found.layouts.emplace_back(rows[k], factors.at(k));
+        convert("make_ups", found.make_ups);
+        convert("rows", found.rows);
+        convert("factors", found.factors);
+        convert("arrays", found.arrays);
+        convert("changes", found.changes);
+        return std::make_unique<HeldPasses>(std::move(found), std::move(kept));
+    }
+    void track(const py::object& tracked) {
+        Kept kept;
+        TwoPasses::track(From<TrackedLinks>::convert(tracked, "links", kept));
         of_links_ = std::move(kept);
     }
     void open(const py::object& window) {
@@ -210,11 +212,7 @@ void offer_stations(py::module_& m) {
         .def("step", &TwoPasses::step)
         .def("predict_velocities", py::overload_cast<>(&TwoPasses::predict_velocities));
     py::class_<HeldPasses, TwoPasses>(m, "TwoPasses")
-        .def(py::init([](const std::vector<std::pair<Layout, Layout>>& layouts,
-                         const MakeUps& make_ups, const py::object& rows, const py::object& factors,
-                         const py::object& arrays, const py::object& changes) {
-            return std::make_unique<HeldPasses>(layouts, make_ups, rows, factors, arrays, changes);
-        }))
+        .def(py::init(&HeldPasses::made))
         .def("track", &HeldPasses::track)
         .def("open", &HeldPasses::open);
     offer(m, "left_behind", left_behind,

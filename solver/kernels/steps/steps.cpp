@@ -23,7 +23,7 @@ Taken Steps::take(int64_t first, int64_t end) {
 /// Move the contacts, and take the line's step without forces there.
 void Steps::begin(int64_t number) {
     const double time = block_.times[number];
-    move_contacts(parts_.train, parts_.speed * time);
+    move_contacts(parts_.train, way(time));
     place(parts_.contacts);
     begin_work(parts_.contacts);
     for (const Loads& loads : parts_.loads) {

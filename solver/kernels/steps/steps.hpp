@@ -53,9 +53,24 @@ struct Taken {
     bool is_full;  ///< whether there is no room for the motion of the last one
 };
 
+/// Where the train is: at `way` [m] at a time `since` [s], and from there on with a speed [m/s].
+struct Course {
+    double speed, way = 0.0, since = 0.0;
+};
+
 class Steps {
   public:
-    Steps(StepParts parts, Block block) : parts_(std::move(parts)), block_(std::move(block)) {}
+    Steps(StepParts parts, Block block)
+        : parts_(std::move(parts)), block_(std::move(block)), course_{parts_.speed} {}
+    /// Way of the train at a time [s] since time zero [m].
+    double way(double time) const { return course_.way + course_.speed * (time - course_.since); }
+    const Course& course() const { return course_; }
+    void set_course(const Course& course) {
+        course_ = course;
+        parts_.contacts.gains.train_speed = course.speed;
+    }
+    /// Let the train go on with another speed [m/s] from a time [s] on.
+    void change_speed(double time, double speed) { set_course({speed, way(time), time}); }
     /// Take the steps of the block from number `first` on up to before `end`.
     Taken take(int64_t first, int64_t end);
 
@@ -68,6 +83,7 @@ class Steps {
 
     StepParts parts_;
     Block block_;
+    Course course_;
 };
 
 }  // namespace catenary

@@ -1,0 +1,152 @@
+// Files of records.
+#include "simulation/image.hpp"
+
+#include <cstdio>
+
+namespace catenary {
+
+namespace {
+
+constexpr size_t kPage = 4096;
+
+struct Close {
+    void operator()(std::FILE* file) const { std::fclose(file); }
+};
+using File = std::unique_ptr<std::FILE, Close>;
+
+/// FNV-1a, by words of eight bytes: it tells damaged files, not forged ones.
+class CheckSum {
+  public:
+    void take(const void* data, size_t n) {
+        const auto* bytes = static_cast<const unsigned char*>(data);
+        for (; n >= 8; n -= 8, bytes += 8) {
+            uint64_t word;
+            std::memcpy(&word, bytes, 8);
+            put(word);
+        }
+        for (; n > 0; --n) put(*bytes++);
+    }
+    uint64_t sum() const { return sum_; }
+
+  private:
+    void put(uint64_t word) { sum_ = (sum_ ^ word) * 0x100000001b3u; }
+    uint64_t sum_ = 0xcbf29ce484222325u;
+};
+
+class FileOutput {
+  public:
+    explicit FileOutput(const std::string& path) : file_(std::fopen(path.c_str(), "wb")) {
+        if (!file_) throw std::runtime_error("it cannot be written");
+    }
+    void put(const void* data, size_t n) {
+        check_.take(data, n);
+        if (std::fwrite(data, 1, n, file_.get()) != n)
+            throw std::runtime_error("it cannot be written to its end");
+    }
+    void end() {
+        const uint64_t sum = check_.sum();
+        put(&sum, sizeof sum);
+        if (std::fflush(file_.get()) != 0)
+            throw std::runtime_error("it cannot be written to its end");
+    }
+
+  private:
+    File file_;
+    CheckSum check_;
+};
+
+class FileInput {
+  public:
+    explicit FileInput(const std::string& path) : file_(std::fopen(path.c_str(), "rb")) {
+        if (!file_) throw std::runtime_error("it cannot be read");
+        if (std::fseek(file_.get(), 0, SEEK_END) != 0 || (left_ = std::ftell(file_.get())) < 0)
+            throw std::runtime_error("it is no plain file");
+        std::rewind(file_.get());
+    }
+    void get(void* data, size_t n) {
+        if (n > static_cast<size_t>(left_) || std::fread(data, 1, n, file_.get()) != n)
+            throw std::runtime_error("it ends too early");
+        left_ -= static_cast<long>(n);
+        check_.take(data, n);
+    }
+    size_t left() const { return static_cast<size_t>(left_); }
+    void end() {
+        const uint64_t expected = check_.sum();
+        uint64_t sum;
+        get(&sum, sizeof sum);
+        if (sum != expected) throw std::runtime_error("it is damaged");
+    }
+
+  private:
+    File file_;
+    CheckSum check_;
+    long left_ = 0;
+};
+
+/// A block as it stands in a file, before its bytes.
+struct BlockHeader {
+    uint64_t size, place_in_page, changes;
+};
+
+}  // namespace
+
+std::vector<MemoryBlock> BlockFinder::blocks() {
+    std::ranges::sort(found_, {}, &MemoryBlock::begin);
+    std::vector<MemoryBlock> merged;
+    for (const MemoryBlock& one : found_) {
+        if (merged.empty() || one.begin >= merged.back().end) {
+            merged.push_back(one);
+        } else {
+            merged.back().end = std::max(merged.back().end, one.end);
+            merged.back().changes |= one.changes;
+        }
+    }
+    return merged;
+}
+
+void write_image(const std::string& path, const std::string& header, const std::string& text,
+                 const std::vector<MemoryBlock>& blocks) {
+    FileOutput output(path);
+    output.put(header.data(), header.size());
+    const uint64_t sizes[2] = {text.size(), blocks.size()};
+    output.put(sizes, sizeof sizes);
+    output.put(text.data(), text.size());
+    for (const MemoryBlock& block : blocks) {
+        const BlockHeader own{block.end - block.begin, block.begin % kPage, block.changes};
+        output.put(&own, sizeof own);
+        output.put(reinterpret_cast<const void*>(block.begin), own.size);
+    }
+    output.end();
+}
+
+std::string read_image(const std::string& path, const std::string& header,
+                       std::vector<OwnBlock>& blocks) {
+    FileInput input(path);
+    std::string found(header.size(), '\0');
+    if (input.left() < header.size()) throw std::runtime_error("it ends too early");
+    input.get(found.data(), found.size());
+    if (found != header)
+        throw std::runtime_error("it is no prepared line of this version of Catenary");
+    uint64_t sizes[2];
+    input.get(sizes, sizeof sizes);
+    if (sizes[0] > input.left() || sizes[1] > input.left() / sizeof(BlockHeader))
+        throw std::runtime_error("it ends too early");
+    std::string text(sizes[0], '\0');
+    input.get(text.data(), text.size());
+    for (uint64_t k = 0; k < sizes[1]; ++k) {
+        BlockHeader own;
+        input.get(&own, sizeof own);
+        if (own.size > input.left() || own.place_in_page >= kPage)
+            throw std::runtime_error("it ends too early");
+        auto memory = std::make_unique<std::byte[]>(own.size + 2 * kPage);
+        const auto start = reinterpret_cast<uintptr_t>(memory.get());
+        const size_t page = (kPage - start % kPage) % kPage;
+        std::byte* bytes = memory.get() + page + own.place_in_page;
+        input.get(bytes, own.size);
+        blocks.push_back({std::move(memory), {bytes, own.size}, own.changes != 0});
+    }
+    input.end();
+    return text;
+}
+
+}  // namespace catenary

@@ -1,0 +1,214 @@
+#pragma once
+// Records with all arrays that they point to, as a file.
+//
+// What arrays share in memory they share afterwards: overlapping ones are kept as one block of
+// bytes, and a record's array as a part of a block. Blocks stand in memory where they stood, modulo
+// pages of 4096 bytes, as arrays that are walked through side by side are placed for the caches.
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <memory>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+#include "base/arrays.hpp"
+#include "base/record.hpp"
+
+namespace catenary {
+
+template <class T>
+concept RecordType = requires(T record) {
+    T::kMembers;
+    record.members();
+};
+
+/// Lets a visitor have all that a value holds: `bytes(T&)` for plain values, `array(T*&, n)` for
+/// arrays of n numbers, and `count(size_t&)` for lengths, upon which a reader resizes. Pointers to
+/// objects are left out.
+template <class Visitor, class T>
+void visit(Visitor& visitor, T& value);
+
+template <class Visitor, class T>
+void visit_value(Visitor& visitor, std::span<T>& value) {
+    size_t n = value.size();
+    visitor.count(n);
+    T* data = value.data();
+    visitor.array(data, n);
+    value = {data, n};
+}
+template <class Visitor, class T>
+void visit_value(Visitor& visitor, Array2<T>& value) {
+    visitor.bytes(value.rows);
+    visitor.bytes(value.columns);
+    visitor.array(value.data, value.rows * value.columns);
+}
+template <class Visitor, class T>
+void visit_value(Visitor& visitor, Array3<T>& value) {
+    visitor.bytes(value.n);
+    visitor.bytes(value.rows);
+    visitor.bytes(value.columns);
+    visitor.array(value.data, value.n * value.rows * value.columns);
+}
+template <class Visitor, class T>
+void visit_value(Visitor& visitor, std::vector<T>& value) {
+    size_t n = value.size();
+    visitor.count(n);
+    value.resize(n);
+    for (T& one : value) visit(visitor, one);
+}
+template <class Visitor, class T>
+void visit_value(Visitor& visitor, std::optional<T>& value) {
+    size_t n = value.has_value();
+    visitor.count(n);
+    if (n && !value) value.emplace();
+    if (n) visit(visitor, *value);
+}
+template <class Visitor, class A, class B>
+void visit_value(Visitor& visitor, std::pair<A, B>& value) {
+    visit(visitor, value.first);
+    visit(visitor, value.second);
+}
+template <class Visitor, class T>
+void visit_value(Visitor&, T*&) {}
+template <class Visitor, class T>
+void visit_value(Visitor&, std::vector<T*>&) {}
+template <class Visitor, class T>
+    requires(!RecordType<T>) && std::is_trivially_copyable_v<T> && (!std::is_pointer_v<T>)
+void visit_value(Visitor& visitor, T& value) {
+    visitor.bytes(value);
+}
+template <class Visitor, RecordType T>
+void visit_value(Visitor& visitor, T& value) {
+    std::apply([&](auto&... member) { (visit(visitor, member), ...); }, value.members());
+}
+
+template <class Visitor, class T>
+void visit(Visitor& visitor, T& value) {
+    visit_value(visitor, value);
+}
+
+/// A part of memory that arrays share.
+struct MemoryBlock {
+    uintptr_t begin, end;
+    bool changes;  ///< whether any array in it is written
+};
+
+/// Finds the blocks of all arrays.
+class BlockFinder {
+  public:
+    template <class T>
+    void bytes(T&) {}
+    void count(size_t&) {}
+    template <class T>
+    void array(T*& data, size_t n) {
+        if (n == 0) return;
+        const auto begin = reinterpret_cast<uintptr_t>(data);
+        found_.push_back({begin, begin + n * sizeof(T), !std::is_const_v<T>});
+    }
+    /// All of them, in the order of memory.
+    std::vector<MemoryBlock> blocks();
+
+  private:
+    std::vector<MemoryBlock> found_;
+};
+
+/// Writes what a record holds as bytes, with arrays as parts of blocks.
+class ImageWriter {
+  public:
+    explicit ImageWriter(std::vector<MemoryBlock> blocks) : blocks_(std::move(blocks)) {}
+    template <class T>
+    void bytes(T& value) {
+        const auto* from = reinterpret_cast<const char*>(&value);
+        text_.append(from, sizeof(T));
+    }
+    void count(size_t& n) { bytes(n); }
+    template <class T>
+    void array(T*& data, size_t n) {
+        if (n == 0) return;
+        const auto begin = reinterpret_cast<uintptr_t>(data);
+        auto block = std::ranges::upper_bound(blocks_, begin, {}, &MemoryBlock::begin) - 1;
+        uint64_t place[2] = {static_cast<uint64_t>(block - blocks_.begin()), begin - block->begin};
+        bytes(place);
+    }
+    const std::string& text() const { return text_; }
+
+  private:
+    std::vector<MemoryBlock> blocks_;
+    std::string text_;
+};
+
+/// Blocks that were read, in memory of their own.
+struct OwnBlock {
+    std::unique_ptr<std::byte[]> memory;
+    std::span<std::byte> bytes;
+    bool changes;
+};
+
+/// Fills in a record from such bytes. Throws std::runtime_error where they end too early or point
+/// out of blocks.
+class ImageReader {
+  public:
+    ImageReader(std::string text, std::vector<OwnBlock>& blocks)
+        : text_(std::move(text)), blocks_(blocks) {}
+    template <class T>
+    void bytes(T& value) {
+        if (sizeof(T) > text_.size() - at_) throw std::runtime_error("it ends too early");
+        std::memcpy(static_cast<void*>(&value), &text_[at_], sizeof(T));
+        at_ += sizeof(T);
+    }
+    void count(size_t& n) {
+        bytes(n);
+        if (n > (size_t{1} << 40)) throw std::runtime_error("a length in it is impossible");
+    }
+    template <class T>
+    void array(T*& data, size_t n) {
+        data = nullptr;
+        if (n == 0) return;
+        uint64_t place[2];
+        bytes(place);
+        const uint64_t block = place[0], begin = place[1];
+        if (block >= blocks_.size() || n > blocks_[block].bytes.size() / sizeof(T) ||
+            begin > blocks_[block].bytes.size() - n * sizeof(T))
+            throw std::runtime_error("an array in it is beyond its block");
+        data = reinterpret_cast<T*>(blocks_[block].bytes.data() + begin);
+    }
+
+  private:
+    std::string text_;
+    size_t at_ = 0;
+    std::vector<OwnBlock>& blocks_;
+};
+
+/// Write a file with a header of one line, the bytes of `writer` and the blocks. Throws
+/// std::runtime_error if it cannot be written.
+void write_image(const std::string& path, const std::string& header, const std::string& text,
+                 const std::vector<MemoryBlock>& blocks);
+/// Read such a file, which begins with this header; returns the bytes and fills in the blocks.
+/// Throws std::runtime_error if it cannot be read, has another header, or was damaged.
+std::string read_image(const std::string& path, const std::string& header,
+                       std::vector<OwnBlock>& blocks);
+
+/// Write a record.
+template <class T>
+void write_record(const std::string& path, const std::string& header, T& record) {
+    BlockFinder finder;
+    visit(finder, record);
+    const auto blocks = finder.blocks();
+    ImageWriter writer(blocks);
+    visit(writer, record);
+    write_image(path, header, writer.text(), blocks);
+}
+/// Read it, with the memory of its arrays.
+template <class T>
+void read_record(const std::string& path, const std::string& header, T& record,
+                 std::vector<OwnBlock>& blocks) {
+    ImageReader reader(read_image(path, header, blocks), blocks);
+    visit(reader, record);
+}
+
+}  // namespace catenary

@@ -1,0 +1,161 @@
+// A prepared line, stepped from outside.
+#include "simulation/simulation.hpp"
+
+namespace catenary {
+
+namespace {
+
+/// The first line of a file, which names the version of its form: all names of members are in it,
+/// so that a file of another form is refused.
+std::string header() {
+    auto names = std::string("Catenary prepared line 1: ") + PreparedLine::kMembers + "; ";
+    names += std::string(StepParts::kMembers) + "; " + PassParts::kMembers + "; " +
+             Contacts::kMembers + "; " + SmallProblem::kMembers + "; " + HeadParts::kMembers +
+             "; " + Window::kMembers + "; ";
+    for (size_t bytes : {sizeof(PreparedLine), sizeof(StepParts), sizeof(Touch), sizeof(Node),
+                         sizeof(Layout), sizeof(HeadParts)})
+        names += std::to_string(bytes) + " ";
+    return names + "\n";
+}
+
+}  // namespace
+
+HeadParts parts_of(const Head& head) {
+    HeadParts parts{};
+    parts.arrays = head.arrays();
+    parts.first = head.first();
+    parts.bending = head.bending();
+    parts.regulation = head.regulation();
+    if (const auto* chain = dynamic_cast<const LinearChain*>(&head)) parts.linear = chain->linear();
+    if (const auto* sprung = dynamic_cast<const SprungHead*>(&head)) {
+        parts.masses = sprung->masses();
+        parts.laws = sprung->laws();
+    }
+    if (const auto* chain = dynamic_cast<const LawfulChain*>(&head))
+        parts.carrier = chain->carrier();
+    if (const auto* raised = dynamic_cast<const RaisedHead*>(&head))
+        parts.mechanism = raised->mechanism();
+    return parts;
+}
+
+std::unique_ptr<Head> head_of(const HeadParts& parts) {
+    std::unique_ptr<Head> head;
+    if (parts.linear)
+        head = std::make_unique<LinearChain>(parts.arrays, *parts.linear);
+    else if (parts.masses && parts.laws && parts.carrier)
+        head =
+            std::make_unique<LawfulChain>(parts.arrays, *parts.masses, *parts.laws, *parts.carrier);
+    else if (parts.masses && parts.laws && parts.mechanism)
+        head = std::make_unique<RaisedHead>(parts.arrays, *parts.masses, *parts.laws,
+                                            *parts.mechanism);
+    else
+        throw std::runtime_error("a pantograph in it has no model");
+    head->set_first(parts.first);
+    if (parts.bending) head->bend(*parts.bending);
+    if (parts.regulation) head->regulate(*parts.regulation);
+    return head;
+}
+
+void write_line(const std::string& path, PreparedLine& line) {
+    write_record(path, header(), line);
+}
+
+/// What a state holds besides what changes in blocks.
+struct Simulation::Place {
+    int64_t n_done;
+    Course course;
+};
+
+Simulation::Simulation(const std::string& path) {
+    read_record(path, header(), line_, blocks_);
+    StepParts& parts = line_.steps;
+    first_ = line_.n_done;
+    const size_t n = line_.heads.size();
+    if (n == 0 || line_.drives.rows != static_cast<int64_t>(n) || line_.ties.size() != n)
+        throw std::runtime_error("pantographs are missing in it");
+    try {
+        free_ = std::make_unique<TwoPasses>(line_.passes);
+        for (const HeadParts& head : line_.heads) heads_.push_back(head_of(head));
+    } catch (const std::invalid_argument& error) {
+        throw std::runtime_error(error.what());
+    }
+    free_->track(line_.tracked);
+    if (line_.window) free_->open(*line_.window);
+    parts.free = free_.get();
+    parts.heads.clear();
+    for (const auto& head : heads_) parts.heads.push_back(head.get());
+    inputs_.resize(n);
+    drive_.resize(line_.drives.rows * line_.drives.columns);
+    Block block{};
+    block.times = times_;
+    block.drives = {drive_.data(), 1, line_.drives.rows, line_.drives.columns};
+    block.now = now_;
+    block.kept.moved = moved_;
+    block.counts = counts_;
+    steps_.emplace(parts, block);
+    state_size_ = sizeof(Place) + inputs_.size() * sizeof(Input);
+    for (const OwnBlock& own : blocks_) state_size_ += own.changes ? own.bytes.size() : 0;
+}
+
+Simulation::Outcome Simulation::step(int64_t n) {
+    for (int64_t k = 0; k < n; ++k) {
+        if (n_steps_left() <= 0) return Outcome::kAtEnd;
+        times_[0] = static_cast<double>(line_.n_done + 1) * line_.dt;
+        drive_next();
+        if (steps_->take(0, 1).n_steps == 0) return Outcome::kNotFound;
+        ++line_.n_done;
+    }
+    return Outcome::kDone;
+}
+
+/// What the next step depends on: what the file tells, and what the host adds.
+void Simulation::drive_next() {
+    const auto rows = line_.drives[line_.n_done - first_];
+    std::ranges::copy(rows.all(), drive_.begin());
+    for (size_t k = 0; k < heads_.size(); ++k) {
+        Drive& drive = *reinterpret_cast<Drive*>(&drive_[k * rows.columns]);
+        const Input& input = inputs_[k];
+        const Tie& tie = line_.ties[k];
+        drive.force += tie.stiffness * input.base + tie.damping * input.base_velocity;
+        drive.base += input.base;
+        drive.base_velocity += input.base_velocity;
+        drive.base_acceleration += input.base_acceleration;
+        drive.head_air += input.head_force;
+        heads_[k]->set_added_force(input.lift_force);
+        // Rows of chains without a controller do not say which part of its force acts.
+        if (input.lift_force != 0.0 && line_.heads[k].linear && !line_.heads[k].regulation)
+            drive.part = 1.0;
+    }
+}
+
+void Simulation::set_speed(double speed) {
+    steps_->change_speed(time(), speed);
+}
+
+void Simulation::save(std::byte* state) const {
+    auto put = [&](const void* from, size_t n) {
+        std::memcpy(state, from, n);
+        state += n;
+    };
+    const Place place{line_.n_done, steps_->course()};
+    put(&place, sizeof place);
+    put(inputs_.data(), inputs_.size() * sizeof(Input));
+    for (const OwnBlock& own : blocks_)
+        if (own.changes) put(own.bytes.data(), own.bytes.size());
+}
+
+void Simulation::restore(const std::byte* state) {
+    auto get = [&](void* to, size_t n) {
+        std::memcpy(to, state, n);
+        state += n;
+    };
+    Place place;
+    get(&place, sizeof place);
+    line_.n_done = place.n_done;
+    steps_->set_course(place.course);
+    get(inputs_.data(), inputs_.size() * sizeof(Input));
+    for (OwnBlock& own : blocks_)
+        if (own.changes) get(own.bytes.data(), own.bytes.size());
+}
+
+}  // namespace catenary

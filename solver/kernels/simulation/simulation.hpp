@@ -1,0 +1,112 @@
+#pragma once
+// A prepared line with its pantographs, stepped from outside: without Python, PETSc or MPI.
+//
+// What it is made of is a file, see `prepare`: factors, states, links, heads, and what each step is
+// told of the time. A host takes steps, changes speed, lift, forces on heads and the motion of
+// bases between them, and keeps states to come back to. A step allocates nothing and waits for
+// nobody.
+#include <string>
+
+#include "heads/lawful_chain.hpp"
+#include "heads/linear_chain.hpp"
+#include "heads/raised_head.hpp"
+#include "simulation/image.hpp"
+#include "steps/steps.hpp"
+
+namespace catenary {
+
+/// A head as a file keeps it: its model by which of the optional records there are.
+struct HeadParts {
+    HeadArrays arrays;
+    int64_t first;
+    std::optional<LinearStep> linear;
+    std::optional<SprungMasses> masses;
+    std::optional<HeadLaws> laws;
+    std::optional<int64_t> carrier;
+    std::optional<ReducedMechanism> mechanism;
+    std::optional<Bending> bending;
+    std::optional<Regulation> regulation;
+    CATENARY_RECORD(arrays, first, linear, masses, laws, carrier, mechanism, bending, regulation)
+};
+/// What a head is made of, and such a head.
+HeadParts parts_of(const Head& head);
+std::unique_ptr<Head> head_of(const HeadParts& parts);
+
+/// A pantograph's spring and damper to its base, if it is a chain that is tied to it.
+struct Tie {
+    double stiffness, damping;  ///< [N/m], [N s/m]
+};
+
+/// All that a prepared line is.
+struct PreparedLine {
+    StepParts steps;
+    PassParts passes;
+    TrackedLinks tracked;
+    std::optional<Window> window;
+    std::vector<HeadParts> heads;
+    std::span<const Tie> ties;    ///< of each pantograph
+    double dt;                    ///< [s]
+    int64_t n_done;               ///< steps taken from time zero on
+    Array3<const double> drives;  ///< (n, n_heads, width) of the steps to come, see `Drive`
+    CATENARY_RECORD(steps, passes, tracked, window, heads, ties, dt, n_done, drives)
+};
+
+/// Write a line to a file. Throws std::runtime_error if that fails.
+void write_line(const std::string& path, PreparedLine& line);
+
+/// What a host adds to a pantograph, from the next step on.
+struct Input {
+    double lift_force = 0.0;         ///< added to the static force [N]
+    double head_force = 0.0;         ///< upward on the head [N]
+    double base = 0.0;               ///< added height of the base [m]
+    double base_velocity = 0.0;      ///< [m/s]
+    double base_acceleration = 0.0;  ///< [m/s2]; read by mechanisms
+};
+
+class Simulation {
+  public:
+    /// Throws std::runtime_error if there is no such file, or it is none of this version.
+    explicit Simulation(const std::string& path);
+
+    enum class Outcome {
+        kDone,
+        kNotFound,  ///< the forces of a step could not be found: nothing can be stepped further
+        kAtEnd,     ///< the file tells no further step what it depends on
+    };
+    /// Take n steps, as far as that is possible.
+    Outcome step(int64_t n);
+
+    double time() const { return line_.n_done * line_.dt; }  ///< [s]
+    double dt() const { return line_.dt; }
+    double way() const { return steps_->way(time()); }  ///< of the train since it started [m]
+    double speed() const { return steps_->course().speed; }
+    void set_speed(double speed);
+    int64_t n_pantographs() const { return static_cast<int64_t>(heads_.size()); }
+    Input& input(int64_t pantograph) { return inputs_.at(pantograph); }
+    const TrainOutputs& outputs() const { return line_.steps.train_outputs; }
+    int64_t n_steps_left() const { return line_.drives.n - (line_.n_done - first_); }
+
+    /// A state to come back to, and how large one is.
+    size_t state_size() const { return state_size_; }
+    void save(std::byte* state) const;
+    void restore(const std::byte* state);
+
+  private:
+    struct Place;
+    void drive_next();
+
+    std::vector<OwnBlock> blocks_;
+    PreparedLine line_{};
+    std::unique_ptr<TwoPasses> free_;
+    std::vector<std::unique_ptr<Head>> heads_;
+    std::vector<Input> inputs_;
+    // The block of one step.
+    std::vector<double> times_ = {0.0}, drive_;
+    std::vector<int64_t> now_ = {0, 0}, moved_ = {0, 0};
+    std::vector<Counts> counts_ = {Counts{}};
+    std::optional<Steps> steps_;
+    int64_t first_ = 0;
+    size_t state_size_ = 0;
+};
+
+}  // namespace catenary
