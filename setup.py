@@ -1,5 +1,6 @@
 """Maps the five folders of the repository into the namespace package ``catenary``, and builds the
-kernels of the time loop, ``catenary.solver.kernels.native``, from C++.
+kernels of the time loop, ``catenary.solver.kernels.native``, from C++; those that step a prepared
+line from outside become the library ``libcatenary.so`` besides, without Python.
 
 setuptools builds them with pybind11, because this file describes all packages already. nanobind
 wants CMake, which would describe them a second time.
@@ -76,6 +77,12 @@ class BuildKernels(build_ext):
         self.compiler.call = self.compiler.spawn = self.compile_or_link
         super().build_extensions()
 
+    def get_ext_filename(self, fullname: str) -> str:
+        """The library of C programs is no module of Python."""
+        name = super().get_ext_filename(fullname)
+        folder, file = os.path.split(name)
+        return os.path.join(folder, "libcatenary.so") if file.startswith("libcatenary.") else name
+
     def compile_or_link(self, command: list[str], **_: object) -> None:
         """Run the linker, or the compiler unless its object is there and up to date."""
         words = shlex.join(command)
@@ -124,6 +131,21 @@ def is_current(target: Path, command: str) -> bool:
         return False
 
 
+def extension(name: str, sources: list[str]) -> Pybind11Extension:
+    """What is built of some of the kernels; objects are shared."""
+    return Pybind11Extension(
+        f"catenary.solver.kernels.{name}",
+        sources,
+        depends=sorted(glob(f"{KERNELS}/*/*.hpp")),
+        include_dirs=[KERNELS],
+        extra_compile_args=FLAGS,
+        cxx_std=20,
+    )
+
+
+SOURCES = sorted(glob(f"{KERNELS}/*/*.cpp"))
+WITHOUT_PYTHON = [source for source in SOURCES if not source.startswith(f"{KERNELS}/python/")]
+
 ParallelCompile(default=0).install()
 
 setup(
@@ -143,18 +165,10 @@ setup(
             "*/*.py",
         ],
         "catenary.postproc": ["report/templates/*", "paraview/*.template"],
+        "catenary.solver": ["kernels/simulation/catenary.h"],
     },
     # What is installed is named above; the source archive has the sources of the extension too.
     include_package_data=False,
-    ext_modules=[
-        Pybind11Extension(
-            "catenary.solver.kernels.native",
-            sorted(glob(f"{KERNELS}/*/*.cpp")),
-            depends=sorted(glob(f"{KERNELS}/*/*.hpp")),
-            include_dirs=[KERNELS],
-            extra_compile_args=FLAGS,
-            cxx_std=20,
-        )
-    ],
+    ext_modules=[extension("native", SOURCES), extension("libcatenary", WITHOUT_PYTHON)],
     cmdclass={"build_ext": BuildKernels},
 )

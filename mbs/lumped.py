@@ -121,6 +121,11 @@ class LumpedPantograph(SteppedHead):
         by_drive = np.ascontiguousarray(unit[:, self._carrier])
         return LinearStep(step, by_drive, unit @ self._push, inverse)
 
+    @property
+    def tie(self) -> tuple[float, float]:
+        """Those between the last mass and the base."""
+        return self._base_stiffness, self._base_damping
+
     def lift(self, time: float) -> float:
         """Net lift on the last mass at ``time`` [N]: a half cosine up to the static force."""
         return self._lift_full * self._part(time)

@@ -1,4 +1,4 @@
-"""The verbs ``check``, ``mesh`` and ``static``: a scene's line, before any run."""
+"""The verbs ``check``, ``mesh``, ``static`` and ``prepare``: a scene's line, before any run."""
 
 from __future__ import annotations
 
@@ -170,3 +170,34 @@ def static(
 
         console.say("")
         console.say(temperatures(scene, [warmer], None))
+
+
+@app.command(
+    "prepare",
+    help="Write a line with its pantographs for steps from outside: a C program, a real-time "
+    "computer or a controller in Python.",
+    epilog="Example: catenary prepare en50318_2002 -o en300.line --set train.speed_km_h=300",
+)
+@console.guarded
+@console.serial
+def prepare(
+    case: Case,
+    out: Annotated[Path, typer.Option("-o", "--out", help="File to write: *.line.")],
+    extras: MoreAssignments = None,
+    assignments: Assignments = None,
+    shortened: Shortened = False,
+    force: Force = False,
+) -> None:
+    """Serial."""
+    from catenary.cases.result_folder.output_files import new_file
+
+    scene = load(case, assignments, extras, shortened)
+    new_file(out, (".line",), force)
+    from catenary.cases.run.prepared import HEADER, LIBRARY, prepare_line
+
+    n_steps = prepare_line(scene, out)
+    console.say(
+        f"{out}: {n_steps} steps of {scene.numerics.dt_s * 1e3:g} ms, "
+        f"{out.stat().st_size / 1e6:.0f} MB\n"
+        f"C programs include {HEADER} and link {LIBRARY}; Python has catenary.solver.simulation"
+    )

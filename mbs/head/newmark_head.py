@@ -96,6 +96,12 @@ class SteppedHead(ABC):
             self._controller = regulator()
 
     @property
+    def tie(self) -> tuple[float, float]:
+        """Spring [N/m] and damper [N s/m] by which rows of ``fill_drives`` turn the motion of the
+        base into a force; none where a head reads that motion itself."""
+        return 0.0, 0.0
+
+    @property
     def added_force(self) -> float:
         """What regulates the lift adds to the static force now [N]."""
         return self.stepped.added_force

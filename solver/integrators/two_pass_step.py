@@ -125,12 +125,11 @@ class StationPasses:
             known, predicted = motion.known, motion.predicted
         self._starts = factors.starts[low : high + 1] - factors.starts[low]
         self._stretch = max(1, _STRETCH * (high - low) // max(1, int(self._starts[-1])))
-        layouts = [
-            [part.native for part in layout.parts] for layout in (product.layout, factors.layout)
-        ]
+        rows = [part.native for part in product.layout.parts]
+        columns = [part.native for part in factors.layout.parts]
         arrays = PassArrays(read, velocity, loads, answer, motion.read, known, predicted)
         stations = product.stations.make_ups, product.arrays, factors.arrays
-        self.native = native.TwoPasses(*layouts, PassParts(*stations, arrays, changes))
+        self.native = native.TwoPasses(rows, columns, PassParts(*stations, arrays, changes))
         self.known = known
         self.track_links(NO_LINKS, np.zeros(0))
 

@@ -232,6 +232,89 @@ class Steps:
     def take(self, first: int, end: int) -> Taken:
         """Take the steps of the block from number ``first`` on up to before ``end``."""
 
+    def write(self, path: str, ahead: object) -> None:
+        """Write a file with all that they are made of, and what is ``Ahead``."""
+
+TIE: np.dtype[np.void]
+
+class Simulation:
+    """A prepared line with its pantographs, stepped from outside.
+
+    It needs no PETSc and no MPI. Arrays look into it, and last as long as they are held.
+
+    Parameters
+    ----------
+    path : of a file that ``catenary prepare`` wrote; numbers in it are believed, so that it is as
+        trustworthy as a program
+
+    Raises
+    ------
+    RuntimeError
+        If it cannot be read, is damaged, or is of another version.
+    """
+
+    def __init__(self, path: str) -> None: ...
+    def step(self, n: int = 1) -> bool:
+        """Take n steps; False if the end of the line, or of what the file tells, came before.
+
+        Raises
+        ------
+        RuntimeError
+            If the forces of a step could not be found: nothing can be stepped further.
+        """
+
+    def set_speed(self, speed: float) -> bool:
+        """Let the train go on at another speed [m/s], at least 0; False if the file tells where
+        wires are across the track, which holds for one speed only."""
+
+    def save(self) -> bytes:
+        """The state, to come back to."""
+
+    def restore(self, state: bytes) -> None:
+        """Go back to a state of this line."""
+
+    @property
+    def inputs(self) -> np.ndarray:
+        """What is added to each pantograph from the next step on, (n,) of ``lift_force`` to the
+        static force and ``head_force`` on the head, upward [N], and of its base the height
+        ``base`` [m], ``base_velocity`` [m/s] and ``base_acceleration`` [m/s2]; all 0 at first."""
+
+    @property
+    def time(self) -> float:
+        """Since time zero [s]."""
+
+    @property
+    def dt(self) -> float:
+        """A step [s]."""
+
+    @property
+    def way(self) -> float:
+        """Of the train since time zero [m]."""
+
+    @property
+    def speed(self) -> float:
+        """Of the train [m/s]."""
+
+    @property
+    def n_steps_left(self) -> int:
+        """Steps for which the file tells what they depend on."""
+
+    @property
+    def contact_force(self) -> np.ndarray:
+        """Of each pantograph after the latest step (n,) [N]."""
+
+    @property
+    def head_height(self) -> np.ndarray:
+        """Mean height of its strips (n,) [m]."""
+
+    @property
+    def wire_height(self) -> np.ndarray:
+        """Mean height of the contact wire over them (n,) [m]."""
+
+    @property
+    def strip_force(self) -> np.ndarray:
+        """Of each strip, strips of one pantograph after another (n_strips,) [N]."""
+
 def has_widths(widths: Sequence[int]) -> bool:
     """Whether kernels were compiled for stations with planes of these widths."""
 

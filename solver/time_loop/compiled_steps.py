@@ -98,6 +98,7 @@ class CompiledSteps:
 
     Attributes
     ----------
+    scheme : whose steps they are
     most : steps of the largest block
     times : (most,) of the steps of the latest block [s]
     rows : (most, width) what each of them shows; empty if nobody looks
@@ -112,7 +113,7 @@ class CompiledSteps:
     """
 
     def __init__(self, scheme: OneSolve, showing: Showing, dt: float, shows: bool) -> None:
-        self._scheme, self._showing, self._dt, self._shows = scheme, showing, dt, shows
+        self.scheme, self._showing, self._dt, self._shows = scheme, showing, dt, shows
         width = showing.layout.width
         least = 1 if scheme.interaction.line.window is None else _ROWS_OF_PART
         self.most = max(least, min(_MOST_ROWS, _BLOCK_BYTES // (8 * width)))
@@ -166,13 +167,13 @@ class CompiledSteps:
         RunBroken
             As ``OneSolve.step``; ``taken`` steps are then taken and shown.
         """
-        scheme, self.taken = self._scheme, 0
+        scheme, self.taken = self.scheme, 0
         times = self.times[:n_steps]
         np.multiply(np.arange(step + 1, step + 1 + n_steps), self._dt, out=times)
         if self._loads is not None:
             n_steps = self._loads.cover(times)
             times = times[:n_steps]
-        line, speed = self._scheme.interaction.line, float(scheme.pantographs.speed)
+        line, speed = self.scheme.interaction.line, float(scheme.pantographs.speed)
         scheme.pantographs.move_to(step * self._dt)
         line.provide(speed * n_steps * self._dt)
         self._moved.begin(step)
@@ -226,7 +227,7 @@ class CompiledSteps:
         kept, motion = self._kept, self._showing.motion
         if number < 0:
             return True
-        columns, line = self._showing.shown.columns, self._scheme.interaction.line
+        columns, line = self._showing.shown.columns, self.scheme.interaction.line
         own, first = slice(*columns.starts[kept.moved].tolist()), int(kept.used[0])
         last = first + 2 * (own.stop - own.start)
         if last > kept.numbers.size:
@@ -242,9 +243,9 @@ class CompiledSteps:
         """Go on with a block as far as kernels can; whether the scheme has to finish a step, and
         whether there is no room for the motion of the last one."""
         self._event.begin()
-        counters = self._scheme.counters
+        counters = self.scheme.counters
         self._counts[:] = 0
-        taken = self._made_steps().take(self.taken, n_steps)
+        taken = self.steps().take(self.taken, n_steps)
         counters.steps += taken.n_steps
         counters.solves += taken.n_steps
         rounds, slack, repeated = self._counts[0].tolist()
@@ -255,11 +256,11 @@ class CompiledSteps:
         self._event.end()
         return taken.begun, taken.is_full
 
-    def _made_steps(self) -> native.Steps:
+    def steps(self) -> native.Steps:
         """What takes steps on the arrays that the scheme has now."""
-        coupling = self._scheme.coupling
+        coupling = self.scheme.coupling
         assert isinstance(coupling, Implicit)
-        share, unknowns = self._scheme.share, coupling.inner.unknowns
+        share, unknowns = self.scheme.share, coupling.inner.unknowns
         # A step may exchange these arrays for larger ones.
         if self._made_of[0] is not share or self._made_of[1] is not unknowns:
             self._made_of = share, unknowns
@@ -268,7 +269,7 @@ class CompiledSteps:
         return self._steps
 
     def _parts(self, problem: SmallProblem) -> StepParts:
-        pantographs, interaction = self._scheme.pantographs, self._scheme.interaction
+        pantographs, interaction = self.scheme.pantographs, self.scheme.interaction
         return StepParts(
             speed=float(pantographs.speed),
             train=pantographs.places_along,

@@ -14,6 +14,7 @@ import gc
 import time as clock
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -332,6 +333,30 @@ class March:
             "" if self.detour is None else str(self.detour),
             finishing,
         )
+
+    def write_line(self, path: Path) -> int:
+        """Write a line that is stepped from outside, see `prepared_line`; for how many steps.
+
+        Not collective; one rank only.
+
+        Raises
+        ------
+        InputError
+            If steps of the scene need more than the compiled loop.
+        RunBroken
+            If the file cannot be written.
+        """
+        from catenary.solver.time_loop.prepared_line import write_line
+
+        dt = self._problem.numerics.dt
+        if self._ahead:
+            raise InputError("incidents change the line, and a prepared line stays as it is")
+        blocks = compiled_steps(self._scheme, self._showing, dt, shows=False)
+        if blocks is None:
+            why = "numerics.scheme is not one_solve" if self.detour is None else self.detour.reason
+            raise InputError(f"its steps are not those of the compiled loop: {why}")
+        write_line(path, blocks, dt, (self._first_step, self.n_steps))
+        return self.n_steps - self._first_step
 
     def destroy(self) -> None:
         """Free all PETSc objects. Collective."""

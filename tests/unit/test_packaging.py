@@ -21,6 +21,8 @@ PARTS = ("meshgen", "solver", "mbs", "postproc", "cases")
 BUILT_FROM = (*PARTS, "pyproject.toml", "setup.py", "LICENSE", "README.md")
 OBJECTS = Path("build", "kernels")
 KERNELS = f"catenary/solver/kernels/native{sysconfig.get_config_var('EXT_SUFFIX')}"
+LIBRARY = "catenary/solver/kernels/libcatenary.so"
+LIBRARY = "catenary/solver/kernels/libcatenary.so"
 
 # What a program finds from outside the checkout, printed as JSON.
 SHOW = """
@@ -68,6 +70,7 @@ def data_files() -> set[str]:
         "cases/*/*.py",
         "postproc/report/templates/*",
         "postproc/paraview/*.template",
+        "solver/kernels/simulation/catenary.h",
     )
     return {
         f"catenary/{path.relative_to(ROOT)}"
@@ -141,7 +144,7 @@ def test_the_wheel_is_imported_from_where_it_is_installed(installed: Path, tmp_p
 def test_the_wheel_holds_all_modules_and_data_and_no_tests(installed: Path) -> None:
     there = {str(path.relative_to(installed)) for path in installed.rglob("*") if path.is_file()}
     ours = {name for name in there if name.startswith("catenary/") and "__pycache__" not in name}
-    assert ours == library_files() | data_files() | {KERNELS}
+    assert ours == library_files() | data_files() | {KERNELS, LIBRARY}
     # beside it only the metadata and the program
     tops = {Path(name).parts[0] for name in there}
     assert {top for top in tops if not top.endswith(".dist-info")} == {"catenary", "bin"}

@@ -135,6 +135,11 @@ class LineLoads:
         if self.memories is not None:
             self.memories.share()
 
+    @property
+    def are_sampled(self) -> bool:
+        """Whether some are made ahead of their times, slice by slice."""
+        return bool(self._sampled)
+
     def cover(self, times: np.ndarray) -> int:
         """Make ready for ascending ``times`` (n,) [s]; how many of them are, one at least."""
         return min((sampled.cover(times) for sampled in self._sampled), default=times.size)

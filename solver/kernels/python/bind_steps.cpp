@@ -1,6 +1,6 @@
-// What Python calls of steps.
+// What Python calls of steps, and of lines that are prepared for steps from outside.
 #include "python/from_python.hpp"
-#include "steps/steps.hpp"
+#include "simulation/simulation.hpp"
 
 namespace catenary::python {
 
@@ -14,9 +14,66 @@ class HeldSteps : public Steps {
                 From<Block>::convert(block, "block", kept)),
           kept_(std::move(kept)) {}
 
+    /// Write them with what steps to come depend on, see `PreparedLine`.
+    void write(const std::string& path, const py::object& ahead) const {
+        Kept kept;
+        const auto given = From<Ahead>::convert(ahead, "ahead", kept);
+        const TwoPasses& free = *parts().free;
+        PreparedLine line{};
+        line.steps = parts();
+        line.passes = free.parts();
+        line.tracked = free.tracked();
+        line.window = free.window();
+        for (const Head* head : parts().heads) line.heads.push_back(parts_of(*head));
+        line.ahead = given;
+        write_line(path, line);
+    }
+
   private:
     Kept kept_;
 };
+
+/// A simulation, with arrays that look into it.
+class HeldSimulation : public Simulation {
+  public:
+    using Simulation::Simulation;
+    static bool step(HeldSimulation& simulation, int64_t n) {
+        const Outcome outcome = simulation.Simulation::step(n);
+        if (outcome == Outcome::kNotFound)
+            throw std::runtime_error("the forces of a step could not be found");
+        return outcome == Outcome::kDone;
+    }
+    py::bytes saved() const {
+        std::string state(state_size(), '\0');
+        save(reinterpret_cast<std::byte*>(state.data()));
+        return state;
+    }
+    void go_back(const std::string& state) {
+        if (state.size() != state_size()) throw py::value_error("this is no state of this line");
+        restore(reinterpret_cast<const std::byte*>(state.data()));
+    }
+};
+
+/// An array that looks at numbers of `owner`.
+template <class T>
+py::array_t<std::remove_const_t<T>> view(std::span<T> numbers, const py::object& owner) {
+    py::array_t<std::remove_const_t<T>> array(static_cast<py::ssize_t>(numbers.size()),
+                                              numbers.data(), owner);
+    if (std::is_const_v<T>) array.attr("setflags")(false);
+    return array;
+}
+/// A property that is such an array.
+template <class Numbers>
+auto viewed(Numbers numbers) {
+    return [numbers](const py::object& self) {
+        return view(numbers(self.cast<HeldSimulation&>()), self);
+    };
+}
+auto output(std::span<double> TrainOutputs::* which) {
+    return viewed([which](HeldSimulation& simulation) {
+        return std::span<const double>(simulation.outputs().*which);
+    });
+}
 
 }  // namespace
 
@@ -32,7 +89,27 @@ void offer_steps(py::module_& module) {
             return std::make_unique<HeldSteps>(parts, block);
         }))
         .def("take",
-             [](HeldSteps& steps, int64_t first, int64_t end) { return steps.take(first, end); });
+             [](HeldSteps& steps, int64_t first, int64_t end) { return steps.take(first, end); })
+        .def("write", &HeldSteps::write);
+    PYBIND11_NUMPY_DTYPE(Tie, stiffness, damping);
+    module.attr("TIE") = py::dtype::of<Tie>();
+    PYBIND11_NUMPY_DTYPE(Input, lift_force, head_force, base, base_velocity, base_acceleration);
+    py::class_<HeldSimulation>(module, "Simulation")
+        .def(py::init<const std::string&>())
+        .def("step", &HeldSimulation::step, py::arg("n") = 1)
+        .def("set_speed", &HeldSimulation::set_speed)
+        .def("save", &HeldSimulation::saved)
+        .def("restore", &HeldSimulation::go_back)
+        .def_property_readonly("time", &HeldSimulation::time)
+        .def_property_readonly("dt", &HeldSimulation::dt)
+        .def_property_readonly("way", &HeldSimulation::way)
+        .def_property_readonly("speed", &HeldSimulation::speed)
+        .def_property_readonly("n_steps_left", &HeldSimulation::n_steps_left)
+        .def_property_readonly("inputs", viewed([](HeldSimulation& own) { return own.inputs(); }))
+        .def_property_readonly("contact_force", output(&TrainOutputs::contact_force))
+        .def_property_readonly("head_height", output(&TrainOutputs::head_height))
+        .def_property_readonly("wire_height", output(&TrainOutputs::wire_height))
+        .def_property_readonly("strip_force", output(&TrainOutputs::strip_force));
 }
 
 }  // namespace catenary::python

@@ -2,6 +2,7 @@
 #include "simulation/image.hpp"
 
 #include <cstdio>
+#include <filesystem>
 
 namespace catenary {
 
@@ -57,7 +58,11 @@ class FileOutput {
 
 class FileInput {
   public:
-    explicit FileInput(const std::string& path) : file_(std::fopen(path.c_str(), "rb")) {
+    explicit FileInput(const std::string& path) {
+        std::error_code unknown;
+        if (!std::filesystem::is_regular_file(path, unknown))
+            throw std::runtime_error("there is no such file");
+        file_.reset(std::fopen(path.c_str(), "rb"));
         if (!file_) throw std::runtime_error("it cannot be read");
         if (std::fseek(file_.get(), 0, SEEK_END) != 0 || (left_ = std::ftell(file_.get())) < 0)
             throw std::runtime_error("it is no plain file");

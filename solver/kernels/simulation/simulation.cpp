@@ -1,6 +1,10 @@
 // A prepared line, stepped from outside.
 #include "simulation/simulation.hpp"
 
+#include <cmath>
+
+#include "base/flush_to_zero.hpp"
+
 namespace catenary {
 
 namespace {
@@ -9,9 +13,9 @@ namespace {
 /// so that a file of another form is refused.
 std::string header() {
     auto names = std::string("Catenary prepared line 1: ") + PreparedLine::kMembers + "; ";
-    names += std::string(StepParts::kMembers) + "; " + PassParts::kMembers + "; " +
-             Contacts::kMembers + "; " + SmallProblem::kMembers + "; " + HeadParts::kMembers +
-             "; " + Window::kMembers + "; ";
+    names += std::string(Ahead::kMembers) + "; " + StepParts::kMembers + "; " +
+             PassParts::kMembers + "; " + Contacts::kMembers + "; " + SmallProblem::kMembers +
+             "; " + HeadParts::kMembers + "; " + Window::kMembers + "; ";
     for (size_t bytes : {sizeof(PreparedLine), sizeof(StepParts), sizeof(Touch), sizeof(Node),
                          sizeof(Layout), sizeof(HeadParts)})
         names += std::to_string(bytes) + " ";
@@ -67,11 +71,20 @@ struct Simulation::Place {
 };
 
 Simulation::Simulation(const std::string& path) {
-    read_record(path, header(), line_, blocks_);
+    try {
+        read_record(path, header(), line_, blocks_);
+        make_steps();
+    } catch (const std::runtime_error& error) {
+        throw std::runtime_error(path + ": " + error.what());
+    }
+}
+
+void Simulation::make_steps() {
     StepParts& parts = line_.steps;
-    first_ = line_.n_done;
+    const Ahead& ahead = line_.ahead;
+    n_done_ = ahead.n_done;
     const size_t n = line_.heads.size();
-    if (n == 0 || line_.drives.rows != static_cast<int64_t>(n) || line_.ties.size() != n)
+    if (n == 0 || ahead.drives.rows != static_cast<int64_t>(n) || ahead.ties.size() != n)
         throw std::runtime_error("pantographs are missing in it");
     try {
         free_ = std::make_unique<TwoPasses>(line_.passes);
@@ -85,10 +98,10 @@ Simulation::Simulation(const std::string& path) {
     parts.heads.clear();
     for (const auto& head : heads_) parts.heads.push_back(head.get());
     inputs_.resize(n);
-    drive_.resize(line_.drives.rows * line_.drives.columns);
+    drive_.resize(ahead.drives.rows * ahead.drives.columns);
     Block block{};
     block.times = times_;
-    block.drives = {drive_.data(), 1, line_.drives.rows, line_.drives.columns};
+    block.drives = {drive_.data(), 1, ahead.drives.rows, ahead.drives.columns};
     block.now = now_;
     block.kept.moved = moved_;
     block.counts = counts_;
@@ -98,24 +111,31 @@ Simulation::Simulation(const std::string& path) {
 }
 
 Simulation::Outcome Simulation::step(int64_t n) {
-    for (int64_t k = 0; k < n; ++k) {
-        if (n_steps_left() <= 0) return Outcome::kAtEnd;
-        times_[0] = static_cast<double>(line_.n_done + 1) * line_.dt;
-        drive_next();
-        if (steps_->take(0, 1).n_steps == 0) return Outcome::kNotFound;
-        ++line_.n_done;
-    }
+    const uint64_t before = flush_subnormals();
+    auto outcome = Outcome::kDone;
+    for (int64_t k = 0; k < n && outcome == Outcome::kDone; ++k) outcome = take_one();
+    restore_subnormals(before);
+    return outcome;
+}
+
+Simulation::Outcome Simulation::take_one() {
+    const double time = static_cast<double>(n_done_ + 1) * line_.ahead.dt;
+    if (n_steps_left() <= 0 || steps_->way(time) > line_.ahead.longest_way) return Outcome::kAtEnd;
+    times_[0] = time;
+    drive_next();
+    if (steps_->take(0, 1).n_steps == 0) return Outcome::kNotFound;
+    ++n_done_;
     return Outcome::kDone;
 }
 
 /// What the next step depends on: what the file tells, and what the host adds.
 void Simulation::drive_next() {
-    const auto rows = line_.drives[line_.n_done - first_];
+    const auto rows = line_.ahead.drives[n_done_ - line_.ahead.n_done];
     std::ranges::copy(rows.all(), drive_.begin());
     for (size_t k = 0; k < heads_.size(); ++k) {
         Drive& drive = *reinterpret_cast<Drive*>(&drive_[k * rows.columns]);
         const Input& input = inputs_[k];
-        const Tie& tie = line_.ties[k];
+        const Tie& tie = line_.ahead.ties[k];
         drive.force += tie.stiffness * input.base + tie.damping * input.base_velocity;
         drive.base += input.base;
         drive.base_velocity += input.base_velocity;
@@ -128,8 +148,10 @@ void Simulation::drive_next() {
     }
 }
 
-void Simulation::set_speed(double speed) {
+bool Simulation::set_speed(double speed) {
+    if (line_.ahead.one_speed || !(speed >= 0.0 && std::isfinite(speed))) return false;
     steps_->change_speed(time(), speed);
+    return true;
 }
 
 void Simulation::save(std::byte* state) const {
@@ -137,7 +159,7 @@ void Simulation::save(std::byte* state) const {
         std::memcpy(state, from, n);
         state += n;
     };
-    const Place place{line_.n_done, steps_->course()};
+    const Place place{n_done_, steps_->course()};
     put(&place, sizeof place);
     put(inputs_.data(), inputs_.size() * sizeof(Input));
     for (const OwnBlock& own : blocks_)
@@ -151,7 +173,7 @@ void Simulation::restore(const std::byte* state) {
     };
     Place place;
     get(&place, sizeof place);
-    line_.n_done = place.n_done;
+    n_done_ = place.n_done;
     steps_->set_course(place.course);
     get(inputs_.data(), inputs_.size() * sizeof(Input));
     for (OwnBlock& own : blocks_)

@@ -37,6 +37,17 @@ struct Tie {
     double stiffness, damping;  ///< [N/m], [N s/m]
 };
 
+/// What steps to come depend on.
+struct Ahead {
+    double dt;                    ///< [s]
+    int64_t n_done;               ///< steps taken from time zero on
+    Array3<const double> drives;  ///< (n, n_heads, width) a row for each head, see `Drive`
+    std::span<const Tie> ties;    ///< of each pantograph
+    bool one_speed;               ///< whether drives hold for the train's first speed only
+    double longest_way;           ///< of the train, to where the line ends [m]
+    CATENARY_RECORD(dt, n_done, drives, ties, one_speed, longest_way)
+};
+
 /// All that a prepared line is.
 struct PreparedLine {
     StepParts steps;
@@ -44,11 +55,8 @@ struct PreparedLine {
     TrackedLinks tracked;
     std::optional<Window> window;
     std::vector<HeadParts> heads;
-    std::span<const Tie> ties;    ///< of each pantograph
-    double dt;                    ///< [s]
-    int64_t n_done;               ///< steps taken from time zero on
-    Array3<const double> drives;  ///< (n, n_heads, width) of the steps to come, see `Drive`
-    CATENARY_RECORD(steps, passes, tracked, window, heads, ties, dt, n_done, drives)
+    Ahead ahead;
+    CATENARY_RECORD(steps, passes, tracked, window, heads, ahead)
 };
 
 /// Write a line to a file. Throws std::runtime_error if that fails.
@@ -65,26 +73,27 @@ struct Input {
 
 class Simulation {
   public:
-    /// Throws std::runtime_error if there is no such file, or it is none of this version.
+    /// Throws std::runtime_error, with the path and why, if it is no whole file of this version.
+    /// Numbers of places in it are believed: it is as trustworthy as a program.
     explicit Simulation(const std::string& path);
 
     enum class Outcome {
         kDone,
         kNotFound,  ///< the forces of a step could not be found: nothing can be stepped further
-        kAtEnd,     ///< the file tells no further step what it depends on
+        kAtEnd,     ///< the line ends, or the file tells no further step what it depends on
     };
     /// Take n steps, as far as that is possible.
     Outcome step(int64_t n);
 
-    double time() const { return line_.n_done * line_.dt; }  ///< [s]
-    double dt() const { return line_.dt; }
+    double time() const { return n_done_ * line_.ahead.dt; }  ///< [s]
+    double dt() const { return line_.ahead.dt; }
     double way() const { return steps_->way(time()); }  ///< of the train since it started [m]
     double speed() const { return steps_->course().speed; }
-    void set_speed(double speed);
-    int64_t n_pantographs() const { return static_cast<int64_t>(heads_.size()); }
-    Input& input(int64_t pantograph) { return inputs_.at(pantograph); }
+    /// Let the train go on with another speed [m/s], if it can; whether it can.
+    bool set_speed(double speed);
+    std::span<Input> inputs() { return inputs_; }  ///< of each pantograph
     const TrainOutputs& outputs() const { return line_.steps.train_outputs; }
-    int64_t n_steps_left() const { return line_.drives.n - (line_.n_done - first_); }
+    int64_t n_steps_left() const { return line_.ahead.drives.n - (n_done_ - line_.ahead.n_done); }
 
     /// A state to come back to, and how large one is.
     size_t state_size() const { return state_size_; }
@@ -93,6 +102,8 @@ class Simulation {
 
   private:
     struct Place;
+    void make_steps();
+    Outcome take_one();
     void drive_next();
 
     std::vector<OwnBlock> blocks_;
@@ -105,7 +116,7 @@ class Simulation {
     std::vector<int64_t> now_ = {0, 0}, moved_ = {0, 0};
     std::vector<Counts> counts_ = {Counts{}};
     std::optional<Steps> steps_;
-    int64_t first_ = 0;
+    int64_t n_done_ = 0;
     size_t state_size_ = 0;
 };
 

@@ -64,6 +64,7 @@ class Steps {
         : parts_(std::move(parts)), block_(std::move(block)), course_{parts_.speed} {}
     /// Way of the train at a time [s] since time zero [m].
     double way(double time) const { return course_.way + course_.speed * (time - course_.since); }
+    const StepParts& parts() const { return parts_; }
     const Course& course() const { return course_; }
     void set_course(const Course& course) {
         course_ = course;

@@ -7,23 +7,16 @@ nothing is a defect; one that acts nowhere in the table has its own test, listed
 from __future__ import annotations
 
 import re
-import tomllib
-from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 import pytest
+from acting_scenes import SCENES, acting_scene
 from mpi4py import MPI
 
-from catenary.cases.scene.input.case_files import find_case
 from catenary.cases.scene.keys.keys import known_keys
-from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.hard import runs
 
-HERE = Path(__file__).parent
-SCENES = tomllib.loads((HERE / "acting.toml").read_text())
-EXAMPLES = Path(__file__).parents[3] / "docs/examples"
 # What other tests look at, by why it is not here.
 ELSEWHERE = re.compile(
     "|".join(
@@ -51,10 +44,8 @@ ELSEWHERE = re.compile(
 )
 
 
-def answers(case: str, words: Sequence[str]) -> list[np.ndarray]:
+def answers(scene: Scene) -> list[np.ndarray]:
     """The line at rest and the histories of a run."""
-    found = EXAMPLES / case
-    scene = load_scene(found if found.is_file() else find_case(case), words)
     rest = runs.at_rest(scene, MPI.COMM_SELF)
     run = runs.run(rest, MPI.COMM_SELF)
     shape = [rest.model.dropper_lengths, rest.form.height, rest.form.dropper_force]
@@ -67,10 +58,10 @@ def answers(case: str, words: Sequence[str]) -> list[np.ndarray]:
 @pytest.mark.parametrize("name", SCENES)
 def test_another_value_changes_what_is_computed(name: str) -> None:
     table = SCENES[name]
-    before = answers(table["case"], table["set"])
+    before = answers(acting_scene(name))
     idle = []
     for change in table["change"]:
-        after = answers(table["case"], [*table["set"], change])
+        after = answers(acting_scene(name, [change]))
         if all(map(np.array_equal, before, after)):
             idle.append(change)
     assert not idle

@@ -1,0 +1,35 @@
+"""Lines that are prepared for steps from outside."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from mpi4py import MPI
+
+import catenary.solver.kernels
+from catenary.cases.run.scene_mesh import mesh_of
+from catenary.cases.scene.convert.problem import problem_of
+from catenary.cases.scene.scene import Scene
+from catenary.solver.statics.line_at_rest import line_at_rest
+from catenary.solver.statics.stability_of_rest import refuse_lost_wire
+from catenary.solver.time_loop.march import March
+
+_KERNELS = Path(catenary.solver.kernels.__path__[0])
+# What C programs include and link.
+HEADER, LIBRARY = _KERNELS / "simulation/catenary.h", _KERNELS / "libcatenary.so"
+
+
+def prepare_line(scene: Scene, path: Path) -> int:
+    """Write the line of a scene with its train at rest; for how many steps. Not collective.
+
+    Raises
+    ------
+    InputError
+        If the line is impossible, or its steps need what a prepared line has not.
+    RunBroken
+        If the file cannot be written.
+    """
+    rest = line_at_rest(problem_of(scene), mesh_of(scene))
+    refuse_lost_wire(rest.model, rest.form)
+    with March(MPI.COMM_SELF, *rest) as march:
+        return march.write_line(path)

@@ -1,0 +1,75 @@
+"""A line that is prepared for steps from outside: a file that needs neither Python nor PETSc.
+
+`native.Simulation`, and the library of `kernels/simulation/catenary.h`, read it.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from catenary.mbs.head.drives import N_DRIVE, drive_width
+from catenary.mbs.head.newmark_head import SteppedHead
+from catenary.solver.base.errors import InputError, RunBroken
+from catenary.solver.kernels import native
+from catenary.solver.time_loop.compiled_steps import CompiledSteps
+
+
+class Ahead(NamedTuple):
+    """What steps to come depend on; see `kernels/simulation/simulation.hpp`."""
+
+    dt: float
+    n_done: int
+    drives: np.ndarray
+    ties: np.ndarray
+    one_speed: bool
+    longest_way: float
+
+
+def write_line(path: Path, blocks: CompiledSteps, dt: float, steps: tuple[int, int]) -> None:
+    """Write a line as it is now, with what steps to come depend on. Not collective.
+
+    Parameters
+    ----------
+    blocks : takes steps of the line
+    dt : time step [s]
+    steps : number of the latest step, and of the last one to come
+
+    Raises
+    ------
+    InputError
+        If loads are made while they are stepped, or only a part of the line is there.
+    RunBroken
+        If the file cannot be written.
+    """
+    scheme = blocks.scheme
+    line, pantographs = scheme.interaction.line, scheme.pantographs
+    if line.loads is not None and line.loads.are_sampled:
+        raise InputError(
+            "gusts are made under way, and a prepared line has none; take them away (wind.gusts=)"
+        )
+    if line.window is not None and not line.window.has_rows(0, line.window.arrays.low.size):
+        raise InputError(
+            "a window of this line has matrices of what moves only: a prepared line has all of "
+            'them; take window.mode = "off"'
+        )
+    first, last = steps
+    models = [model for model in pantographs.models if isinstance(model, SteppedHead)]
+    drives = np.zeros((last - first, len(models), drive_width(pantographs.most_contacts)))
+    pantographs.fill_drives((np.arange(first + 1, last + 1) * dt).tolist(), drives)
+    end = float(scheme.interaction.contacts.wires.nodes["x"].max())
+    ahead = Ahead(
+        dt,
+        first,
+        drives,
+        ties=np.array([model.tie for model in models], dtype=native.TIE),
+        one_speed=bool(drives[..., N_DRIVE:].any()),
+        longest_way=end - float(pantographs.places_along.start.max()),
+    )
+    pantographs.move_to(first * dt)
+    try:
+        blocks.steps().write(str(path), ahead)
+    except RuntimeError as error:
+        raise RunBroken(f"{path}: {error}") from error
