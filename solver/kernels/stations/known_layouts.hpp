@@ -60,12 +60,18 @@ constexpr Widths kWidths[] = {{2}, {2, 2}, {4}, {4, 4}, {6}, {8}, {10}, {12}, {1
 /// Rows and factors of the shipped kinds of lines.
 struct Shipped {
     Layout rows, factors;
+    /// Whether such stations stand in one line with others, so that chains often go one by one.
+    bool is_mixed = false;
 };
 constexpr Shipped dense(const Layout& rows) {
     return {rows, dense_factors(rows)};
 }
 constexpr Shipped sparse(const Layout& rows) {
     return {rows, sparse_factors(rows)};
+}
+constexpr Shipped mixed(Shipped shipped) {
+    shipped.is_mixed = true;
+    return shipped;
 }
 /// Two wires that stretch, in three planes, and the factors of each wire by itself.
 constexpr Shipped kTensioned = [] {
@@ -76,21 +82,23 @@ constexpr Shipped kTensioned = [] {
     return of;
 }();
 constexpr Shipped kShipped[] = {
-    dense(rows_of({2}, {0, 1})),         // one wire
-    dense(rows_of({2, 2}, {0, 1})),      // in two planes
-    dense(rows_of({4}, {0, 1, 2})),      // two wires with droppers
-    sparse(rows_of({4}, {0, 1, 2})),     // the same where no two spans are alike
-    dense(rows_of({4, 4}, {0, 1, 2})),   // two such lines side by side
-    sparse(rows_of({4, 4}, {0, 1, 2})),  // two wires in two planes
-    dense(rows_of({6}, {0, 1, 2, 6})),   // compound
-    sparse(rows_of({6}, {0, 1, 2, 6})),
+    dense(rows_of({2}, {0, 1})),                  // one wire
+    dense(rows_of({2, 2}, {0, 1})),               // in two planes
+    mixed(dense(rows_of({4}, {0, 1, 2}))),        // two wires with droppers
+    sparse(rows_of({4}, {0, 1, 2})),              // the same where no two spans are alike
+    mixed(dense(rows_of({4, 4}, {0, 1, 2}))),     // two such lines side by side, in an overlap
+    sparse(rows_of({4, 4}, {0, 1, 2})),           // two wires in two planes
+    dense(rows_of({6}, {0, 1, 2, 6})),            // compound
+    sparse(rows_of({6}, {0, 1, 2, 6})),           //
     dense(rows_of({6}, {0, 1, 4, 6})),            // twin, with relative motion
-    sparse(rows_of({4}, {0, 1})),                 // stitched, by M: two wires
-    sparse(rows_of({6}, {0, 1})),                 // and three
-    sparse(rows_of({8}, {0, 1})),                 // two wires in planes that arms join, by M
+    mixed(dense(rows_of({4}, {0, 1}))),           // stitched, by M: two wires
+    mixed(sparse(rows_of({4}, {0, 1}))),          //
+    mixed(dense(rows_of({6}, {0, 1}))),           // and three
+    mixed(sparse(rows_of({6}, {0, 1}))),          //
+    mixed(sparse(rows_of({8}, {0, 1}))),          // two wires in planes that arms join, by M
     sparse(rows_of({8}, {0, 1, 2, 4, 6}, true)),  // in wind
     sparse(rows_of({12}, {0, 1})),                // three wires in planes that arms join, by M
-    sparse(rows_of({16}, {0, 1})),                // an overlap of such lines of two wires
+    mixed(sparse(rows_of({16}, {0, 1}))),         // an overlap of such lines of two wires
     kTensioned,
 };
 

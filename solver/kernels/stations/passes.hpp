@@ -324,9 +324,9 @@ class KernelsOf final : public Kernels {
     Blocks blocks_;
 };
 
-/// Kernels of one kind of blocks for what steps of Newmark's family spend their time with; others
-/// do the rest.
-template <class Blocks>
+/// Kernels of one kind of blocks for what steps of Newmark's family spend their time with, which is
+/// two chains at once, and of a mixed line single ones as well; others do the rest.
+template <class Blocks, bool IsMixed>
 class QuickKernels final : public Kernels {
   public:
     QuickKernels(const Layout& r, const Layout& f, std::unique_ptr<Kernels> rest)
@@ -338,6 +338,8 @@ class QuickKernels final : public Kernels {
         multiply_rows(blocks_, work, chain, result);
     }
     void forth(const Work& work, Chain& chain, int step) const override {
+        if constexpr (IsMixed)
+            if (!work.right) return go_forth<false>(blocks_, work, chain, step);
         rest_->forth(work, chain, step);
     }
     void forth(const Work& work, Chain& from_start, Chain& from_end) const override {
@@ -348,6 +350,9 @@ class QuickKernels final : public Kernels {
         rest_->meet(work, run, middle, from_end);
     }
     void back(const Work& work, Chain& chain, int step) const override {
+        if constexpr (IsMixed)
+            if (then_of(work) == Then::kNewmark)
+                return go_back<Then::kNewmark>(blocks_, work, chain, step);
         rest_->back(work, chain, step);
     }
     void back(const Work& work, Chain& to_start, Chain& to_end) const override {

@@ -47,7 +47,7 @@ std::unique_ptr<Kernels> make_quick(const Layout& rows, const Layout& factors) {
     if constexpr (kHasKnown && K < std::size(kShipped)) {
         constexpr Shipped s = kShipped[K];
         if (rows == s.rows && factors == s.factors)
-            return std::make_unique<QuickKernels<KnownBlocks<s.rows, s.factors>>>(
+            return std::make_unique<QuickKernels<KnownBlocks<s.rows, s.factors>, s.is_mixed>>(
                 rows, factors, make_listed(rows, factors));
         return make_quick<K + 1>(rows, factors);
     }
