@@ -8,14 +8,18 @@ and it moves with the base.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from catenary.mbs.head.newmark_head import raised
+from catenary.mbs.called_model import CalledModel
+from catenary.mbs.head.drives import drive_width, named
+from catenary.mbs.head.newmark_head import SteppedHead, raised
 from catenary.mbs.interface import HeadState, Pantograph
 from catenary.mbs.vehicle.base_motion import BaseMotion
+from catenary.solver.kernels import native
 
 
 @dataclass(frozen=True)
@@ -44,8 +48,20 @@ class Lowering:
         return part
 
 
+class LoweringArrays(NamedTuple):
+    """A lowering as kernels take it; see `kernels/heads/lowering.hpp`."""
+
+    time: float
+    drop: float
+    memory: np.ndarray
+
+
 class LoweredPantograph:
     """Any pantograph, lowered and caught.
+
+    Attributes
+    ----------
+    stepped : what steps it, from Python and in the loop of kernels
 
     Parameters
     ----------
@@ -57,69 +73,76 @@ class LoweredPantograph:
     def __init__(
         self, model: Pantograph, lowering: Lowering, base: BaseMotion | None = None
     ) -> None:
-        s = len(model.strip_offsets)
-        self.model = model
-        self._lowering, self._base = lowering, base
-        # Of the strips' mean over the base: now, and where it is caught, None before.
-        self._height = 0.0
-        self._catch: float | None = None
-        self._caught = False
-        self._latest: HeadState | None = None
-        self._time = 0.0
-        self._still = HeadState(s)
+        self.model, self._base = model, base
+        if isinstance(model, SteppedHead):
+            self._head, self._row, self.stepped = model.head, model.row, model.stepped
+        else:
+            called = CalledModel(model)
+            self._head, self._row = called.head, np.zeros(drive_width(len(model.strip_offsets)))
+            self.stepped = called.stepped()
+        self._now, self._memory = named(self._row), np.zeros(1, dtype=native.LOWERING_MEMORY)
+        self.stepped.lower(LoweringArrays(lowering.time, lowering.drop, self._memory))
 
     @property
     def strip_offsets(self) -> tuple[float, ...]:
         """Places of the strips ahead of the pantograph's own place [m]."""
         return self.model.strip_offsets
 
+    @property
+    def is_caught(self) -> bool:
+        """Whether it has been lowered and caught."""
+        return bool(self._memory["phase"][0] == 2.0)
+
     def place(self, head_height: float, velocity: float = 0.0) -> None:
         """Put the model without contact to where its head is at this height [m]."""
         self.model.place(head_height, velocity)
-        self._height = head_height - self._base_at(0.0)[0]
+        self._memory["height"] = head_height - self._base_at(0.0)[0]
 
     def extrapolate(self, time: float) -> tuple[np.ndarray, np.ndarray]:
         """Heights and velocities (s,) of the strips at ``time`` [s] from the motion alone."""
-        if not self._caught:
+        if not self.is_caught:
             return self.model.extrapolate(time)
-        still = self._where_caught(time)
-        return still.height, still.velocity
+        place, velocity = self._base_at(time)
+        s = len(self.strip_offsets)
+        return np.full(s, self._memory["caught_at"][0] + place), np.full(s, velocity)
 
     def predict(self, time: float) -> HeadState:
         """Strips at ``time`` [s] as functions of the contact forces in the coming step.
 
         Forces do not move what is caught.
         """
-        if self._caught:
-            return self._where_caught(time)
-        if self._catch is None and time > self._lowering.time:
-            self._catch = self._height - self._lowering.drop
-        self._time, self._latest = time, self.model.predict(time)
-        return self._latest
+        now = self._now
+        now["time"] = time
+        now["roof"], now["roof_velocity"] = self._base_at(time)
+        if isinstance(self.model, SteppedHead):
+            return self.model.predict(time)
+        self.stepped.step(self._row)
+        return self._head
 
     def advance(self, contact_force: np.ndarray) -> None:
         """Take the step predicted last with these contact forces (s,) [N]."""
-        if self._caught:
-            return
-        assert self._latest is not None
-        height = self._latest.height - self._latest.height_compliance @ contact_force
-        self.model.advance(contact_force)
-        self._height = float(height.mean()) - self._base_at(self._time)[0]
-        self._caught = self._catch is not None and self._height <= self._catch
+        taken = self.model if isinstance(self.model, SteppedHead) else self.stepped
+        if not self.is_caught:
+            taken.advance(contact_force)
+
+    def fill_drives(self, times: Sequence[float], drives: np.ndarray) -> None:
+        """Fill in what steps to ``times`` [s] depend on, see `SteppedHead`."""
+        if self._base is not None:
+            rows = named(drives)
+            motions = np.array([self._base_at(time) for time in times])
+            rows["roof"], rows["roof_velocity"] = motions.T
+        if isinstance(self.model, SteppedHead):
+            self.model.fill_drives(times, drives)
 
     def state(self) -> np.ndarray:
         """The model's state, its height, where it is caught, and 0 before the lowering, 1 while it
         is lowered, 2 when it is caught."""
-        lowered = self._catch is not None
-        phase = float(lowered) + float(self._caught)
-        return np.append(self.model.state(), [self._height, self._catch or 0.0, phase])
+        return np.append(self.model.state(), self._memory.view(float))
 
     def restore(self, state: np.ndarray) -> None:
         """Continue from what ``state`` returned."""
         self.model.restore(np.asarray(state)[:-3])
-        self._height = float(state[-3])
-        self._catch = float(state[-2]) if state[-1] >= 1.0 else None
-        self._caught = bool(state[-1] == 2.0)
+        self._memory.view(float)[:] = state[-3:]
 
     def places(self) -> np.ndarray:
         """Where the model's masses or bodies are; those of what is caught as it was then."""
@@ -131,14 +154,7 @@ class LoweredPantograph:
 
     def energy(self) -> float:
         """That of the model [J]; what is caught has none."""
-        return 0.0 if self._caught else self.model.energy()
-
-    def _where_caught(self, time: float) -> HeadState:
-        assert self._catch is not None
-        place, velocity = self._base_at(time)
-        self._still.height[:] = self._catch + place
-        self._still.velocity[:] = velocity
-        return self._still
+        return 0.0 if self.is_caught else self.model.energy()
 
     def _base_at(self, time: float) -> tuple[float, float]:
         """Height [m] and velocity [m/s] of the base."""

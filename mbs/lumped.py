@@ -153,8 +153,8 @@ class LumpedPantograph(SteppedHead):
             now["part"] = self._part(time)
         if self._laws.laws:
             now["base"], now["base_velocity"] = self._base_motion(time)
-        self.stepped.step(self._row)
-        return self._head
+        self.stepped.step(self.row)
+        return self.head
 
     def fill_drives(self, times: Sequence[float], drives: np.ndarray) -> None:
         """Fill in the forces, and where the wire crosses; see `SteppedHead`."""

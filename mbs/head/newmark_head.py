@@ -26,6 +26,8 @@ class SteppedHead(ABC):
     Attributes
     ----------
     stepped : what steps it, from Python and in the loop of kernels
+    head : HeadState, what it predicted last
+    row : what the coming step depends on, see `drives`
 
     Parameters
     ----------
@@ -63,12 +65,12 @@ class SteppedHead(ABC):
         )
         self._state = np.zeros(3 * n)
         self._early = np.zeros((2, s))
-        self._head = HeadState(s)
+        self.head = HeadState(s)
         roll = -1 if self._lateral is None else head.roll
-        self._arrays = HeadArrays(self._touch, self._state, self._head.numbers, self._newmark, roll)
+        self._arrays = HeadArrays(self._touch, self._state, self.head.numbers, self._newmark, roll)
         # What the coming step depends on, and those of its numbers that have names.
-        self._row = np.zeros(drive_width(s))
-        self._now = named(self._row)
+        self.row = np.zeros(drive_width(s))
+        self._now = named(self.row)
         self._laws: LawsInPlace = in_place((), (), n, ())
         self._law_arrays = self._laws.arrays(s)
         self._bending = None if self._lateral is None else head.bending
@@ -155,7 +157,7 @@ class SteppedHead(ABC):
     def extrapolate(self, time: float) -> tuple[np.ndarray, np.ndarray]:
         """Heights and velocities (s,) of the strips by Newmark's predictor (paper eq. 2.5)."""
         self._aim(time)
-        self.stepped.extrapolate(self._row, self._early)
+        self.stepped.extrapolate(self.row, self._early)
         return self._early[0], self._early[1]
 
     def advance(self, contact_force: np.ndarray) -> None:
@@ -200,8 +202,8 @@ class SteppedHead(ABC):
         if self._lateral is not None:
             self._lateral.move_to(time)
             s = self._lateral.place.size
-            self._row[N_DRIVE : N_DRIVE + s] = self._lateral.place
-            self._row[N_DRIVE + s :] = self._lateral.rate
+            self.row[N_DRIVE : N_DRIVE + s] = self._lateral.place
+            self.row[N_DRIVE + s :] = self._lateral.rate
 
 
 def raised(time: float, raise_time: float) -> float:

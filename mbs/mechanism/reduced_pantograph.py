@@ -116,9 +116,9 @@ class RaisingPantograph(SteppedHead):
         self._aim(time)
         self._move_base(time)
         # What is not a number is left to those who couple.
-        if not self._raised.step(self._row):
+        if not self._raised.step(self.row):
             raise self._data.frame.left(self._raised.height, time)
-        return self._head
+        return self.head
 
     def fill_drives(self, times: Sequence[float], drives: np.ndarray) -> None:
         """Fill in lift and base, and where the wire crosses; see `SteppedHead`."""

@@ -15,10 +15,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, TextIO
 
-import numpy as np
-
 from catenary.postproc.files.result_file import DONE
-from catenary.solver.time_loop.views.observers import Stage, StepView
+from catenary.solver.time_loop.views.observers import Observer, Stage, StepView
 
 logger = logging.getLogger("catenary.progress")
 
@@ -31,7 +29,7 @@ _GROWTH = 2
 _NEVER = sys.maxsize
 
 
-class Progress:
+class Progress(Observer):
     """Phases of a run, and an observer of its march. Not collective.
 
     Parameters
@@ -97,9 +95,6 @@ class Progress:
     def next_state(self, step: int) -> int:
         """The step of the next reading of the clock."""
         return max(step + 1, self._next_look)
-
-    def observe_rows(self, first_step: int, times: np.ndarray, rows: np.ndarray) -> None:
-        """Pass over steps."""
 
     def observe(self, view: StepView) -> None:
         """Read the clock now and then; most steps are passed over."""

@@ -22,14 +22,13 @@ from catenary.postproc.record.line_rows import LineGather, LineRows
 from catenary.solver.base.errors import RunBroken
 from catenary.solver.base.parallel import on_root
 from catenary.solver.time_loop.views import channels
-from catenary.solver.time_loop.views.observers import Stage, StepView
+from catenary.solver.time_loop.views.observers import NEVER, Observer, Stage, StepView
 
-_NEVER = 2**62
 # Single steps of which the line's channels are taken in together.
 _WAITING = 16
 
 
-class Recorder:
+class Recorder(Observer):
     """Observer that writes ``run.h5``.
 
     Collective, like all its methods except ``observe`` between flushes. Call ``close`` after
@@ -111,30 +110,26 @@ class Recorder:
             self._line.restore(self._comm.bcast(self._extremes, root=0))
 
     def observe(self, view: StepView) -> None:
-        """Copy a step into the buffers; collective at the first step and whenever they are full."""
-        row = self._rows
-        if row == 0:
-            self._first_step = view.step
+        """Copy steps into the buffers; collective at the first step and whenever they are full."""
+        begin = self._rows
+        if begin == 0:
+            self._first_step = view.first_step
         if not self._kept:
             self._make_room(view.columns)
-        self._time[row] = view.time
+        end = self._rows = begin + len(view.times)
+        self._time[begin:end] = view.times
         for part, kept in self._kept.values():
-            kept[row] = view.row[part]
-        self._rows = row + 1
+            kept[begin:end] = view.rows[:, part]
         self._take_line(view)
         self._view = view
         self._last_time = view.time
-        self.observe_motion(view)
+        if self._energy_every and view.step % self._energy_every == 0:
+            self._energies.append((view.time, *view.energies()))
         # The first step is written at once: it makes room for the state to continue from. After it
         # each flush ends with a chunk of the file: a chunk is written once, so that a kill in the
         # midst of writing one spoils no checksum of earlier rows.
         if (view.step + 1) % self._flush_every == 0 or not self._flushed_once:
             self._flush(view)
-
-    def observe_motion(self, view: StepView) -> None:
-        """Keep the energies of a step, if they are due. Collective."""
-        if self._energy_every and view.step % self._energy_every == 0:
-            self._energies.append((view.time, *view.energies()))
 
     def next_state(self, step: int) -> int:
         """The step of the next flush, or record of energies that need more than the motion."""
@@ -151,20 +146,7 @@ class Recorder:
 
     def _next_energies(self, step: int) -> int:
         every = self._energy_every
-        return step - step % every + every if every else _NEVER
-
-    def observe_rows(self, first_step: int, times: np.ndarray, rows: np.ndarray) -> None:
-        """Copy steps between two states into the buffers."""
-        begin = self._rows
-        if begin == 0:
-            self._first_step = first_step
-        end = self._rows = begin + times.size
-        self._time[begin:end] = times
-        for part, kept in self._kept.values():
-            kept[begin:end] = rows[:, part]
-        self._take_waiting()
-        self._take(first_step, rows, all_move=False)
-        self._last_time = float(times[-1])
+        return step - step % every + every if every else NEVER
 
     def finish(self, outcome: str) -> None:
         """Write what is left and the outcome. Collective.
@@ -208,10 +190,10 @@ class Recorder:
         self._waiting = np.empty((_WAITING, width))
 
     def _take_line(self, view: StepView) -> None:
-        """Take in the line's channels of one step, a few together if all of the line moves."""
-        if not self._moving.are_all:
+        """Take in the line's channels, of single steps a few together if all of the line moves."""
+        if len(view.rows) > 1 or not self._moving.are_all:
             self._take_waiting()
-            self._take(view.step, view.row[None], all_move=False)
+            self._take(view.first_step, view.rows, all_move=False)
             return
         self._waiting[self._n_waiting] = view.row
         self._n_waiting += 1

@@ -29,7 +29,7 @@ import numpy as np
 from catenary.solver.base.errors import RunBroken
 from catenary.solver.model.loads import MemoryLoad
 from catenary.solver.statics.line_at_rest import LineAtRest
-from catenary.solver.time_loop.views.observers import Stage, StepView
+from catenary.solver.time_loop.views.observers import Observer, Stage, StepView
 
 logger = logging.getLogger("catenary.watch")
 
@@ -99,7 +99,7 @@ def watched(at_rest: LineAtRest, has_train: bool = True) -> Watched:
     )
 
 
-class RunWatch:
+class RunWatch(Observer):
     """Observer that judges a march while it goes on. Collective.
 
     Each fault is told once, when it is seen; ``facts`` has them at the end.
@@ -119,7 +119,6 @@ class RunWatch:
         self._comm, self._run, self._every = comm, run, every
         self.remarks: list[str] = []
         self._told: set[str] = set()
-        self._columns: dict[str, slice] = {}
         self._start: tuple[float, float] | None = None
         self._energy = self._most_energy = self._work = self._most_work = self._made = 0.0
         self._rotation = self._turned = 0.0
@@ -136,24 +135,19 @@ class RunWatch:
 
     def next_state(self, step: int) -> int:
         """The step of the next look; rows of others will do."""
-        return step - step % self._every + self._every if self._columns else step + 1
+        return step - step % self._every + self._every
 
     def observe(self, view: StepView) -> None:
-        """Look at a step.
+        """Look at steps.
 
         Raises
         ------
         RunBroken
             On all ranks, where the march has left what its model bears.
         """
-        self._columns = view.columns
-        self._check_contact(np.array([view.time]), view.row[None])
+        self._check_contact(view)
         if view.step % self._every == 0 or view.step == self._n_steps or self._start is None:
             self._look(view)
-
-    def observe_rows(self, first_step: int, times: np.ndarray, rows: np.ndarray) -> None:
-        """Look at steps of which only rows are left."""
-        self._check_contact(times, rows)
 
     def finish(self, outcome: str) -> None:
         """Tell of contacts that are lost to the end."""
@@ -261,11 +255,11 @@ class RunWatch:
             return here
         return max(self._comm.allgather(here))
 
-    def _check_contact(self, times: np.ndarray, rows: np.ndarray) -> None:
-        forces = rows[:, self._columns["contact_force"]]
+    def _check_contact(self, view: StepView) -> None:
+        times, forces = view.times, view.each("contact_force")
         if not forces.shape[1]:
             return  # on another rank
-        places = rows[:, self._columns["contact_position"]]
+        places = view.each("contact_position")
         for p, raised in enumerate(self._run.raised):
             touching = np.flatnonzero((forces[:, p] != 0.0) | (times < raised))
             first = 0

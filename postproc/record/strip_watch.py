@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import logging
-import sys
 from collections.abc import Sequence
 
 import numpy as np
 
-from catenary.solver.time_loop.views.observers import Stage, StepView
+from catenary.solver.time_loop.views.observers import NEVER, Observer, Stage, StepView
 
 logger = logging.getLogger("catenary.strips")
 
 
-class StripWatch:
+class StripWatch(Observer):
     """Observer of lateral places of contact wires. Not collective; rank 0 sees them.
 
     Parameters
@@ -29,26 +28,14 @@ class StripWatch:
         ends = stage.n_wires * np.cumsum([0, *stage.train.n_strips])
         self._contacts = [slice(*pair) for pair in zip(ends[:-1], ends[1:], strict=True)]
         self._warned = [False] * stage.n_pantographs
-        self._columns: dict[str, slice] = {}
-
-    def observe(self, view: StepView) -> None:
-        """Check a step."""
-        self._columns = view.columns
-        self._check(np.array([view.time]), view.row[None])
 
     def next_state(self, step: int) -> int:
-        """Rows are enough, once the first step has shown where they have what."""
-        return sys.maxsize if self._columns else step + 1
+        """Rows are enough."""
+        return NEVER
 
-    def observe_rows(self, first_step: int, times: np.ndarray, rows: np.ndarray) -> None:
-        """Check steps of which only rows are left."""
-        self._check(times, rows)
-
-    def finish(self, outcome: str) -> None:
-        """Nothing."""
-
-    def _check(self, times: np.ndarray, rows: np.ndarray) -> None:
-        places = rows[:, self._columns["lateral_place"]]
+    def observe(self, view: StepView) -> None:
+        """Check steps."""
+        places = view.each("lateral_place")
         if not places.shape[1]:
             return  # on another rank
         for p, (half, own) in enumerate(zip(self._half_lengths, self._contacts, strict=True)):
@@ -58,12 +45,12 @@ class StripWatch:
             if beyond.any():
                 self._warned[p] = True
                 row = int(np.argmax(beyond))
-                x = rows[row, self._columns["contact_position"]][p]
+                x = view.each("contact_position")[row, p]
                 logger.warning(
                     "a contact wire leaves the strips of pantograph %d at %.4g s, %.4g m: they end "
                     "%.3g m beside their middle; contact goes on as if it stayed on them",
                     p + 1,
-                    times[row],
+                    view.times[row],
                     x,
                     half,
                 )

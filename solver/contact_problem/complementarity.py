@@ -37,12 +37,6 @@ from catenary.solver.kernels import native
 
 # Mostly one or two rounds are needed; a set that cycles shows within a few.
 _MAX_ROUNDS = 30
-# Newton's method on a law doubles its digits with each tangent.
-_MAX_TANGENTS = 50
-# Where so many do not do, round-off is looked at: large terms may cancel in depths and rates.
-_USUAL_TANGENTS = 12
-# A term of a sum is known to some roundings of itself.
-_ROUNDING = 8.0 * np.finfo(float).eps
 # What there is to say of a step that holds something that is no number.
 NOT_FINITE = "it has no finite solution; try a smaller numerics.dt_s"
 # Links that the arrays have room for at first.
@@ -155,17 +149,6 @@ class Gap:
             raise RunBroken(NOT_FINITE)
         return self.found
 
-    def rounding(self, force: np.ndarray, slack: np.ndarray) -> np.ndarray:
-        """What depths [m] and rates [m/s] of ``under`` may be wrong by, (2, n)."""
-        pushed, m = np.abs(force), slack.size
-        size = Affine(*map(np.abs, self.affine))
-        depth = size.place + size.by_force @ pushed
-        rate = size.rate + size.rate_by_force @ pushed
-        if m:
-            depth += np.abs(self.line.rows.lift[:m]).T @ np.abs(slack)
-            rate += np.abs(self.line.rows.rise[:m]).T @ np.abs(slack)
-        return _ROUNDING * np.stack([depth, rate])
-
 
 class InnerProblem:
     """Solves the inner problem through both compliances: the linearly implicit coupling.
@@ -186,7 +169,6 @@ class InnerProblem:
     def __init__(self, law: LawInSteps, coupled: Coupled) -> None:
         self.law = law
         self.gap = Gap(law.n)
-        self._no_rounding = np.zeros((2, law.n))
         self.coupled = coupled
         self.pivoted = False
         self._room = -1
@@ -237,18 +219,16 @@ class InnerProblem:
         gap.put(line, heads)
         law.linearise(gap.affine.place, gap.affine.rate)
         rounds = 0
-        for number in range(_MAX_TANGENTS):
+        for number in range(native.MOST_TANGENTS):
             found = self._with_tangents(line, heads)
             rounds += found.rounds
             law.linearise(found.depth, found.rate)
-            looks = number >= _USUAL_TANGENTS
-            force = found.contact_force
-            rounding = gap.rounding(force, found.compensation) if looks else self._no_rounding
-            if law.agrees(force, rounding):
+            forces = found.contact_force, found.compensation
+            if native.agrees(gap.affine, line.rows, *forces, law, number):
                 return found._replace(rounds=rounds)
         raise NotConverged(
-            f"the contact law finds no force within {_MAX_TANGENTS} tangents; take a smaller "
-            "numerics.dt_s"
+            f"the contact law finds no force within {native.MOST_TANGENTS} tangents; take a "
+            "smaller numerics.dt_s"
         )
 
     def _with_tangents(self, line: LineResponse, heads: Heads) -> InnerSolution:

@@ -16,12 +16,6 @@ from catenary.solver.problem.contact_laws import HertzLaw, KinematicLaw, LinearL
 from catenary.solver.problem.problem import Problem
 from catenary.solver.problem.simulated import Simulated
 
-# Largest difference between the law and its last tangent, relative to the force.
-_TOLERANCE = 1e-10
-# How well depths [m] and rates [m/s] are known: differences of heights of 5 m and of speeds of some
-# m/s, a few roundings of 4e-16 to 9e-16 each. No force is known better than that times the slope.
-_KNOWN = 5e-15
-
 
 class Tangents(NamedTuple):
     """own f = offset + by_depth d + by_rate d' at n contacts, with depth d and rate d' of the gap
@@ -49,6 +43,16 @@ class ReportedForces(NamedTuple):
     reported: np.ndarray
 
 
+class StepLaw(NamedTuple):
+    """A law in a loop of kernels.
+
+    ``marched`` is the law unless it is linear, ``reported`` what of its forces is reported.
+    """
+
+    marched: HertzInSteps | None
+    reported: ReportedForces
+
+
 class LawInSteps(Protocol):
     """A law for n contacts.
 
@@ -71,14 +75,6 @@ class LawInSteps(Protocol):
     def force(self, depth: np.ndarray, rate: np.ndarray) -> np.ndarray:
         """The law itself without the cut at zero (n,) [N]."""
 
-    def agrees(self, force: np.ndarray, rounding: np.ndarray) -> bool:
-        """Whether forces (n,) found with tangents are those of the law where it was linearised
-        last.
-
-        ``rounding`` (2, n) is what depths [m] and rates [m/s] may be wrong by because terms much
-        larger than heights of some metres and speeds of some m/s cancel in them.
-        """
-
     def accept(self, time: float, depth: np.ndarray, rate: np.ndarray, force: np.ndarray) -> None:
         """Remember a step to ``time`` [s]: depths, rates and forces (n,) at its end.
 
@@ -91,8 +87,8 @@ class LawInSteps(Protocol):
     def reported(self, force: np.ndarray) -> np.ndarray:
         """What of the forces (n,) of the latest step is to be recorded [N]."""
 
-    def in_loop(self) -> ReportedForces | None:
-        """``accept`` and ``reported`` for a loop of kernels, None if there is none for the law."""
+    def in_loop(self) -> StepLaw:
+        """The same for a loop of kernels."""
 
     def state(self) -> np.ndarray:
         """All that is remembered, as one array."""
@@ -120,10 +116,6 @@ class _Tangents:
         """Spring and damper (n,) [N]."""
         return np.asarray(self.tangents.by_depth * depth + self.tangents.by_rate * rate)
 
-    def agrees(self, force: np.ndarray, rounding: np.ndarray) -> bool:
-        """Always."""
-        return True
-
     def accept(self, time: float, depth: np.ndarray, rate: np.ndarray, force: np.ndarray) -> None:
         """Nothing is remembered."""
 
@@ -131,9 +123,9 @@ class _Tangents:
         """The forces themselves."""
         return force
 
-    def in_loop(self) -> ReportedForces | None:
+    def in_loop(self) -> StepLaw:
         """Forces count as they are."""
-        return ReportedForces(0.0, 0.0, np.zeros(0), np.zeros(self.n))
+        return StepLaw(None, ReportedForces(0.0, 0.0, np.zeros(0), np.zeros(self.n)))
 
     def state(self) -> np.ndarray:
         """Nothing."""
@@ -154,48 +146,48 @@ class HertzInSteps(_Tangents):
     """Hertz's law with hysteresis, which remembers the speed of each contact's last impact.
 
     That is the rate at the start of the step in which the gap closes.
+
+    Attributes
+    ----------
+    law : HertzLaw
+    speed : (n,) these speeds of those that touch, or of the next impact [m/s]
+    there : (n,) forces of the law where it was linearised last, not cut at zero [N]
     """
 
     is_linear = False
 
     def __init__(self, law: HertzLaw, n: int) -> None:
         super().__init__(n, 1.0, 0.0, 0.0, pulls=False)
-        self._law = law
-        self._speed = np.full(n, law.least_speed)
-        self._force = np.zeros(n)
+        self.law = law
+        self.speed = np.full(n, law.least_speed)
+        self.there = np.zeros(n)
+        self._linearise = native.linearise.bound(self)
+        self._remember = native.remember.bound(self)
 
     def linearise(self, depth: np.ndarray, rate: np.ndarray) -> None:
         """Tangents at depths and rates (n,)."""
-        native.linearise(self._law, depth, rate, self._speed, self.tangents, self._force)
+        self._linearise(depth, rate)
 
     def force(self, depth: np.ndarray, rate: np.ndarray) -> np.ndarray:
         """The law (n,) [N]."""
         self.linearise(depth, rate)
-        return self._force
-
-    def agrees(self, force: np.ndarray, rounding: np.ndarray) -> bool:
-        """Whether law and tangents give the same forces."""
-        law = np.maximum(self._force, 0.0)
-        within = _TOLERANCE * (1.0 + law)
-        depth, rate = _KNOWN + rounding
-        within += depth * self.tangents.by_depth + rate * self.tangents.by_rate
-        return bool((np.abs(law - force) <= within).all())
+        return self.there
 
     def accept(self, time: float, depth: np.ndarray, rate: np.ndarray, force: np.ndarray) -> None:
         """Remember how fast those come who do not touch yet."""
-        free = depth <= 0.0
-        self._speed[free] = np.maximum(rate[free], self._law.least_speed)
+        self._remember(depth, rate)
 
-    def in_loop(self) -> None:
-        """A law that is not linear is linearised again and again, which no loop does."""
+    def in_loop(self) -> StepLaw:
+        """The law, whose forces count as they are."""
+        return super().in_loop()._replace(marched=self)
 
     def state(self) -> np.ndarray:
         """Speeds of impact of those that touch, or of the next impact."""
-        return self._speed.copy()
+        return self.speed.copy()
 
     def restore(self, state: np.ndarray) -> None:
         """Continue from what ``state`` returned."""
-        self._speed[:] = state
+        self.speed[:] = state
 
 
 class KinematicInSteps(_Tangents):
@@ -230,9 +222,10 @@ class KinematicInSteps(_Tangents):
         """The mean over the step."""
         return self._mean
 
-    def in_loop(self) -> ReportedForces:
+    def in_loop(self) -> StepLaw:
         """Means over the steps; none may pull once the pantographs are raised."""
-        return ReportedForces(self._gamma, self._from_time, self._force, self._mean)
+        reported = ReportedForces(self._gamma, self._from_time, self._force, self._mean)
+        return StepLaw(None, reported)
 
     def state(self) -> np.ndarray:
         """The latest force itself."""

@@ -1,6 +1,6 @@
 """Kernels of the time loop, compiled from C++: what the extension offers, for type checkers."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -38,6 +38,7 @@ HEAD_LAW_POINT: np.dtype[np.void]
 REGULATION: np.dtype[np.void]
 CONTROL_GAINS: np.dtype[np.void]
 REGULATION_MEMORY: np.dtype[np.void]
+LOWERING_MEMORY: np.dtype[np.void]
 
 class Head:
     """A pantograph that steps by Newmark's method, of any model: ``HeadArrays`` and what the model
@@ -49,6 +50,9 @@ class Head:
     """What regulates the lift adds to the static force now [N]; put for one without regulation."""
     def bend(self, bending: object) -> None:
         """Let strips bend, see ``flexure.Bending``."""
+
+    def lower(self, lowering: object) -> None:
+        """Let the head be caught when it has been lowered, see ``LoweringArrays``."""
 
     def regulate(self, regulation: object) -> None:
         """Let the lift be regulated, see ``RegulationArrays``."""
@@ -80,6 +84,17 @@ class RaisedHead(Head):
     @property
     def height(self) -> float:
         """At which the mechanism's tables were taken in the latest step [m]."""
+
+class CalledHead(Head):
+    """A head whose steps are calls: ``predict(time)`` fills ``out``, see ``HeadState.numbers``, and
+    ``advance(contact_force)`` takes the step. What they raise ends the call that steps the head."""
+
+    def __init__(
+        self,
+        out: np.ndarray,
+        predict: Callable[[float], None],
+        advance: Callable[[np.ndarray], None],
+    ) -> None: ...
 
 RESERVE: np.dtype[np.void]
 NODE: np.dtype[np.void]
@@ -142,7 +157,11 @@ settle: Kernel
 under: Kernel
 leaves_out: Kernel
 solve: Kernel
+
+MOST_TANGENTS: int
 linearise: Kernel
+remember: Kernel
+agrees: Kernel
 
 class Layout:
     """How the unknowns of a station stand in lanes; see ``station_layout.Layout``."""
@@ -215,11 +234,9 @@ take_in: Kernel
 COUNTS: np.dtype[np.void]
 
 class Taken:
-    """How far a block of steps has come: steps that were taken; whether the next one is begun, up
-    to its free step; whether there is no room for the motion of the last one."""
+    """How a block of steps has ended: whether the next one is begun, up to its free step; whether
+    there is no room for the motion of the last one."""
 
-    @property
-    def n_steps(self) -> int: ...
     @property
     def begun(self) -> bool: ...
     @property

@@ -6,7 +6,7 @@ something is no number, is finished by the scheme itself, from where the loop ha
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,11 +18,12 @@ from catenary.solver.contact.line_response import affine
 from catenary.solver.contact.train.pantographs import Pantographs, TrainPlaces
 from catenary.solver.contact_problem.complementarity import SmallProblem
 from catenary.solver.contact_problem.coupling import Implicit
-from catenary.solver.contact_problem.law_tangents import ReportedForces
+from catenary.solver.contact_problem.law_tangents import StepLaw
 from catenary.solver.integrators.loads.line_loads import LoadArguments
 from catenary.solver.kernels import native
 from catenary.solver.schemes.one_solve import OneSolve
 from catenary.solver.schemes.scheme import Scheme
+from catenary.solver.time_loop.views.audience import Audience
 from catenary.solver.time_loop.views.observers import StepView
 from catenary.solver.time_loop.views.step_views import Showing, Shown
 from catenary.solver.window.moving_columns import MovedStations
@@ -72,7 +73,7 @@ class StepParts(NamedTuple):
     heads: Sequence[native.Head]
     strips: np.ndarray
     problem: SmallProblem
-    law: ReportedForces
+    law: StepLaw
     lateral_place: np.ndarray
     switched: np.ndarray
     train_outputs: Pantographs
@@ -100,7 +101,7 @@ class CompiledSteps:
     ----------
     scheme : whose steps they are
     most : steps of the largest block
-    times : (most,) of the steps of the latest block [s]
+    times : (most,) of the steps that are prepared [s]
     rows : (most, width) what each of them shows; empty if nobody looks
     taken : steps of the latest block that were taken, fewer than asked for if one broke, if there
         was no room for its motion, or if loads were not known for all of them
@@ -120,14 +121,17 @@ class CompiledSteps:
         self.rows = np.zeros((self.most if shows else 0, width))
         self.times = np.zeros(self.most)
         self._moved = MovedStations(len(self.rows), showing.shown.columns)
-        self.taken = 0
+        self.taken, self._block = 0, slice(0, 0)
+        # The step before those that are prepared, and of these how many there are, and are taken.
+        self._first, self._ready, self._done = -1, 0, 0
         n_numbers = 2 * scheme.interaction.line.ownership.n_local
         most = _MOST_MOTIONS
         if scheme.interaction.line.window is None:
             most = min(most, _MOTION_BYTES // (8 * n_numbers))
         self.most_motions = most if shows else 0
+        pantographs, interaction = scheme.pantographs, scheme.interaction
         # Where masses of the pantographs are, which is kept with a motion.
-        self._place_arrays = scheme.pantographs.places()
+        self._heads, places = pantographs.heads_in_loop()
         room = min(n_numbers * self.most_motions, _MOTION_BYTES // 8)
         self._kept = KeptMotions(
             motion_of=np.full(self.most, -1),
@@ -135,20 +139,15 @@ class CompiledSteps:
             stations=np.zeros((self.most_motions, 3), dtype=np.int64),
             used=np.zeros(1, dtype=np.int64),
             moved=showing.motion.moved,
-            places=self._place_arrays,
-            kept_places=np.zeros(
-                (self.most_motions, sum(array.size for array in self._place_arrays))
-            ),
+            places=places,
+            kept_places=np.zeros((self.most_motions, sum(array.size for array in places))),
         )
-        pantographs, interaction = scheme.pantographs, scheme.interaction
-        n = pantographs.n_contacts
-        heads, passes = pantographs.heads_in_loop(), interaction.line.passes
-        law = scheme.coupling.law.in_loop()
-        assert heads is not None and passes is not None and law is not None
+        n, passes = pantographs.n_contacts, interaction.line.passes
+        assert passes is not None
         self._free = passes.native
         loads = interaction.line.loads
         self._loads = loads if loads is not None and loads.changes else None
-        self._heads, self._law = heads, law
+        self._law = scheme.coupling.law.in_loop()
         self._strips = np.zeros(2 * n * (1 + n))
         self._at_contacts = affine(self._strips, n)
         self._drives = np.zeros((self.most, pantographs.n, drive_width(pantographs.most_contacts)))
@@ -157,70 +156,96 @@ class CompiledSteps:
         self._steps: native.Steps
         self._event = event("Steps")
 
-    def take(self, step: int, n_steps: int, kept: Sequence[int] = ()) -> None:
+    def take(self, step: int, n_steps: int, left: int, kept: Sequence[int] = ()) -> None:
         """Take up to ``n_steps`` <= ``most`` steps after the one of number ``step``, one at least.
 
-        Of those of the indices ``kept``, at most ``most_motions``, the motion is kept.
+        There are ``left`` steps to come. Of those of the indices ``kept``, at most
+        ``most_motions``, the motion is kept.
 
         Raises
         ------
         RunBroken
             As ``OneSolve.step``; ``taken`` steps are then taken and shown.
         """
-        scheme, self.taken = self.scheme, 0
+        if step != self._first + self._done or self._done == self._ready:
+            self._prepare(step, left)
+        begin, motion_of = self._done, self._kept.motion_of
+        end = min(begin + n_steps, self._ready)
+        self._block, self.taken = slice(begin, begin), 0
+        motion_of[begin:end] = -1
+        self._kept.used[0] = 0
+        for number, at in enumerate(kept):
+            # The last step is shown as it is.
+            if begin + at < end - 1:
+                motion_of[begin + at] = number
+        try:
+            while self._done < end:
+                begun, is_full = self._take_on(end)
+                if begun:
+                    is_full = self._finish()
+                if is_full:
+                    end = self._done
+        finally:
+            self.taken = self._done - begin
+            self._block = slice(begin, self._done)
+            self._showing.follow(self._moved.now)
+
+    def _prepare(self, step: int, left: int) -> None:
+        """Fill in what steps after the one of number ``step`` are told, ``left`` of them at most.
+
+        Where states are looked at often these are many blocks.
+        """
+        pantographs, n_steps = self.scheme.pantographs, min(left, self.most)
         times = self.times[:n_steps]
         np.multiply(np.arange(step + 1, step + 1 + n_steps), self._dt, out=times)
         if self._loads is not None:
             n_steps = self._loads.cover(times)
             times = times[:n_steps]
-        line, speed = self.scheme.interaction.line, float(scheme.pantographs.speed)
-        scheme.pantographs.move_to(step * self._dt)
-        line.provide(speed * n_steps * self._dt)
+        pantographs.move_to(step * self._dt)
+        self.scheme.interaction.line.provide(float(pantographs.speed) * n_steps * self._dt)
+        self._moved.end(self._first + self._done, self._done)
         self._moved.begin(step)
-        self._kept.motion_of[:n_steps] = -1
-        self._kept.used[0] = 0
-        for number, at in enumerate(kept):
-            # The last step is shown as it is.
-            if at < n_steps - 1:
-                self._kept.motion_of[at] = number
-        scheme.pantographs.fill_drives(times.tolist(), self._drives[:n_steps])
-        while self.taken < n_steps:
-            begun, is_full = self._take_on(n_steps)
-            if begun:
-                time = float(times[self.taken])
-                scheme.finish(time, stop=False)
-                if self._shows:
-                    number = step + self.taken + 1
-                    view = self._showing.view(number, time, followed=True)
-                    self.rows[self.taken] = view.row
-                    is_full = not self._keep_motion(int(self._kept.motion_of[self.taken]))
-                self.taken += 1
-            if is_full:
-                n_steps = self.taken
-        self._moved.end(step + n_steps, n_steps)
-        self._showing.follow(self._moved.now)
+        pantographs.fill_drives(times.tolist(), self._drives[:n_steps])
+        self._first, self._done, self._ready = step, 0, n_steps
 
-    def last_view(self, step: int) -> StepView:
-        """The state after the latest block, ``step`` being the number of its last step."""
-        last = self.taken - 1
-        return self._showing.view_of(step, float(self.times[last]), self.rows[last])
+    def _finish(self) -> bool:
+        """Let the scheme finish a step; whether there is no room for its motion."""
+        at = self._done
+        time = float(self.times[at])
+        self.scheme.finish(time, stop=False)
+        self._done += 1
+        if not self._shows:
+            return False
+        self.rows[at] = self._showing.view(self._first + self._done, time, followed=True).row
+        return not self._keep_motion(int(self._kept.motion_of[at]))
 
-    def motion_view(self, step: int, at: int, number: int) -> StepView:
-        """What is left of a step in the midst of the latest block, see ``MotionObserver``.
+    def show_to(self, audience: Audience, step: int, kept: Sequence[int], *, broke: bool) -> None:
+        """Show the steps of the latest block, which are those after the one of number ``step``.
 
-        Parameters
-        ----------
-        step : its number
-        at : its index in the block
-        number : of the kept motion
+        ``kept`` are those of ``take``. A block that ``broke`` has left its state amid a step.
         """
-        kept = self._kept
-        begin, end, first = kept.stations[number].tolist()
-        starts = self._showing.shown.columns.starts
-        last = first + 2 * int(starts[end] - starts[begin])
-        motion = (begin, end), kept.numbers[first:last]
-        time, row = float(self.times[at]), self.rows[at]
-        return self._showing.view_of_kept(step, time, row, motion, kept.kept_places[number])
+        times, rows = self.times[self._block], self.rows[self._block]
+        audience.show_block(step, times, rows, self._views(step, times, rows, kept, broke))
+
+    def _views(
+        self, step: int, times: np.ndarray, rows: np.ndarray, kept: Sequence[int], broke: bool
+    ) -> Iterator[StepView]:
+        """Views of the steps of which more than the row is left, then of the last one."""
+        showing, room = self._showing, self._kept
+        starts, seen = showing.shown.columns.starts, 0
+        for number, at in enumerate(kept):
+            if at >= self.taken - (not broke):
+                break
+            begin, end, first = room.stations[number].tolist()
+            last = first + 2 * int(starts[end] - starts[begin])
+            motion = (begin, end), room.numbers[first:last]
+            seen = at + 1
+            upto = step + seen, times[:seen], rows[:seen]
+            yield showing.view_of_kept(*upto, motion, room.kept_places[number])
+        if not broke:
+            yield showing.view_of(step + self.taken, times, rows)
+        elif seen < self.taken:
+            yield showing.view_of_rows(step + self.taken, times, rows)
 
     def _keep_motion(self, number: int) -> bool:
         """Keep the motion of a step as that of a number, none if below 0; whether there is room."""
@@ -236,24 +261,26 @@ class CompiledSteps:
         kept.stations[number] = *motion.moved, first
         kept.used[0] = last
         motion.moved[:] = columns.ends[:2]
-        kept.kept_places[number] = np.concatenate(self._place_arrays)
+        kept.kept_places[number] = np.concatenate(self.scheme.pantographs.places())
         return True
 
-    def _take_on(self, n_steps: int) -> tuple[bool, bool]:
-        """Go on with a block as far as kernels can; whether the scheme has to finish a step, and
-        whether there is no room for the motion of the last one."""
+    def _take_on(self, end: int) -> tuple[bool, bool]:
+        """Go on up to before index ``end`` as far as kernels can; whether the scheme has to finish
+        a step, and whether there is no room for the motion of the last one."""
         self._event.begin()
         counters = self.scheme.counters
         self._counts[:] = 0
-        taken = self.steps().take(self.taken, n_steps)
-        counters.steps += taken.n_steps
-        counters.solves += taken.n_steps
-        rounds, slack, repeated = self._counts[0].tolist()
-        counters.rounds += rounds
-        counters.slack_dropper_steps += slack
-        counters.repeated_steps += repeated
-        self.taken += taken.n_steps
-        self._event.end()
+        try:
+            taken = self.steps().take(self._done, end)
+        finally:
+            steps, rounds, slack, repeated = self._counts[0].tolist()
+            counters.steps += steps
+            counters.solves += steps
+            counters.rounds += rounds
+            counters.slack_dropper_steps += slack
+            counters.repeated_steps += repeated
+            self._done += steps
+            self._event.end()
         return taken.begun, taken.is_full
 
     def steps(self) -> native.Steps:
@@ -265,7 +292,7 @@ class CompiledSteps:
         if self._made_of[0] is not share or self._made_of[1] is not unknowns:
             self._made_of = share, unknowns
             problem = coupling.inner.problem(self._at_contacts, share)
-            self._steps = native.Steps(self._parts(problem), self._block())
+            self._steps = native.Steps(self._parts(problem), self._block_of_steps())
         return self._steps
 
     def _parts(self, problem: SmallProblem) -> StepParts:
@@ -288,7 +315,7 @@ class CompiledSteps:
             channels=self._showing.layout.copied,
         )
 
-    def _block(self) -> Block:
+    def _block_of_steps(self) -> Block:
         moved = self._moved
         return Block(
             times=self.times,
@@ -309,8 +336,6 @@ def compiled_steps(
         return None
     line = scheme.interaction.line
     if not isinstance(scheme.coupling, Implicit) or line.passes is None:
-        return None
-    if scheme.coupling.law.in_loop() is None or scheme.pantographs.heads_in_loop() is None:
         return None
     if not showing.layout.in_loop:
         return None  # as a channel is a function

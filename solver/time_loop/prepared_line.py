@@ -12,6 +12,8 @@ import numpy as np
 
 from catenary.mbs.head.drives import N_DRIVE, drive_width
 from catenary.mbs.head.newmark_head import SteppedHead
+from catenary.mbs.interface import Pantograph
+from catenary.mbs.lowering import LoweredPantograph
 from catenary.solver.base.errors import InputError, RunBroken
 from catenary.solver.kernels import native
 from catenary.solver.time_loop.compiled_steps import CompiledSteps
@@ -56,7 +58,7 @@ def write_line(path: Path, blocks: CompiledSteps, dt: float, steps: tuple[int, i
             'them; take window.mode = "off"'
         )
     first, last = steps
-    models = [model for model in pantographs.models if isinstance(model, SteppedHead)]
+    models = [stepped_by_kernels(model) for model in pantographs.models]
     drives = np.zeros((last - first, len(models), drive_width(pantographs.most_contacts)))
     pantographs.fill_drives((np.arange(first + 1, last + 1) * dt).tolist(), drives)
     end = float(scheme.interaction.contacts.wires.nodes["x"].max())
@@ -73,3 +75,19 @@ def write_line(path: Path, blocks: CompiledSteps, dt: float, steps: tuple[int, i
         blocks.steps().write(str(path), ahead)
     except RuntimeError as error:
         raise RunBroken(f"{path}: {error}") from error
+
+
+def stepped_by_kernels(model: Pantograph) -> SteppedHead:
+    """What kernels step of a pantograph.
+
+    Raises
+    ------
+    InputError
+        If they call Python for it.
+    """
+    moved = model.model if isinstance(model, LoweredPantograph) else model
+    if not isinstance(moved, SteppedHead):
+        raise InputError("a pantograph has all its bodies in the time loop, which Python steps")
+    if moved.by_hand:
+        raise InputError("a pantograph has a controller in Python")
+    return moved

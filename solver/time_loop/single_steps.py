@@ -1,4 +1,4 @@
-"""Why steps are taken one by one, not many in one compiled loop, and what that costs.
+"""Why steps are not taken by compiled kernels alone, many in one loop, and what that costs.
 
 One list of reasons: `plan` reads it for a problem, a march for what it steps.
 """
@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, NamedTuple
 from catenary.mbs.build import has_joints
 from catenary.solver.effects.all_effects import simulated
 from catenary.solver.integrators.detour import Detour
-from catenary.solver.problem.contact_laws import HertzLaw
 from catenary.solver.problem.problem import Problem
 from catenary.solver.problem.simulated import Simulated
 
@@ -39,11 +38,6 @@ def _has_all_bodies(stepped: _Stepped) -> bool:
     return any(has_joints(place.data) for place in stepped.problem.train.placements)
 
 
-def _is_lowered(stepped: _Stepped) -> bool:
-    placements = stepped.problem.train.placements
-    return stepped.laws.lowering and any(place.lowering is not None for place in placements)
-
-
 # Factors are those of the case ambrosio2012 with its lumped pantograph; the largest comes first.
 REASONS = (
     Reason("a pantograph has all its bodies in the time loop", 40.0, _has_all_bodies),
@@ -53,16 +47,10 @@ REASONS = (
         lambda stepped: stepped.problem.numerics.coupling == "iterated",
     ),
     Reason(
-        "contact.law is not linear, and is linearised again until the forces hold",
-        7.0,
-        lambda stepped: isinstance(stepped.laws.contact, HertzLaw),
-    ),
-    Reason(
         "numerics.adaptive_tolerance_N lets steps be halved",
         5.5,
         lambda stepped: stepped.problem.numerics.adaptive_tolerance is not None,
     ),
-    Reason("a pantograph is lowered", 4.0, _is_lowered),
     Reason(
         "a channel is a Python function, called after each step",
         3.0,
@@ -72,7 +60,7 @@ REASONS = (
 
 
 def single_steps_of(problem: Problem, layout: RowLayout | None = None) -> Detour | None:
-    """Why steps of a problem are taken one by one on one rank, None if they are not.
+    """Why steps of a problem take longer on one rank than in kernels alone, None if they do not.
 
     Not collective. A scheme other than ``one_solve``, and a coupling that is not implicit, step in
     their own way, which is told elsewhere.

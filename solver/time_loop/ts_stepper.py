@@ -106,20 +106,16 @@ class Stepper:
         n_steps, kept = self._motions_of(blocks, first, n_steps)
         begin, broken = clock.perf_counter(), None
         try:
-            blocks.take(first, n_steps, kept)
+            blocks.take(first, n_steps, self._end - first, kept)
         except RunBroken as error:
             broken = error
         spent = clock.perf_counter() - begin
         allowed = int(_BLOCK_TIME * n_steps / max(spent, 1e-9))
         self._most = max(1, min(_GROWTH * self._most, allowed))
-        taken = blocks.taken
-        self.step_number = first + taken
-        # A state can be read after the last step only, if that is not amid the next one.
-        passed = taken if broken is not None else taken - 1
-        self._show_passed(blocks, first, passed, kept)
+        self.step_number = first + blocks.taken
+        blocks.show_to(self._audience, first, kept, broke=broken is not None)
         if broken is not None:
             raise self._placed(broken) from broken
-        self._audience.show(lambda: blocks.last_view(self.step_number))
         ts.setStepNumber(self.step_number - 1)  # PETSc adds one
 
     def _motions_of(self, blocks: CompiledSteps, first: int, n_steps: int) -> tuple[int, list[int]]:
@@ -133,14 +129,6 @@ class Stepper:
             kept.append(at - first - 1)
             at = self._audience.next_motion(at)
         return n_steps, kept
-
-    def _show_passed(self, blocks: CompiledSteps, first: int, passed: int, kept: list[int]) -> None:
-        """Show the first ``passed`` steps of a block, behind which the line has gone."""
-        self._audience.show_rows(first + 1, blocks.times[:passed], blocks.rows[:passed])
-        for number, at in enumerate(kept):
-            if at >= passed:
-                break
-            self._audience.show_motion(blocks.motion_view(first + 1 + at, at, number))
 
     def _placed(self, error: RunBroken) -> RunBroken:
         """The error of the next step with its time and place."""

@@ -20,7 +20,7 @@ from catenary.cases.scene.load import load_scene
 from catenary.solver.problem.window import EXACT, OFF, WindowChoice
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest
 from catenary.solver.time_loop.march import March
-from catenary.solver.time_loop.views.observers import Stage, StepView
+from catenary.solver.time_loop.views.observers import Observer, StepView
 
 SPANS = int(os.environ.get("CATENARY_SPANS", "1000"))
 SECONDS = float(os.environ.get("CATENARY_SECONDS", "60"))
@@ -28,24 +28,17 @@ SECONDS = float(os.environ.get("CATENARY_SECONDS", "60"))
 SAME = 1e-12
 
 
-class Forces:
+class Forces(Observer):
     """Keeps the contact forces of all steps."""
 
     def __init__(self) -> None:
         self.blocks: list[np.ndarray] = []
 
-    def start(self, stage: Stage) -> None:
-        """Nothing is needed of the stage."""
-
     def next_state(self, step: int) -> int:
         return step - step % 10_000 + 10_000
 
-    def observe_rows(self, first_step: int, times: np.ndarray, rows: np.ndarray) -> None:
-        self.blocks.append(rows[:, self.part].copy())
-
     def observe(self, view: StepView) -> None:
-        self.part = view.columns["contact_force"]
-        self.blocks.append(view.row[None, self.part].copy())
+        self.blocks.append(view.each("contact_force").copy())
 
     def finish(self, outcome: str) -> None:
         assert outcome == "done", outcome

@@ -20,7 +20,7 @@ from catenary.cases.scene.load import load_scene
 from catenary.solver.problem.problem import Problem
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest
 from catenary.solver.time_loop.march import March
-from catenary.solver.time_loop.views.observers import Stage, StepView
+from catenary.solver.time_loop.views.observers import Observer, StepView
 
 ENERGY_EVERY = 20
 # Ways whose difference tells what a step costs [m].
@@ -51,17 +51,11 @@ CONTENDERS = {
 AT_MOST = {"1000 spans": 1.15, "10 000 spans": 1.15, "1000 spans, no two alike": 1.3}
 
 
-class Rows:
+class Rows(Observer):
     """Is shown the rows of all steps, in blocks."""
-
-    def start(self, stage: Stage) -> None:
-        """Nothing is needed of the stage."""
 
     def next_state(self, step: int) -> int:
         return step - step % 500 + 500
-
-    def observe_rows(self, first_step: int, times: np.ndarray, rows: np.ndarray) -> None:
-        """Nothing is kept."""
 
     def observe(self, view: StepView) -> None:
         """Nothing is kept."""
@@ -77,9 +71,6 @@ class Energies(Rows):
         return step - step % ENERGY_EVERY + ENERGY_EVERY
 
     def observe(self, view: StepView) -> None:
-        self.observe_motion(view)
-
-    def observe_motion(self, view: StepView) -> None:
         if view.step % ENERGY_EVERY == 0:
             view.energies()
 

@@ -14,13 +14,13 @@ from small_lines import mesh_of, numerics, problem_of, train
 from catenary.solver.problem.along_track import AlongTrack, Tensioner
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest, line_at_rest_on_all
 from catenary.solver.time_loop.march import March
-from catenary.solver.time_loop.views.observers import Stage, StepView
+from catenary.solver.time_loop.views.observers import Observer, Stage, StepView
 
 COMM = MPI.COMM_WORLD
 AGAIN = 40  # the step to go on from
 
 
-class Seen:
+class Seen(Observer):
     """Keeps contact forces, this rank's dropper forces, motion along the track, a checkpoint."""
 
     def __init__(self) -> None:
@@ -29,6 +29,9 @@ class Seen:
 
     def start(self, stage: Stage) -> None:
         self.droppers, self.nodes = stage.owned_droppers, stage.owned_nodes
+
+    def next_state(self, step: int) -> int:
+        return step + 1
 
     def observe(self, view: StepView) -> None:
         along = view.node_motion("u", False).copy()

@@ -16,7 +16,7 @@ from catenary.solver.model.partition import distribute
 from catenary.solver.problem.contact_laws import LinearLaw
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest
 from catenary.solver.time_loop.march import March
-from catenary.solver.time_loop.views.observers import Stage, StepView
+from catenary.solver.time_loop.views.observers import Observer, Stage, StepView
 
 COMM = MPI.COMM_WORLD
 WAYS = {
@@ -27,7 +27,7 @@ WAYS = {
 }
 
 
-class Seen:
+class Seen(Observer):
     """Keeps what rank 0 is shown of the train, and this rank's columns of dropper forces."""
 
     def __init__(self) -> None:
@@ -35,6 +35,9 @@ class Seen:
 
     def start(self, stage: Stage) -> None:
         self.owned = stage.owned_droppers
+
+    def next_state(self, step: int) -> int:
+        return step + 1
 
     def observe(self, view: StepView) -> None:
         train_of = view.contact_force, view.strip_force, view.wire_height

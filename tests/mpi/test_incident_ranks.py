@@ -28,7 +28,7 @@ from catenary.solver.problem.problem import Problem
 from catenary.solver.statics.form_finding.equilibrium import find_form
 from catenary.solver.statics.line_at_rest import line_at_rest
 from catenary.solver.time_loop.march import March
-from catenary.solver.time_loop.views.observers import Stage, StepView
+from catenary.solver.time_loop.views.observers import Observer, Stage, StepView
 
 WORLD = MPI.COMM_WORLD
 # See test_same_answers.py.
@@ -46,7 +46,7 @@ SCENE = (
 )
 
 
-class Watching:
+class Watching(Observer):
     """Observer that keeps forces and, of each state, the line's energy; and checkpoints."""
 
     def __init__(self, kept: tuple[int, ...] = ()) -> None:
@@ -57,6 +57,9 @@ class Watching:
 
     def start(self, stage: Stage) -> None:
         self.owned = stage.owned_droppers
+
+    def next_state(self, step: int) -> int:
+        return step + 1
 
     def observe(self, view: StepView) -> None:
         energies = view.energies()

@@ -13,12 +13,12 @@ from catenary.mbs.head.strips import Turning
 from catenary.meshgen.curve import Curve
 from catenary.solver.statics.line_at_rest import line_at_rest_on_all
 from catenary.solver.time_loop.march import March
-from catenary.solver.time_loop.views.observers import Stage, StepView
+from catenary.solver.time_loop.views.observers import Observer, Stage, StepView
 
 COMM = MPI.COMM_WORLD
 
 
-class Seen:
+class Seen(Observer):
     """Keeps contact forces and lateral places, on rank 0, and this rank's arm uplifts."""
 
     def __init__(self) -> None:
@@ -26,6 +26,9 @@ class Seen:
 
     def start(self, stage: Stage) -> None:
         self.owned = stage.owned_arms
+
+    def next_state(self, step: int) -> int:
+        return step + 1
 
     def observe(self, view: StepView) -> None:
         here = np.append(view.contact_force, 1e3 * view.lateral_place)

@@ -15,12 +15,12 @@ from catenary.solver.model.partition import distribute
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest
 from catenary.solver.time_loop.march import March
 from catenary.solver.time_loop.views import channels
-from catenary.solver.time_loop.views.observers import Stage, StepView
+from catenary.solver.time_loop.views.observers import Observer, Stage, StepView
 
 COMM = MPI.COMM_WORLD
 
 
-class Seen:
+class Seen(Observer):
     """Keeps this rank's columns of three channels."""
 
     def __init__(self) -> None:
@@ -28,6 +28,9 @@ class Seen:
 
     def start(self, stage: Stage) -> None:
         self.owned = stage.owned_droppers, stage.owned_arms
+
+    def next_state(self, step: int) -> int:
+        return step + 1
 
     def observe(self, view: StepView) -> None:
         stops = view.further_stop_force  # type: ignore[attr-defined]

@@ -22,7 +22,7 @@ from catenary.solver.base.parallel import on_root
 from catenary.solver.problem.problem import Problem
 from catenary.solver.statics.line_at_rest import line_at_rest
 from catenary.solver.time_loop.march import March
-from catenary.solver.time_loop.views.observers import Stage, StepView
+from catenary.solver.time_loop.views.observers import Observer, Stage, StepView
 
 # The parallel solve leaves a relative residual of 1e-16 a step, which grows at most in proportion
 # over some hundred steps; as in test_same_answers.py.
@@ -38,7 +38,7 @@ SCENE = (
 )
 
 
-class Watched:
+class Watched(Observer):
     """Observer that keeps forces and open joints on rank 0."""
 
     def __init__(self) -> None:
@@ -48,12 +48,12 @@ class Watched:
     def start(self, stage: Stage) -> None:
         assert stage.joints_in_loop
 
+    def next_state(self, step: int) -> int:
+        return step + 1
+
     def observe(self, view: StepView) -> None:
         self.force.append(view.contact_force.copy())
         self.open.append(view.constraint_violation.copy())
-
-    def finish(self, outcome: str) -> None:
-        pass
 
 
 @pytest.fixture(scope="module")
@@ -191,17 +191,14 @@ def test_laws_and_regulators_give_the_answer_of_one_rank() -> None:
         assert off < TOLERANCE
 
 
-class Forces:
+class Forces(Observer):
     """Observer that keeps contact forces on rank 0."""
 
     def __init__(self) -> None:
         self.force: list[np.ndarray] = []
 
-    def start(self, stage: Stage) -> None:
-        """Nothing to do."""
+    def next_state(self, step: int) -> int:
+        return step + 1
 
     def observe(self, view: StepView) -> None:
         self.force.append(view.contact_force.copy())
-
-    def finish(self, outcome: str) -> None:
-        """Nothing to do."""

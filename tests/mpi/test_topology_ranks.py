@@ -21,7 +21,7 @@ from catenary.solver.base.parallel import on_root
 from catenary.solver.problem.problem import Problem, steps_of
 from catenary.solver.statics.line_at_rest import line_at_rest_on_all
 from catenary.solver.time_loop.march import March
-from catenary.solver.time_loop.views.observers import Stage, StepView
+from catenary.solver.time_loop.views.observers import Observer, StepView
 
 # As in `test_same_answers`.
 TOLERANCE = 1e-9
@@ -74,7 +74,7 @@ def test_lines_of_all_topologies_give_the_answer_of_one_rank(case: str) -> None:
     assert max(found.values()) < TOLERANCE
 
 
-class Passing:
+class Passing(Observer):
     """Keeps the force on each contact wire, and the state at a step."""
 
     def __init__(self, step: int) -> None:
@@ -82,8 +82,8 @@ class Passing:
         self.forces: list[np.ndarray] = []
         self.state: dict[str, Any] | None = None
 
-    def start(self, stage: Stage) -> None:
-        """Nothing to prepare."""
+    def next_state(self, step: int) -> int:
+        return step + 1
 
     def observe(self, view: StepView) -> None:
         self.forces.append(view.contact_wire_force.copy())

@@ -13,13 +13,13 @@ from catenary.meshgen.topologies.all_topologies import make_line
 from catenary.solver.problem.incidents import DropperBreak, TensionLoss
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest
 from catenary.solver.time_loop.march import March
-from catenary.solver.time_loop.views.observers import Stage, StepView
+from catenary.solver.time_loop.views.observers import Observer, Stage, StepView
 
 COMM = MPI.COMM_WORLD
 INCIDENTS = frozenset({"dropper_break", "tension_loss"})
 
 
-class Seen:
+class Seen(Observer):
     """Keeps contact forces, on rank 0, and this rank's columns of dropper forces."""
 
     def __init__(self) -> None:
@@ -27,6 +27,9 @@ class Seen:
 
     def start(self, stage: Stage) -> None:
         self.owned = stage.owned_droppers
+
+    def next_state(self, step: int) -> int:
+        return step + 1
 
     def observe(self, view: StepView) -> None:
         self.rows.append((view.contact_force.copy(), view.dropper_force.copy()))

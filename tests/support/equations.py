@@ -10,12 +10,12 @@ from catenary.solver.model.matrices import whole_matrix
 from catenary.solver.model.partition import distribute
 from catenary.solver.statics.line_at_rest import LineAtRest
 from catenary.solver.time_loop.march import March
-from catenary.solver.time_loop.views.observers import Stage, StepView
+from catenary.solver.time_loop.views.observers import Observer, StepView
 
 _NEVER_LESS = 1e-9  # [N]
 
 
-class Residual:
+class Residual(Observer):
     """Observer of a march without incidents: the largest of what is left of
 
         M a + C v + K u + sum of s L - sum of f N,    s = (1 - r) max(0, -T)
@@ -38,15 +38,9 @@ class Residual:
         self._released = 1.0 - model.simulated.kept_ratio if slackens else 0.0
         self._held = model.constrained
 
-    def start(self, stage: Stage) -> None:
-        """Nothing is needed of the stage."""
-
     def next_state(self, step: int) -> int:
         """Every state."""
         return step + 1
-
-    def observe_rows(self, first_step: int, times: np.ndarray, rows: np.ndarray) -> None:
-        """There are none between two states."""
 
     def observe(self, view: StepView) -> None:
         """Put the state after a step into the equations; rest comes before a step."""
@@ -71,9 +65,6 @@ class Residual:
         np.subtract.at(left, dofs.reshape(place.size, -1), pushed)
         left[self._held] = 0.0
         self.largest = max(self.largest, np.abs(left).max() / max(size, _NEVER_LESS))
-
-    def finish(self, outcome: str) -> None:
-        """Nothing is left to do."""
 
 
 def residual_of(rest: LineAtRest) -> float:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -25,7 +24,7 @@ from catenary.solver.problem.problem import Numerics, Problem
 from catenary.solver.statics.form_finding.equilibrium import Equilibrium
 from catenary.solver.statics.line_at_rest import line_at_rest
 from catenary.solver.time_loop.march import March, Outcome
-from catenary.solver.time_loop.views.observers import Stage, StepView
+from catenary.solver.time_loop.views.observers import NEVER, Observer, Stage, StepView
 
 COMM = MPI.COMM_WORLD
 
@@ -117,10 +116,13 @@ def step(line: LineIntegrator) -> None:
 
 
 @dataclass
-class History:
-    """Records what the march shows: arrays with one row a step, the initial state included."""
+class History(Observer):
+    """Records what the march shows: arrays with one row a step, the initial state included.
 
-    watch: Callable[[StepView], Any] = lambda view: None
+    Each state is shown to ``watch``; without it blocks of steps are shown at once.
+    """
+
+    watch: Callable[[StepView], Any] | None = None
     time: list[float] = field(default_factory=list)
     watched: list[Any] = field(default_factory=list)
     stage: Stage | None = None
@@ -142,43 +144,18 @@ class History:
     def start(self, stage: Stage) -> None:
         self.stage = stage
 
-    def observe(self, view: StepView) -> None:
-        self.time.append(view.time)
-        self.watched.append(self.watch(view))
-        for name, rows in self._rows.items():
-            rows.append(getattr(view, name).copy())
+    def next_state(self, step: int) -> int:
+        return NEVER if self.watch is None else step + 1
 
-    def finish(self, outcome: str) -> None:
-        pass
+    def observe(self, view: StepView) -> None:
+        self.time.extend(view.times.tolist())
+        if self.watch is not None:
+            self.watched.append(self.watch(view))
+        for name, rows in self._rows.items():
+            rows.extend(view.each(name).copy())
 
     def __getitem__(self, channel: str) -> np.ndarray:
         return np.array(self._rows[channel])
-
-
-class LongHistory(History):
-    """The same of a march that nobody else watches: blocks of steps are shown at once.
-
-    A step then takes a tenth of the time; compiled loops of a line that no other test has take a
-    second more.
-    """
-
-    def next_state(self, step: int) -> int:
-        # The first view says which columns rows have.
-        return sys.maxsize if self.time else step + 1
-
-    def observe(self, view: StepView) -> None:
-        super().observe(view)
-        self._columns = view.columns
-
-    def observe_rows(self, first_step: int, times: np.ndarray, rows: np.ndarray) -> None:
-        self.time.extend(times.tolist())
-        self.watched.extend([None] * len(times))
-        for name, kept in self._rows.items():
-            kept.extend(rows[:, self._columns[name]].copy())
-
-
-# Steps from which blocks pay.
-LONG = 3000
 
 
 def start_march(
@@ -199,12 +176,7 @@ def march(
 ) -> History:
     """March to the end and return what was seen; what ``watch`` returns of each step is kept."""
     run, _ = start_march(problem, mesh, change_form)
-    course, dt = problem.train, problem.numerics.dt
-    is_long = course.end - course.start > LONG * dt * course.speed
-    if watch is not None:
-        history = History(watch)
-    else:
-        history = LongHistory() if is_long else History()
+    history = History(watch)
     try:
         history.outcome = run.run([history])
     finally:

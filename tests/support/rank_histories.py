@@ -13,12 +13,12 @@ from catenary.solver.base.parallel import on_root
 from catenary.solver.problem.problem import Problem
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest
 from catenary.solver.time_loop.march import March
-from catenary.solver.time_loop.views.observers import Stage, StepView
+from catenary.solver.time_loop.views.observers import Observer, Stage, StepView
 
 T = TypeVar("T")
 
 
-class Histories:
+class Histories(Observer):
     """Observer that keeps what it is shown and joins the ranks' parts."""
 
     def __init__(self, comm: Any) -> None:
@@ -27,6 +27,9 @@ class Histories:
 
     def start(self, stage: Stage) -> None:
         self._stage = stage
+
+    def next_state(self, step: int) -> int:
+        return step + 1
 
     def observe(self, view: StepView) -> None:
         self._rows["force"].append(view.contact_force.copy())
@@ -53,7 +56,7 @@ class Histories:
         return result if self._comm.rank == 0 else None
 
 
-class Watching:
+class Watching(Observer):
     """Keeps forces and energies of each state, and on all ranks the checkpoint of step ``kept``."""
 
     def __init__(self, kept: int = -1) -> None:
@@ -61,8 +64,8 @@ class Watching:
         self.checkpoint: dict[str, Any] | None = None
         self.rows: list[np.ndarray] = []
 
-    def start(self, stage: Stage) -> None:
-        """Nothing is needed."""
+    def next_state(self, step: int) -> int:
+        return step + 1
 
     def observe(self, view: StepView) -> None:
         self.rows.append(np.array([*view.contact_force, *view.energies()]))

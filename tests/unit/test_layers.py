@@ -35,7 +35,8 @@ ROOMS = {
     "mbs": (
         "frame", "interface", "rigid", "time_steps", "vehicle", "control", "head", "air",
         "mechanism",
-        "lumped_data", "library", "response", "lumped", "lowering", "roll", "shape", "build",
+        "lumped_data", "library", "response", "lumped", "called_model", "lowering", "roll", "shape",
+        "build",
     ),
     "solver": (
         "kernels", "base", "problem", "model", "wind", "ends", "effects", "linear", "statics",

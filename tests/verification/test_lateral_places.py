@@ -17,7 +17,7 @@ from catenary.solver.contact.contact_wire import ContactWires
 from catenary.solver.model.links.directions import at_places
 from catenary.solver.problem.problem import Problem
 from catenary.solver.statics.form_finding.equilibrium import find_form
-from catenary.solver.time_loop.views.observers import Stage, StepView
+from catenary.solver.time_loop.views.observers import Observer, Stage, StepView
 
 LATERAL = frozenset({"lateral_motion"})
 ROLL = Turning(2.0, 470.0, 60.0)
@@ -36,7 +36,7 @@ def problem(*, rolls: bool = False, sways: bool = False) -> Problem:
     return replace(made, train=replace(made.train, vehicle=vehicle))
 
 
-class Rows:
+class Rows(Observer):
     """Takes blocks of rows from a compiled loop, and some whole states beside them."""
 
     def __init__(self) -> None:
@@ -47,13 +47,10 @@ class Rows:
 
     def observe(self, view: StepView) -> None:
         self.columns = view.columns
-        self.rows.append(view.row.copy())
+        self.rows += list(view.rows.copy())
 
     def next_state(self, step: int) -> int:
         return step + 100
-
-    def observe_rows(self, first_step: int, times: np.ndarray, rows: np.ndarray) -> None:
-        self.rows += list(rows.copy())
 
     def finish(self, outcome: str) -> None:
         assert outcome == "done"

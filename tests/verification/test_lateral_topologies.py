@@ -16,7 +16,7 @@ from catenary.meshgen.mesh import LineMesh
 from catenary.solver.model.model import Model
 from catenary.solver.problem.problem import Damping, Problem
 from catenary.solver.statics.form_finding.equilibrium import Equilibrium, find_form
-from catenary.solver.time_loop.views.observers import Stage, StepView
+from catenary.solver.time_loop.views.observers import Observer, StepView
 
 EPS = np.finfo(float).eps
 _TWIN = ["line.topology=twin_messenger", "line.twin={spacing_m=0.1,droppers='pairs'}"]
@@ -81,14 +81,14 @@ def test_wires_of_any_topology_rest_in_the_lateral_plane(name: str) -> None:
     check("pull of an arm over the kink", pull / kink, 1.15, within=0.2)
 
 
-class Forces:
+class Forces(Observer):
     """Keeps forces and lateral places."""
 
     def __init__(self) -> None:
         self.rows: list[np.ndarray] = []
 
-    def start(self, stage: Stage) -> None:
-        """Nothing is needed."""
+    def next_state(self, step: int) -> int:
+        return step + 1
 
     def observe(self, view: StepView) -> None:
         self.rows.append(np.append(view.contact_force, np.nan_to_num(view.lateral_place)))

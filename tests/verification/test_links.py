@@ -38,7 +38,7 @@ from catenary.solver.schemes.monolithic_system import WholeSystem
 from catenary.solver.statics.form_finding.equilibrium import find_form
 from catenary.solver.time_loop import march as time_loop
 from catenary.solver.time_loop.views import channels
-from catenary.solver.time_loop.views.observers import StepView
+from catenary.solver.time_loop.views.observers import NEVER, Observer, StepView
 
 KINDS = (UPLIFT_STOP, LEANING_LINKS)
 
@@ -192,23 +192,17 @@ def test_the_compiled_loop_shows_the_same_stops_as_steps_from_python(
 ) -> None:
     problem, mesh = scene({"uplift_stop"})
 
-    class Rows:
+    class Rows(Observer):
         """Keeps rows of blocks and of single states."""
 
         def __init__(self) -> None:
             self.rows: list[np.ndarray] = []
 
-        def start(self, stage: Any) -> None:
-            """Nothing is needed."""
-
         def next_state(self, step: int) -> int:
-            return 10**9
-
-        def observe_rows(self, first: int, times: np.ndarray, rows: np.ndarray) -> None:
-            self.rows += list(rows.copy())
+            return NEVER
 
         def observe(self, view: StepView) -> None:
-            self.rows.append(view.row.copy())
+            self.rows += list(view.rows.copy())
 
         def finish(self, outcome: str) -> None:
             assert outcome == "done"

@@ -25,7 +25,7 @@ from catenary.solver.ends.half_lines import Chain, half_lines
 from catenary.solver.model.matrices import stiffness_matrix
 from catenary.solver.problem.ends import AbsorbingLayer, Fixed, Periodic
 from catenary.solver.problem.problem import Damping, Numerics, Problem
-from catenary.solver.time_loop.views.observers import Stage, StepView
+from catenary.solver.time_loop.views.observers import Observer, StepView
 
 GOES_ON = Periodic(), Periodic()
 STEPS, DT, SHORT, BESIDE = 1500, 2e-3, 4, 5
@@ -147,25 +147,19 @@ def test_a_march_that_is_continued_is_the_same_to_the_last_bit() -> None:
         run.restore(without)
 
 
-class Rows:
+class Rows(Observer):
     """Forces of all steps, of which most are taken in one compiled loop."""
 
     def __init__(self) -> None:
         self.forces: list[float] = []
         self.in_blocks = 0
 
-    def start(self, stage: Stage) -> None:
-        """Nothing is needed."""
-
     def next_state(self, step: int) -> int:
         return step + 64
 
-    def observe_rows(self, first_step: int, times: np.ndarray, rows: np.ndarray) -> None:
-        self.forces += rows[:, 1].tolist()  # after the position
-        self.in_blocks += len(rows)
-
     def observe(self, view: StepView) -> None:
-        self.forces.append(float(view.row[1]))
+        self.forces += view.each("contact_force")[:, 0].tolist()
+        self.in_blocks += len(view.rows) - 1
 
     def finish(self, outcome: str) -> None:
         assert outcome == "done"

@@ -16,9 +16,7 @@ from catenary.solver.base.errors import RunBroken
 from catenary.solver.problem.problem import steps_of
 from catenary.solver.statics.line_at_rest import LineAtRest
 from catenary.solver.time_loop.march import March
-from catenary.solver.time_loop.views.observers import Stage, StepView
-
-_NEVER = 2**62
+from catenary.solver.time_loop.views.observers import NEVER, Observer, StepView
 
 
 class RepeatedMarch:
@@ -39,7 +37,7 @@ class RepeatedMarch:
         If the march does not come to the end of the first round.
     """
 
-    def __init__(self, comm: Any, at_rest: LineAtRest, first: int = 0, n_steps: int = _NEVER):
+    def __init__(self, comm: Any, at_rest: LineAtRest, first: int = 0, n_steps: int = NEVER):
         problem = at_rest.problem
         train, dt = problem.train, problem.numerics.dt
         last = min(first + n_steps, steps_of(problem))
@@ -77,30 +75,21 @@ class RepeatedMarch:
         self.destroy()
 
 
-class _Kept:
-    """A `BlockObserver` that keeps the state of one step."""
+class _Kept(Observer):
+    """Observer that keeps the state of one step."""
 
     def __init__(self, step: int) -> None:
         self._step = step
         self.state: dict[str, Any] | None = None
 
-    def start(self, stage: Stage) -> None:
-        """Nothing to prepare."""
-
     def next_state(self, step: int) -> int:
         """The step that is kept, then none."""
-        return self._step if step < self._step else _NEVER
+        return self._step if step < self._step else NEVER
 
     def observe(self, view: StepView) -> None:
         """Keep the state of the step."""
         if view.step == self._step:
             self.state = view.checkpoint()
-
-    def observe_rows(self, first_step: int, times: np.ndarray, rows: np.ndarray) -> None:
-        """Rows are not needed."""
-
-    def finish(self, outcome: str) -> None:
-        """Nothing to close."""
 
 
 class Beside(NamedTuple):

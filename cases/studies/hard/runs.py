@@ -29,13 +29,12 @@ from catenary.solver.model.partition import distribute
 from catenary.solver.problem.incidents import in_steps
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest_on_all
 from catenary.solver.time_loop.march import March
-from catenary.solver.time_loop.views.observers import Stage, StepView
+from catenary.solver.time_loop.views.observers import NEVER, Observer, StepView
 
 # Force under which a line is held before it is let go [N].
 PULL = 200.0
 # Steps whose states are kept until the work done in them is summed.
 _BLOCK = 100
-_NEVER = 2**62
 _MOTION = ("displacement", "velocity", "acceleration")
 
 
@@ -107,7 +106,7 @@ class Watched:
         return np.asarray((self.taut[1:] != self.taut[:-1]).sum(axis=1))
 
 
-class Watcher:
+class Watcher(Observer):
     """Observer that keeps what `Watched` holds; wire and balance are needed for the work.
 
     With the work, dropper forces and displacements are kept after the steps ``keep``. Steps are
@@ -134,22 +133,15 @@ class Watcher:
         self._one_switch = 0.0
         self._latest = np.zeros(0)
 
-    def start(self, stage: Stage) -> None:
-        """Nothing is needed of the stage."""
-
     def next_state(self, step: int) -> int:
         """Every state if the work is wanted, otherwise none."""
-        return step + 1 if self._balance is not None else _NEVER
-
-    def observe_rows(self, first_step: int, times: np.ndarray, rows: np.ndarray) -> None:
-        """Copy rows between two states."""
-        self._times.append(times.copy())
-        self._rows.append(rows.copy())
+        return step + 1 if self._balance is not None else NEVER
 
     def observe(self, view: StepView) -> None:
         """Collective if the work is wanted."""
         self._columns = view.columns
-        self.observe_rows(view.step, np.array([view.time]), view.row[np.newaxis])
+        self._times.append(view.times.copy())
+        self._rows.append(view.rows.copy())
         if self._balance is not None:
             self._energy.append(sum(view.energies()))
             state = view.line_state()
@@ -158,9 +150,6 @@ class Watcher:
                 self._kept[view.step] = view.dropper_force.copy(), self._states[-1][0]
             if len(self._states) > _BLOCK:
                 self._add_work()
-
-    def finish(self, outcome: str) -> None:
-        """Nothing is left to do."""
 
     def watched(self, outcome: str, counters: dict[str, int]) -> Watched:
         """All that was seen."""
@@ -246,7 +235,7 @@ class _EndlessWatch(RunWatch):
     _ended = False
 
     def observe(self, view: StepView) -> None:
-        """Look at a step, unless a run would have ended before. Collective."""
+        """Look at steps, unless a run would have ended before. Collective."""
         if self._ended:
             return
         try:
@@ -254,11 +243,6 @@ class _EndlessWatch(RunWatch):
         except RunBroken as broken:
             self._ended = True
             self.remarks.append(f"A run would end here: {broken}.")
-
-    def observe_rows(self, first_step: int, times: np.ndarray, rows: np.ndarray) -> None:
-        """Look at steps of which only rows are left, unless a run would have ended before."""
-        if not self._ended:
-            super().observe_rows(first_step, times, rows)
 
 
 def at_rest(scene: Scene, comm: Any) -> LineAtRest:

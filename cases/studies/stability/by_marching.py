@@ -17,7 +17,7 @@ from catenary.solver.problem.contact_laws import LinearLaw
 from catenary.solver.problem.problem import Problem
 from catenary.solver.statics.line_at_rest import LineAtRest
 from catenary.solver.time_loop.march import March
-from catenary.solver.time_loop.views.observers import Stage, StepView
+from catenary.solver.time_loop.views.observers import NEVER, Observer, StepView
 
 # Depth at the start [m]: exchanges settle to a share of it that is more than the round-off of
 # heights of 5 m, 1e-15 m.
@@ -117,19 +117,18 @@ class Bench:
         return low, high
 
 
-class _Growth:
+class _Growth(Observer):
     """Observer that checks whether a contact force has passed a bound [N]."""
 
     def __init__(self, bound: float) -> None:
         self._bound = bound
         self.grown = False
 
-    def start(self, stage: Stage) -> None:
-        """Nothing is needed of the stage."""
+    def next_state(self, step: int) -> int:
+        """Rows are enough."""
+        return NEVER
 
     def observe(self, view: StepView) -> None:
         """Not collective."""
-        self.grown = self.grown or not float(np.abs(view.contact_force).max()) < self._bound
-
-    def finish(self, outcome: str) -> None:
-        """Nothing is left to do."""
+        largest = float(np.abs(view.each("contact_force")).max())
+        self.grown = self.grown or not largest < self._bound

@@ -24,7 +24,7 @@ from catenary.solver.problem.problem import Placement, Problem, Train
 from catenary.solver.problem.window import BOUNDED
 from catenary.solver.statics.line_at_rest import LineAtRest
 from catenary.solver.time_loop.march import March
-from catenary.solver.time_loop.views.observers import Stage, StepView
+from catenary.solver.time_loop.views.observers import NEVER, Observer, Stage, StepView
 from catenary.solver.waves.excitation import (
     FORCE,
     HAMMER,
@@ -41,7 +41,6 @@ from catenary.solver.waves.excitation_load import load_of
 DURATIONS = {PULSE: 0.1, HAMMER: 0.02}
 # Impulse of a hammer [N s].
 IMPULSE = 10.0
-_NEVER = 2**62
 _ASIDE = LumpedData((8.0,), (0.0,), (0.0,))
 
 
@@ -175,7 +174,7 @@ def without_train(problem: Problem, excitation: Excitation) -> Problem:
     )
 
 
-class Watch:
+class Watch(Observer):
     """Observer that shows the uplift of all nodes at every so many steps.
 
     Parameters
@@ -193,29 +192,19 @@ class Watch:
 
     def next_state(self, step: int) -> int:
         """No state is needed."""
-        return _NEVER
+        return NEVER
 
     def next_motion(self, step: int) -> int:
         """The next multiple."""
         return (step // self._every + 1) * self._every
 
-    def observe_rows(self, first_step: int, times: np.ndarray, rows: np.ndarray) -> None:
-        """Channels are of no interest."""
-
     def observe(self, view: StepView) -> None:
-        """Hand over, if it is time."""
-        self.observe_motion(view)
-
-    def observe_motion(self, view: StepView) -> None:
         """Hand over, if it is time."""
         if view.step % self._every == 0:
             uplift = np.empty(self._nodes.size)
             uplift[self._nodes] = view.node_uplift()
             for one in self._seen:
                 one.add(view.time, uplift)
-
-    def finish(self, outcome: str) -> None:
-        """Nothing is left to do."""
 
 
 def march(

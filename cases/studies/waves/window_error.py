@@ -29,7 +29,7 @@ from catenary.solver.base.errors import InputError, RunBroken
 from catenary.solver.problem.window import WindowChoice
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest
 from catenary.solver.time_loop.march import March
-from catenary.solver.time_loop.views.observers import Stage, StepView
+from catenary.solver.time_loop.views.observers import NEVER, Observer, StepView
 from catenary.solver.window.choice import estimated_error, spans_of_window
 
 TABLE, PICTURE = "window_error.csv", "window_error.png"
@@ -38,7 +38,6 @@ OPTION = "--window-error"
 MOST, LEAST = 100, 2
 # Share of a window that is ahead of the train, as in the one that the program chooses.
 _AHEAD = 0.55
-_NEVER = 2**62
 
 
 class Error(NamedTuple):
@@ -208,30 +207,20 @@ def as_text(curves: Sequence[Curve]) -> str:
     return "\n".join([*lines, *remark_lines(told)])
 
 
-class _Forces:
+class _Forces(Observer):
     """Observer that keeps positions and contact forces of all pantographs at all steps."""
 
     def __init__(self) -> None:
         self._blocks: list[np.ndarray] = []
 
-    def start(self, stage: Stage) -> None:
-        """Nothing is needed."""
-
     def next_state(self, step: int) -> int:
         """No state is needed."""
-        return _NEVER
-
-    def observe_rows(self, first_step: int, times: np.ndarray, rows: np.ndarray) -> None:
-        """Copy."""
-        self._blocks.append(np.hstack([rows[:, part] for part in self._parts]))
+        return NEVER
 
     def observe(self, view: StepView) -> None:
-        """Copy; the first view says where the channels stand."""
-        self._parts = [view.columns[name] for name in ("contact_position", "contact_force")]
-        self._blocks.append(np.hstack([view.row[None, part] for part in self._parts]))
-
-    def finish(self, outcome: str) -> None:
-        """Nothing is left to do."""
+        """Copy."""
+        channels = "contact_position", "contact_force"
+        self._blocks.append(np.hstack([view.each(name) for name in channels]))
 
     def table(self) -> np.ndarray:
         """(rows, 2, n_pantographs), positions [m] and forces [N]."""

@@ -19,12 +19,12 @@ from catenary.postproc.record.snapshots.field_values import FieldValues, Gathere
 from catenary.postproc.record.snapshots.fields_file import FieldsFile, LineSize
 from catenary.solver.base.errors import RunBroken
 from catenary.solver.base.parallel import on_root
-from catenary.solver.time_loop.views.observers import Stage, StepView
+from catenary.solver.time_loop.views.observers import Observer, Stage, StepView
 
 _MAX_BUFFER = 32 * 1024 * 1024
 
 
-class FieldRecorder:
+class FieldRecorder(Observer):
     """Observer that writes ``fields.xdmf`` and the ``.h5`` beside it.
 
     Collective, like all its methods except ``observe`` between flushes. Both files are valid after
@@ -119,24 +119,17 @@ class FieldRecorder:
         """The step of the next snapshot."""
         return step - step % self._every + self._every
 
-    def observe_rows(self, first_step: int, times: np.ndarray, rows: np.ndarray) -> None:
-        """Pass over steps between two snapshots."""
-
     def observe(self, view: StepView) -> None:
         """Keep a snapshot if one is due; collective when the buffer is to be written."""
-        self.observe_motion(view)
-        # The first snapshot is written at once, so that ParaView can open the files.
-        due = view.step == self._first_step or (view.step + 1) % self._flush_every == 0
-        if due and self._buffered:
-            self._flush()
-
-    def observe_motion(self, view: StepView) -> None:
-        """Keep a snapshot if one is due; collective when the buffer is full."""
         if view.step % self._every == 0:
             self._keep(view, len(self._buffered))
             self._buffered.append(view.time)
             if len(self._buffered) == self._capacity:
                 self._flush()
+        # The first snapshot is written at once, so that ParaView can open the files.
+        due = view.step == self._first_step or (view.step + 1) % self._flush_every == 0
+        if due and self._buffered:
+            self._flush()
 
     def finish(self, outcome: str) -> None:
         """Write what is left. Collective."""

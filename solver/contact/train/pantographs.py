@@ -5,12 +5,14 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
 
 from catenary.mbs.build import Operation, has_joints, make_pantograph, steady_forces
-from catenary.mbs.head.drives import N_DRIVE
+from catenary.mbs.called_model import CalledModel
+from catenary.mbs.head.drives import N_DRIVE, named
 from catenary.mbs.head.newmark_head import SteppedHead
 from catenary.mbs.head.wire_crossing import CrossingPath, FollowedPath, LateralPath, SeveralPaths
 from catenary.mbs.interface import Pantograph
@@ -238,35 +240,48 @@ class Pantographs:
         """Heights of the pantographs' bases at ``time`` [s], see `Pantograph.base`; rank 0 [m]."""
         return [model.base(time) for model in self.models]
 
-    def heads_in_loop(self) -> list[native.Head] | None:
-        """The heads as the loop of kernels steps them, None if it cannot step one of them."""
-        heads = []
-        for model, strips in zip(self.models, self._contacts, strict=True):
-            if not isinstance(model, SteppedHead) or model.by_hand:
-                return None
-            model.stepped.first = strips.start
-            heads.append(model.stepped)
-        return heads
+    def heads_in_loop(self) -> tuple[list[native.Head], list[np.ndarray]]:
+        """The heads as a loop of kernels steps them, and where it keeps ``places``.
+
+        Those that no kernel steps, it calls.
+        """
+        heads, places = [], []
+        for number, (model, strips) in enumerate(self._models_with_contacts):
+            moved = model.model if isinstance(model, LoweredPantograph) else model
+            if isinstance(moved, SteppedHead) and not moved.by_hand:
+                heads.append(moved.stepped)
+                places.append(moved.places())
+            else:
+                called = CalledModel(model, partial(self._measure_joint, number))
+                heads.append(called.stepped())
+                places.append(called.places)
+            heads[-1].first = strips.start
+        return heads, places
 
     def fill_drives(self, times: Sequence[float], drives: np.ndarray) -> None:
         """Fill in what ``heads_in_loop`` depend on in steps to ``times`` [s].
 
         ``drives`` (len(times), n, `drives.drive_width`).
         """
+        named(drives)["time"] = np.asarray(times)[:, None]
         for number, model in enumerate(self.models):
-            assert isinstance(model, SteppedHead)
-            model.fill_drives(times, drives[:, number])
+            if isinstance(model, SteppedHead | LoweredPantograph):
+                model.fill_drives(times, drives[:, number])
             if self._followed:
                 path = self._followed[number]
                 path.fill_ahead(times, drives[:, number, N_DRIVE : N_DRIVE + 2 * path.place.size])
 
     def measure_joints(self) -> None:
         """Measure by how much joints are open now; nothing where there are no models."""
-        for number, model in enumerate(self.models):
-            if self._has_joints[number]:
-                moved = model.model if isinstance(model, LoweredPantograph) else model
-                jointed = cast("FullPantograph", moved)
-                self.constraint_violation[number] = jointed.constraint_violation()
+        for number in range(len(self.models)):
+            self._measure_joint(number)
+
+    def _measure_joint(self, number: int) -> None:
+        if self._has_joints[number]:
+            model = self.models[number]
+            moved = model.model if isinstance(model, LoweredPantograph) else model
+            jointed = cast("FullPantograph", moved)
+            self.constraint_violation[number] = jointed.constraint_violation()
 
     def take_over(self, other: Pantographs) -> None:
         """Go on from where ``other`` are, the same train made for another step. Not collective."""

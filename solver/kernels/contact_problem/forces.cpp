@@ -1,18 +1,88 @@
 #include "contact_problem/forces.hpp"
 
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
 namespace catenary {
 
-int64_t find_forces(double time, const SmallProblem& problem, const ReportedForces& law,
+namespace {
+
+/// Largest difference between the law and its last tangent, relative to the force.
+constexpr double kTolerance = 1e-10;
+/// How well depths [m] and rates [m/s] are known: differences of heights of 5 m and of speeds of
+/// some m/s, a few roundings of 4e-16 to 9e-16 each. No force is known better than that times the
+/// slope.
+constexpr double kKnown = 5e-15;
+/// Where so many tangents do not do, round-off is looked at: large terms may cancel in depths and
+/// rates, of which each is known to some roundings of itself.
+constexpr int64_t kUsualTangents = 12;
+constexpr double kRounding = 8.0 * std::numeric_limits<double>::epsilon();
+
+/// Solve for a law by Newton's method; rounds that are not positive if it does not come to an end.
+Solved solve_by_tangents(const SmallProblem& problem, const MarchedHertzLaw& law) {
+    const auto& [depth, rate] = problem.found;
+    const Affine& gap = problem.gap;
+    const auto force = problem.unknowns.solution.first(depth.size());
+    Solved solved{};
+    // Without a force heads stand highest: from there Newton's method comes from one side.
+    if (!subtract(problem.heads, problem.share.line, problem.share.present, gap)) return solved;
+    linearise(law, gap.place, gap.rate);
+    int64_t rounds = 0;
+    for (int64_t number = 0; number < kMostTangents; ++number) {
+        solved = solve(problem);
+        if (solved.rounds <= 0 || !solved.finite) return solved;
+        rounds += solved.rounds;
+        linearise(law, depth, rate);
+        const auto compensation = part(problem.unknowns.solution, size(depth), solved.size);
+        if (agrees(gap, problem.share.rows, force, compensation, law, number)) {
+            solved.rounds = rounds;
+            return solved;
+        }
+    }
+    return {};
+}
+
+}  // namespace
+
+bool agrees(const Affine& gap, const LinkRows& rows, std::span<const double> force,
+            std::span<const double> compensation, const MarchedHertzLaw& law, int64_t number) {
+    const int64_t n = size(force);
+    for (int64_t i = 0; i < n; ++i) {
+        double depth = 0.0, rate = 0.0;
+        if (number >= kUsualTangents) {
+            depth = std::abs(gap.place[i]);
+            rate = std::abs(gap.rate[i]);
+            for (int64_t j = 0; j < n; ++j) {
+                depth += std::abs(gap.by_force(i, j) * force[j]);
+                rate += std::abs(gap.rate_by_force(i, j) * force[j]);
+            }
+            for (int64_t k = 0; k < size(compensation); ++k) {
+                depth += std::abs(rows.lift(k, i) * compensation[k]);
+                rate += std::abs(rows.rise(k, i) * compensation[k]);
+            }
+        }
+        const double wanted = std::max(law.there[i], 0.0);
+        const double within = kTolerance * (1.0 + wanted) +
+                              (kKnown + kRounding * depth) * law.tangents.by_depth[i] +
+                              (kKnown + kRounding * rate) * law.tangents.by_rate[i];
+        if (!(std::abs(wanted - force[i]) <= within)) return false;
+    }
+    return true;
+}
+
+int64_t find_forces(double time, const SmallProblem& problem, const StepLaw& law,
                     std::span<int64_t> switched, Counts& counts) {
     const Flags& flags = problem.share.flags[0];
     const auto solution = problem.unknowns.solution;
     const int64_t n = size(problem.gap.place);
     if (flags.broken != 0.0 || flags.missing != 0.0) return kLeft;
     if (n + static_cast<int64_t>(flags.rows) > size(solution)) return kLeft;
-    const Solved solved = solve(problem);
+    const Solved solved = law.marched ? solve_by_tangents(problem, *law.marched) : solve(problem);
     if (solved.rounds <= 0 || !solved.finite) return kLeft;
     if (!solved.complete) return kTooSmall;
-    if (!report(time, solution.first(n), law)) return kLeft;
+    if (!report(time, solution.first(n), law.reported)) return kLeft;
+    if (law.marched) remember(*law.marched, problem.found.depth, problem.found.rate);
     counts.rounds += solved.rounds;
     for (int64_t k = 0; k < solved.size - n; ++k) {
         switched[k] = problem.share.rows.number(k);

@@ -1,11 +1,14 @@
 #pragma once
 // The forces of a step on one rank, as far as they are found without help.
+#include <optional>
+
 #include "contact_problem/small_problem.hpp"
 
 namespace catenary {
 
 /// What is counted over steps, as in `schemes.Counters`.
 struct Counts {
+    int64_t steps;     ///< that were taken
     int64_t rounds;    ///< of the active-set iteration
     int64_t slack;     ///< links that slacken, step by step
     int64_t repeated;  ///< steps for which bounds were too small
@@ -14,11 +17,26 @@ struct Counts {
 /// In place of a number of compensations: forces are left to others; bounds were too small.
 inline constexpr int64_t kLeft = -1, kTooSmall = -2;
 
+/// Tangents of a step at most: Newton's method on a law doubles its digits with each.
+inline constexpr int64_t kMostTangents = 50;
+
+/// Whether contact forces and compensations that were found with tangents are those of the law,
+/// which was linearised under them since; `number` tangents did not do before.
+bool agrees(const Affine& gap, const LinkRows& rows, std::span<const double> force,
+            std::span<const double> compensation, const MarchedHertzLaw& law, int64_t number);
+
+/// The contact law, and what is reported of its forces.
+struct StepLaw {
+    std::optional<MarchedHertzLaw> marched;  ///< the law, unless it is linear
+    ReportedForces reported;
+    CATENARY_RECORD(marched, reported)
+};
+
 /// Find contact forces and compensations of the step to `time` [s], into the solution of the
 /// problem; `switched` takes the numbers of the links with a compensation.
 ///
 /// Returns the number of these, `kTooSmall` or `kLeft`.
-int64_t find_forces(double time, const SmallProblem& problem, const ReportedForces& law,
+int64_t find_forces(double time, const SmallProblem& problem, const StepLaw& law,
                     std::span<int64_t> switched, Counts& counts);
 
 /// Double the bounds of what may switch.

@@ -5,8 +5,9 @@
 
 namespace catenary {
 
-void linearise(const HertzLaw& law, std::span<const double> depth, std::span<const double> rate,
-               std::span<const double> speed, const Tangents& tangents, std::span<double> force) {
+void linearise(const MarchedHertzLaw& marched, std::span<const double> depth,
+               std::span<const double> rate) {
+    const auto& [law, speed, tangents, force] = marched;
     for (size_t i = 0; i < depth.size(); ++i) {
         double &offset = tangents.offset[i], &by_depth = tangents.by_depth[i],
                &by_rate = tangents.by_rate[i];
@@ -24,6 +25,12 @@ void linearise(const HertzLaw& law, std::span<const double> depth, std::span<con
         by_rate = spring * law.hysteresis / speed[i];
         offset = force[i] - by_depth * d - by_rate * rate[i];
     }
+}
+
+void remember(const MarchedHertzLaw& marched, std::span<const double> depth,
+              std::span<const double> rate) {
+    for (size_t i = 0; i < depth.size(); ++i)
+        if (depth[i] <= 0.0) marched.speed[i] = std::max(rate[i], marched.law.least_speed);
 }
 
 bool report(double time, std::span<const double> force, const ReportedForces& law) {

@@ -15,12 +15,23 @@ struct Tangents {
 /// f = K d^n (1 + chi d' / d0') with the rate d0' at which the gap closed.
 struct HertzLaw {
     double stiffness, exponent, hysteresis;  ///< K [N/m^n], n, chi
-    CATENARY_RECORD(stiffness, exponent, hysteresis)
+    double least_speed;                      ///< of the rates at which gaps close [m/s]
+    CATENARY_RECORD(stiffness, exponent, hysteresis, least_speed)
 };
-/// Fill in the tangents at depths [m] and rates [m/s], and the forces there [N]; (n,) each, with
-/// the rates `speed` at which gaps closed.
-void linearise(const HertzLaw& law, std::span<const double> depth, std::span<const double> rate,
-               std::span<const double> speed, const Tangents& tangents, std::span<double> force);
+/// The law at n contacts.
+struct MarchedHertzLaw {
+    HertzLaw law;
+    std::span<double> speed;  ///< rates at which gaps closed [m/s], (n,)
+    Tangents tangents;        ///< where the law was linearised last
+    std::span<double> there;  ///< forces of the law there, not cut at zero [N], (n,)
+    CATENARY_RECORD(law, speed, tangents, there)
+};
+/// Linearise the law at depths [m] and rates [m/s], (n,) each.
+void linearise(const MarchedHertzLaw& marched, std::span<const double> depth,
+               std::span<const double> rate);
+/// Remember at the end of a step how fast those come who do not touch.
+void remember(const MarchedHertzLaw& marched, std::span<const double> depth,
+              std::span<const double> rate);
 
 /// Which forces of n contacts are reported at the end of a step.
 struct ReportedForces {

@@ -6,14 +6,17 @@ namespace catenary {
 
 /// The first numbers of a row. Upward is positive; a model reads those that it needs.
 struct Drive {
-    double force;              ///< on the last mass of a chain [N]
-    double part;               ///< of the lift that acts
-    double base;               ///< height of the base [m], over where it rests
-    double base_velocity;      ///< [m/s]
-    double base_acceleration;  ///< [m/s2]
-    double head_air;           ///< force of the air on the head [N]
-    double arm_air;            ///< force of the air on the arm of a mechanism [N]
-    double bodies_air;         ///< what it lifts by the mechanism's bodies, in parts of the tables'
+    double time;                 ///< at the end of the step [s]
+    double force;                ///< on the last mass of a chain [N]
+    double part;                 ///< of the lift that acts
+    double base;                 ///< height of the base [m], over where it rests
+    double base_velocity;        ///< [m/s]
+    double base_acceleration;    ///< [m/s2]
+    double roof, roof_velocity;  ///< height of what catches a head that is lowered, over where it
+                                 ///< rests [m], and velocity [m/s]
+    double head_air;             ///< force of the air on the head [N]
+    double arm_air;              ///< force of the air on the arm of a mechanism [N]
+    double bodies_air;  ///< what it lifts by the mechanism's bodies, in parts of the tables'
 };
 inline constexpr int64_t kDrive = sizeof(Drive) / sizeof(double);
 

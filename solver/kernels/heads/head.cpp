@@ -1,6 +1,7 @@
 // What all pantographs share that step by Newmark's method.
 #include "heads/head.hpp"
 
+#include <algorithm>
 #include <limits>
 #include <stdexcept>
 
@@ -29,8 +30,34 @@ void Head::bend(const Bending& bending) {
 
 bool Head::step(std::span<const double> drive) {
     const DriveRow<const double> row{drive, n_strips_};
+    if (lowering_ && is_held(row.drive())) return true;
     aim(drive);
     return step_free(row.drive());
+}
+
+bool Head::is_held(const Drive& drive) {
+    LoweringMemory& memory = lowering_->memory.front();
+    roof_ = drive.roof;
+    if (memory.phase == 0.0 && drive.time > lowering_->time) {
+        memory.caught_at = memory.height - lowering_->drop;
+        memory.phase = 1.0;
+    }
+    if (memory.phase < 2.0) return false;
+    // Forces do not move what is caught.
+    std::ranges::fill(arrays_.out, 0.0);
+    std::ranges::fill(arrays_.out.first(n_strips_), memory.caught_at + drive.roof);
+    std::ranges::fill(part(arrays_.out, n_strips_, 2 * n_strips_), drive.roof_velocity);
+    return true;
+}
+
+double Head::height_under(std::span<const double> contact_force) const {
+    double total = 0.0;
+    for (int64_t i = 0; i < n_strips_; ++i) {
+        total += arrays_.out[i];
+        for (int64_t j = 0; j < n_strips_; ++j)
+            total -= arrays_.out[2 * n_strips_ + i * n_strips_ + j] * contact_force[j];
+    }
+    return total / static_cast<double>(n_strips_) - roof_;
 }
 
 void Head::aim(std::span<const double> drive) {
@@ -91,6 +118,12 @@ void Head::respond(Array2<const double> inverse) {
 }
 
 void Head::advance(std::span<const double> contact_force) {
+    if (lowering_) {
+        LoweringMemory& memory = lowering_->memory.front();
+        if (memory.phase == 2.0) return;
+        memory.height = height_under(contact_force);
+        if (memory.phase == 1.0 && memory.height <= memory.caught_at) memory.phase = 2.0;
+    }
     const Array2<double> by = by_force();
     for (int64_t i = 0; i < 3 * n_; ++i) {
         double value = free_[i];

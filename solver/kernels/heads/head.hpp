@@ -10,6 +10,7 @@
 #include "contact/across.hpp"
 #include "contact/touch.hpp"
 #include "heads/drive.hpp"
+#include "heads/lowering.hpp"
 #include "heads/regulation.hpp"
 
 namespace catenary {
@@ -61,6 +62,8 @@ class Head {
     void bend(const Bending& bending);
     /// Let the lift be regulated.
     void regulate(const Regulation& regulation) { regulation_ = regulation; }
+    /// Let the head be caught when it has been lowered.
+    void lower(const Lowering& lowering) { lowering_ = lowering; }
     /// What regulates the lift adds to the static force now [N].
     double added_force() const {
         return added_force_ + (regulation_ ? regulation_->memory.front().acting : 0.0);
@@ -68,7 +71,8 @@ class Head {
     /// Put that of a controller that no kernel knows.
     void set_added_force(double force) { added_force_ = force; }
 
-    /// What bends, and what regulates the lift, if anything does.
+    /// How it is lowered, what bends, and what regulates the lift, if anything does.
+    const std::optional<Lowering>& lowering() const { return lowering_; }
     const std::optional<Bending>& bending() const { return bending_; }
     const std::optional<Regulation>& regulation() const { return regulation_; }
     const HeadArrays& arrays() const { return arrays_; }
@@ -117,6 +121,10 @@ class Head {
     std::span<Number> state_part(std::span<Number> state, int64_t number) const {
         return part(state, number * n_, (number + 1) * n_);
     }
+    /// Whether the head is caught, which then moves with what holds it; fills `out` if so.
+    bool is_held(const Drive& drive);
+    /// Height of the strips' mean over what catches them under contact forces (s,) [N], [m].
+    double height_under(std::span<const double> contact_force) const;
     /// Let the strips touch where wires are.
     void aim(std::span<const double> drive);
     void bend_at(std::span<const double> place, std::span<const double> rate);
@@ -131,6 +139,8 @@ class Head {
     std::optional<Bending> bending_;
     std::vector<double> shapes_, slopes_;  ///< room for modes
     std::optional<Regulation> regulation_;
+    std::optional<Lowering> lowering_;
+    double roof_ = 0.0;  ///< height of what catches the head at the end of the step [m]
 };
 
 }  // namespace catenary

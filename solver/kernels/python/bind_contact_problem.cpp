@@ -1,5 +1,5 @@
 // What Python calls of the small problem of a step.
-#include "contact_problem/small_problem.hpp"
+#include "contact_problem/forces.hpp"
 #include "python/from_python.hpp"
 
 namespace catenary::python {
@@ -24,7 +24,10 @@ void offer_contact_problem(py::module_& module) {
     offer(module, "leaves_out", leaves_out, "Whether a link without a row may have switched.");
     offer(module, "solve", solve_problem,
           "Contact forces and compensations: rounds, unknowns used, finite, complete.");
-    offer(module, "linearise", linearise, "Tangents of Hertz's law with hysteresis, and forces.");
+    module.attr("MOST_TANGENTS") = kMostTangents;
+    offer(module, "linearise", linearise, "Linearise Hertz's law with hysteresis.");
+    offer(module, "remember", remember, "Remember how fast those come who do not touch.");
+    offer(module, "agrees", agrees, "Whether forces found with tangents are those of the law.");
 }
 
 }  // namespace catenary::python

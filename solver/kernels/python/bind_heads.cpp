@@ -45,6 +45,25 @@ Record taken(Head& head, const py::object& given, const char* name) {
     return From<Record>::convert(given, name, dynamic_cast<Keeper&>(head).kept);
 }
 
+/// A head whose steps are calls of Python, with no coordinates of its own.
+class CalledHead : public Head {
+  public:
+    CalledHead(const HeadArrays& arrays, py::object predict, py::object advance)
+        : Head(arrays), predict_(std::move(predict)), advance_(std::move(advance)) {}
+
+  protected:
+    bool step_free(const Drive& drive) override {
+        predict_(drive.time);
+        return true;
+    }
+    void remember(std::span<const double> force) override {
+        advance_(py::array_t<double>(static_cast<py::ssize_t>(force.size()), force.data()));
+    }
+
+  private:
+    py::object predict_, advance_;
+};
+
 /// Numbers that a call reads, `n` or more.
 std::span<const double> numbers(const py::object& given, const char* name, int64_t n) {
     Kept kept;
@@ -67,13 +86,15 @@ void extrapolate(Head& head, const py::object& drive, const py::object& early) {
 }  // namespace
 
 void offer_heads(py::module_& m) {
-    PYBIND11_NUMPY_DTYPE(Drive, force, part, base, base_velocity, base_acceleration, head_air,
-                         arm_air, bodies_air);
+    PYBIND11_NUMPY_DTYPE(Drive, time, force, part, base, base_velocity, base_acceleration, roof,
+                         roof_velocity, head_air, arm_air, bodies_air);
     PYBIND11_NUMPY_DTYPE(HeadLaw, by_base, zero, of_rate, begin, end);
     PYBIND11_NUMPY_DTYPE(HeadLawPoint, at, force);
     PYBIND11_NUMPY_DTYPE(RegulationSettings, of_height, target, part, dt, sample, least, most);
     PYBIND11_NUMPY_DTYPE(ControlGains, measured, of_error, of_integral, of_rate);
     PYBIND11_NUMPY_DTYPE(RegulationMemory, time, next, filtered, integral, error, samples, acting);
+    PYBIND11_NUMPY_DTYPE(LoweringMemory, height, caught_at, phase);
+    m.attr("LOWERING_MEMORY") = py::dtype::of<LoweringMemory>();
     m.attr("DRIVE") = py::dtype::of<Drive>();
     m.attr("HEAD_LAW") = py::dtype::of<HeadLaw>();
     m.attr("HEAD_LAW_POINT") = py::dtype::of<HeadLawPoint>();
@@ -86,6 +107,10 @@ void offer_heads(py::module_& m) {
         .def("bend",
              [](Head& head, const py::object& bending) {
                  head.bend(taken<Bending>(head, bending, "bending"));
+             })
+        .def("lower",
+             [](Head& head, const py::object& lowering) {
+                 head.lower(taken<Lowering>(head, lowering, "lowering"));
              })
         .def("regulate",
              [](Head& head, const py::object& regulation) {
@@ -116,6 +141,19 @@ void offer_heads(py::module_& m) {
                 {{"arrays", arrays}, {"masses", masses}, {"laws", laws}, {"mechanism", mechanism}});
         }))
         .def_property_readonly("height", &RaisedHead::height);
+    py::class_<CalledHead, Head>(m, "CalledHead")
+        .def(py::init(
+            [](const py::object& out, const py::object& predict, const py::object& advance) {
+                Kept kept;
+                HeadArrays arrays{};
+                arrays.out = From<std::span<double>>::convert(out, "out", kept);
+                arrays.roll = -1;
+                for (arrays.touch.n = 2;
+                     2 * arrays.touch.rows * (1 + arrays.touch.rows) < size(arrays.out);)
+                    ++arrays.touch.rows;
+                return std::unique_ptr<CalledHead>(std::make_unique<HeldHead<CalledHead>>(
+                    std::move(kept), arrays, predict, advance));
+            }));
 }
 
 }  // namespace catenary::python

@@ -78,10 +78,9 @@ auto output(std::span<double> TrainOutputs::* which) {
 }  // namespace
 
 void offer_steps(py::module_& module) {
-    PYBIND11_NUMPY_DTYPE(Counts, rounds, slack, repeated);
+    PYBIND11_NUMPY_DTYPE(Counts, steps, rounds, slack, repeated);
     module.attr("COUNTS") = py::dtype::of<Counts>();
     py::class_<Taken>(module, "Taken")
-        .def_readonly("n_steps", &Taken::n_steps)
         .def_readonly("begun", &Taken::begun)
         .def_readonly("is_full", &Taken::is_full);
     py::class_<HeldSteps>(module, "Steps")

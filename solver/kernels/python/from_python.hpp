@@ -129,6 +129,13 @@ struct From<std::reference_wrapper<T>> {
     }
 };
 template <class T>
+struct From<std::optional<T>> {
+    static std::optional<T> convert(py::handle given, const std::string& name, Kept& kept) {
+        if (given.is_none()) return std::nullopt;
+        return From<T>::convert(given, name, kept);
+    }
+};
+template <class T>
 struct From<std::vector<T>> {
     static std::vector<T> convert(py::handle given, const std::string& name, Kept& kept) {
         std::vector<T> found;

@@ -30,6 +30,7 @@ HeadParts parts_of(const Head& head) {
     parts.first = head.first();
     parts.bending = head.bending();
     parts.regulation = head.regulation();
+    parts.lowering = head.lowering();
     if (const auto* chain = dynamic_cast<const LinearChain*>(&head)) parts.linear = chain->linear();
     if (const auto* sprung = dynamic_cast<const SprungHead*>(&head)) {
         parts.masses = sprung->masses();
@@ -57,6 +58,7 @@ std::unique_ptr<Head> head_of(const HeadParts& parts) {
     head->set_first(parts.first);
     if (parts.bending) head->bend(*parts.bending);
     if (parts.regulation) head->regulate(*parts.regulation);
+    if (parts.lowering) head->lower(*parts.lowering);
     return head;
 }
 
@@ -140,6 +142,8 @@ void Simulation::drive_next() {
         drive.base += input.base;
         drive.base_velocity += input.base_velocity;
         drive.base_acceleration += input.base_acceleration;
+        drive.roof += input.base;
+        drive.roof_velocity += input.base_velocity;
         drive.head_air += input.head_force;
         heads_[k]->set_added_force(input.lift_force);
         // Rows of chains without a controller do not say which part of its force acts.

@@ -26,7 +26,9 @@ struct HeadParts {
     std::optional<ReducedMechanism> mechanism;
     std::optional<Bending> bending;
     std::optional<Regulation> regulation;
-    CATENARY_RECORD(arrays, first, linear, masses, laws, carrier, mechanism, bending, regulation)
+    std::optional<Lowering> lowering;
+    CATENARY_RECORD(arrays, first, linear, masses, laws, carrier, mechanism, bending, regulation,
+                    lowering)
 };
 /// What a head is made of, and such a head.
 HeadParts parts_of(const Head& head);

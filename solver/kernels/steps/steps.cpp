@@ -11,6 +11,7 @@ Taken Steps::take(int64_t first, int64_t end) {
         const int64_t n_compensations = predict_heads(number) ? find_forces(number) : kLeft;
         if (n_compensations < 0) return {number - first, true, false};
         finish(n_compensations);
+        ++block_.counts[0].steps;
         if (!shows) continue;
         show(number);
         const int64_t motion = kept.motion_of[number];
@@ -77,7 +78,7 @@ void Steps::finish(int64_t n_compensations) {
                    solution.subspan(n, n_compensations));
     add_work(parts_.contacts, force);
     for (Head* head : parts_.heads) head->move(force);
-    write_outputs(parts_.train_outputs, force, parts_.law.reported, problem.heads,
+    write_outputs(parts_.train_outputs, force, parts_.law.reported.reported, problem.heads,
                   problem.found.depth);
 }
 

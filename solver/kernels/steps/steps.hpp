@@ -22,7 +22,7 @@ struct StepParts {
     std::vector<Head*> heads;  ///< of the pantographs
     std::span<double> strips;  ///< all strips as functions of the forces, see `Head::predict`
     SmallProblem problem;      ///< of a step's forces
-    ReportedForces law;        ///< which forces the contact law reports
+    StepLaw law;               ///< of the contacts
     std::span<double> lateral_place;  ///< (n,) where wires are on the strips [m], or nothing
     std::span<int64_t> switched;      ///< room for the numbers of links with a compensation
     TrainOutputs train_outputs;       ///< what a step fills in of the following

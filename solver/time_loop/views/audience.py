@@ -1,22 +1,14 @@
-"""All who watch a march: shown step by step, or blocks of steps where they need no more."""
+"""All who watch a march: they are shown blocks of steps, which end where they need a state."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
 from catenary.solver.base.errors import RunBroken
 from catenary.solver.base.petsc_events import event
-from catenary.solver.time_loop.views.observers import (
-    BlockObserver,
-    MotionObserver,
-    Observer,
-    Stage,
-    StepView,
-)
-
-_NEVER = 2**62
+from catenary.solver.time_loop.views.observers import NEVER, Observer, Stage, StepView
 
 
 class Audience:
@@ -30,9 +22,9 @@ class Audience:
 
     def __init__(self, observers: Sequence[Observer], after: Callable[[], None] | None) -> None:
         self._observers = observers
-        self._blockwise = [one for one in observers if isinstance(one, BlockObserver)]
-        self._of_motion = [one for one in self._blockwise if isinstance(one, MotionObserver)]
         self._after = after
+        # The latest step that each was shown.
+        self._latest = [0] * len(observers)
         self._event = event("Show")
 
     @property
@@ -52,13 +44,13 @@ class Audience:
 
     def next_state(self, step: int) -> int:
         """The next step after ``step`` whose state has to be shown; rows of others will do."""
-        if self._after is not None or len(self._blockwise) < len(self._observers):
+        if self._after is not None:
             return step + 1
-        return min((one.next_state(step) for one in self._blockwise), default=_NEVER)
+        return min((one.next_state(step) for one in self._observers), default=NEVER)
 
     def next_motion(self, step: int) -> int:
-        """The next step after ``step`` whose motion has to be kept; see ``MotionObserver``."""
-        return min((one.next_motion(step) for one in self._of_motion), default=_NEVER)
+        """The next step after ``step`` whose motion has to be kept."""
+        return min((one.next_motion(step) for one in self._observers), default=NEVER)
 
     def show(self, view: Callable[[], StepView]) -> None:
         """Show a state to the observers; RunBroken if one cannot go on."""
@@ -66,32 +58,47 @@ class Audience:
             self._event.begin()
             try:
                 shown = view()
-                for observer in self._observers:
+                for number, observer in enumerate(self._observers):
+                    self._latest[number] = shown.step
                     observer.observe(shown)
             finally:
                 self._event.end()
         if self._after is not None:
             self._after()
 
-    def show_rows(self, first_step: int, times: np.ndarray, rows: np.ndarray) -> None:
-        """Show the rows of steps whose states no observer needs; see ``BlockObserver``."""
-        if not times.size:
-            return
-        self._event.begin()
-        try:
-            for observer in self._blockwise:
-                observer.observe_rows(first_step, times, rows)
-        finally:
-            self._event.end()
+    def show_block(
+        self,
+        first: int,
+        times: np.ndarray,
+        rows: np.ndarray,
+        views: Iterable[StepView],
+    ) -> None:
+        """Show a block of steps; RunBroken if an observer cannot go on.
 
-    def show_motion(self, view: StepView) -> None:
-        """Show what was kept of a step whose row is shown."""
-        self._event.begin()
-        try:
-            for observer in self._of_motion:
-                observer.observe_motion(view)
-        finally:
-            self._event.end()
+        Parameters
+        ----------
+        first : number of the step before the block, which is shown
+        times, rows : of its steps (k,) [s] and (k, n)
+        views : one after another of steps whose motion is kept, then of the last step
+        """
+        last = first + len(times)
+        if last == first:
+            return
+        if self._observers:
+            self._event.begin()
+            try:
+                for view in views:
+                    step = view.step
+                    for number, observer in enumerate(self._observers):
+                        if step < last and observer.next_motion(step - 1) != step:
+                            continue
+                        since, self._latest[number] = self._latest[number] - first, step
+                        view.move_to(step, times[since : step - first], rows[since : step - first])
+                        observer.observe(view)
+            finally:
+                self._event.end()
+        if self._after is not None:
+            self._after()
 
     def finish(self, outcome: str) -> str:
         """Call the ``finish`` of all observers; return how the march ended after that.

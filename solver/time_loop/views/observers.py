@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -81,16 +81,19 @@ class Stage:
 
 @dataclass
 class StepView:
-    """The state after a step; arrays are views that the next step overwrites.
+    """Steps that were taken since the view before, and the state after the last of them.
 
-    A channel's values are an attribute of its name: those of arms and droppers are the rank's own,
-    those of pantographs and strips rank 0 has, ``contact_position`` all ranks.
+    Arrays are views that the next steps overwrite. A channel's values after the last step are an
+    attribute of its name: those of arms and droppers are the rank's own, those of pantographs and
+    strips rank 0 has, ``contact_position`` all ranks.
 
     Attributes
     ----------
-    step, time : number of the step (0 is the initial state) and its time [s]
-    row : (n,) the values of all channels one after another
-    columns : where in the row each channel is, by name
+    step, time : number of the last step (0 is the initial state) and its time [s]
+    row : (n,) the values of all channels after it, one after another
+    columns : where in a row each channel is, by name
+    times, rows : (k,) [s] and (k, n), the same of each step of the view; alone those of the last
+        if they are not given
     node_uplift : () -> (n owned nodes,) vertical displacement [m]; not collective
     node_motion : (name of an unknown, whether its rate is meant, which of the owned nodes, all if
         that is left out) -> (n nodes,) [m], [m/s] or
@@ -107,6 +110,8 @@ class StepView:
         was made [J]; not collective
     state : () -> arrays by name on rank 0 with which to continue, None elsewhere, each of which is
         made when it is read, before the next step; collective
+
+    What no observer has asked for at the last step may be refused, but its row.
     """
 
     step: int
@@ -121,6 +126,26 @@ class StepView:
     energies: Callable[[], tuple[float, ...]]
     state: Callable[[], Mapping[str, Any] | None]
     contact_work: Callable[[], float] = lambda: 0.0
+    times: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    rows: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
+
+    def __post_init__(self) -> None:
+        if not self.times.size:
+            self.move_to(self.step, np.array([self.time]), self.row[np.newaxis])
+
+    @property
+    def first_step(self) -> int:
+        """Number of the first of the steps."""
+        return self.step + 1 - len(self.times)
+
+    def move_to(self, step: int, times: np.ndarray, rows: np.ndarray) -> None:
+        """Show steps up to ``step``, with their times (k,) [s] and rows (k, n)."""
+        self.step, self.times, self.rows = step, times, rows
+        self.time, self.row = float(times[-1]), rows[-1]
+
+    def each(self, channel: str) -> np.ndarray:
+        """Values of a channel after each of the steps, shape (k, columns)."""
+        return self.rows[:, self.columns[channel]]
 
     def checkpoint(self) -> dict[str, Any] | None:
         """The same, to be kept. Collective."""
@@ -152,59 +177,43 @@ class NodeMotion(Protocol):
         """The values of those owned nodes whose numbers among them are given, of all if not."""
 
 
-class Observer(Protocol):
-    """Watches a run. All methods are called on all ranks at the same steps."""
+# A step that never comes.
+NEVER = 2**62
+
+
+class Observer:
+    """Watches a run. All methods are called on all ranks at the same steps.
+
+    Each step is shown once, in order, the initial state first. Many are shown at once, which costs
+    little a step: all of a state can be seen at the steps that ``next_state`` names, motion at
+    those of ``next_motion``.
+    """
 
     def start(self, stage: Stage) -> None:
         """Before the initial state is shown."""
 
+    def next_state(self, step: int) -> int:
+        """The next step after ``step`` whose state is to be shown, ``NEVER`` if rows will do.
+
+        Called when all steps up to ``step`` are shown. Steps of which each state is wanted take
+        many times as long.
+        """
+        raise NotImplementedError
+
+    def next_motion(self, step: int) -> int:
+        """The next step after ``step`` of which the motion of nodes, the places of pantographs or
+        ``energies`` are to be shown and no more; asked for any step.
+
+        A block goes on behind such a step, of which these are kept.
+        """
+        return NEVER
+
     def observe(self, view: StepView) -> None:
-        """After the initial state and after every step. May be collective at steps that depend
-        only on ``view.step``."""
+        """After the steps of ``view``, the last of which may be one that was asked for.
+
+        May be collective at steps that depend only on ``view.step`` and ``next_state``.
+        """
+        raise NotImplementedError
 
     def finish(self, outcome: str) -> None:
         """After the last step: "done", "interrupted" or the sentence of what broke."""
-
-
-@runtime_checkable
-class MotionObserver(Observer, Protocol):
-    """A `BlockObserver` that at some steps needs the motion of nodes or ``energies`` and no more.
-
-    The places of pantographs are kept as well.
-
-    A block goes on behind them: these steps are shown by ``observe_motion`` when the rows of the
-    block are shown. Where a block ends at such a step, there is ``observe`` alone.
-    """
-
-    def next_motion(self, step: int) -> int:
-        """The next step after ``step`` of which that is needed; asked for any step."""
-
-    def observe_motion(self, view: StepView) -> None:
-        """After a step whose motion was kept, for this observer or another one. Not collective.
-
-        What else a view has, the row excepted, is refused.
-        """
-
-
-@runtime_checkable
-class BlockObserver(Observer, Protocol):
-    """An observer to whom the rows of many steps may be shown at once, which costs little a step.
-
-    Each step is shown to it once, in order: by ``observe_rows``, or by ``observe``.
-    """
-
-    def next_state(self, step: int) -> int:
-        """The next step after ``step`` that ``observe`` has to show, as it needs more than the row.
-
-        Called when all steps up to ``step`` are shown.
-        """
-
-    def observe_rows(self, first_step: int, times: np.ndarray, rows: np.ndarray) -> None:
-        """After steps before the next state, of which only the rows are left. Not collective.
-
-        Parameters
-        ----------
-        first_step : number of the step of the first row
-        times : (k,) [s]
-        rows : (k, n), ``StepView.row`` of each; overwritten by what is shown next
-        """

@@ -34,6 +34,8 @@ from catenary.solver.time_loop.views.row_layout import RowLayout
 from catenary.solver.time_loop.views.shown_motion import ShownMotion
 from catenary.solver.window.moving_columns import Columns, MovingColumns, columns_of
 
+# What can be seen of a step, more with each.
+_ROW, _MOTION, _STATE = range(3)
 # Channels of the first tables of ``Shown.columns``.
 _OF_COLUMNS = ("arm_uplift", "dropper_force")
 
@@ -112,10 +114,10 @@ class Showing:
         at_ends = {name: by_name.pop(name) for name in watched}
         self._sources = Sources(pantographs, interaction, scheme, uplift, tension, by_name, at_ends)
         self.layout = RowLayout(self._sources, self._shown)
-        self._is_kept, self._energies_follow_motion = False, energies_follow_motion()
+        self._seen, self._energies_follow_motion = _STATE, energies_follow_motion()
         self._rows_of_unknown: dict[str, tuple[np.ndarray, np.ndarray]] = {}
         self._kept_places = np.zeros(0)
-        self._row = np.zeros(self.layout.width)
+        self._row, self._times = np.zeros(self.layout.width), np.zeros(1)
         self._view = self._new_view()
         self.shown = self._what_is_shown(droppers, others, other_force)
         stepped = slice(self._line.ownership.first, self._line.ownership.last)
@@ -133,7 +135,7 @@ class Showing:
             time=0.0,
             row=self._row,
             columns=self.layout.columns,
-            node_uplift=lambda: self.motion.displacement[self._node_rows],
+            node_uplift=lambda: self._moved.displacement[self._node_rows],
             node_motion=self._node_motion,
             wire_tension=lambda: self._tension,
             pantograph_places=self._pantograph_places,
@@ -190,16 +192,16 @@ class Showing:
 
         ``followed`` says whether a compiled loop has noted which stations moved up to it.
         """
-        view, outputs, self._is_kept = self._view, self._pantographs.outputs, False
+        outputs, row = self._pantographs.outputs, self._row
         self.motion.late(followed=followed)
         if not followed:
             self._moving.all_move()
-        view.step, view.time, view.row = step, time, self._row
         self._shown[: outputs.size] = outputs
         self._show()
-        view.row[: self._shown.size] = self._shown
-        self.layout.fill(view.row)
-        return view
+        row[: self._shown.size] = self._shown
+        self.layout.fill(row)
+        self._times[0] = time
+        return self._viewed(step, self._times, row[np.newaxis], _STATE)
 
     def cross(self, time: float, *, found: bool = False) -> None:
         """Note where wires that move sideways cross the strips at ``time`` [s], if any do.
@@ -219,31 +221,35 @@ class Showing:
         if self._line.window is not None:
             self._moving.follow(self.shown.columns, _OF_COLUMNS, stations)
 
-    def view_of(self, step: int, time: float, row: np.ndarray) -> StepView:
-        """The state after a step that a compiled loop has shown as ``row`` of a view, its latest
-        one."""
+    def view_of(self, step: int, times: np.ndarray, rows: np.ndarray) -> StepView:
+        """The state after steps that a compiled loop has taken up to ``step``, its latest one, with
+        their times (k,) [s] and rows (k, n)."""
         self.motion.late(followed=True)
-        return self._viewed(step, time, row, is_kept=False)
+        return self._viewed(step, times, rows, _STATE)
+
+    def view_of_rows(self, step: int, times: np.ndarray, rows: np.ndarray) -> StepView:
+        """The same where the loop has left the state amid the next step."""
+        return self._viewed(step, times, rows, _ROW)
 
     def view_of_kept(
         self,
         step: int,
-        time: float,
-        row: np.ndarray,
+        times: np.ndarray,
+        rows: np.ndarray,
         motion: tuple[tuple[int, int], np.ndarray],
         places: np.ndarray,
     ) -> StepView:
-        """The same of a step before it, with what is left of its ``motion``, see
+        """The same of steps that the loop went on from, with what is left of the ``motion``, see
         ``ShownMotion.show``, and with ``places`` of the pantographs."""
         self.motion.show(*motion)
         self._kept_places = places
-        return self._viewed(step, time, row, is_kept=True)
+        return self._viewed(step, times, rows, _MOTION)
 
-    def _viewed(self, step: int, time: float, row: np.ndarray, *, is_kept: bool) -> StepView:
-        view, self._is_kept = self._view, is_kept
-        # Of a long line a row is not to be copied.
-        view.step, view.time, view.row = step, time, row
-        return view
+    def _viewed(self, step: int, times: np.ndarray, rows: np.ndarray, seen: int) -> StepView:
+        self._seen = seen
+        # Of a long line rows are not to be copied.
+        self._view.move_to(step, times, rows)
+        return self._view
 
     @cached_property
     def _node_rows(self) -> np.ndarray:
@@ -258,7 +264,7 @@ class Showing:
             there = np.flatnonzero(numbers >= 0)
             self._rows_of_unknown[name] = there, numbers[there] - self._line.ownership.first
         there, own = self._rows_of_unknown[name]
-        motion = self.motion.velocity if rate else self.motion.displacement
+        motion = self._moved.velocity if rate else self._moved.displacement
         if there.size == self._owned_nodes.size:
             return np.take(motion, own if among is None else own[among])
         result = np.zeros(self._owned_nodes.size)
@@ -267,7 +273,8 @@ class Showing:
 
     def _pantograph_places(self) -> np.ndarray:
         """Heights of the bases, then places of masses and bodies, on rank 0."""
-        now = [self._kept_places] if self._is_kept else self._pantographs.places()
+        self._refuse_unseen(_MOTION)
+        now = [self._kept_places] if self._seen == _MOTION else self._pantographs.places()
         return np.concatenate([self._pantographs.bases(self._view.time), *now])
 
     @cached_property
@@ -290,12 +297,19 @@ class Showing:
         return gained
 
     def _line_state(self) -> Mapping[str, np.ndarray]:
-        self._refuse_kept_motion()
+        self._refuse_unseen(_STATE)
         return self._line.state()
 
-    def _refuse_kept_motion(self) -> None:
-        if self._is_kept:
-            raise RuntimeError("of this step only the motion was kept, see `MotionObserver`")
+    @property
+    def _moved(self) -> ShownMotion:
+        """The motion at the step that is shown."""
+        self._refuse_unseen(_MOTION)
+        return self.motion
+
+    def _refuse_unseen(self, wanted: int) -> None:
+        if wanted > self._seen:
+            kept = "row" if self._seen == _ROW else "motion"
+            raise RuntimeError(f"of this step only the {kept} was kept, see `Observer`")
 
     def _energies(self) -> tuple[float, ...]:
         """The energies that are recorded, in the order of their table. Collective."""
@@ -304,7 +318,7 @@ class Showing:
         return energies_of(Energies(*self._line_energies(), self._sources))
 
     def _contact_work(self) -> float:
-        self._refuse_kept_motion()
+        self._refuse_unseen(_STATE)
         return float(self._pantographs.work.total[0])
 
     def _line_energies(self) -> tuple[float, float]:
@@ -312,13 +326,13 @@ class Showing:
 
         Collective. After an incident it is that of what is left of the line; see `after_incidents`.
         """
-        parts = self._energy.parts(self.motion)
+        parts = self._energy.parts(self._moved)
         kinetic, elastic = total(self._comm, parts).tolist()
         return kinetic, elastic + self._changed.energy if self._unbalanced else elastic
 
     def _state(self) -> State | None:
         """Everything needed to continue after the step shown last, on rank 0. Collective."""
-        self._refuse_kept_motion()
+        self._refuse_unseen(_STATE)
         return self.checkpoints.make(self._view.step)
 
 

@@ -15,7 +15,6 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
-import numpy as np
 from mpi4py import MPI
 
 from catenary.cases.run.runner import run_case
@@ -24,28 +23,19 @@ from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.load import load_scene
 from catenary.solver.statics.line_at_rest import line_at_rest
 from catenary.solver.time_loop import march
-from catenary.solver.time_loop.views.observers import Stage, StepView
+from catenary.solver.time_loop.views.observers import NEVER, Observer, StepView
 
 SCENE = ("ambrosio2012", ["train.start_m=310", 'train.pantographs=[{name="lumped"}]'])
 
 
-class Rows:
+class Rows(Observer):
     """Is shown the rows of all steps and keeps none."""
 
-    def start(self, stage: Stage) -> None:
-        """Nothing is needed of the stage."""
-
     def next_state(self, step: int) -> int:
-        return 2**62
-
-    def observe_rows(self, first_step: int, times: np.ndarray, rows: np.ndarray) -> None:
-        """Nothing is kept."""
+        return NEVER
 
     def observe(self, view: StepView) -> None:
         """Nothing is kept."""
-
-    def finish(self, outcome: str) -> None:
-        """Nothing is left."""
 
 
 def main(rounds: int) -> None:

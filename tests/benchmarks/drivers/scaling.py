@@ -25,12 +25,12 @@ from step_cost import room
 from catenary.cases.scene.load import load_scene
 from catenary.cases.studies.hard.runs import at_rest
 from catenary.solver.time_loop.march import March
-from catenary.solver.time_loop.views.observers import Stage, StepView
+from catenary.solver.time_loop.views.observers import Observer, StepView
 
 WORLD = MPI.COMM_WORLD
 
 
-class Timed:
+class Timed(Observer):
     """A march that starts again and again, and keeps its first state for that. Collective."""
 
     def __init__(self, comm: MPI.Comm, n_spans: int, n_steps: int) -> None:
@@ -42,8 +42,8 @@ class Timed:
         self._march = March(comm, problem, rest.model, rest.form, rest.lift)
         self._march.run([self])
 
-    def start(self, stage: Stage) -> None:
-        """An observer of the first run, for the state that it starts from."""
+    def next_state(self, step: int) -> int:
+        return step + 1
 
     def observe(self, view: StepView) -> None:
         if view.step == 0:

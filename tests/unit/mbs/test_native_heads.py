@@ -64,7 +64,7 @@ def test_a_pantograph_may_outlive_what_it_was_made_by() -> None:
     one = LumpedPantograph(LumpedData((10.0,), (50.0,), (1.0,)), 100.0, 5.0, 0.0, DT)
     one.place(5.0)
     head, position = one.stepped, one.position
-    row = one._row.copy()
+    row = one.row.copy()
     del one
     gc.collect()
     named(row)["force"] = 500.0

@@ -61,7 +61,7 @@ def test_drives_of_many_steps_are_those_of_single_ones() -> None:
     for time, row in zip(times, drives, strict=True):
         other = pantograph()
         other.predict(time)
-        assert row == pytest.approx(other._row, rel=1e-12)
+        assert row == pytest.approx(other.row, rel=1e-12)
 
 
 def test_the_base_rises_by_the_half_cosine_of_the_lift() -> None:

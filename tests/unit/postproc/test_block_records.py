@@ -13,39 +13,33 @@ from catenary.postproc.channels.line_record import GZIP, LineRecord
 from catenary.postproc.record.progress import Progress
 from catenary.postproc.record.recorder import Recorder
 from catenary.postproc.record.snapshots.fields import FieldRecorder
-from catenary.solver.time_loop.views.observers import BlockObserver, MotionObserver
+from catenary.solver.time_loop.views.audience import Audience
+from catenary.solver.time_loop.views.observers import Observer
 
 
-def drive_by_blocks(march: Any, *observers: BlockObserver, first: int, most: int) -> list[int]:
-    """As ``drive``, with as many rows at once as the observers need no states between.
+def drive_by_blocks(march: Any, *observers: Observer, first: int, most: int) -> list[int]:
+    """As ``drive``, with as many steps at once as the observers need no states between.
 
     Returns the steps of each block.
     """
-    of_motion = [one for one in observers if isinstance(one, MotionObserver)]
-    stage, step, blocks = march.stage(first), first, []
-    for observer in observers:
-        observer.start(stage)
-        observer.observe(march.view(step))
+    stage, step, blocks, audience = march.stage(first), first, [], Audience(observers, None)
+    audience.start(stage)
+    audience.show(lambda: march.view(first))
     while step < march.n_steps:
-        until = min(march.n_steps, step + most, *(one.next_state(step) for one in observers))
+        until = min(march.n_steps, step + most, audience.next_state(step))
         views = [march.view(number) for number in range(step + 1, until + 1)]
-        if len(views) > 1:
-            rows = np.array([view.row for view in views[:-1]])
-            times = np.array([view.time for view in views[:-1]])
-            for observer in observers:
-                observer.observe_rows(step + 1, times, rows)
-            rows[:] = times[:] = np.nan  # they are overwritten
-            due = min((one.next_motion(step) for one in of_motion), default=until)
-            while due < until:
-                for observer in of_motion:
-                    observer.observe_motion(views[due - step - 1])
-                due = min(one.next_motion(due) for one in of_motion)
-        for observer in observers:
-            observer.observe(views[-1])
+        rows = np.array([view.row for view in views])
+        times = np.array([view.time for view in views])
+        due = audience.next_motion(step)
+        shown = [views[-1]]
+        while due < until:
+            shown.insert(-1, views[due - step - 1])
+            due = audience.next_motion(due)
+        audience.show_block(step, times, rows, shown)
+        rows[:] = times[:] = np.nan  # they are overwritten
         blocks.append(len(views))
         step = until
-    for observer in observers:
-        observer.finish("done")
+    audience.finish("done")
     return blocks
 
 

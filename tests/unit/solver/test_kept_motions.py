@@ -18,13 +18,13 @@ from catenary.solver.problem.window import BOUNDED, EXACT, WindowChoice
 from catenary.solver.time_loop import compiled_steps
 from catenary.solver.time_loop import march as time_loop
 from catenary.solver.time_loop.views import line_energy, step_views
-from catenary.solver.time_loop.views.observers import Stage, StepView
+from catenary.solver.time_loop.views.observers import Observer, StepView
 from catenary.solver.time_loop.views.shown_motion import ShownMotion
 
 N_STEPS, EVERY = 250, 7
 
 
-class Looking:
+class Looking(Observer):
     """Takes energies, uplift and places of masses at every seventh step, and rows of all."""
 
     def __init__(self) -> None:
@@ -35,37 +35,24 @@ class Looking:
         self.places: list[np.ndarray] = []
         self.refused = 0
 
-    def start(self, stage: Stage) -> None:
-        """Nothing is needed of the stage."""
-
     def next_state(self, step: int) -> int:
         return step - step % 64 + 64
 
     def next_motion(self, step: int) -> int:
         return step - step % EVERY + EVERY
 
-    def observe_rows(self, first_step: int, times: np.ndarray, rows: np.ndarray) -> None:
-        assert first_step == len(self.rows)
-        self.rows += [row.copy() for row in rows]
-
     def observe(self, view: StepView) -> None:
-        assert view.step == len(self.rows)
-        assert view.checkpoint() is not None
-        self.rows.append(view.row.copy())
-        self.take(view)
-
-    def observe_motion(self, view: StepView) -> None:
-        assert view.step < len(self.rows) and np.array_equal(
-            view.row, self.rows[view.step], equal_nan=True
-        )
-        self.refused += 1
-        with pytest.raises(RuntimeError, match="only the motion"):
-            view.line_state()
-        with pytest.raises(RuntimeError, match="only the motion"):
-            view.checkpoint()
-        self.take(view)
-
-    def take(self, view: StepView) -> None:
+        assert view.first_step == len(self.rows)
+        self.rows += [row.copy() for row in view.rows]
+        assert view.step == len(self.rows) - 1 and view.time == pytest.approx(1e-3 * view.step)
+        try:
+            assert view.checkpoint() is not None
+        except RuntimeError as error:
+            assert "only the motion" in str(error) and view.step % EVERY == 0
+            assert view.step % 64 != 0 and view.step < N_STEPS
+            self.refused += 1
+            with pytest.raises(RuntimeError, match="only the motion"):
+                view.line_state()
         if view.step % EVERY == 0:
             self.energies.append(view.energies())
             self.uplift.append(view.node_uplift().copy())
@@ -162,18 +149,18 @@ def whole_line(motion: ShownMotion) -> tuple[int, int]:
 
 
 def test_those_who_need_rows_alone_get_each_once() -> None:
-    class Rows:
+    class Rows(Observer):
         """Takes rows alone."""
 
         def __init__(self) -> None:
             self.rows: list[np.ndarray] = []
 
-        start, finish, next_state = Looking.start, Looking.finish, Looking.next_state
-        observe_rows = Looking.observe_rows
+        def next_state(self, step: int) -> int:
+            return step - step % 64 + 64
 
         def observe(self, view: StepView) -> None:
             assert view.checkpoint() is not None
-            self.rows.append(view.row.copy())
+            self.rows += list(view.rows.copy())
 
     rows = Rows()
     looking = watched(problem(), rows)

@@ -71,7 +71,7 @@ def test_a_march_runs_to_the_end_of_its_stretch(mesh: LineMesh) -> None:
 
 def test_a_stop_request_ends_it_after_the_step(mesh: LineMesh) -> None:
     run, _ = start_march(problem(), mesh)
-    history, asked = History(), []
+    history, asked = History(lambda view: None), []
 
     def stop() -> bool:
         asked.append(True)

@@ -23,7 +23,7 @@ from catenary.solver.problem.problem import Damping, Problem
 from catenary.solver.problem.window import BOUNDED, EXACT, WindowChoice
 from catenary.solver.time_loop import compiled_steps
 from catenary.solver.time_loop import march as time_loop
-from catenary.solver.time_loop.views.observers import Stage, StepView
+from catenary.solver.time_loop.views.observers import Observer, StepView
 from catenary.solver.window.moving_columns import MovedStations, columns_of
 from catenary.solver.window.where_possible import refuse_window
 
@@ -119,23 +119,17 @@ def test_a_bounded_window_follows_the_train_and_errs_little() -> None:
     assert max(sizes[10:]) < sizes[0]
 
 
-class Rows:
+class Rows(Observer):
     """Keeps the rows of all steps, which come in blocks."""
 
     def __init__(self) -> None:
         self.rows: list[np.ndarray] = []
 
-    def start(self, stage: Stage) -> None:
-        """Nothing is needed of the stage."""
-
     def next_state(self, step: int) -> int:
         return step + 1 if step % 90 == 0 else step - step % 90 + 90
 
-    def observe_rows(self, first_step: int, times: np.ndarray, rows: np.ndarray) -> None:
-        self.rows += list(rows.copy())
-
     def observe(self, view: StepView) -> None:
-        self.rows.append(view.row.copy())
+        self.rows += list(view.rows.copy())
 
     def finish(self, outcome: str) -> None:
         assert outcome == "done"
