@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from catenary.meshgen.slopes import Slopes, steepness
 from catenary.meshgen.wires import Wire
 
 
@@ -13,8 +14,10 @@ from catenary.meshgen.wires import Wire
 class DropperKind:
     """What all droppers of a group share.
 
-    Exactly one of ``stiffness`` [N/m] and ``axial_stiffness`` EA [N] is given; with EA the
-    stiffness of each dropper is EA over its own length. Clamp masses in kg.
+    Exactly one of ``stiffness`` [N/m], ``axial_stiffness`` EA [N] and ``curve`` is given; with EA
+    the stiffness of each dropper is EA over its own length, and the points of a curve, strain [-]
+    and tension [N] from (0, 0) on, both ascending, are those of its stretch over that length.
+    Clamp masses in kg.
     """
 
     stiffness: float | None
@@ -22,13 +25,38 @@ class DropperKind:
     mass_per_length: float
     upper_clamp_mass: float
     lower_clamp_mass: float
+    curve: tuple[tuple[float, float], ...] | None = None
+
+    @property
+    def n_pieces(self) -> int:
+        """How many slopes their tension has."""
+        return 1 if self.curve is None else len(self.curve) - 1
+
+    def slopes_at(self, length: np.ndarray) -> Slopes:
+        """Tension over stretch of droppers of these lengths (n,) [m]."""
+        if self.curve is not None:
+            strain, tension = np.array(self.curve[:-1]).T
+            return Slopes(
+                length[:, None] * strain,
+                np.tile(tension, (length.size, 1)),
+                steepness(self.curve) / length[:, None],
+            )
+        none = np.zeros((length.size, 1))
+        return Slopes(none, none, self.stiffness_at(length)[:, None])
 
     def stiffness_at(self, length: np.ndarray) -> np.ndarray:
-        """Stiffness of droppers of these lengths (n,) [m], shape as ``length`` [N/m]."""
+        """Stiffness of droppers of these lengths (n,) [m] without tension, shape as ``length``
+        [N/m]."""
         if self.stiffness is not None:
             return np.full(length.shape, self.stiffness)
+        if self.curve is not None:
+            return np.asarray(steepness(self.curve)[0] / length)
         assert self.axial_stiffness is not None
         return np.asarray(self.axial_stiffness / length)
+
+    def stiffest_at(self, length: float) -> float:
+        """The largest stiffness of a dropper of a length [m] [N/m]."""
+        return float(self.slopes_at(np.array([length])).slope.max())
 
 
 @dataclass(frozen=True)

@@ -11,12 +11,12 @@ from pydantic import ValidationError
 
 from catenary.cases.scene.checks.scene import check
 from catenary.cases.scene.input.case_files import find_case
-from catenary.cases.scene.input.faults import Fault, SceneError
+from catenary.cases.scene.input.faults import SceneError
 from catenary.cases.scene.input.origin import Origin
+from catenary.cases.scene.input.pair_files import take_in_files
 from catenary.cases.scene.input.plain_text import refuse_deep
 from catenary.cases.scene.input.text_faults import text_faults
 from catenary.cases.scene.input.toml_input import Assigned, assign, parse_assignment, read_toml
-from catenary.cases.scene.input.vehicle_files import take_in_files
 from catenary.cases.scene.keys.error_sentences import schema_faults, unknown_key
 from catenary.cases.scene.keys.keys import is_known, known_keys, with_kinds
 from catenary.cases.scene.scene import Scene
@@ -70,11 +70,8 @@ def scene_from(raw: dict[str, Any], origin: Origin, folder: Path | None = None) 
     raw = copy.deepcopy(raw)
     faults, more = text_faults(raw, origin), 0
     _fill_in(raw, folder, origin.is_overridden("mesh.file"))
-    try:
-        origin = take_in_files(raw, origin, folder)
-    except InputError as error:
-        faults.append(Fault("vehicle", str(error)))
-        del raw["vehicle"]
+    origin, of_files = take_in_files(raw, origin, folder)
+    faults += of_files
     try:
         scene = Scene.model_validate(raw)
     except ValidationError as failed:

@@ -122,7 +122,7 @@ def _stiffest_dropper(source: Derivation) -> float:
     stiffest = 0.0
     for number, group in enumerate(source.problem.line.droppers):
         length = source.dropper_length[source.mesh.dropper_group == number]
-        stiffest = max(stiffest, float(group.kind.stiffness_at(length).max(initial=0.0)))
+        stiffest = max(stiffest, float(group.kind.slopes_at(length).slope.max(initial=0.0)))
     return stiffest
 
 

@@ -73,12 +73,15 @@ class FollowedLinks:
         links = self.numbers, self.links, self.reserve, self.moving
         return Followed(*links, self.riders, self.riding)
 
-    def shown(self, component: str) -> tuple[np.ndarray, LinkArrays]:
+    def shown(self, component: str) -> tuple[np.ndarray, LinkArrays, Riders]:
         """Numbers among those of its component, and arrays, of all links that this rank owns,
-        broken ones included."""
+        broken ones included, and what bends of these add to their forces."""
         numbers = self.table.of_component(component)
         numbers = numbers[self._mine[numbers]]
-        return self.table.index[numbers], self.local.of(numbers)
+        bends, begin = self.table.bends_of(numbers)
+        add = self.local.of(bends)
+        add.law["released"] *= self.table.pulls[bends]
+        return self.table.index[numbers], self.local.of(numbers), Riders(add, begin)
 
     def find_reserve(self) -> np.ndarray:
         """Reserve in the line's present motion [N], shape (n,), overwritten by the next call."""

@@ -1,15 +1,21 @@
 """What finds a step's forces where the active set cycles: pivoting, and riders that carry in part.
 
 Contacts and links alone are a linear complementarity problem with a P-matrix, which pivoting
-solves. A wheel that slips one way or the other has a row for each way, of which one acts at most:
-sets with both are left out, as with them the matrix is none. Nor is it with riders: what a dropper
-does across it is whole while it is taut and nothing while it is slack, whatever its tension, so
-that it jumps where that passes zero. If the jump tightens the dropper that slackens, it is neither
-taut nor slack. The step then ends with its tension at zero and riders that carry in part
-(docs/theory.md, section 16).
+solves. Bends of one link, and a wheel that slips one way or the other, have a row each, of which
+some act only where others do, and some only where others do not. Sets are taken that belong to a
+place along the link: with others the matrix is none. So a link goes from piece to piece of its law,
+one at a time, and with a law that rises all over it does not come back to one: with all rows before
+its own solved for, what it lacks has one sign to either side of where it stays.
+
+Nor is the matrix one with riders: what a dropper does across it is whole while it is taut and
+nothing while it is slack, whatever its tension, so that it jumps where that passes zero. If the
+jump tightens the dropper that slackens, it is neither taut nor slack. The step then ends with its
+tension at zero and riders that carry in part (docs/theory.md, section 16).
 """
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,7 +30,7 @@ _FIRST_GRID = 0.25
 # from shares to shares, what shares and tensions may disagree by.
 _ROUNDING = 1e-12
 _AGREEMENT = 10.0 * _ROUNDING
-# Rows of two ways of one direction differ by this at most, of their largest number.
+# Rows of bends along one direction differ by this at most, of their largest number.
 _ALIKE = 1e-9
 # Problems that one step may solve on its way to shares: some ten seconds.
 _MOST_LOOKS = 100_000
@@ -47,10 +53,10 @@ def pivot(
     NotConverged
         If there is no solution.
     """
-    acts, opposite = always.copy(), _opposites(matrix, right)
-    found, rounds, circle = _pivot(matrix, right, always, behind, opposite, solution, acts)
+    acts, along = always.copy(), _along(matrix, right)
+    found, rounds, circle = _pivot(matrix, right, always, behind, along, solution, acts)
     if not found and behind.any():
-        found, more = _share(matrix, right, always, behind, opposite, solution, acts, circle)
+        found, more = _share(matrix, right, always, behind, along, solution, acts, circle)
         rounds += more
     if not found:
         raise NotConverged(
@@ -60,22 +66,32 @@ def pivot(
     return rounds
 
 
-def _opposites(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """The row of the other way of each row, its own where there is none.
+class _Along(NamedTuple):
+    """How rows of bends along one direction go with each other: ``needs[i, j]`` says that i acts
+    only while j does, ``excludes[i, j]`` that it does not while j does."""
 
-    Rows i and j of two ways of one direction add up to those of a unit matrix. Where both act,
-    their values add up to those of the right-hand side, which is negative for ways that exclude
-    each other.
-    """
-    opposite = np.arange(right.size)
+    needs: np.ndarray
+    excludes: np.ndarray
+
+
+def _along(matrix: np.ndarray, right: np.ndarray) -> _Along:
+    """Rows of bends along one direction: but for a unit matrix they are multiples of one row u,
+    c u, and act where u x is below right / c of a positive c, and above it of a negative one."""
     beside = matrix - np.eye(right.size)
-    size = np.einsum("ij,ij->i", beside, beside)
-    other = (size + 2.0 * beside @ beside.T).argmin(axis=1)
-    apart = np.abs(beside + beside[other]).max(axis=1)
-    both = apart <= _ALIKE * np.abs(beside).max(axis=1)
-    both &= (other[other] == opposite) & (other != opposite) & (right + right[other] < 0.0)
-    opposite[both] = other[both]
-    return opposite
+    size = np.abs(beside).max(axis=1, initial=0.0)
+    scaled = np.divide(beside, size[:, None], out=np.zeros_like(beside), where=size[:, None] > 0.0)
+    length = np.linalg.norm(scaled, axis=1)
+    cosine = np.abs(scaled @ scaled.T) - (1.0 - _ALIKE) * np.outer(length, length)
+    needs, excludes = np.zeros((2, *matrix.shape), dtype=bool)
+    for i, j in np.argwhere((cosine > 0.0) & ~np.eye(right.size, dtype=bool)):
+        sign = np.sign(scaled[i] @ scaled[j])
+        if np.abs(scaled[i] - sign * scaled[j]).max() > _ALIKE:
+            continue
+        # Where along u of row i both begin to act, i below its place.
+        place, other = right[i] / size[i], sign * right[j] / size[j]
+        needs[i, j] = sign > 0.0 and other > place
+        excludes[i, j] = sign < 0.0 and other >= place
+    return _Along(needs, excludes)
 
 
 def _pivot(
@@ -83,14 +99,14 @@ def _pivot(
     right: np.ndarray,
     always: np.ndarray,
     behind: np.ndarray,
-    opposite: np.ndarray,
+    along: _Along,
     solution: np.ndarray,
     acts: np.ndarray,
 ) -> tuple[bool, int, np.ndarray]:
     """Whether a set was right, the rounds to get there from ``acts``, which it overwrites, and, if
     it was not, the rows that go round in a circle of sets."""
     master = np.arange(behind.size) - behind
-    scale, alone = _ROUNDING * (1.0 + np.abs(right).max()), opposite == np.arange(behind.size)
+    scale = _ROUNDING * (1.0 + np.abs(right).max())
     most = 20 * right.size + 100
     system, room = System(matrix, right, solution), room_for(right.size)
     turned: list[int] = []
@@ -101,8 +117,10 @@ def _pivot(
             return False, rounds, np.unique(turned[since:])
         native.solve_on(system, acts, room)
         residual = matrix @ solution - right
-        free = residual < -scale  # while the other way acts, that one is wrong then, too
-        wrong = np.where(acts, (solution < -scale) & ~always, free & (alone | ~acts[opposite]))
+        # Of bends along one direction the next one turns, whichever are wrong.
+        held = (along.needs.T & acts).any(axis=1) | always
+        barred = (along.needs & ~acts | along.excludes & acts).any(axis=1)
+        wrong = np.where(acts, (solution < -scale) & ~held, (residual < -scale) & ~barred)
         wrong &= behind == 0
         if not wrong.any():
             return True, rounds, np.zeros(0, dtype=int)
@@ -118,7 +136,7 @@ def _share(
     right: np.ndarray,
     always: np.ndarray,
     behind: np.ndarray,
-    opposite: np.ndarray,
+    along: _Along,
     solution: np.ndarray,
     acts: np.ndarray,
     circle: np.ndarray,
@@ -147,7 +165,7 @@ def _share(
         partly[np.diag_indices(part.size)] += 1.0 - part
         free = always | (rides & (part > 0.0))
         acts[free], acts[rides & ~free] = True, False
-        found, rounds, _ = _pivot(partly, right * part, free, none, opposite, solution, acts)
+        found, rounds, _ = _pivot(partly, right * part, free, none, along, solution, acts)
         total, looks = total + rounds, looks + 1
         left = (matrix[masters] @ solution - right[masters] - solution[masters]) / size
         return left if found and looks < _MOST_LOOKS else np.full(masters.size, np.nan)

@@ -9,7 +9,7 @@ import numpy as np
 from catenary.meshgen.mesh import DROPPERS
 from catenary.solver.model.elements import beam
 from catenary.solver.model.links.leaning import dropper_directions
-from catenary.solver.model.links.links import BOTH, PULLS, Direction, Links, law
+from catenary.solver.model.links.links import BOTH, NO_BENDS, PULLS, Bends, Direction, Links, law
 from catenary.solver.model.loads import Load
 from catenary.solver.model.model import Block, Hanging, Model, wire_elements
 from catenary.solver.model.unknowns.stations import SAME_STATION
@@ -115,19 +115,24 @@ class ModelBuilder:
         self.model.hanging.append(Hanging(unknowns, mass[:, None] * weights))
 
     def add_links(
-        self, component: str, direction: Direction, law: np.ndarray, of_shape: bool = False
+        self,
+        component: str,
+        direction: Direction,
+        law: np.ndarray,
+        of_shape: bool = False,
+        bends: Bends = NO_BENDS,
     ) -> Links:
         """Links with directions and laws as `model.links` makes them; of ``of_shape`` see `Block`.
 
-        Those that act one way are followed in the time loop; what stands open at rest is no part of
-        K. Their forces at rest are the rest shape's: no weight is added here.
+        Those that act one way are followed in the time loop, and those that bend; what stands open
+        at rest is no part of K. Their forces at rest are the rest shape's: no weight is added here.
 
         Raises
         ------
         ValueError
             If further links of one sign are named like the droppers, whose channel they are not of.
         """
-        model, links = self.model, Links(component, direction, law, of_shape)
+        model, links = self.model, Links(component, direction, law, of_shape, bends)
         if model.droppers is not None and component == model.droppers.component:
             if (law["acts"] != BOTH).any():
                 raise ValueError(f"links of one sign need a name of their own, not {component}")

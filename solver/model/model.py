@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from catenary.meshgen.mesh import LineMesh
+from catenary.meshgen.slopes import Slopes
 from catenary.meshgen.wires import Role
 from catenary.solver.model.links.links import Links
 from catenary.solver.model.loads import Load
@@ -97,7 +98,8 @@ class Model:
     blocks : element blocks; their sums are M and K
     constrained : (n,) int, unknowns held at zero, and numbers that are no node's
     dropper_lengths : (n_droppers,) unstretched [m]
-    dropper_stiffness, dropper_damping : (n_droppers,) [N/m], [N s/m], of the taut dropper
+    dropper_stiffness, dropper_damping : (n_droppers,) [N/m], [N s/m], of the taut dropper, about
+        its tension in ``form``
     released_damping : (n_droppers,) the part of ``dropper_damping`` that goes slack with the spring
     broken : (n_droppers,) droppers that carry nothing; what they weigh stays on their clamps
     missing : (n_droppers,) those of them that are not there at all
@@ -168,13 +170,37 @@ class Model:
         """Numbers of one unknown at mesh nodes, shape as ``nodes``; ValueError if one has none."""
         return self.numbering.of(nodes, unknown)
 
+    @cached_property
+    def dropper_slopes(self) -> Slopes:
+        """Tension over stretch of the droppers as they are cut, sound ones and broken ones."""
+        groups = [group.kind for group in self.problem.line.droppers]
+        found = np.zeros(
+            (3, self.mesh.droppers.shape[0], max((k.n_pieces for k in groups), default=1))
+        )
+        for number, kind in enumerate(groups):
+            mine = self.mesh.dropper_group == number
+            own = np.stack(kind.slopes_at(self.dropper_lengths[mine]))
+            # The last piece again, for those that have fewer.
+            found[:, mine] = np.pad(
+                own, ((0, 0), (0, 0), (0, found.shape[2] - own.shape[2])), "edge"
+            )
+        return Slopes(*found)
+
+    @property
+    def droppers_bend(self) -> bool:
+        """Whether any has several slopes."""
+        return any(group.kind.n_pieces > 1 for group in self.problem.line.droppers)
+
+    @property
+    def dropper_pieces(self) -> Slopes:
+        """The piece of each dropper on which it is at rest, of what is slack there the first."""
+        slopes = self.dropper_slopes
+        force = np.zeros(self.broken.size) if self.form is None else self.form.dropper_force
+        return slopes.at(np.where(self.dropper_gap > 0.0, 0, slopes.piece_under(force)))
+
     @property
     def dropper_stiffness(self) -> np.ndarray:
-        stiffness = np.zeros(self.mesh.droppers.shape[0])
-        for number, group in enumerate(self.problem.line.droppers):
-            mine = self.mesh.dropper_group == number
-            stiffness[mine] = group.kind.stiffness_at(self.dropper_lengths[mine])
-        return np.where(self.broken, 0.0, stiffness)
+        return np.where(self.broken, 0.0, self.dropper_pieces.slope)
 
     def droppers_at(self, places: tuple[float, ...]) -> np.ndarray:
         """Which droppers stand nearest to places [m], (n_droppers,) bool."""

@@ -6,6 +6,11 @@ compensation s = released max(0, -R) beside what K does; for an open link, which
 s = max(0, -R) is its force. Both act on the unknowns with -L s, so that the time loop treats both
 alike: R = rest + k e + c e' with rest, k and c of an open link the negative ones of its law.
 
+A *bend* is where the law of a link has another slope. It is a link of its own, which beyond its
+place adds the change of slope times the way there to what the other link goes on doing as at rest:
+with L where that pulls, with -L where it pushes, so that s = max(0, -R) of each. A table of slopes
+has as many s as bends, and its link carries the sum.
+
 A *rider* is a link of K that carries while its *master* does: what a dropper's force does across it
 goes with the dropper. Where the master has R < 0, its riders get s = -released R, of any sign.
 """
@@ -13,15 +18,16 @@ goes with the dropper. Where the master has R < 0, its riders get s = -released 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
 from catenary.solver.kernels import native
 from catenary.solver.model.links.leaning import swings_of_droppers
-from catenary.solver.model.links.links import BOTH, PUSHES, Links
+from catenary.solver.model.links.links import BOTH, NO_BENDS, PUSHES, Bends, Links
 from catenary.solver.model.model import Model
 
+_SIDES: tuple[Literal["left"], Literal["right"]] = ("left", "right")
 # What a link's reserve is made of, and what it does beyond; see `kernels/motion/links.hpp`.
 RESERVE = native.RESERVE
 
@@ -59,8 +65,11 @@ class LinkTable:
     ----------
     arrays : LinkArrays, in a number all over the line
     components : names of components
-    component, index : (n,) which of these each is of, -1 for riders, and its number there
+    component, index : (n,) which of these each is of, -1 for riders and bends, and its
+        number there
     master : (n,) number of the link that each switches with, for most its own
+    bent : (n,) number of the link that each bends, -1 of others and where that is not followed
+    pulls : (n,) what a unit compensation of a bend adds to the force of its link, 1 or -1
     broken : (n,) whether it carries nothing any longer
     half_length : (n,) how far its unknowns are from its place [m]
     switches : whether any of them does
@@ -71,6 +80,8 @@ class LinkTable:
     component: np.ndarray
     index: np.ndarray
     master: np.ndarray
+    bent: np.ndarray
+    pulls: np.ndarray
     broken: np.ndarray
     half_length: np.ndarray
 
@@ -88,6 +99,15 @@ class LinkTable:
         """(n,) whether each is a link of K that slackens, and no open one that closes."""
         return np.asarray(self.arrays.law["carried"] > 0.0)
 
+    def bends_of(self, numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Numbers of the bends of some links, link by link, and (k + 1,) where those of each
+        begin."""
+        by_link = np.argsort(self.bent, kind="stable")
+        low, high = (np.searchsorted(self.bent[by_link], numbers, side) for side in _SIDES)
+        begin = np.concatenate([[0], np.cumsum(high - low)])
+        own = np.arange(begin[-1]) + np.repeat(low - begin[:-1], high - low)
+        return by_link[own], begin
+
     def of_component(self, name: str) -> np.ndarray:
         """Numbers of a component's links, in its own order."""
         if name not in self.components:
@@ -97,17 +117,17 @@ class LinkTable:
 
 
 def switching_links(model: Model, dropper_force: np.ndarray) -> LinkTable:
-    """Droppers, and all links of one sign; ``dropper_force`` (n_droppers,) at rest [N]. Not
+    """Droppers, all links of one sign, and bends; ``dropper_force`` (n_droppers,) at rest [N]. Not
     collective."""
     parts: list[LinkArrays] = []
     names: list[str] = []
     broken: list[np.ndarray] = []
-    first_dropper = 0
+    firsts: list[int] = []
     free = np.ones(model.n_dofs)
     free[model.constrained] = 0.0
     for links in model.links:
+        firsts.append(sum(part.law.size for part in parts))
         if links is model.droppers:
-            first_dropper = sum(part.law.size for part in parts)
             arrays = _droppers(model, links, dropper_force)
             out = model.broken
         else:
@@ -119,10 +139,32 @@ def switching_links(model: Model, dropper_force: np.ndarray) -> LinkTable:
         broken.append(out)
     sizes = [part.law.size for part in parts]
     own = np.arange(sum(sizes))
-    masters = [own]
+    masters, bent, pulls = [own], [np.full(own.size, -1)], [np.ones(own.size)]
+    # With which link or bend each dropper slackens.
+    slackens = np.zeros(0, dtype=np.int64)
+    for links, first in zip(model.links, firsts, strict=True):
+        bends, slack = links.bends, np.zeros(links.bends.link.size, dtype=bool)
+        alpha = np.full(links.law.size, model.damping_of(links.component)[0])
+        # Those that push are followed turned.
+        given, turned = links.law["acts"] != BOTH, links.law["acts"] == PUSHES
+        numbers = np.where(given, first + np.cumsum(given) - 1, -1)
+        if links is model.droppers:
+            bends, slack = _dropper_bends(model, dropper_force)
+            alpha, slackens = _released_alpha(model), numbers.copy()
+        sign = np.sign(bends.change * bends.side)
+        arrays = _bends(links, bends, alpha[bends.link], sign)
+        arrays.law["carried"][slack] = 1.0
+        masters.append(sum(part.law.size for part in parts) + np.arange(slack.size))
+        slackens[bends.link[slack]] = masters[-1][slack]
+        parts.append(arrays._replace(weights=arrays.weights * free[arrays.unknowns]))
+        bent.append(numbers[bends.link])
+        pulls.append(np.where(turned[bends.link], -sign, sign))
+        broken.append(np.zeros(slack.size, dtype=bool))
     for arrays, droppers in _riders(model):
         parts.append(arrays._replace(weights=arrays.weights * free[arrays.unknowns]))
-        masters.append(first_dropper + droppers)
+        masters.append(slackens[droppers])
+        bent.append(np.full(droppers.size, -1))
+        pulls.append(np.ones(droppers.size))
         broken.append(np.zeros(droppers.size, dtype=bool))
     # Two at least, which kernels take without a loop.
     m = max((part.unknowns.shape[1] for part in parts), default=2)
@@ -144,10 +186,17 @@ def switching_links(model: Model, dropper_force: np.ndarray) -> LinkTable:
     arrays = arrays.of(order)
     x = model.numbering.as_vector(model.mesh.points[:, :1])
     half_length = np.abs(x[arrays.unknowns] - arrays.law["place"][:, None]).max(axis=1)
-    out = np.concatenate(broken)[order]
-    masters_there = place_of[master[order]]
+    bends_of = np.concatenate(bent)[order]
     return LinkTable(
-        arrays, distinct, component[order], index[order], masters_there, out, half_length
+        arrays,
+        distinct,
+        component[order],
+        index[order],
+        place_of[master[order]],
+        np.where(bends_of < 0, -1, place_of[bends_of]),
+        np.concatenate(pulls)[order],
+        np.concatenate(broken)[order],
+        half_length,
     )
 
 
@@ -156,7 +205,8 @@ def _droppers(model: Model, links: Links, force: np.ndarray) -> LinkArrays:
     law["rest"] = np.where(model.broken, 0.0, force)
     law["stiffness"], law["damping"] = links.law["stiffness"], model.released_damping
     law["place"], law["carried"] = links.law["place"], 1.0
-    law["released"] = 1.0 - kept
+    # Where another bend is nearer at rest than that of slackness, this is a bend, too.
+    law["released"] = np.where(model.dropper_pieces.begin > 0.0, 0.0, 1.0 - kept)
     # One that is slack at rest stands open: its reserve is what it lacks to be taut.
     slack = (model.dropper_gap > 0.0) & ~model.broken
     law["rest"][slack] = (model.dropper_gap * law["stiffness"])[slack]
@@ -164,6 +214,47 @@ def _droppers(model: Model, links: Links, force: np.ndarray) -> LinkArrays:
     law["damping"][slack] *= -1.0
     law["carried"][slack] = -kept
     return LinkArrays(*links.direction, law)
+
+
+def _released_alpha(model: Model) -> np.ndarray:
+    """Damping of droppers that goes slack with their springs over their stiffness, (n_droppers,)
+    [s]."""
+    stiffness = model.dropper_stiffness
+    none = np.zeros(stiffness.size)
+    return np.divide(model.released_damping, stiffness, out=none, where=stiffness > 0.0)
+
+
+def _dropper_bends(model: Model, force: np.ndarray) -> tuple[Bends, np.ndarray]:
+    """Bends of droppers with several slopes, and which of them slacken (k,).
+
+    A dropper whose spring is at rest on another piece than the first slackens with a bend.
+    """
+    slopes, on, kept = model.dropper_slopes, model.dropper_pieces, model.simulated.kept_ratio
+    if not (model.droppers_bend and model.simulated.slackening):
+        return NO_BENDS, np.zeros(0, dtype=bool)
+    rest = np.where(
+        model.dropper_gap > 0.0, -model.dropper_gap, on.begin + (force - on.force) / on.slope
+    )
+    side = np.where(slopes.begin > on.begin[:, None], 1.0, -1.0)
+    # Below the first piece is what a slack dropper keeps.
+    less = np.concatenate([kept * slopes.slope[:, :1], slopes.slope[:, :-1]], axis=1)
+    change = side * (slopes.slope - less)
+    bends = (change != 0.0) & ~model.broken[:, None]
+    bends[:, 0] &= on.begin > 0.0
+    link, piece = np.nonzero(bends)
+    stretch = (slopes.begin - rest[:, None])[bends]
+    return Bends(link, stretch, side[bends], change[bends]), piece == 0
+
+
+def _bends(links: Links, bends: Bends, alpha: np.ndarray, sign: np.ndarray) -> LinkArrays:
+    """Bends as links: ``sign`` (k,) of the force by which each acts beyond, ``alpha`` (k,) damping
+    over stiffness [s]."""
+    law = np.zeros(bends.link.size, dtype=RESERVE)
+    law["rest"] = bends.side * np.abs(bends.change) * bends.stretch
+    law["stiffness"], law["damping"] = -bends.change, -alpha * bends.change
+    law["place"], law["released"] = links.law["place"][bends.link], 1.0
+    unknowns, weights = links.direction
+    return LinkArrays(unknowns[bends.link], sign[:, None] * weights[bends.link], law)
 
 
 def _riders(model: Model) -> list[tuple[LinkArrays, np.ndarray]]:
@@ -175,8 +266,7 @@ def _riders(model: Model) -> list[tuple[LinkArrays, np.ndarray]]:
         own = np.flatnonzero((stiffness > 0.0) & ~model.broken & (model.dropper_gap <= 0.0))
         law = np.zeros(own.size, dtype=RESERVE)
         law["stiffness"] = stiffness[own]
-        alpha = model.released_damping[own] / model.dropper_stiffness[own]
-        law["damping"] = alpha * law["stiffness"]
+        law["damping"] = _released_alpha(model)[own] * law["stiffness"]
         law["place"] = model.droppers.law["place"][own]
         law["released"] = 1.0 - model.simulated.kept_ratio
         if law["released"].any():

@@ -191,8 +191,7 @@ class March:
         before, line, scheme = self._changed, self._line, self._scheme
         after, step = changed_line(self._first, self._form, happened.incidents), happened.step
         moving = line.displacement, line.velocity
-        kept_ratio = self._first.simulated.kept_ratio
-        jump = acceleration_jump(self._comm, self.ownership, before, after, moving, kept_ratio)
+        jump = acceleration_jump(self._comm, self.ownership, before, after, moving)
         try:
             self._set_up(after)
             # What the method keeps besides the state moves with the acceleration.

@@ -43,10 +43,17 @@ LINES: dict[str, tuple[str, list[str], tuple[str, ...]]] = {
     "overlap": ("overlap", ["line.overlap.first_span=4"], ("contact_wire", "messenger_wire")),
 }
 LATERAL = ["effects.lateral_motion=true"]
+# Droppers of some 60 N at rest that soften to both sides of it.
+BENT = [
+    "line.dropper.stiffness_N_per_m=",
+    "line.dropper.curve=[[0,0],[5e-4,20],[8e-4,80],[3e-3,120],[4e-3,600]]",
+]
 PLANES = {
     "vertical": [],
     "lateral": LATERAL,
     "axial": ["effects.axial_motion=true"],
+    "curves": BENT,
+    "curves in three planes": [*LATERAL, *BENT],
     "gusts": [
         *LATERAL,
         "wind={speed_m_per_s=30,direction_deg=110,drag='quadratic',gusts={highest_hz=2}}",
@@ -56,6 +63,7 @@ PLANES = {
 CHOSEN = [
     *((name, plane) for name in LINES for plane in ("vertical", "all")),
     *(("simple", plane) for plane in ("lateral", "axial", "gusts")),
+    *(("simple", plane) for plane in ("curves", "curves in three planes")),
 ]
 
 

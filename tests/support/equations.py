@@ -18,10 +18,11 @@ _NEVER_LESS = 1e-9  # [N]
 class Residual(Observer):
     """Observer of a march without incidents: the largest of what is left of
 
-        M a + C v + K u + sum of s L - sum of f N,    s = (1 - r) max(0, -T)
+        M a + C v + K u + sum of s L - sum of f N,    s = T - T' + (1 - r) max(0, -T)
 
     in terms of the largest sum of the terms' sizes. T is a dropper's tension as if it could push,
-    with its damping; f are the recorded contact forces.
+    by its curve and with its damping, T' that by its slope at rest; f are the recorded contact
+    forces.
     """
 
     def __init__(self, rest: LineAtRest) -> None:
@@ -36,6 +37,7 @@ class Residual(Observer):
         self._stiffness, self._damping = model.dropper_stiffness, model.dropper_damping
         slackens = "dropper_slackening" in rest.problem.effects
         self._released = 1.0 - model.simulated.kept_ratio if slackens else 0.0
+        self._curves = model.dropper_slopes if slackens and model.droppers_bend else None
         self._held = model.constrained
 
     def next_state(self, step: int) -> int:
@@ -54,6 +56,10 @@ class Residual(Observer):
         spread, rate = (x[self._ends[:, 0]] - x[self._ends[:, 1]] for x in motion[:2])
         tension = self._tension + self._stiffness * spread + self._damping * rate
         slack = self._released * np.maximum(0.0, -tension)
+        if self._curves is not None:
+            at = self._curves.stretch_under(self._tension) + spread
+            own = self._curves.force_at(at + self._damping / self._stiffness * rate)
+            slack = own - tension + self._released * np.maximum(0.0, -own)
         np.add.at(left, self._ends[:, 0], slack)
         np.subtract.at(left, self._ends[:, 1], slack)
         n = self._wires.n_wires

@@ -101,12 +101,11 @@ def _droppers(scene: Scene, line: Line, group: Droppers) -> dict[str, Any]:
 
 
 def _kind(kind: DropperKind) -> dict[str, Any]:
-    stiff = (
-        {"axial_stiffness_N": kind.axial_stiffness}
-        if kind.stiffness is None
-        else {"stiffness_N_per_m": kind.stiffness}
-    )
-    return stiff | {
+    curve = None if kind.curve is None else [list(point) for point in kind.curve]
+    return {
+        "stiffness_N_per_m": kind.stiffness,
+        "axial_stiffness_N": kind.axial_stiffness,
+        "curve": curve,
         "mass_kg_per_m": kind.mass_per_length,
         "messenger_clamp_kg": kind.upper_clamp_mass,
         "contact_clamp_kg": kind.lower_clamp_mass,

@@ -7,6 +7,7 @@ from __future__ import annotations
 import random
 
 from fuzzing_free import masts
+from fuzzing_line import strands
 
 Words = dict[str, object]
 _NOW_AND_THEN = 0.2
@@ -113,8 +114,7 @@ def _sags(rng: random.Random, words: Words) -> None:
     if not words.get("line.auxiliary_wire"):
         return
     if rng.random() < 0.5:
-        words[f"{hung}.stiffness_N_per_m"] = ""
-        words[f"{hung}.axial_stiffness_N"] = 10 ** rng.uniform(4.0, 6.3)
+        strands(rng, words, hung)
     if "patterns" in str(words["line.auxiliary_wire"]):
         words[f"{hung}.patterns.0.pre_sag_mm"] = [0.0] * (
             str(words["line.auxiliary_wire"])

@@ -6,6 +6,8 @@ import random
 import re
 from itertools import accumulate, pairwise
 
+from fuzzing_line import strands
+
 Words = dict[str, object]
 _NOW_AND_THEN = 0.3
 
@@ -62,6 +64,7 @@ def _droppers(
 ) -> None:
     """Droppers in some of the spans, or by their places along the line."""
     key, places = links["droppers"], masts(words)
+    strands(random.Random(str(words["line.links"])), words, key)
     _, patterns, listed = str(words["line.links"]).partition("patterns=[")
     if patterns:
         count = listed.partition("positions_m=[")[2].partition("]")[0].count(",") + 1

@@ -41,8 +41,23 @@ def droppers(rng: random.Random, words: Words, span: float) -> None:
     if count > 2:  # of two there is none in between
         # Thousandths of a millimetre are taken for metres.
         words["line.dropper.pre_sag_mid_mm"] = sag if abs(sag) > 1.0 else 0.0
-    words["line.dropper.stiffness_N_per_m"] = ""
-    words["line.dropper.axial_stiffness_N"] = 10 ** rng.uniform(4.0, 6.3)
+    strands(rng, words, "line.dropper")
+
+
+def strands(rng: random.Random, words: Words, hung: str) -> None:
+    """Droppers of a table as strands with a modulus, or with a curve that softens and stiffens."""
+    stiffness = 10 ** rng.uniform(4.0, 6.3)
+    own = random.Random(stiffness)
+    words[f"{hung}.stiffness_N_per_m"] = ""
+    if own.random() < 0.7:
+        words[f"{hung}.axial_stiffness_N"] = stiffness
+        return
+    points = [[0.0, 0.0]]
+    for _ in range(own.randint(1, 4)):
+        tension = points[-1][1] + 10 ** own.uniform(0.7, 2.3)
+        strain = (tension - points[-1][1]) / (stiffness * 10 ** own.uniform(-0.3, 0.7))
+        points.append([points[-1][0] + strain, tension])
+    words[f"{hung}.curve"] = points
 
 
 def clamps(rng: random.Random, words: Words, span: float) -> None:

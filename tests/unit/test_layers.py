@@ -30,8 +30,8 @@ LEAVES = {
 # The rooms of each part from below to above: each imports only itself and those before it. A file
 # beside sub-packages is a room of its own.
 ROOMS = {
-    "meshgen": ("spans", "curve", "wires", "hardware", "line", "slowest_wave", "mesh", "topologies",
-        "geometry", "chains", "division", "gmsh_lines", "reader", "build"),
+    "meshgen": ("spans", "curve", "wires", "slopes", "hardware", "line", "slowest_wave", "mesh",
+                "topologies", "geometry", "chains", "division", "gmsh_lines", "reader", "build"),
     "mbs": (
         "frame", "interface", "rigid", "time_steps", "vehicle", "control", "head", "air",
         "mechanism",

@@ -30,9 +30,10 @@ from stops import (
 )
 
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE, LineMesh
+from catenary.solver.effects.effect import Effect
 from catenary.solver.model.builder import ModelBuilder
 from catenary.solver.model.links.directions import at_nodes
-from catenary.solver.model.links.links import BOTH, PULLS, law
+from catenary.solver.model.links.links import BOTH, NO_BENDS, PULLS, PUSHES, Bends, law
 from catenary.solver.problem.problem import Damping, Problem
 from catenary.solver.schemes.monolithic_system import WholeSystem
 from catenary.solver.statics.form_finding.equilibrium import find_form
@@ -277,3 +278,60 @@ def test_what_is_shown_is_by_component(recorded: None) -> None:
     history: History = march(problem, mesh, stop_force)
     assert all(force.shape == (mesh.steady_arms.size,) for force, _ in history.watched)
     assert STOPS == "uplift_stops"
+
+
+# Gap [m] and stiffness [N/m] of stops at the arms, and what there is more of it from where on.
+FIRST, MORE = (2e-4, 3e4), (6e-4, 9e4)
+
+
+def _bent(acts: int, second: bool) -> Effect:
+    """Stops at the arms that stiffen, by a bend or by a ``second`` stop each; with ``acts`` of
+    ``BOTH`` springs there that carry nothing where they are shorter, by a bend or as links that
+    only pull."""
+
+    def build(builder: ModelBuilder) -> None:
+        arms = builder.mesh.steady_arms
+        x, at = builder.mesh.x(arms), at_nodes(builder.model, arms)
+        links, one = np.arange(x.size), np.ones(x.size)
+        if acts == BOTH:
+            bends = NO_BENDS if second else Bends(links, 0.0 * one, -one, -FIRST[1] * one)
+            laws = law(x, FIRST[1], acts=PULLS if second else BOTH)
+            builder.add_links(STOPS, at, laws, bends=bends)
+            return
+        laws, side = law(x, FIRST[1], acts=acts, gap=FIRST[0]), one if acts == PULLS else -one
+        if second:
+            builder.add_links(STOPS, at, laws)
+            builder.add_links("more", at, law(x, MORE[1], acts=acts, gap=MORE[0]))
+            return
+        bends = Bends(links, side * MORE[0], side, MORE[1] * one)
+        builder.add_links(STOPS, at, laws, bends=bends)
+
+    return Effect("bent", "links with a bend", "a link each", "test", False, build=build)
+
+
+@pytest.mark.parametrize("acts", [PULLS, PUSHES, BOTH])
+def test_a_link_with_a_bend_is_two_links_or_one_that_slackens(
+    acts: int, request: pytest.FixtureRequest
+) -> None:
+    """In forces of contacts and droppers, and in energy; and what is shown is the sum."""
+    if acts != BOTH:
+        request.getfixturevalue("recorded")
+    found = []
+    for second in (False, True):
+        with registered(_bent(acts, second)):
+            problem, mesh = scene({"bent"})
+            found.append(march(problem, mesh, lambda view: view.energies()))
+    for channel in ("contact_force", "dropper_force"):
+        check(channel, found[0][channel], found[1][channel], within=1e-8)
+    check("energy [J]", found[0].watched, found[1].watched, within=1e-10)
+    if acts == BOTH:
+        assert (np.abs(found[0]["arm_uplift"]) > 1e-4).any()
+        return
+    with registered(_bent(acts, False)):
+        problem, mesh = scene({"bent"}, damping=Damping(0.0, 0.0))
+        seen = march(problem, mesh, stop_force)
+    way = seen["arm_uplift"] * (1.0 if acts == PULLS else -1.0)
+    expected = sum(k * np.maximum(0.0, way - gap) for gap, k in (FIRST, MORE))
+    assert (way > MORE[0]).sum() > 5
+    force = np.array([force for force, _ in seen.watched])
+    check("forces of stops [N]", force, expected, within=1e-9 * expected.max())

@@ -207,7 +207,7 @@ def test_a_slack_dropper_that_breaks_takes_its_damper_along(scheme: str) -> None
     first, later = unchanged(model, form), changed_line(model, form, (incident,))
     ownership = distribute(model, COMM.size, COMM.rank)
     moving = state["displacement"], state["velocity"]
-    jump = acceleration_jump(COMM, ownership, first, later, moving, 0.0)
+    jump = acceleration_jump(COMM, ownership, first, later, moving)
     # The line loses the damper's force and nothing else: the spring carried none.
     force = np.zeros(model.n_dofs)
     force[upper], force[lower] = pushed, -pushed

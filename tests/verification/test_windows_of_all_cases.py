@@ -34,6 +34,8 @@ ALONG = ("effects.axial_motion=true", "line.contact_wire.axial_stiffness_N=1e7",
          "line.steady_arm.length_m=1.2")  # fmt: skip
 TWO = "train.pantographs=[{name='three_masses'},{name='three_masses',behind_m=100}]"
 BEHIND = ("train.start_m=250",)
+CURVES = ("line.dropper.stiffness_N_per_m=",
+          "line.dropper.curve=[[0,0],[5e-4,20],[1e-3,80],[3e-3,120],[4e-3,600]]")  # fmt: skip
 SCENES: dict[str, tuple[str, tuple[str, ...]]] = {
     "ambrosio2012": ("ambrosio2012", SPANS),
     "en50318_2002": ("en50318_2002", SPANS),
@@ -47,6 +49,8 @@ SCENES: dict[str, tuple[str, tuple[str, ...]]] = {
     "shinkansen_compound": ("shinkansen_compound", SPANS),
     "tramway": ("tramway", SPANS),
     "windy_viaduct": ("windy_viaduct", ()),
+    "dropper curves": ("ac_simple", (*SPANS, *CURVES)),
+    "dropper curves and incidents": ("ac_simple", (*SPANS, *CURVES, *ALONG, BREAKS)),
     "axial motion": (
         "ac_simple", (*SPANS, *ALONG),
     ),

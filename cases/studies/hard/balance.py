@@ -80,13 +80,14 @@ class LineBalance:
         whole = Subdomain(*(0, model.n_dofs) * 3)
         outer = [load for load in model.loads if not isinstance(load, MemoryLoad)]
         self._loads = LineLoads(outer, whole, model.constrained) if outer else None
-        self._share = 0.5 * model.dropper_stiffness * ((1.0 - gamma) * dt) ** 2
+        steepest = model.dropper_slopes.slope.max(axis=1, initial=0.0)
+        self._share = 0.5 * steepest * ((1.0 - gamma) * dt) ** 2
         assert model.droppers is not None
-        self._along, self._stiffness = model.droppers.direction, model.dropper_stiffness
-        self._tension = tension
+        self._along = model.droppers.direction
+        self._rest = model.dropper_slopes.stretch_under(tension)
         hangs = (model.dropper_gap <= 0.0) & ~model.broken
         alpha = np.divide(
-            model.released_damping, self._stiffness, where=hangs, out=np.zeros(hangs.size)
+            model.released_damping, model.dropper_stiffness, where=hangs, out=np.zeros(hangs.size)
         )
         share = np.where(hangs, 1.0 - model.simulated.kept_ratio, 0.0)
         if problem.incidents:  # one that breaks carries nothing either, but is no part of the line
@@ -131,7 +132,7 @@ class LineBalance:
         moved, speed = states["displacement"], states["velocity"]
         lacks, work = np.zeros(len(moved)), np.zeros(len(moved) - 1)
         # Stored energy knows of no dampers.
-        loose = self._tension + self._stiffness * _stretch(self._along, moved) < 0.0
+        loose = self._rest + _stretch(self._along, moved) < 0.0
         before, after = self.weights
         for direction, pull, alpha in self._swings:
             across = _stretch(direction, moved)

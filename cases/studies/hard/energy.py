@@ -55,7 +55,7 @@ def _leaves(
     mesh, line = rest.model.mesh, rest.problem.line
     if isinstance(incident, DropperBreak):
         number = int(np.argmin(np.abs(mesh.x(mesh.droppers[:, 1]) - incident.x)))
-        return float(force[number] ** 2 / (2.0 * rest.model.dropper_stiffness[number]))
+        return float(rest.model.dropper_slopes.energy_under(force)[number])
     before = shares.get(incident.wire, 1.0)
     shares[incident.wire] = incident.share
     dofs, length = rest.model.wire_elements(incident.wire)

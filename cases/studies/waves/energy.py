@@ -12,8 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from catenary.meshgen.mesh import LineMesh
+from catenary.meshgen.mesh import DROPPERS, LineMesh
 from catenary.solver.model.matrices import whole_matrix
+from catenary.solver.model.switching_links import switching_links
 from catenary.solver.statics.line_at_rest import LineAtRest
 
 # Length of the stretches of line that energy is summed over [m].
@@ -96,12 +97,12 @@ class EnergyMotion:
             place[numbers] = self._x
         last = self._middles.size - 1
         self._stretch = np.clip(((place - edges[0]) // STRETCH).astype(int), 0, last)
-        # A slack dropper stores nothing but what its weight does: see `_slack`.
-        self._upper, self._lower = mesh.droppers.T
-        self._dropper_stretch = self._stretch[self._deflection[self._lower]]
-        self._dropper_stiffness = model.dropper_stiffness
-        self._tension = rest.form.dropper_force
-        self._goes_slack = (1.0 - model.simulated.kept_ratio) if model.simulated.slackening else 0.0
+        # Droppers and their bends: see `_switched`.
+        table = switching_links(model, rest.form.dropper_force)
+        owner = np.where(table.bent < 0, np.arange(table.bent.size), table.bent)
+        mine = np.isin(owner, table.of_component(DROPPERS)) & ~table.rides & ~table.broken
+        self._links = table.arrays.of(mine & (table.arrays.law["released"] > 0.0))
+        self._link_stretch = self._stretch[self._links.unknowns[:, 0]]
         self._before: tuple[float, np.ndarray] | None = None
         self._times: list[float] = []
         self._rows: list[np.ndarray] = []
@@ -124,7 +125,7 @@ class EnergyMotion:
         energy = 0.5 * (d * (self._stiffness @ d) + v * (self._mass @ v))
         n = self._middles.size
         density = np.bincount(self._stretch, energy, n)
-        density += np.bincount(self._dropper_stretch, self._slack(uplift), n)
+        density += np.bincount(self._link_stretch, self._switched(d), n)
         return density / STRETCH
 
     def _vector(self, values: np.ndarray) -> np.ndarray:
@@ -136,18 +137,17 @@ class EnergyMotion:
             vector[self._slope[nodes]] = spline(self._x[nodes], 1)
         return vector
 
-    def _slack(self, uplift: np.ndarray) -> np.ndarray:
-        """What the energy of slack droppers differs by from k e^2 / 2 [J], (n_droppers,).
+    def _switched(self, d: np.ndarray) -> np.ndarray:
+        """What the energy of droppers differs by from k e^2 / 2 as they are slack, or on another
+        slope of their curve than at rest, by link and bend [J].
 
         A dropper of tension N at rest and stretch e beyond it has (N + k e)^2 / 2 k - N^2 / 2 k -
         N e, the last term being the work of the weights: k e^2 / 2 if it pulls, -N^2 / 2 k - N e if
         not.
         """
-        k, n = self._dropper_stiffness, self._tension
-        stretch = uplift[self._upper] - uplift[self._lower]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            less = -0.5 * (n + k * stretch) ** 2 / k
-        return np.where((n + k * stretch < 0.0) & (k > 0.0), self._goes_slack * less, 0.0)
+        unknowns, weights, law = self._links
+        beyond = law["rest"] + law["stiffness"] * (weights * d[unknowns]).sum(axis=1)
+        return -law["released"] * np.minimum(beyond, 0.0) ** 2 / (2.0 * law["stiffness"])
 
 
 def _pieces(mesh: LineMesh) -> list[np.ndarray]:

@@ -83,8 +83,11 @@ def obstacles_of(rest: LineAtRest) -> list[Obstacle]:
         half = 0.5 * group.kind.mass_per_length * length if "dropper_mass" in on else 0.0
         clamps = [group.kind.lower_clamp_mass, group.kind.upper_clamp_mass]
         masses = [half + (clamp if "clamp_mass" in on else 0.0) for clamp in clamps]
-        k = float(group.kind.stiffness_at(np.array([length]))[0])
-        part = replace(group, upper_x=(HALF,), lower_x=(HALF,))
+        slopes = group.kind.slopes_at(np.array([length]))
+        tension = np.median(rest.form.dropper_force[mine], keepdims=True)
+        k = float(slopes.at(slopes.piece_under(tension)).slope[0])
+        spring = replace(group.kind, stiffness=k, axial_stiffness=None, curve=None)
+        part = replace(group, kind=spring, upper_x=(HALF,), lower_x=(HALF,))
         found.append(
             Obstacle(
                 f"{group.name} ({length:.2f} m)", Bench(wires, (part,), length),

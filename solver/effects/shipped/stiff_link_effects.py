@@ -23,7 +23,7 @@ NAME = "stiff_link_damping"
 # A link is stiff from k dt^2 = 4 kappa m on, with some 0.25 kg of wire that move with its ends
 # within a step: kappa = 0.2. Undamped lines gained energy at 0.25, over 4 km (docs/hard_cases.md).
 STIFF = 0.22  # k dt^2 [N s2/m]
-# Length of droppers whose stiffness is given by EA and which are not cut yet, a short one [m].
+# Length of droppers whose stiffness goes with it and which are not cut yet, a short one [m].
 _SHORT = 0.3
 
 
@@ -32,11 +32,7 @@ def _one_sided(problem: Problem) -> Iterator[tuple[str, float]]:
     line = problem.line
     if "dropper_slackening" in problem.effects:
         for group in line.droppers:
-            kind = group.kind
-            if kind.stiffness is not None:
-                yield group.name, kind.stiffness
-            elif kind.axial_stiffness is not None:
-                yield group.name, kind.axial_stiffness / _SHORT
+            yield group.name, group.kind.stiffest_at(_SHORT)
     if "uplift_stops" in problem.effects:
         kinds = [arms.kind for arms in line.steady_arms if arms.kind.uplift_stop is not None]
         if kinds:

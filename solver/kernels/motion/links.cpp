@@ -49,6 +49,15 @@ void forces_within(const Motion& motion, const Links& links, int64_t begin, int6
     });
 }
 
+void add_bends(const Motion& motion, const Riders& bends, int64_t begin, int64_t end,
+               std::span<double> result) {
+    if (bends.links.law.empty()) return;
+    for (int64_t link = begin; link < end; ++link)
+        for (int64_t b = bends.begin[link]; b < bends.begin[link + 1]; ++b)
+            result[link] -=
+                bends.links.law[b].released * std::min(reserve_of(b, bends.links, motion), 0.0);
+}
+
 double energy_of_switching(std::span<const double> displacement, const Links& links,
                            const Riders& riders, int64_t begin, int64_t end) {
     auto stretch_of = [&](const Links& of, int64_t link) {

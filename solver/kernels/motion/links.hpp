@@ -21,7 +21,7 @@ struct Links {
     CATENARY_RECORD(unknowns, weights, law)
 };
 
-/// What goes with links that switch: those from begin[d] to begin[d + 1] go with link d.
+/// What goes with links: those from begin[d] to begin[d + 1] go with link d.
 struct Riders {
     Links links;
     std::span<const int64_t> begin;
@@ -53,6 +53,10 @@ void reserves(const Motion& motion, const Links& links, std::span<double> result
 /// Fill in the forces of links from `begin` to `end` [N], positive where they pull.
 void forces_within(const Motion& motion, const Links& links, int64_t begin, int64_t end,
                    std::span<double> result);
+/// Add what bends of links from `begin` to `end` do beyond them to forces [N]; of a bend that
+/// pushes `released` is below zero.
+void add_bends(const Motion& motion, const Riders& bends, int64_t begin, int64_t end,
+               std::span<double> result);
 /// What elastic energy lacks where links from `begin` to `end` have switched, and what goes with
 /// them [J], were they springs.
 double energy_of_switching(std::span<const double> displacement, const Links& links,

@@ -8,9 +8,12 @@ void show(const Shown& shown, std::span<double> uplift, std::span<double> droppe
     const auto first = shown.columns.first[begin], last = shown.columns.last[end];
     for (int64_t i = first[kArms]; i < last[kArms]; ++i)
         uplift[i] = displacement_at(shown.arms[i], shown.motion);
-    forces_within(shown.motion, shown.droppers, first[kDroppers], last[kDroppers], dropper_force);
-    if (!shown.other_force.empty())
-        forces_within(shown.motion, shown.others, first[kOthers], last[kOthers], shown.other_force);
+    const auto& motion = shown.motion;
+    forces_within(motion, shown.droppers, first[kDroppers], last[kDroppers], dropper_force);
+    add_bends(motion, shown.dropper_bends, first[kDroppers], last[kDroppers], dropper_force);
+    if (shown.other_force.empty()) return;
+    forces_within(motion, shown.others, first[kOthers], last[kOthers], shown.other_force);
+    add_bends(motion, shown.other_bends, first[kOthers], last[kOthers], shown.other_force);
 }
 
 bool keep(const KeptMotions& kept, int64_t number, const Motion& motion, const Columns& columns) {

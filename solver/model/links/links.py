@@ -3,6 +3,8 @@
 The stretch of a link is e = L d, a sum of m displacements times weights. Its law is
 T = rest + k e + c e', and it acts on the unknowns with -L T. A link that only pulls has no T < 0,
 one that only pushes no T > 0. With a gap a link stands open at rest: it is then no part of K.
+Where its stiffness changes besides, it has bends: beyond one its force differs from what it would
+be by a slope times the way beyond.
 """
 
 from __future__ import annotations
@@ -36,6 +38,27 @@ class Direction(NamedTuple):
     weights: np.ndarray
 
 
+class Bends(NamedTuple):
+    """Where the laws of links have another slope.
+
+    Attributes
+    ----------
+    link : (k,) number of the link
+    stretch : (k,) where its law bends, from where it is at rest [m]
+    side : (k,) beyond which it does: 1 if for what is longer, -1 if for what is shorter
+    change : (k,) slope beyond less that before [N/m]
+    """
+
+    link: np.ndarray
+    stretch: np.ndarray
+    side: np.ndarray
+    change: np.ndarray
+
+
+_NONE = np.zeros(0)
+NO_BENDS = Bends(np.zeros(0, dtype=np.int64), _NONE, _NONE, _NONE)
+
+
 @dataclass(frozen=True)
 class Links:
     """Links of one component of the line.
@@ -46,12 +69,14 @@ class Links:
     direction : Direction of each
     law : (n,) records of ``LAW``
     of_shape : whether form finding finds their forces at rest; those of others are given
+    bends : Bends beside the one where a link of one sign switches
     """
 
     component: str
     direction: Direction
     law: np.ndarray
     of_shape: bool = False
+    bends: Bends = NO_BENDS
 
     @property
     def stiffness_matrices(self) -> np.ndarray:

@@ -38,6 +38,7 @@ from typing import Any
 
 import numpy as np
 
+from catenary.meshgen.mesh import DROPPERS
 from catenary.solver.base.errors import InputError, RunBroken
 from catenary.solver.effects import all_effects as effects
 from catenary.solver.effects.build_model import build
@@ -46,13 +47,13 @@ from catenary.solver.linear.step_operators import LineOperators
 from catenary.solver.linear.unit_responses import Windows
 from catenary.solver.model.elements import beam
 from catenary.solver.model.entries import iterate_entries
-from catenary.solver.model.links.leaning import swings_of_droppers
 from catenary.solver.model.links.links import Direction
 from catenary.solver.model.loads import ShapeLoad
 from catenary.solver.model.matrices import whole_matrix
 from catenary.solver.model.model import Model, wire_elements
 from catenary.solver.model.partition import Ownership
 from catenary.solver.model.rest.rest_shape import Equilibrium
+from catenary.solver.model.switching_links import switching_links
 from catenary.solver.model.wire_ends import tensioned_ends
 from catenary.solver.problem.incidents import DropperBreak, LineIncident
 from catenary.solver.statics.changed_line.potential import Potential
@@ -115,14 +116,13 @@ def changed_line(first: Model, form: Equilibrium, incidents: Sequence[LineIncide
             pull = np.einsum("nij,nj->ni", beam.stiffness(length, 0.0, lost), shape)
             np.add.at(load, dofs, -pull)
             energy += 0.5 * float((shape * pull).sum())
-    rest = form.dropper_force[broken]
     unknowns, weights = _droppers(model, broken)
-    np.add.at(load, unknowns, rest[:, None] * weights)
-    stiffness = first.dropper_stiffness[broken]
+    np.add.at(load, unknowns, form.dropper_force[broken, None] * weights)
+    stored = first.dropper_slopes.energy_under(form.dropper_force)
     # One that was slack at rest held the energy of what it keeps of its stiffness.
-    stiffness[first.dropper_gap[broken] > 0.0] *= first.simulated.kept_ratio
-    carried = rest != 0.0
-    energy -= float((rest[carried] ** 2 / (2.0 * stiffness[carried])).sum())
+    keeps = (first.dropper_gap > 0.0) & (stored > 0.0)
+    stored[keeps] /= first.simulated.kept_ratio
+    energy -= float(stored[broken].sum())
     if effects.needs_form(problem):
         model, form, load = _about_rest(first, model, form)
         _break_unstable(model)
@@ -160,7 +160,7 @@ def _about_rest(
     now = replace(form, dropper_force=tension)
     load = whole_matrix(model, stiffness=1.0) @ moved
     there = ChangedLine(model, now, load, 0.0)
-    push = _compensation(there, moved, np.zeros(moved.size), model.simulated.kept_ratio)
+    push = _compensation(there, moved, np.zeros(moved.size))
     return model, now, load - push
 
 
@@ -183,14 +183,12 @@ def acceleration_jump(
     before: ChangedLine,
     after: ChangedLine,
     state: tuple[np.ndarray, np.ndarray],
-    pushed_share: float,
 ) -> np.ndarray:
     """What the acceleration changes by when ``before`` becomes ``after``, owned part. Collective.
 
     Parameters
     ----------
     state : owned displacement and velocity, (n_local,) each [m], [m/s]
-    pushed_share : of what a dropper would push, what it does push
 
     Returns
     -------
@@ -202,42 +200,29 @@ def acceleration_jump(
     for line, sign in ((after, 1.0), (before, -1.0)):
         force -= sign * _times(line.model, ownership, 1.0, 0.0, displacement)
         force -= sign * _times(line.model, ownership, 0.0, 1.0, velocity)
-        push = _compensation(line, displacement, velocity, pushed_share)
+        push = _compensation(line, displacement, velocity)
         force += sign * push[first:last]
     held = after.model.constrained[ownership.owned(after.model.constrained)] - first
     force[held] = 0.0
     return divided_by_mass(comm, ownership, after.model, force)
 
 
-def _compensation(
-    line: ChangedLine, displacement: np.ndarray, velocity: np.ndarray, pushed_share: float
-) -> np.ndarray:
-    """Forces on the line beside those of K and C, of droppers that are slack and of those that were
-    so at rest and are taut, (n_dofs,) [N]."""
-    model = line.model
-    assert model.droppers is not None
-    unknowns, weights = model.droppers.direction
+def _compensation(line: ChangedLine, displacement: np.ndarray, velocity: np.ndarray) -> np.ndarray:
+    """Forces on the line beside those of K and C, of droppers that have switched and of what goes
+    with them, (n_dofs,) [N]."""
+    table = switching_links(line.model, line.form.dropper_force)
+    unknowns, weights, law = table.arrays
     stretch, rate = (
         (weights * values[unknowns]).sum(axis=1) for values in (displacement, velocity)
     )
-    tension = np.where(model.dropper_gap > 0.0, 0.0, line.form.dropper_force)
-    tension += model.dropper_stiffness * (stretch - model.dropper_gap)
-    tension += model.released_damping * rate
-    # One that was slack at rest is no part of K: what it pulls is all compensation.
-    other = np.where(model.dropper_gap > 0.0, -np.maximum(tension, 0.0), np.minimum(tension, 0.0))
-    other[model.broken] = 0.0
-    total = np.zeros(model.n_dofs)
-    np.add.at(total, unknowns, ((1.0 - pushed_share) * other)[:, None] * weights)
-    # What a dropper does across it goes with it.
-    slack = (tension < 0.0) & (model.dropper_gap <= 0.0) & ~model.broken
-    alpha = np.zeros(slack.size)
-    alpha[slack] = model.released_damping[slack] / model.dropper_stiffness[slack]
-    for (unknowns, weights), stiffness in swings_of_droppers(model):
-        across, rate = (
-            (weights * values[unknowns]).sum(axis=1) for values in (displacement, velocity)
-        )
-        gone = np.where(slack, (1.0 - pushed_share) * stiffness * (across + alpha * rate), 0.0)
-        np.add.at(total, unknowns, gone[:, None] * weights)
+    reserve = law["rest"] + law["stiffness"] * stretch + law["damping"] * rate
+    # Other links are the same before and after an incident.
+    owner = np.where(table.bent >= 0, table.bent, table.master)
+    owner = np.where(table.bent[owner] >= 0, table.bent[owner], owner)  # of riders of bends
+    acts = np.isin(owner, table.of_component(DROPPERS)) & ~table.broken[owner]
+    acts &= reserve[table.master] < 0.0
+    total = np.zeros(line.model.n_dofs)
+    np.add.at(total, unknowns[acts], (law["released"] * reserve)[acts, None] * weights[acts])
     return total
 
 

@@ -41,7 +41,6 @@ class Potential:
         self.model, self.known, self._cut = model, known, cut
         self._wires = [_Wire(was, model, wire, known) for wire in model.problem.line.wires]
         self._springs = [b for b in model.blocks if b.stiffness is not None and not b.of_shape]
-        self._stiffness = model.dropper_stiffness
         self._parts = [k for k, name in enumerate(_DROPPER) if name in model.unknowns]
         if not model.simulated.lateral:
             self._parts = [k for k in self._parts if _DROPPER[k] != "v"]
@@ -51,7 +50,8 @@ class Potential:
     def reserve(self, form: Equilibrium) -> np.ndarray:
         """What droppers would carry if they could push, (n_droppers,) [N]."""
         vectors = form.dropper_vectors(self.model.mesh.droppers)
-        return np.asarray(self._stiffness * (np.linalg.norm(vectors, axis=1) - self._cut))
+        stretch = np.linalg.norm(vectors, axis=1) - self._cut
+        return np.where(self.model.broken, 0.0, self.model.dropper_slopes.force_at(stretch))
 
     def form(self, moved: np.ndarray) -> Equilibrium:
         """The shape after a displacement (n_dofs,), forces of droppers as if they could push."""

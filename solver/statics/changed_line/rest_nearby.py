@@ -2,10 +2,10 @@
 
 Newton's method on its potential energy, all planes at once; its tangent is the stiffness of the
 model about each shape, and one step is all that a line needs whose matrices do not depend on its
-shape. Droppers only pull, and wheels of tensioners stand or turn: which ones do is found by
-switching all at once, until nothing switches; should that go round, one at a time from the first
-on, which ends always where shapes are small displacements (K. G. Murty, Linear Algebra Appl. 7,
-1974: the matrix of that problem is positive definite).
+shape and whose droppers have one slope each. Droppers only pull, and wheels of tensioners stand or
+turn: which ones do is found by switching all at once, until nothing switches; should that go round,
+one at a time from the first on, which ends always where shapes are small displacements (K. G.
+Murty, Linear Algebra Appl. 7, 1974: the matrix of that problem is positive definite).
 """
 
 from __future__ import annotations
@@ -87,7 +87,7 @@ class RestNearby:
             If there is none.
         """
         model, potential = self._model, self._potential
-        k = model.dropper_stiffness
+        n = model.broken.size
         switches = self._switches
         slack = switches & (potential.reserve(potential.known) < -_NO_FORCE)
         moved = np.zeros(model.n_dofs)
@@ -99,15 +99,14 @@ class RestNearby:
             turned = [end.changes(form) for end in self._ends]
             if not (wrong.any() or any(turned)):
                 break
-            if again > _ALL_AT_ONCE + 2 * k.size + 2 * len(self._ends):
+            if again > _ALL_AT_ONCE + 2 * n + 2 * len(self._ends):
                 raise InputError(
                     f"the line finds no rest{where(model)}: its droppers or tensioners start and "
                     "stop without end"
                 )
-            chosen = wrong if again < _ALL_AT_ONCE else np.arange(k.size) == np.argmax(wrong)
+            chosen = wrong if again < _ALL_AT_ONCE else np.arange(n) == np.argmax(wrong)
             slack = slack ^ (chosen & wrong)
-        gap = np.zeros(k.size)
-        gap[slack] = -reserve[slack] / k[slack]
+        gap = np.where(slack, -model.dropper_slopes.stretch_under(reserve), 0.0)
         force = np.where(np.abs(reserve) < _NO_FORCE, 0.0, reserve)
         rest = replace(form, dropper_force=self._carried(force, slack))
         return Rest(rest, moved, reserve, gap)
@@ -147,7 +146,7 @@ class RestNearby:
                 lengths = model.dropper_lengths
                 about = build(model.problem, model.mesh, lengths, model.broken, shape)
                 about.constrained = constrained
-            step = self._solved(about, slack, lacks)
+            step = self._solved(about, self._softening(about, form, slack), lacks)
             change = float(np.abs(step).max())
             if not change < _FARTHEST:
                 raise InputError(
@@ -156,7 +155,7 @@ class RestNearby:
                 )
             moved += step
             form = potential.form(moved)
-            if change < _SETTLED or not self._bends:
+            if change < _SETTLED or not (self._bends or model.droppers_bend):
                 return moved, form, slack
         raise InputError(
             f"the line finds no rest{where(model)}: it still moves by {change:.2g} m after "
@@ -168,8 +167,15 @@ class RestNearby:
         known = self._potential.known
         return float(known.along[end.end.node]) if known.along.size else 0.0
 
-    def _solved(self, about: Model, slack: np.ndarray, lacks: np.ndarray) -> np.ndarray:
-        """Displacement under what is lacking (n_dofs,), by the stiffness with droppers slack.
+    def _softening(self, about: Model, form: Equilibrium, slack: np.ndarray) -> np.ndarray:
+        """What droppers in a shape are softer by than the model has them, (n_droppers,) [N/m]."""
+        slopes = about.dropper_slopes
+        now = slopes.at(slopes.piece_under(form.dropper_force)).slope
+        lost = np.where(slack, self._lost * now, 0.0)
+        return np.where(about.broken, 0.0, lost + (about.dropper_stiffness - now))
+
+    def _solved(self, about: Model, softer: np.ndarray, lacks: np.ndarray) -> np.ndarray:
+        """Displacement under what is lacking (n_dofs,), by the stiffness with droppers softer.
 
         Infinite where that is singular.
         """
@@ -179,16 +185,17 @@ class RestNearby:
         if self._matrix is None or self._bends:
             self._matrix = stiffness_matrix(about)
         matrix = self._matrix
-        if slack.any():
+        changed = softer != 0.0
+        if changed.any():
             assert about.droppers is not None
-            unknowns, weights = (part[slack] for part in about.droppers.direction)
+            unknowns, weights = (part[changed] for part in about.droppers.direction)
             rows = np.repeat(np.arange(len(unknowns)), unknowns.shape[1])
             shape = len(unknowns), about.n_dofs
             spread = sparse.csr_matrix((weights.ravel(), (rows, unknowns.ravel())), shape=shape)
             free = np.ones(about.n_dofs)
             free[about.constrained] = 0.0
             spread = spread @ sparse.diags(free)
-            gone = sparse.diags(self._lost * about.dropper_stiffness[slack])
+            gone = sparse.diags(softer[changed])
             matrix = (matrix - spread.T @ gone @ spread).tocsc()
         try:
             return np.asarray(sparse_linalg.splu(matrix.tocsc()).solve(lacks))

@@ -151,9 +151,10 @@ def _noise(problem: Problem, mesh: LineMesh) -> float:
 
 
 def about(model: Model, form: Equilibrium) -> tuple[Model, Equilibrium]:
-    """The model with matrices about its shape at rest, if any effect's are, and that shape; wires
-    that move together share unknowns. Not collective."""
-    if not effects.needs_form(model.problem) and not effects.move_together(model.problem):
+    """The model with matrices about its shape at rest, if any effect's are or droppers have several
+    slopes, and that shape; wires that move together share unknowns. Not collective."""
+    problem = model.problem
+    if not (effects.needs_form(problem) or effects.move_together(problem) or model.droppers_bend):
         return model, form
     return build(model.problem, model.mesh, model.dropper_lengths, form=form), form
 
@@ -166,7 +167,7 @@ def _with_lateral(model: Model, form: Equilibrium, moments: np.ndarray | None) -
     length = np.linalg.norm(vectors, axis=1)
     force = form.dropper_force * length / vectors[:, 2]
     return replace(
-        form, dropper_force=force, dropper_length=length - force / model.dropper_stiffness
+        form, dropper_force=force, dropper_length=length - model.dropper_slopes.stretch_under(force)
     )
 
 
@@ -234,7 +235,7 @@ class _HangingWires:
         lift, first = np.zeros(mesh.steady_arms.size), mesh.droppers.shape[0]
         by_group = np.argsort(mesh.arm_group[holding], kind="stable")
         lift[np.flatnonzero(holding)[by_group]] = held_by[first : first + by_group.size]
-        cut = stretched - force / model.dropper_stiffness
+        cut = stretched - model.dropper_slopes.stretch_under(force)
         return Equilibrium(height, slope, force, cut, arm_lift=lift)
 
     def _solve(self, load: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -16,7 +16,7 @@ from catenary.solver.contact.train.pantographs import Pantographs
 from catenary.solver.integrators.line_state import Motion
 from catenary.solver.kernels import native
 from catenary.solver.model.gauges import Gauges, gauges_of
-from catenary.solver.model.switching_links import NO_LINKS, LinkArrays, padded
+from catenary.solver.model.switching_links import NO_LINKS, LinkArrays, Riders, padded
 from catenary.solver.problem.watched_links import GAUGES
 from catenary.solver.schemes.scheme import Scheme
 from catenary.solver.statics.changed_line.after_incidents import ChangedLine
@@ -48,6 +48,7 @@ class Shown(NamedTuple):
     motion : Motion
     arms : (k,) int, unknowns of vertical displacement at steady arms
     droppers, others : links, all but droppers
+    dropper_bends, other_bends : of these
     other_force : (m,) room for the forces of the latter [N]
     columns : of arms, droppers and others
     """
@@ -56,6 +57,8 @@ class Shown(NamedTuple):
     arms: np.ndarray
     droppers: LinkArrays
     others: LinkArrays
+    dropper_bends: Riders
+    other_bends: Riders
     other_force: np.ndarray
     columns: Columns
 
@@ -105,12 +108,12 @@ class Showing:
         nodes = np.arange(model.mesh.n_nodes, dtype=np.int32)
         self._owned_nodes = nodes[owned(model.dofs(nodes))]
         n_outputs, n_arms = pantographs.outputs.size, self._arm_rows.size
-        self._owned_droppers, droppers = interaction.links.shown(DROPPERS)
+        self._owned_droppers, droppers, dropper_bends = interaction.links.shown(DROPPERS)
         self._shown = np.zeros(n_outputs + n_arms + self._owned_droppers.size)
         _, uplift, tension = np.split(self._shown, [n_outputs, n_outputs + n_arms])
         self._gauges = gauges_of(model)
         self._owned_gauges, watched = _owned_gauges(self._gauges, owned, first)
-        others, other_force, by_name = _further_links(interaction.links, watched)
+        others, other_bends, force, by_name = _further_links(interaction.links, watched)
         at_ends = {name: by_name.pop(name) for name in watched}
         self._sources = Sources(pantographs, interaction, scheme, uplift, tension, by_name, at_ends)
         self.layout = RowLayout(self._sources, self._shown)
@@ -119,7 +122,8 @@ class Showing:
         self._kept_places = np.zeros(0)
         self._row, self._times = np.zeros(self.layout.width), np.zeros(1)
         self._view = self._new_view()
-        self.shown = self._what_is_shown(droppers, others, other_force)
+        links = droppers, others, dropper_bends, other_bends
+        self.shown = self._what_is_shown(*links, force)
         stepped = slice(self._line.ownership.first, self._line.ownership.last)
         load = line.load[stepped] if self._unbalanced else np.zeros(0)
         columns = self.shown.columns
@@ -146,7 +150,12 @@ class Showing:
         )
 
     def _what_is_shown(
-        self, droppers: LinkArrays, others: LinkArrays, other_force: np.ndarray
+        self,
+        droppers: LinkArrays,
+        others: LinkArrays,
+        dropper_bends: Riders,
+        other_bends: Riders,
+        other_force: np.ndarray,
     ) -> Shown:
         """Where a row's values of the line come from, and which change with which stations."""
         window = self._line.window
@@ -155,7 +164,8 @@ class Showing:
             self._line.ownership.n_local,
             None if window is None else window.stations,
         )
-        return Shown(self._line.motion.read, self._arm_rows, droppers, others, other_force, columns)
+        links = droppers, others, dropper_bends, other_bends
+        return Shown(self._line.motion.read, self._arm_rows, *links, other_force, columns)
 
     def stage(self, dt: float, start_time: float, n_steps: int) -> Stage:
         """What stays the same for the whole run."""
@@ -352,17 +362,24 @@ def _owned_gauges(
 
 def _further_links(
     links: FollowedLinks, watched: Mapping[str, LinkArrays]
-) -> tuple[LinkArrays, np.ndarray, dict[str, np.ndarray]]:
-    """Owned links of one sign beside droppers, then gauges, room for their forces [N], and that by
-    component and by what a gauge shows."""
-    parts = {
-        name: links.shown(name)[1] for name in links.table.components if name != DROPPERS
-    } | dict(watched)
+) -> tuple[LinkArrays, Riders, np.ndarray, dict[str, np.ndarray]]:
+    """Owned links of one sign beside droppers, then gauges, bends of these, room for their forces
+    [N], and that by component and by what a gauge shows."""
+    shown = {name: links.shown(name)[1:] for name in links.table.components if name != DROPPERS}
+    parts = {name: own for name, (own, _) in shown.items()} | dict(watched)
     if not parts:
-        return NO_LINKS, np.zeros(0), {}
+        return NO_LINKS, Riders(NO_LINKS, np.zeros(1, dtype=np.int64)), np.zeros(0), {}
+    counts = [np.diff(bends.begin) for _, bends in shown.values()]
+    counts += [np.zeros(part.law.size, dtype=np.int64) for part in watched.values()]
+    added = [bends.links for _, bends in shown.values()] or [NO_LINKS]
+    bends = Riders(_one_after_another(added), np.cumsum(np.concatenate([[0], *counts])))
     width = max(part.unknowns.shape[1] for part in parts.values())
     wide = [padded(part, width) for part in parts.values()]
     ends = np.cumsum([part.law.size for part in wide])
     force = np.zeros(ends[-1])
     by_name = dict(zip(parts, np.split(force, ends[:-1]), strict=True))
-    return LinkArrays(*map(np.concatenate, zip(*wide, strict=True))), force, by_name
+    return _one_after_another(wide), bends, force, by_name
+
+
+def _one_after_another(parts: list[LinkArrays]) -> LinkArrays:
+    return LinkArrays(*map(np.concatenate, zip(*parts, strict=True)))

@@ -35,8 +35,8 @@ ELSEWHERE = re.compile(
             r"line\.links\.\*\.(residual_stiffness_ratio|slack_damping|lower)",
             # Tables of one kind, of which another one is changed here.
             r"line\.(stitch_wire|bridle)\.(section_mm2|youngs_modulus_GPa)",
-            r"line\.auxiliary_wire\.(axial_stiffness_N|dropper\.(count|spacing_m|patterns))",
-            r"line\.links\.\*\.(count|spacing_m)",
+            r"line\.auxiliary_wire\.(axial_stiffness_N|dropper\.(count|spacing_m|patterns|curve))",
+            r"line\.links\.\*\.(count|spacing_m|curve)",
             # A stop that an end meets on its way: test_axial_motion.
             r"line\.tensioner\.stop_stiffness_N_per_m",
         )

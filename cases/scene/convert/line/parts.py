@@ -56,6 +56,7 @@ def dropper_kind(table: HangingTable, lower_clamp: float) -> DropperKind:
         mass_per_length=table.mass_kg_per_m,
         upper_clamp_mass=table.messenger_clamp_kg,
         lower_clamp_mass=lower_clamp,
+        curve=None if table.curve is None else tuple((x, y) for x, y in table.curve),
     )
 
 

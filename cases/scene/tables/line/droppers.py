@@ -4,13 +4,35 @@ from __future__ import annotations
 
 from typing import Annotated, ClassVar, Literal
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
+from catenary.cases.scene.tables.courses import PAIR
 from catenary.cases.scene.tables.line.spans import Span
 from catenary.cases.scene.tables.table import TAKE_AWAY, Table, ascending, exactly_one
 
 PreSag = Annotated[float, Field(ge=-1000, le=1000)]
 DropperPosition = Annotated[float, Field(gt=0, le=500)]
+# Of droppers in tension: the least and the most of EA, or of the slope of a curve [N].
+_LEAST, _MOST = 1.0, 1e9
+
+
+def _is_curve(pairs: list[list[float]]) -> list[list[float]]:
+    if any(pairs[0]):
+        first = ", ".join(f"{number:g}" for number in pairs[0])
+        raise ValueError(f"must begin with strain 0 and tension 0, but begins with {first}")
+    ascending([strain for strain, _ in pairs], "its strains")
+    ascending([tension for _, tension in pairs], "its tensions")
+    for (low, below), (high, above) in zip(pairs, pairs[1:], strict=False):
+        slope = (above - below) / (high - low)
+        if not _LEAST <= slope <= _MOST:
+            raise ValueError(
+                f"must have slopes of {_LEAST:g} to {_MOST:g} N, but has {slope:.3g} N between "
+                f"strains {low:g} and {high:g}"
+            )
+    return pairs
+
+
+Curve = Annotated[list[PAIR], Field(min_length=2, max_length=20), AfterValidator(_is_curve)]
 
 
 class DropperPattern(Table):
@@ -41,7 +63,15 @@ class HangingTable(Table):
         None, ge=1, le=1e9, description="stiffness in tension, the same for every length"
     )
     axial_stiffness_N: float | None = Field(
-        None, ge=1, le=1e9, description="EA; the stiffness is EA over the dropper's length"
+        None, ge=_LEAST, le=_MOST, description="EA; the stiffness is EA over the dropper's length"
+    )
+    curve: Curve | None = Field(
+        None,
+        description="in place of these pairs of strain and tension [N] from 0, 0 on, joined by "
+        "straight lines, the last of which goes on",
+    )
+    curve_file: str | None = Field(
+        None, min_length=1, description="the same pairs as a CSV file, taken in when it is read"
     )
     mass_kg_per_m: float = Field(0.0, ge=0, le=100, description="mass per length")
     messenger_clamp_kg: float = Field(
@@ -63,7 +93,7 @@ class HangingTable(Table):
 
     @model_validator(mode="after")
     def _placed(self) -> HangingTable:
-        exactly_one(self, "stiffness_N_per_m", "axial_stiffness_N")
+        exactly_one(self, "stiffness_N_per_m", "axial_stiffness_N", "curve")
         exactly_one(self, *self.PLACED_BY)
         if (self.count is None) != (self.spacing_m is None):
             raise ValueError("needs count and spacing_m together, but only one is given")
@@ -85,7 +115,11 @@ class DropperTable(HangingTable):
         None, description="pre-sag at mid-span of a parabola from the first to the last dropper"
     )
     residual_stiffness_ratio: float = Field(
-        0.0, ge=0, lt=1, description="share of its stiffness that a compressed dropper keeps"
+        0.0,
+        ge=0,
+        lt=1,
+        description="share of its stiffness, of a curve the first slope, that a compressed dropper "
+        "keeps",
     )
     slack_damping: Literal["released", "kept"] = Field(
         "released",
