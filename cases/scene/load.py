@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ from catenary.cases.scene.checks.scene import check
 from catenary.cases.scene.input.case_files import find_case
 from catenary.cases.scene.input.faults import SceneError
 from catenary.cases.scene.input.origin import Origin
-from catenary.cases.scene.input.pair_files import take_in_files
+from catenary.cases.scene.input.pair_files import absolute_names, take_in_files
 from catenary.cases.scene.input.plain_text import refuse_deep
 from catenary.cases.scene.input.text_faults import text_faults
 from catenary.cases.scene.input.toml_input import Assigned, assign, parse_assignment, read_toml
@@ -23,8 +24,90 @@ from catenary.cases.scene.scene import Scene
 from catenary.solver.base.errors import InputError
 
 
+@dataclass(frozen=True)
+class Draft:
+    """A scene as it is written, not checked. Nothing changes it: ``assigned`` makes others.
+
+    Attributes
+    ----------
+    raw : the nested table
+    file : where it stands, for sentences
+    folder : of the file, to which its own paths are relative; None of a table without a file
+    given : pairs of a key that was assigned, and the place of that
+    recorded : whether a result recorded it
+    """
+
+    raw: dict[str, Any]
+    file: str
+    folder: Path | None = None
+    given: tuple[tuple[str, str], ...] = ()
+    recorded: bool = False
+
+    def assigned(self, values: Iterable[tuple[str, Any, str]]) -> Draft:
+        """This scene with further values: dotted key, value (``REMOVED`` takes the key away), and
+        the place where that is written.
+
+        Raises
+        ------
+        InputError
+            If no scene has such a key, or if it leads through something that is no table.
+        """
+        raw, given = self._copy(), list(self.given)
+        known = known_keys(Scene)
+        for key, value, where in values:
+            if not is_known(key, known):
+                near = known_keys(Scene, with_kinds(key, raw, Scene))
+                raise InputError(unknown_key(key, where, near))
+            assign(raw, key, value, where)
+            given.append((key, where))
+        return replace(self, raw=raw, given=tuple(given))
+
+    def shortened(self) -> Draft:
+        """With the values of its ``[test]`` table."""
+        raw = self._copy()
+        if isinstance(raw.get("test"), dict):
+            for key, value in raw["test"].items():
+                assign(raw, key, value, f"in the [test] table of {self.file}")
+        return replace(self, raw=raw)
+
+    def scene(self) -> Scene:
+        """The checked scene.
+
+        Raises
+        ------
+        InputError
+            As ``load_scene``.
+        """
+        origin = Origin(self.file, self.given, recorded=self.recorded)
+        return scene_from(self.raw, origin, folder=self.folder)
+
+    def table(self) -> dict[str, Any]:
+        """The nested table with the name of its case, and with paths that hold everywhere."""
+        raw, given = self._copy(), {key for key, _ in self.given}
+        if self.folder is not None:
+            _fill_in(raw, self.folder, "mesh.file" in given)
+        absolute_names(raw, lambda key: Path.cwd() if key in given else self.folder or Path.cwd())
+        return raw
+
+    def _copy(self) -> dict[str, Any]:
+        refuse_deep(self.raw, self.file)
+        return copy.deepcopy(self.raw)
+
+
+def read_draft(case: str | Path) -> Draft:
+    """What a shipped case's name, a case file or its folder stands for, not checked.
+
+    Raises
+    ------
+    InputError
+        If there is none, or if it is no TOML.
+    """
+    path = find_case(str(case)).absolute()
+    return Draft(read_toml(path), str(path), path.parent)
+
+
 def load_scene(
-    case: str | Path,
+    case: str | Path | Draft,
     overrides: Sequence[str] = (),
     shortened: bool = False,
     varied: Sequence[Assigned] = (),
@@ -33,7 +116,7 @@ def load_scene(
 
     Parameters
     ----------
-    case : name, file or folder
+    case : name, file or folder, or what was read of one
     overrides : ``key=value`` each, value in TOML; they win over the file; ``key=`` removes a key
     shortened : apply the case's ``[test]`` table before the overrides
     varied : further assignments, which come last, and where they were written
@@ -43,21 +126,12 @@ def load_scene(
     InputError
         If anything is wrong: a ``SceneError`` with all faults of the scene, or one sentence.
     """
-    path = find_case(str(case)).absolute()
-    raw = read_toml(path)
-    known = known_keys(Scene)
-    if shortened and isinstance(raw.get("test"), dict):
-        for key, value in raw["test"].items():
-            assign(raw, key, value, f"in the [test] table of {path}")
-    given = []
-    for assigned in (*(Assigned(text) for text in overrides), *varied):
-        key, value = parse_assignment(assigned.text, assigned.option)
-        if not is_known(key, known):
-            near = known_keys(Scene, with_kinds(key, raw, Scene))
-            raise InputError(unknown_key(key, assigned.where, near))
-        assign(raw, key, value, assigned.where)
-        given.append((key, assigned.where))
-    return scene_from(raw, Origin(str(path), tuple(given)), folder=path.parent)
+    draft = case if isinstance(case, Draft) else read_draft(case)
+    if shortened:
+        draft = draft.shortened()
+    assigned = (*(Assigned(text) for text in overrides), *varied)
+    values = ((*parse_assignment(one.text, one.option), one.where) for one in assigned)
+    return draft.assigned(values).scene()
 
 
 def scene_from(raw: dict[str, Any], origin: Origin, folder: Path | None = None) -> Scene:

@@ -1,5 +1,14 @@
 """Errors that a user sees: one sentence, one exit code. A leaf module, importing none of ours."""
 
+from typing import NamedTuple
+
+
+class Fault(NamedTuple):
+    """A key of a scene and the sentence that says what is wrong with it."""
+
+    key: str
+    sentence: str
+
 
 class CatenaryError(Exception):
     """An error with a sentence for the user and an exit code for the shell."""
@@ -11,9 +20,21 @@ class InputError(CatenaryError):
     """The scene, the mesh or the command line asks for something impossible (exit code 2).
 
     The message is one sentence that names the key, its value, what is allowed and where.
+
+    Attributes
+    ----------
+    faults : tuple of (key, sentence), at least one
+        All that is wrong with a scene, the most likely cause first. What is no scene's fault is one
+        sentence with an empty key.
     """
 
     exit_code = 2
+    _of_scene: tuple[Fault, ...] = ()
+
+    @property
+    def faults(self) -> tuple[Fault, ...]:
+        """All that is wrong, each with its key."""
+        return self._of_scene or (Fault("", str(self)),)
 
 
 class RunBroken(CatenaryError):

@@ -3,19 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
-from catenary.solver.base.errors import InputError
+from catenary.solver.base.errors import Fault, InputError
 
 # More sentences than these nobody reads; the rest is counted.
 MOST_TOLD = 50
-
-
-class Fault(NamedTuple):
-    """A key of a scene and the sentence that says what is wrong with it."""
-
-    key: str
-    sentence: str
 
 
 class SceneError(InputError):
@@ -28,7 +20,7 @@ class SceneError(InputError):
     """
 
     def __init__(self, faults: Sequence[Fault], more: int = 0) -> None:
-        self.faults = tuple(faults[:MOST_TOLD])
+        self._of_scene = tuple(faults[:MOST_TOLD])
         self.more = more + max(0, len(faults) - MOST_TOLD)
         others = len(self.faults) - 1 + self.more
         text = self.faults[0].sentence

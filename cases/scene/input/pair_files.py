@@ -6,7 +6,7 @@ A result then holds the numbers themselves, and does not change with the file.
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -50,6 +50,15 @@ def take_in_files(
         except InputError as error:
             faults.append(Fault(where, str(error)))
     return replace(origin, taken_in=tuple(taken)), faults
+
+
+def absolute_names(raw: dict[str, Any], folder_of: Callable[[str], Path]) -> None:
+    """Write every name of a file with pairs as a path from the root, in place; by its key
+    ``folder_of`` says to which folder it is relative."""
+    for where, table, key in _places(raw):
+        name = table.get(f"{key}_file") if isinstance(table, dict) else None
+        if isinstance(name, str) and name:
+            table[f"{key}_file"] = str(folder_of(f"{where}.{key}_file") / name)
 
 
 def _places(raw: dict[str, Any]) -> Iterator[tuple[str, Any, str]]:

@@ -10,7 +10,7 @@ from catenary.cases.scene.input.faults import UnfitScene
 from catenary.cases.scene.input.origin import shown
 from catenary.cases.scene.input.toml_input import Assigned
 from catenary.cases.scene.keys.keys import nearest
-from catenary.cases.scene.load import load_scene
+from catenary.cases.scene.load import Draft, load_scene
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.sweep.variants import NAMES, Variant
 from catenary.solver.base.errors import InputError
@@ -134,7 +134,7 @@ def _refuse_petsc(variant: Variant) -> None:
 
 
 def jobs_and_refused(
-    case: str,
+    case: str | Draft,
     variants: Sequence[Variant],
     overrides: Sequence[str] = (),
     shortened: bool = False,
@@ -201,7 +201,7 @@ def make_jobs(
 
 
 def _scene(
-    case: str, variant: Variant, overrides: Sequence[str], shortened: bool, several: bool
+    case: str | Draft, variant: Variant, overrides: Sequence[str], shortened: bool, several: bool
 ) -> Scene:
     """The scene of a variant; InputError names it if it is one of ``several``."""
     _refuse_petsc(variant)
