@@ -37,31 +37,11 @@ def check(
             console.complain(line)
         return console.BAD_INPUT
     # What a refusal does not need is imported once the scene is valid.
-    from catenary.cases.run.at_rest.installed import registration_of
-    from catenary.cases.run.describe.arrivals import arrival_facts
-    from catenary.cases.run.describe.pantographs import kind_lines
-    from catenary.cases.run.scene_mesh import mesh_of
-    from catenary.cases.scene.convert.problem import problem_of
-    from catenary.solver.statics.line_at_rest import stable_form
-    from catenary.solver.statics.stability_of_rest import refuse_lost_wire
+    from catenary.cases.run.checking import check_line
 
-    problem = problem_of(scene)
-    mesh = mesh_of(scene)
-    model, form = stable_form(problem, mesh)
-    refuse_lost_wire(model, form)
-    console.say(
-        f"{scene.case.name} is valid: {counted(problem.line.n_spans, 'span')}, "
-        f"{problem.line.support_positions[-1]:g} m, {counted(mesh.droppers.shape[0], 'dropper')}, "
-        f"{mesh.n_nodes} nodes"
-    )
-    for name, lines in kind_lines(scene, problem).items():
-        console.say(f"pantograph {name}, " + "\n  ".join(lines))
-    waves = arrival_facts(scene, problem)
-    console.say(f"ends: {'; '.join(waves['ends'])}")
-    for fact in waves["pantographs"]:
-        console.say(fact["says"])
-    arms = registration_of(mesh, form)
-    for text in [*waves["warnings"], *([] if arms is None else arms.warnings())]:
+    found = check_line(scene)
+    console.say("\n".join(found.sentences))
+    for text in found.warnings:
         console.warn(text)
     return console.DONE
 
@@ -137,7 +117,6 @@ def static(
 ) -> None:
     """Serial."""
     from catenary.cases.result_folder.output_files import new_file, write_static
-    from catenary.cases.terminal import terminal_text
 
     if registration and (out is None or over is not None):
         raise InputError("--registration takes -o with the name of a *.csv file to write")
@@ -151,7 +130,7 @@ def static(
         console.say(temperatures(load(case, assignments, extras), differences, out))
         return
     scene = load(case, assignments, extras)
-    from catenary.cases.run.at_rest.static_table import static_table
+    from catenary.cases.run.at_rest.static_table import rest_text, static_table
     from catenary.cases.run.describe.defects import defect_facts
     from catenary.cases.scene.convert.problem import problem_of
 
@@ -160,10 +139,7 @@ def static(
         write_static(out, table, registration)
     for fact in defect_facts(scene, problem):
         console.say(fact["says"])
-    lengths = [scene.pantographs[place.name].strips.length_m for place in scene.train.pantographs]
-    half_heads = [0.5 * length for length in lengths if length is not None]
-    shortest = min(half_heads, default=None)
-    console.say(terminal_text.static_text(table, problem.line, shortest))
+    console.say(rest_text(scene, table))
     warmer = problem.along.warmer
     if warmer and {"axial_motion", "temperature"} <= problem.effects:
         from catenary.cases.run.at_rest.temperatures import temperatures

@@ -16,7 +16,6 @@ from measuring import COMM
 from typer.testing import CliRunner
 
 from catenary.cases.cli.main import app
-from catenary.cases.cli.studies.sweep import _refuse_other_sweep
 from catenary.cases.result_folder import output_folder
 from catenary.cases.run.planning.needs import needs_before_meshing
 from catenary.cases.run.runner import run_case
@@ -25,6 +24,7 @@ from catenary.cases.studies.sweep.done_before import read_record, read_summary
 from catenary.cases.studies.sweep.jobs import STATISTICS, Ended, Job, RunOptions, make_jobs
 from catenary.cases.studies.sweep.output import as_text, draw, rows, write
 from catenary.cases.studies.sweep.run_jobs import run_jobs
+from catenary.cases.studies.sweep.sweep import refuse_other_sweep
 from catenary.cases.studies.sweep.variants import Variant, parse_vary, product
 from catenary.postproc.read.results import Results
 from catenary.solver.base.errors import InputError
@@ -416,7 +416,7 @@ def test_a_sweep_without_room_for_all_its_runs_is_refused(
 @pytest.mark.parametrize("text", ["[" * 5000, '{"variants": [{"name": 3}, 4]}', "{"])
 def test_a_table_that_no_sweep_wrote_names_no_variants(text: str, tmp_path: Path) -> None:
     (tmp_path / "sweep.json").write_text(text)
-    _refuse_other_sweep(tmp_path, [], False)
+    refuse_other_sweep(tmp_path, [], False)
 
 
 def test_a_pipe_in_place_of_a_record_is_not_waited_for(tmp_path: Path) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -27,8 +26,8 @@ from catenary.solver.base.errors import InputError
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from catenary.cases.studies.sweep.jobs import Ended, Job
-    from catenary.cases.studies.sweep.variants import Variant
+    from catenary.cases.studies.sweep.jobs import Ended
+    from catenary.cases.studies.sweep.sweep import Sweep
 
 _SHOWN_BROKEN = 3
 
@@ -79,10 +78,11 @@ def sweep(
 ) -> int:
     """Collective."""
     from catenary.cases.process.petsc_options import split_extras
-    from catenary.cases.studies.sweep.jobs import check_statistics, in_order, jobs_and_refused
+    from catenary.cases.studies.sweep.jobs import RunOptions, check_statistics
+    from catenary.cases.studies.sweep.sweep import run_sweep, sweep_of
     from catenary.cases.studies.sweep.variants import check_keys, parse_vary, product, read_named
 
-    def read() -> tuple[tuple[list[Job], list[Ended], list[Variant]], list[str]]:
+    def read() -> tuple[Sweep, list[str]]:
         more, options = split_extras(extras or [])
         if not vary and named is None:
             raise InputError("there is nothing to vary: give --vary key=v1,v2,... or --variants")
@@ -92,26 +92,17 @@ def sweep(
         table = {} if named is None else read_named(named)
         check_keys(product([], table), f"in {named}")
         variants = product(varied, table)
-        overrides = [*(assignments or []), *more]
-        made = jobs_and_refused(case, variants, overrides, shortened, full_report=reports)
-        _refuse_other_sweep(out, variants, force)
-        return (*made, variants), options
+        words = [*(assignments or []), *more]
+        made = sweep_of(case, variants, out, words, shortened, full_report=reports, force=force)
+        return made, options
 
-    comm, (jobs, refused, variants), arguments = begin(read, verbose, lambda made: made[0][0].scene)
-    for one in refused:
+    comm, made, arguments = begin(read, verbose, lambda made: made.jobs[0].scene)
+    for one in made.refused:
         console.warn(f"variant {one.variant.name} is not run: {one.outcome}")
-    from catenary.cases.result_folder.folder_lock import held
+    options = RunOptions(force, arguments, console.say)
+    ended, files = run_sweep(made, out, comm, options, f"catenary sweep {case}", _names(plotted))
     from catenary.cases.studies.sweep import output as sweep_output
-    from catenary.cases.studies.sweep.jobs import RunOptions
-    from catenary.cases.studies.sweep.run_jobs import run_jobs
-    from catenary.solver.base.parallel import on_root
 
-    name = jobs[0].scene.case.name
-    show = _names(plotted) or sweep_output.PLOTTED
-    with held(out, comm, f"catenary sweep {case}"):
-        ended = run_jobs(jobs, out, comm, RunOptions(force, arguments, console.say))
-        ended = in_order(variants, ended, refused)
-        files = on_root(comm, lambda: sweep_output.write(out, name, ended, show), takes_long=True)
     console.say("\n" + sweep_output.as_text(ended))
     console.say("\n" + "\n".join(str(path) for path in files))
     return verdict(ended, "sweep")
@@ -170,22 +161,3 @@ def verdict(ended: Sequence[Ended], what: str) -> int:
 def _names(text: str | None) -> list[str]:
     """The names of a list with commas."""
     return [] if text is None else [name.strip() for name in text.split(",")]
-
-
-def _refuse_other_sweep(out: Path, variants: Sequence[Variant], force: bool) -> None:
-    """Refuse to replace the table of a sweep that had variants which this one has not."""
-    refuse_impossible(out)
-    path = out / "sweep.json"
-    if force or not path.is_file():
-        return
-    try:
-        table = json.loads(path.read_text(encoding="utf-8"))
-        there = {str(one["name"]) for one in table["variants"]}
-    except (OSError, ValueError, KeyError, TypeError, RecursionError):
-        there = set()
-    other = sorted(there - {variant.name for variant in variants})
-    if other:
-        raise InputError(
-            f"{path} is the table of a sweep with other variants ({other[0]}); name another folder "
-            "with -o, or give --force to replace it"
-        )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import itertools
+import json
 import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -66,17 +67,48 @@ def parse_vary(text: str) -> VariedKey:
             f"--vary {shown(text)} must have the form key=value,value,..., e.g. "
             "train.speed_km_h=250,300"
         )
+    return varied_key(key, values)
+
+
+def varied_key(key: str, values: tuple[str, ...], option: str = "--vary") -> VariedKey:
+    """A key and the texts of its values, at least one; ``option`` names in an error what gave them.
+
+    Raises
+    ------
+    InputError
+        If a value is named twice, or if PETSc takes the key at its start.
+    """
     if key.split(".")[0] == "petsc":
         raise InputError(
-            f"--vary {shown(key)[1:-1]} is not possible: PETSc takes its options once, when the "
+            f"{option} {shown(key)[1:-1]} is not possible: PETSc takes its options once, when the "
             "program starts"
         )
-    if any(steers(letter) for letter in text):
-        raise InputError(f"--vary {shown(text)} holds a control character")
+    for text in (key, *values):
+        if any(steers(letter) for letter in text):
+            raise InputError(f"{option} {shown(text)} holds a control character")
     value, times = Counter(values).most_common(1)[0]
     if times > 1:
-        raise InputError(f"--vary {shown(key)[1:-1]} names {shown(value)[1:-1]} twice")
+        raise InputError(f"{option} {shown(key)[1:-1]} names {shown(value)[1:-1]} twice")
     return VariedKey(key, values)
+
+
+def text_of(value: Any) -> str:
+    """A value of TOML as the text of an assignment, which ``parse_assignment`` reads again."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, list):
+        return f"[{', '.join(map(_quoted, value))}]"
+    if isinstance(value, dict):
+        return f"{{{', '.join(f'{json.dumps(k)} = {_quoted(v)}' for k, v in value.items())}}}"
+    text = str(value)
+    if isinstance(value, str) and parse_assignment(f"key={text}")[1] != value:
+        return json.dumps(value)
+    return text
+
+
+def _quoted(value: Any) -> str:
+    """The same within a list or a table, where texts stand in quotes."""
+    return json.dumps(value) if isinstance(value, str) else text_of(value)
 
 
 def _split(text: str) -> list[str]:

@@ -1,0 +1,91 @@
+"""A sweep from its variants to its table: what the command line and Python programs share."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from catenary.cases.result_folder.output_folder import refuse_impossible
+from catenary.cases.scene.load import Draft
+from catenary.cases.studies.sweep.jobs import Ended, Job, RunOptions, in_order, jobs_and_refused
+from catenary.cases.studies.sweep.variants import Variant
+from catenary.solver.base.errors import InputError
+
+
+class Sweep(NamedTuple):
+    """Variants of a case, the jobs of those that can be run, and how the others ended."""
+
+    variants: Sequence[Variant]
+    jobs: list[Job]
+    refused: list[Ended]
+
+
+def sweep_of(
+    case: str | Draft,
+    variants: Sequence[Variant],
+    out: Path,
+    overrides: Sequence[str] = (),
+    shortened: bool = False,
+    *,
+    full_report: bool = False,
+    force: bool = False,
+) -> Sweep:
+    """A sweep into a folder, all scenes checked. Not collective.
+
+    Raises
+    ------
+    InputError
+        As ``jobs_and_refused``, or if the folder has the table of a sweep with variants that this
+        one has not, and ``force`` is not given.
+    """
+    jobs, refused = jobs_and_refused(case, variants, overrides, shortened, full_report=full_report)
+    refuse_other_sweep(out, variants, force)
+    return Sweep(variants, jobs, refused)
+
+
+def run_sweep(
+    sweep: Sweep, out: Path, comm: Any, options: RunOptions, command: str, plotted: Sequence[str]
+) -> tuple[list[Ended], list[Path]]:
+    """Run what is not done yet, and write table and picture. Collective.
+
+    Parameters
+    ----------
+    command : what this process does, for others that want the folder
+    plotted : statistics that are drawn; the usual ones if there are none
+
+    Returns
+    -------
+    How all variants ended, in their order, and the files.
+    """
+    from catenary.cases.result_folder.folder_lock import held
+    from catenary.cases.studies.sweep import output
+    from catenary.cases.studies.sweep.run_jobs import run_jobs
+    from catenary.solver.base.parallel import on_root
+
+    name, show = sweep.jobs[0].scene.case.name, plotted or output.PLOTTED
+    with held(out, comm, command):
+        ended = run_jobs(sweep.jobs, out, comm, options)
+        ended = in_order(sweep.variants, ended, sweep.refused)
+        files = on_root(comm, lambda: output.write(out, name, ended, show), takes_long=True)
+    return ended, files
+
+
+def refuse_other_sweep(out: Path, variants: Sequence[Variant], force: bool) -> None:
+    """Refuse to replace the table of a sweep that had variants which this one has not."""
+    refuse_impossible(out)
+    path = out / "sweep.json"
+    if force or not path.is_file():
+        return
+    try:
+        table = json.loads(path.read_text(encoding="utf-8"))
+        there = {str(one["name"]) for one in table["variants"]}
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        there = set()
+    other = sorted(there - {variant.name for variant in variants})
+    if other:
+        raise InputError(
+            f"{path} is the table of a sweep with other variants ({other[0]}); name another folder "
+            "with -o, or give --force to replace it"
+        )
