@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import shlex
 import sys
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import Any
 
 from catenary.cases.scene.input.origin import shown
@@ -78,6 +79,30 @@ def start_petsc(arguments: Sequence[str]) -> None:
 
     if running and arguments:
         PETSc.Options().insertString(shlex.join(arguments))
+
+
+@contextlib.contextmanager
+def options_of(table: Mapping[str, Any]) -> Iterator[list[str]]:
+    """PETSc with the options of a scene's table, as words, while entered. Collective.
+
+    For programs that run several scenes: what the table changed is as before afterwards.
+    """
+    before = {}
+    if "petsc4py.PETSc" in sys.modules:
+        from catenary.solver.base.petsc import PETSc
+
+        before = PETSc.Options().getAll()
+    arguments = as_arguments(table)
+    start_petsc(arguments)
+    try:
+        yield arguments
+    finally:
+        from catenary.solver.base.petsc import PETSc
+
+        for name in table:
+            PETSc.Options().delValue(name)
+            if name in before:
+                PETSc.Options().setValue(name, before[name])
 
 
 def idle_options(of_scene: Collection[str]) -> list[str]:

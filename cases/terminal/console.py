@@ -17,8 +17,9 @@ import typer
 
 from catenary.cases.scene.input.plain_text import plain, shown
 from catenary.postproc.files.disk_errors import reason
-from catenary.solver.base import lone_process
 from catenary.solver.base.errors import CatenaryError, InputError
+from catenary.solver.base.lone_process import alone as alone
+from catenary.solver.base.lone_process import world as world
 from catenary.solver.base.parallel import NO_MEMORY, launched_by_mpirun, on_root
 
 DONE, BROKEN, BAD_INPUT, NOT_ACCEPTED = 0, 1, 2, 3
@@ -167,22 +168,6 @@ def run_folder(text: str) -> Path:
     """The folder of a run, for which its result file may stand. Not collective."""
     path = Path(text)
     return path.parent if path.name == "run.h5" and path.is_file() else path
-
-
-def world() -> Any:
-    """The communicator of all processes; starts MPI. Not collective."""
-    with lone_process.settings():
-        from mpi4py import MPI
-
-    return MPI.COMM_WORLD
-
-
-def alone() -> Any:
-    """The communicator of this process alone; starts MPI. Not collective."""
-    world()
-    from mpi4py import MPI
-
-    return MPI.COMM_SELF
 
 
 def guarded(command: Callable[..., int | None]) -> Callable[..., None]:

@@ -36,6 +36,7 @@ class Results(LineOfRun):
     ----------
     path : the result file or the folder that holds it as ``run.h5``
     records : what ``evaluate.guard`` found in it, None to check it here
+    image : the bytes of the file, if a run of this process wrote it; it need not be there any more
 
     Raises
     ------
@@ -44,12 +45,14 @@ class Results(LineOfRun):
         so that no report can be made of it.
     """
 
-    def __init__(self, path: Path | str, records: Records | None = None) -> None:
+    def __init__(
+        self, path: Path | str, records: Records | None = None, image: bytes | None = None
+    ) -> None:
         path = Path(path)
         self.path = path / RESULT_FILE if path.is_dir() else path
-        if not self.path.is_file():
+        if image is None and not self.path.is_file():
             raise InputError(f"{self.path} does not exist: name a result file or its folder")
-        super().__init__(SoundFile(self.path, records))
+        super().__init__(SoundFile(self.path, records, image))
 
     def __enter__(self) -> Results:
         return self

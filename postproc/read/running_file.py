@@ -11,6 +11,7 @@ import time
 from pathlib import Path
 
 import h5py
+from h5py import h5f
 
 from catenary.postproc.files.hdf5.checked import text_of
 from catenary.postproc.files.hdf5.self_contained import open_own
@@ -60,6 +61,11 @@ def opened(path: Path) -> tuple[h5py.File, Complete | None]:
             file.close()
             time.sleep(_PAUSE)
     return file, None
+
+
+def opened_image(image: bytes) -> h5py.File:
+    """A result file that was read into memory, of a run of this program that has ended."""
+    return h5py.File(h5f.open_file_image(image))
 
 
 def _read_indices(file: h5py.File) -> None:

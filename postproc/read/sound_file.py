@@ -24,7 +24,7 @@ from catenary.postproc.read.file_schema import (
     step_tables,
 )
 from catenary.postproc.read.records import Records, scan, table_faults
-from catenary.postproc.read.running_file import opened
+from catenary.postproc.read.running_file import opened, opened_image
 from catenary.postproc.read.tables import PartialTable
 from catenary.solver.base.errors import InputError
 
@@ -42,6 +42,7 @@ class SoundFile:
     ----------
     path : the result file
     records : what ``scan`` found in it, None to scan it when records are first read
+    image : its bytes, if a run of this process wrote it; the file need not be there any more
 
     Attributes
     ----------
@@ -54,10 +55,14 @@ class SoundFile:
         If it is no result file, or damaged so that no report can be made of it.
     """
 
-    def __init__(self, path: Path, records: Records | None = None) -> None:
+    def __init__(
+        self, path: Path, records: Records | None = None, image: bytes | None = None
+    ) -> None:
         self.path = path
         try:
-            self._file, self._complete = opened(path)
+            self._file, self._complete = (
+                opened(path) if image is None else (opened_image(image), None)
+            )
         except HDF5_ERRORS as error:
             reason = " ".join(str(error).split())
             raise InputError(

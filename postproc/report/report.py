@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     # Name of the file without its end, caption, and what makes the figure, if there is one.
-    _Drawing = tuple[str, str, Callable[[], Figure | None]]
+    Drawing = tuple[str, str, Callable[[], Figure | None]]
 
 logger = logging.getLogger("catenary.report")
 
@@ -161,13 +161,13 @@ def _pictures(results: Results, statistics: RunStatistics) -> list[_Picture]:
     from catenary.postproc.report.pictures import figures
 
     pictures = []
-    for name, caption, draw in _drawings(results, statistics):
+    for name, caption, draw in drawings(results, statistics):
         data = figures.painted(f"{name}.png", draw)
         pictures += [_Picture(name, caption, content) for content in data.values()]
     return pictures
 
 
-def _drawings(results: Results, statistics: RunStatistics) -> Iterator[_Drawing]:
+def drawings(results: Results, statistics: RunStatistics) -> Iterator[Drawing]:
     """Name, caption and what makes the figure of each picture of a run, in their order."""
     from catenary.postproc.report.pictures import (
         channel_pictures,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 from collections.abc import Iterator
+from typing import Any
 
 from catenary.solver.base.parallel import launched_by_mpirun
 
@@ -34,3 +35,19 @@ def settings() -> Iterator[None]:
     finally:
         for name in added:
             del os.environ[name]
+
+
+def world() -> Any:
+    """The communicator of all processes; starts MPI. Not collective."""
+    with settings():
+        from mpi4py import MPI
+
+    return MPI.COMM_WORLD
+
+
+def alone() -> Any:
+    """The communicator of this process alone; starts MPI. Not collective."""
+    world()
+    from mpi4py import MPI
+
+    return MPI.COMM_SELF
