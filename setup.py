@@ -1,6 +1,7 @@
-"""Maps the five folders of the repository into the namespace package ``catenary``, and builds the
-kernels of the time loop, ``catenary.solver.kernels.native``, from C++; those that step a prepared
-line from outside become the library ``libcatenary.so`` besides, without Python.
+"""Maps the five folders of the repository into the package ``catenary``, whose own files stand in
+``cases/api``, and builds the kernels of the time loop, ``catenary.solver.kernels.native``, from
+C++; those that step a prepared line from outside become the library ``libcatenary.so`` besides,
+without Python.
 
 setuptools builds them with pybind11, because this file describes all packages already. nanobind
 wants CMake, which would describe them a second time.
@@ -23,6 +24,8 @@ from setuptools.command.build_ext import build_ext
 from setuptools.errors import CompileError, LinkError
 
 PARTS = ("meshgen", "solver", "mbs", "postproc", "cases")
+# The package itself: what ``import catenary`` gives. It is no part of ``catenary.cases``.
+FACE = "cases/api"
 KERNELS = "solver/kernels"
 
 # No target is named: a wheel runs on every processor of its architecture, and a source that has
@@ -150,12 +153,17 @@ ParallelCompile(default=0).install()
 
 setup(
     packages=[
-        f"catenary.{package}"
-        for part in PARTS
-        for package in (part, *(f"{part}.{inner}" for inner in find_packages(part)))
+        "catenary",
+        *(
+            f"catenary.{package}"
+            for part in PARTS
+            for package in (part, *(f"{part}.{inner}" for inner in find_packages(part)))
+            if package.replace(".", "/") != FACE
+        ),
     ],
-    package_dir={f"catenary.{part}": part for part in PARTS},
+    package_dir={"catenary": FACE, **{f"catenary.{part}": part for part in PARTS}},
     package_data={
+        "catenary": ["py.typed"],
         "catenary.cases": [
             "*/case.toml",
             "*/README.md",
@@ -167,6 +175,7 @@ setup(
         "catenary.postproc": ["report/templates/*", "paraview/*.template"],
         "catenary.solver": ["kernels/simulation/catenary.h"],
     },
+    exclude_package_data={"catenary.cases": ["api/*"]},
     # What is installed is named above; the source archive has the sources of the extension too.
     include_package_data=False,
     ext_modules=[extension("native", SOURCES), extension("libcatenary", WITHOUT_PYTHON)],

@@ -1,4 +1,5 @@
-"""What is installed: the five folders as catenary.*, their data, and nothing under a bare name."""
+"""What is installed: the package catenary, the five folders within it, their data, and nothing
+under a bare name."""
 
 from __future__ import annotations
 
@@ -18,10 +19,10 @@ pytestmark = pytest.mark.process
 
 ROOT = Path(__file__).parents[2]
 PARTS = ("meshgen", "solver", "mbs", "postproc", "cases")
+FACE = "cases/api"  # the files of the package itself
 BUILT_FROM = (*PARTS, "pyproject.toml", "setup.py", "LICENSE", "README.md")
 OBJECTS = Path("build", "kernels")
 KERNELS = f"catenary/solver/kernels/native{sysconfig.get_config_var('EXT_SUFFIX')}"
-LIBRARY = "catenary/solver/kernels/libcatenary.so"
 LIBRARY = "catenary/solver/kernels/libcatenary.so"
 
 # What a program finds from outside the checkout, printed as JSON.
@@ -51,29 +52,34 @@ def must(done: subprocess.CompletedProcess[str]) -> str:
     return done.stdout
 
 
+def installed_name(path: Path) -> str:
+    """Under which name a file of the checkout is installed."""
+    return f"catenary/{path.relative_to(ROOT)}".replace(f"/{FACE}/", "/")
+
+
 def library_files() -> set[str]:
     """Python files of the checkout, by the names under which they are to be installed."""
     files = (
         path for part in PARTS for end in ("py", "pyi") for path in (ROOT / part).rglob(f"*.{end}")
     )
-    return {f"catenary/{path.relative_to(ROOT)}" for path in files}
+    return {installed_name(path) for path in files}
 
 
 def data_files() -> set[str]:
     """Data of the checkout that a run or a report reads, likewise."""
     patterns = (
+        f"{FACE}/py.typed",
         "cases/*/case.toml",
         "cases/*/README.md",
         "cases/*/reference/*.csv",
         "cases/*/study.toml",
         "cases/studies/hard/hard.toml",
-        "cases/*/*.py",
         "postproc/report/templates/*",
         "postproc/paraview/*.template",
         "solver/kernels/simulation/catenary.h",
     )
     return {
-        f"catenary/{path.relative_to(ROOT)}"
+        installed_name(path)
         for pattern in patterns
         for path in ROOT.glob(pattern)
         if path.is_file()
@@ -124,6 +130,8 @@ def installed(sources: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_the_wheel_is_imported_from_where_it_is_installed(installed: Path, tmp_path: Path) -> None:
     modules = (
+        "catenary",
+        "catenary.scenes",
         "catenary.meshgen",
         "catenary.meshgen.line",
         "catenary.solver.base.errors",
@@ -158,6 +166,8 @@ def test_the_source_archive_can_build_the_wheel(sources: Path, tmp_path: Path) -
     with tarfile.open(archive) as content:
         names = {name.partition("/")[2] for name in content.getnames()}
     wanted = {name.removeprefix("catenary/") for name in library_files() | data_files()}
+    face = {path.name for path in (ROOT / FACE).iterdir() if path.is_file()}
+    wanted = {f"{FACE}/{name}" if name in face else name for name in wanted}
     assert wanted | kernel_files() | {"pyproject.toml", "setup.py", "LICENSE"} <= names
     assert not [name for name in names if name.endswith(".so")]
 
@@ -195,10 +205,36 @@ def test_a_bare_name_is_refused_with_a_hint(part: str) -> None:
     assert last.startswith(f"ImportError: import catenary.{part}, not {part}: ")
 
 
+@pytest.mark.parametrize("wheel", [False, True])
+def test_the_package_itself_has_one_name(wheel: bool, installed: Path, tmp_path: Path) -> None:
+    place = {"PYTHONPATH": str(installed)} if wheel else {}
+    done = run(sys.executable, "-P", "-c", "import catenary.cases.api", cwd=tmp_path, **place)
+    assert done.returncode == 1
+    last = done.stderr.strip().splitlines()[-1]
+    says = "ImportError: import catenary, not catenary.cases.api: "
+    # From where a wheel is alone there is no such file; here the checkout is found behind it.
+    assert last.startswith((says, "ModuleNotFoundError"))
+
+
+def test_the_wheel_has_the_public_names(installed: Path, tmp_path: Path) -> None:
+    """Each from its file; `py.typed` says to type checkers that they have types."""
+    program = (
+        "import catenary, pathlib; print(pathlib.Path(catenary.__file__).parent);"
+        "print(all(getattr(catenary, name) is not None for name in catenary.__all__))"
+    )
+    told = must(run(sys.executable, "-c", program, cwd=tmp_path, PYTHONPATH=str(installed)))
+    assert told.splitlines() == [str(installed / "catenary"), "True"]
+    assert (installed / "catenary" / "py.typed").is_file()
+
+
 def test_the_editable_install_is_found_from_elsewhere(tmp_path: Path) -> None:
-    modules = [f"catenary.{part}" for part in PARTS]
+    modules = ["catenary", "catenary.runs", *(f"catenary.{part}" for part in PARTS)]
     found = json.loads(must(run(sys.executable, "-c", SHOW, *modules, cwd=tmp_path)))
-    assert found == {f"catenary.{part}": str(ROOT / part / "__init__.py") for part in PARTS}
+    face = {"catenary": "__init__.py", "catenary.runs": "runs.py"}
+    assert found == {
+        **{name: str(ROOT / FACE / file) for name, file in face.items()},
+        **{f"catenary.{part}": str(ROOT / part / "__init__.py") for part in PARTS},
+    }
 
 
 def test_the_program_is_installed_beside_the_interpreter() -> None:

@@ -1,0 +1,83 @@
+"""Overhead lines under pantographs, from Python: scenes, runs, steps, results.
+
+``docs/python.md`` shows all of it. Names are loaded when they are first used: what a program does
+not use costs it nothing. Nothing is printed and nothing shown unless it is asked for; the logger
+is called ``catenary``.
+"""
+
+from __future__ import annotations
+
+import logging
+from typing import TYPE_CHECKING, Any
+
+if __name__ != "catenary":
+    raise ImportError(
+        f"import catenary, not {__name__}: the folder is installed as catenary, "
+        "and a second copy under another name would hold its own state"
+    )
+
+if TYPE_CHECKING:
+    from catenary.line_tables import AtRest, Plan, check, plan, static
+    from catenary.pictures import Pictures
+    from catenary.results import Run, open
+    from catenary.runs import run, sweep
+    from catenary.scenes import Scene, load
+    from catenary.solver.base.errors import CatenaryError, Fault, InputError, RunBroken
+    from catenary.steps import Simulation
+
+__all__ = [
+    "AtRest",
+    "CatenaryError",
+    "Fault",
+    "InputError",
+    "Pictures",
+    "Plan",
+    "Run",
+    "RunBroken",
+    "Scene",
+    "Simulation",
+    "__version__",
+    "check",
+    "load",
+    "open",
+    "plan",
+    "run",
+    "static",
+    "sweep",
+]
+
+_FILES = {
+    "line_tables": ("AtRest", "Plan", "check", "plan", "static"),
+    "pictures": ("Pictures",),
+    "results": ("Run", "open"),
+    "runs": ("run", "sweep"),
+    "scenes": ("Scene", "load"),
+    "solver.base.errors": ("CatenaryError", "Fault", "InputError", "RunBroken"),
+    "steps": ("Simulation",),
+}
+_FILE_OF = {name: file for file, names in _FILES.items() for name in names}
+
+# A program that sets up no logging is told nothing; one that does hears what it asks for.
+logging.getLogger(__name__).addHandler(logging.NullHandler())
+
+
+def __getattr__(name: str) -> Any:
+    """A public name, whose file is loaded when it is asked for."""
+    value: Any
+    if name == "__version__":
+        from importlib.metadata import version
+
+        value = version("catenary")
+    elif name in _FILE_OF:
+        from importlib import import_module
+
+        value = getattr(import_module(f"catenary.{_FILE_OF[name]}"), name)
+    else:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    """The public names."""
+    return sorted(__all__)

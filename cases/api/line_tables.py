@@ -1,0 +1,306 @@
+"""Tables of a scene before any run: what is checked, what is planned, how the line hangs."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from catenary.scenes import SceneLike, checked
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from catenary.cases.run.planning import plan as planning
+    from catenary.cases.scene.scene import Scene as CheckedScene
+
+
+def check(scene: SceneLike) -> list[str]:
+    """Check a scene with its line hung, beyond what ``load`` checks. Not collective.
+
+    Parameters
+    ----------
+    scene : Scene, str, Path or mapping
+        The scene, or whatever ``load`` takes for one.
+
+    Returns
+    -------
+    list of str
+        Warnings, for instance of an end so near that it sends waves back; empty if there are none.
+
+    Raises
+    ------
+    InputError
+        If anything is wrong, with the sentence that ``catenary check`` prints.
+
+    Examples
+    --------
+    >>> catenary.check("en50318_2002")
+    []
+    """
+    from catenary.cases.run.checking import check_line
+
+    return check_line(checked(scene)).warnings
+
+
+class Plan:
+    """What a run will simulate, and what it will need: what ``plan`` gives.
+
+    As text it is what ``catenary plan`` prints.
+
+    Examples
+    --------
+    >>> plan = catenary.plan("en50318_2002")
+    >>> plan.effects.loc["dropper_slackening", "simulated"]
+    True
+    """
+
+    def __init__(self, own: planning.Plan) -> None:
+        self._own = own
+
+    @property
+    def effects(self) -> pd.DataFrame:
+        """All effects by their names: ``title``, whether ``simulated``, and the ``reason``.
+
+        Examples
+        --------
+        >>> catenary.plan("en50318_2002").effects.columns.tolist()
+        ['title', 'simulated', 'reason']
+        """
+        import pandas as pd
+
+        rows = [
+            {"name": row.name, "title": row.title, "simulated": simulated, "reason": row.reason}
+            for chosen, simulated in ((self._own.on, True), (self._own.off, False))
+            for row in chosen
+        ]
+        return pd.DataFrame(rows).set_index("name").astype({"simulated": object})
+
+    @property
+    def figures(self) -> pd.Series:
+        """Sizes, and estimates of memory [B], of wall time on one rank [s] and of files [B].
+
+        Examples
+        --------
+        >>> int(catenary.plan("en50318_2002").figures["n_steps"])
+        8208
+        """
+        import pandas as pd
+
+        own = self._own
+        figures: dict[str, Any] = {
+            "n_nodes": own.n_nodes,
+            "n_unknowns": own.n_dofs,
+            "n_steps": own.n_steps,
+            "n_droppers": own.n_droppers,
+            "n_steady_arms": own.n_arms,
+            "n_pantographs": own.n_pantographs,
+            "dt_s": own.dt,
+            "simulated_s": own.simulated,
+            "speed_m_per_s": own.speed,
+            "wave_speed_m_per_s": own.wave_speed,
+            "memory_B": own.memory,
+            "wall_s": own.march,
+            "result_B": own.files.result,
+            "film_B": own.files.film,
+        }
+        return pd.Series(figures, dtype=float)
+
+    @property
+    def warnings(self) -> list[str]:
+        """Sentences on what disturbs the evaluated stretch, such as waves from a near end.
+
+        Examples
+        --------
+        >>> catenary.plan("en50318_2002").warnings
+        []
+        """
+        return list(self._own.warnings)
+
+    def __str__(self) -> str:
+        from catenary.cases.run.planning.plan import plan_text
+
+        return plan_text(self._own)
+
+    def __repr__(self) -> str:
+        return f"<catenary.Plan {self._own.case}: {self._own.n_steps} steps>"
+
+
+def plan(scene: SceneLike) -> Plan:
+    """What a run of a scene simulates, its sizes, and what it will need. Not collective.
+
+    Parameters
+    ----------
+    scene : Scene, str, Path or mapping
+        The scene, or whatever ``load`` takes for one.
+
+    Returns
+    -------
+    Plan
+
+    Raises
+    ------
+    InputError
+        If the scene is wrong.
+
+    Examples
+    --------
+    >>> print(catenary.plan("en50318_2002"))
+    en50318_2002: Reference model of EN 50318:2002
+    ...
+    """
+    from catenary.cases.run.planning.plan import make_plan
+
+    return Plan(make_plan(checked(scene)))
+
+
+class AtRest:
+    """A line at rest as tables: what ``static`` gives. As text it is what the program prints.
+
+    Examples
+    --------
+    >>> rest = catenary.static("en50318_2002")
+    >>> rest.droppers.query("span == 11").length_m.round(3).tolist()[:2]
+    [0.972, 0.79]
+    """
+
+    def __init__(self, scene: CheckedScene, data: dict[str, np.ndarray]) -> None:
+        self._scene = scene
+        self._data = data
+
+    @property
+    def droppers(self) -> pd.DataFrame:
+        """A row for each dropper, along the track.
+
+        ``span`` from 1; ``x_m`` along the track and ``in_span_m`` from the support before it;
+        ``length_m`` unstretched, as cut; ``force_N`` the tension at rest; the wires ``hangs_from``
+        and ``carries``.
+
+        Examples
+        --------
+        >>> bool((catenary.static("en50318_2002").droppers.force_N > 0).all())
+        True
+        """
+        import pandas as pd
+
+        data = self._data
+        span = data["dropper_span"].astype(int)
+        table = pd.DataFrame(
+            {
+                "span": span + 1,
+                "x_m": data["dropper_x"],
+                "in_span_m": data["dropper_x"] - data["support_x"][span],
+                "length_m": data["dropper_length"],
+                "force_N": data["dropper_force"],
+                "hangs_from": data["dropper_upper"],
+                "carries": data["dropper_lower"],
+            }
+        )
+        return table.sort_values("x_m", kind="stable", ignore_index=True)
+
+    @property
+    def contact_wires(self) -> pd.DataFrame:
+        """A row for each node of the contact wires: ``wire``, ``x_m``, ``height_m`` above the rail.
+
+        Of lines whose wires move sideways also ``y_m``, to the left of the track.
+
+        Examples
+        --------
+        >>> bool(catenary.static("en50318_2002").contact_wires.height_m.max() > 5.0)
+        True
+        """
+        import pandas as pd
+
+        from catenary.cases.scene.convert.problem import problem_of
+        from catenary.meshgen.wires import Role
+
+        names = [wire.name for wire in problem_of(self._scene).line.wires_of(Role.CONTACT)]
+        sizes = [self._data[f"wires/{name}"].size for name in names]
+        columns = {"x_m": "contact_x", "height_m": "contact_height", "y_m": "contact_y"}
+        there = {own: self._data[name] for own, name in columns.items() if name in self._data}
+        return pd.DataFrame({"wire": np.repeat(names, sizes), **there})
+
+    @property
+    def elasticity(self) -> pd.DataFrame:
+        """Lift of a head by a unit force along the middle span: ``x_m``, ``elasticity_mm_per_N``.
+
+        Examples
+        --------
+        >>> bool(catenary.static("en50318_2002").elasticity.elasticity_mm_per_N.max() < 1.0)
+        True
+        """
+        import pandas as pd
+
+        lift = 1e3 * self._data["elasticity"]
+        return pd.DataFrame({"x_m": self._data["elasticity_x"], "elasticity_mm_per_N": lift})
+
+    @property
+    def steady_arms(self) -> pd.DataFrame:
+        """A row for each steady arm: ``x_m`` and, of lines that move sideways, what holds the wire.
+
+        Then ``stagger_m`` is the place of the wire to the left of the track, ``radial_N``,
+        ``lift_N`` and ``along_N`` the force of the arm on it to the left, upward and along the
+        track, and ``tension_N`` that of the arm, negative if the wire pushes it.
+
+        Examples
+        --------
+        >>> catenary.static("en50318_2002").steady_arms.columns.tolist()
+        ['x_m']
+        >>> catenary.static("ac_simple_3d").steady_arms.stagger_m.abs().max() > 0.1
+        True
+        """
+        import pandas as pd
+
+        from catenary.postproc.read.registration import Registration
+
+        table = Registration.of(self._data)
+        if table is None:
+            return pd.DataFrame({"x_m": np.sort(self._data["arm_x"])})
+        left, up, along = table.force.T
+        return pd.DataFrame(
+            {
+                "x_m": table.x,
+                "stagger_m": table.stagger,
+                "radial_N": left,
+                "lift_N": up,
+                "along_N": along,
+                "tension_N": table.tension,
+            }
+        )
+
+    def __str__(self) -> str:
+        from catenary.cases.run.at_rest.static_table import rest_text
+
+        return rest_text(self._scene, self._data)
+
+    def __repr__(self) -> str:
+        return f"<catenary.AtRest {self._scene.case.name}>"
+
+
+def static(scene: SceneLike) -> AtRest:
+    """The line of a scene at rest: droppers, heights, elasticity, steady arms. Not collective.
+
+    Parameters
+    ----------
+    scene : Scene, str, Path or mapping
+        The scene, or whatever ``load`` takes for one.
+
+    Returns
+    -------
+    AtRest
+
+    Raises
+    ------
+    InputError
+        If the scene is wrong, or if its line cannot hang.
+
+    Examples
+    --------
+    >>> print(catenary.static("en50318_2002"))
+     span  in span [m]  length [m]  force [N]
+    ...
+    """
+    from catenary.cases.run.at_rest.static_table import static_table
+
+    own = checked(scene)
+    return AtRest(own, static_table(own))

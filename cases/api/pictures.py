@@ -1,0 +1,124 @@
+"""The pictures of a report, as figures of Matplotlib."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from catenary.postproc.evaluate.statistics import RunStatistics
+from catenary.postproc.read.results import Results
+from catenary.postproc.report.report import drawings
+from catenary.solver.base.errors import InputError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+class Pictures:
+    """Draws what a run has to show: ``run.plot``. Not collective.
+
+    A figure is Matplotlib's: ``savefig`` writes it, a notebook shows it. Nothing opens a window.
+
+    Examples
+    --------
+    >>> run.plot.names[:3]
+    ('contact_force', 'statistics', 'histogram')
+    >>> run.plot("static").axes[0].get_ylabel() != ""
+    True
+    """
+
+    def __init__(self, results: Results, evaluated: Callable[[], RunStatistics]) -> None:
+        self._results = results
+        self._evaluated = evaluated
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Pictures that the report of this run has, by the names of their files.
+
+        Examples
+        --------
+        >>> "droppers" in run.plot.names
+        True
+        """
+        return tuple(name for name, *_ in drawings(self._results, self._evaluated()))
+
+    def __call__(self, name: str) -> Figure:
+        """The picture of a name out of ``names``.
+
+        Parameters
+        ----------
+        name : str
+            Of its file in the report, without the end.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+
+        Raises
+        ------
+        InputError
+            If the run has no such picture.
+
+        Examples
+        --------
+        >>> figure = run.plot("histogram")
+        """
+        for own, _, draw in drawings(self._results, self._evaluated()):
+            if own == name and (figure := draw()) is not None:
+                return figure
+        raise InputError(f"the run has no picture {name}; it has {', '.join(self.names)}")
+
+    def force(self) -> Figure:
+        """Contact force of each pantograph along the track, unfiltered and below 20 Hz [N].
+
+        Examples
+        --------
+        >>> run.plot.force().axes[0].get_ylabel()
+        'contact force [N]'
+        """
+        return self("contact_force")
+
+    def statistics(self) -> Figure:
+        """Mean, deviation and extremes of the contact force of each pantograph as bars [N].
+
+        Examples
+        --------
+        >>> figure = run.plot.statistics()
+        """
+        return self("statistics")
+
+    def histogram(self) -> Figure:
+        """Share of time [%] of the contact force below 20 Hz in bins of 10 N.
+
+        Examples
+        --------
+        >>> figure = run.plot.histogram()
+        """
+        return self("histogram")
+
+    def uplift(self) -> Figure:
+        """Uplift of the contact wire at the steady arms [mm].
+
+        Examples
+        --------
+        >>> figure = run.plot.uplift()
+        """
+        return self("uplift")
+
+    def droppers(self) -> Figure:
+        """Forces of the most loaded dropper and of one in the middle of a span; ranges of all [N].
+
+        Examples
+        --------
+        >>> figure = run.plot.droppers()
+        """
+        return self("droppers")
+
+    def at_rest(self) -> Figure:
+        """Profile of the contact wire at rest [m], and elasticity along a span [mm/N].
+
+        Examples
+        --------
+        >>> figure = run.plot.at_rest()
+        """
+        return self("static")

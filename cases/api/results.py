@@ -1,0 +1,408 @@
+"""Results of a run as named arrays and tables."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from catenary.cases.scene.load import Draft
+from catenary.pictures import Pictures
+from catenary.postproc.evaluate import statistics as stats
+from catenary.postproc.evaluate.statistics import RunStatistics
+from catenary.postproc.read.results import Results
+from catenary.postproc.report.report import judge
+from catenary.postproc.report.summary import summarise
+from catenary.scenes import Scene
+from catenary.solver.base.errors import InputError
+from catenary.solver.time_loop.views import channels
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
+
+# Names of the columns' dimension, by what a column stands for.
+_COLUMNS = {
+    channels.PANTOGRAPH: "pantograph",
+    channels.STRIP: "strip",
+    channels.WIRE: "wire_under_pantograph",
+    channels.CONTACT: "contact",
+    channels.ARM: "steady_arm",
+    channels.DROPPER: "dropper",
+    channels.WIRE_END: "wire_end",
+}
+_PLACES = {channels.ARM: "arm_x", channels.DROPPER: "dropper_x", channels.WIRE_END: "end_x"}
+_PLACE = {"units": "m", "long_name": "position along the track"}
+_WORDS = ("name", "kind", "model", "criterion", "unit", "relation", "clause", "wire")
+
+
+class Run:
+    """The results of a run: what ``run`` and ``open`` give.
+
+    Arrays are of xarray, with names, places along the track [m], times [s] and units; tables are of
+    pandas, with the columns of ``summary.json``. An array is read when it is asked for.
+    Under mpirun each process has its own: not collective.
+
+    Attributes
+    ----------
+    plot : Pictures
+        Draws the pictures of the report.
+
+    Examples
+    --------
+    >>> run.outcome, run.passed in (True, False, None)
+    ('done', True)
+    >>> run.force.dims, run.force.units
+    (('time', 'pantograph'), 'N')
+    """
+
+    def __init__(self, results: Results, folder: Path | None = None) -> None:
+        self._results = results
+        self._folder = folder
+        self.plot = Pictures(results, lambda: self._evaluated)
+
+    @property
+    def folder(self) -> Path | None:
+        """The folder of the results, None of a run in memory.
+
+        Examples
+        --------
+        >>> run.folder is None
+        True
+        """
+        return self._folder
+
+    @property
+    def outcome(self) -> str:
+        """How the run ended: "done", "interrupted", "running", or the sentence of what broke.
+
+        Examples
+        --------
+        >>> run.outcome
+        'done'
+        """
+        return self._results.outcome
+
+    @cached_property
+    def scene(self) -> Scene:
+        """The scene of the run with all values that held, to run again or to replace some.
+
+        Raises
+        ------
+        InputError
+            If a version of Catenary recorded it whose keys are not those of this one.
+
+        Examples
+        --------
+        >>> run.scene["train.speed_km_h"]
+        250.0
+        """
+        file = "the scene of the run" if self._folder is None else str(self._results.path)
+        return Scene(Draft(self._results.attributes["config"], file, recorded=True))
+
+    @cached_property
+    def _evaluated(self) -> RunStatistics:
+        return stats.evaluate(self._results)
+
+    @cached_property
+    def summary(self) -> dict[str, Any]:
+        """What ``summary.json`` holds: the figures of the run as numbers, texts, lists and tables.
+
+        Examples
+        --------
+        >>> run.summary["case"], run.summary["speed_km_h"]
+        ('en50318_2002', 250.0)
+        """
+        criteria = judge(self._results, self._evaluated)
+        return summarise(self._results, self._evaluated, criteria)
+
+    @property
+    def statistics(self) -> pd.DataFrame:
+        """Statistics of the contact force in the evaluated stretch, a row for each pantograph.
+
+        Forces [N] are those below 20 Hz: ``mean_N``, ``std_N``, ``max_N``, ``min_N``, the means and
+        three standard deviations ``stat_max_N`` and ``stat_min_N``; ``loss_percent`` is the share
+        of time without contact. Units end the names. NaN where there is no record to evaluate.
+
+        Examples
+        --------
+        >>> bool(100 < run.statistics.loc["pantograph", "mean_N"] < 130)
+        True
+        """
+        return _table(self.summary["pantographs"]).set_index("name")
+
+    @property
+    def verdict(self) -> pd.DataFrame:
+        """Acceptance by EN 50367, a row for each criterion with its value and limit.
+
+        ``passed`` is true, false, or missing where there is nothing to judge; ``clause`` says where
+        the limit comes from.
+
+        Examples
+        --------
+        >>> run.verdict.set_index("criterion").loc["mean contact force", "unit"]
+        'N'
+        """
+        found = _table(self.summary["acceptance"])
+        return found.astype({"passed": "boolean"})
+
+    @property
+    def passed(self) -> bool | None:
+        """Whether all criteria are met; None if that cannot be judged, or if the run is not done.
+
+        Examples
+        --------
+        >>> run.passed
+        True
+        """
+        found: bool | None = self.summary["passed"]
+        return found
+
+    @property
+    def remarks(self) -> list[str]:
+        """Sentences on what decides the results, and on what could not be evaluated.
+
+        Examples
+        --------
+        >>> all(isinstance(sentence, str) for sentence in run.remarks)
+        True
+        """
+        return [*self.summary["complaints"], *self.summary["remarks"]]
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Names of all that is recorded over time, for ``channel``.
+
+        Examples
+        --------
+        >>> "contact_force" in run.channels
+        True
+        """
+        names = (*channels.CHANNELS, *channels.ENERGIES)
+        kept = self._results.energies()
+        return tuple(n for n in names if n != "time" and (n in kept or self._results.has(n)))
+
+    def channel(self, name: str) -> xr.DataArray:
+        """A recorded quantity over time.
+
+        Parameters
+        ----------
+        name : str
+            One of ``channels``; ``docs/architecture.md`` lists them with units and signs.
+
+        Returns
+        -------
+        xarray.DataArray, shape (n_times, n_columns) or (n_times,)
+            ``time`` [s] and, by what a column stands for, ``pantograph`` (its name), ``strip``,
+            ``contact``, or ``steady_arm``, ``dropper`` and ``wire_end`` (their places [m]). Those
+            of pantographs have the places ``position`` (n_times, n_pantographs) [m]. NaN where the
+            line is not recorded.
+
+        Raises
+        ------
+        InputError
+            If the run has no such record.
+
+        Examples
+        --------
+        >>> uplift = run.channel("arm_uplift")
+        >>> uplift.dims, uplift.units
+        (('time', 'steady_arm'), 'm')
+        >>> float(uplift.sel(steady_arm=480.0).max()) > 0.01
+        True
+        """
+        import xarray as xr
+
+        if name not in self.channels:
+            there = ", ".join(self.channels)
+            raise InputError(f"the run has no record {name}; it has {there}")
+        results = self._results
+        kept = results.energies()
+        if name in kept:
+            channel = channels.ENERGIES[name]
+            clock = ("time", kept["time"], _about(channels.TIME))
+            return xr.DataArray(kept[name], {"time": clock}, "time", name, _about(channel))
+        channel = channels.CHANNELS[name]
+        times = results.line_time if channel.of_line else results.time
+        dims = ("time", _COLUMNS[channel.per])
+        coords = {"time": ("time", times, _about(channels.TIME)), **self._columns(channel.per)}
+        if channel.per == channels.PANTOGRAPH:
+            place = results.channel("contact_position")
+            coords["position"] = (dims, place, _PLACE)
+        return xr.DataArray(results.channel(name), coords, dims, name, _about(channel))
+
+    def _columns(self, per: str) -> dict[str, Any]:
+        """What stands beside the columns of a channel, by the name of the coordinate."""
+        results, dim = self._results, _COLUMNS[per]
+        names = results.pantograph_names()
+        if per in _PLACES:
+            return {dim: (dim, results.line(_PLACES[per]), _PLACE)}
+        if per == channels.PANTOGRAPH:
+            return {dim: names}
+        counts = results.n_strips()
+        if per == channels.STRIP:
+            numbers = [number + 1 for count in counts for number in range(count)]
+            return {"number": (dim, numbers), "pantograph": (dim, np.repeat(names, counts))}
+        if per == channels.WIRE:
+            wires = results.wire_columns()
+            own = np.repeat(names, [len(one) for one in wires])
+            return {
+                "wire": (dim, [wire for one in wires for wire in one]),
+                "pantograph": (dim, own),
+            }
+        words = results.contact_names()
+        own = np.repeat(names, [len(one) for one in words])
+        return {"contact": [word for one in words for word in one], "pantograph": (dim, own)}
+
+    @property
+    def force(self) -> xr.DataArray:
+        """Contact force of each pantograph, (n_times, n_pantographs) [N], >= 0 in compression.
+
+        Unfiltered, of every time step; ``position`` is where the pantograph is [m].
+
+        Examples
+        --------
+        >>> float(run.force.min()) >= 0.0
+        True
+        >>> run.force.isel(pantograph=0).swap_dims(time="position").sel(
+        ...     position=480.0, method="nearest"
+        ... ).units
+        'N'
+        """
+        return self.channel("contact_force")
+
+    @property
+    def uplift(self) -> xr.Dataset:
+        """Uplift of the contact wire at the steady arms, by their places [m].
+
+        ``uplift`` over time (n_times, n_arms) [m], as far as it is recorded; ``largest`` (n_arms,)
+        over every step [m]; ``evaluated`` (n_arms,) whether an arm stands in the evaluated stretch.
+
+        Examples
+        --------
+        >>> own = run.uplift
+        >>> bool(own.largest.where(own.evaluated).max() > 0.04)
+        True
+        """
+        import xarray as xr
+
+        found = self._evaluated.supports
+        dim = _COLUMNS[channels.ARM]
+        about = {"units": "m", "long_name": "largest uplift over every step"}
+        recorded = {"uplift": self.channel("arm_uplift")} if self._results.has("arm_uplift") else {}
+        return xr.Dataset(
+            {**recorded, "largest": (dim, found.uplift, about)},
+            {**self._columns(channels.ARM), "evaluated": (dim, found.evaluated)},
+        )
+
+    @property
+    def droppers(self) -> xr.Dataset:
+        """The droppers, by their places [m]: forces are tensions [N], negative in compression.
+
+        ``force`` over time (n_times, n_droppers), as far as it is recorded; ``largest`` and
+        ``smallest`` (n_droppers,) over every step; ``force_at_rest`` (n_droppers,); ``length``
+        (n_droppers,) unstretched, as cut [m]; ``slackened`` whether it was slack at some time.
+        Beside them ``span`` (from 1), the wires ``hangs_from`` and ``carries``, and ``evaluated``,
+        whether it hangs in the evaluated stretch.
+
+        Examples
+        --------
+        >>> own = run.droppers
+        >>> worst = own.isel(dropper=own.largest.argmax("dropper"))
+        >>> bool(worst.largest > worst.force_at_rest), worst.largest.units
+        (True, 'N')
+        """
+        import xarray as xr
+
+        results, found = self._results, self._evaluated.droppers
+        dim = _COLUMNS[channels.DROPPER]
+        names = np.array([*results.roles], dtype=str)
+        upper, lower = results.dropper_wires().T
+        slack = (found.lowest <= 0.0) & stats.slackens_at_all(results)
+        of_force = {"units": "N"}
+        recorded = {"force": self.channel("dropper_force")} if results.has("dropper_force") else {}
+        return xr.Dataset(
+            {
+                **recorded,
+                "largest": (dim, found.highest, of_force),
+                "smallest": (dim, found.lowest, of_force),
+                "slackened": (dim, slack),
+                "force_at_rest": (dim, results.static("dropper_force"), of_force),
+                "length": (dim, results.static("dropper_length"), {"units": "m"}),
+            },
+            {
+                **self._columns(channels.DROPPER),
+                "span": (dim, results.line("dropper_span").astype(int) + 1),
+                "hangs_from": (dim, names[upper]),
+                "carries": (dim, names[lower]),
+                "evaluated": (dim, found.evaluated),
+            },
+        )
+
+    def close(self) -> None:
+        """Close the result file; tables that were not read before cannot be read then.
+
+        Examples
+        --------
+        >>> catenary.open(folder).close()
+        """
+        self._results.close()
+
+    def __enter__(self) -> Run:
+        return self
+
+    def __exit__(self, kind: object, error: object, trace: object) -> None:
+        self.close()
+
+    def __repr__(self) -> str:
+        about = self._results.attributes
+        where = "in memory" if self._folder is None else f"in {self._folder}"
+        return f"<catenary.Run {about['case']}, {where}: {self.outcome}>"
+
+
+def open(folder: str | Path) -> Run:
+    """The results of a run that the program or ``run`` wrote, done or not. Not collective.
+
+    The file is looked through for damage first, in a process of its own.
+
+    Parameters
+    ----------
+    folder : str or Path
+        The folder of the run, or its ``run.h5``.
+
+    Returns
+    -------
+    Run
+
+    Raises
+    ------
+    InputError
+        If there is no such file, or if it is so damaged that nothing can be told.
+
+    Examples
+    --------
+    >>> with catenary.open(folder) as run:
+    ...     print(run.outcome, run.summary["case"])
+    done en50318_2002
+    """
+    from catenary.postproc.read.guard import examined
+
+    results = Results(Path(folder), examined(Path(folder)))
+    return Run(results, results.path.parent)
+
+
+def _about(channel: channels.Channel) -> dict[str, str]:
+    """Unit and meaning, under the names that xarray draws."""
+    return {"units": channel.unit, "long_name": channel.meaning}
+
+
+def _table(rows: list[Mapping[str, Any]]) -> pd.DataFrame:
+    """Rows as a table; columns of numbers have NaN where there is none."""
+    import pandas as pd
+
+    found = pd.DataFrame(rows)
+    numbers = [name for name in found.columns if name not in (*_WORDS, "passed", "evaluated")]
+    return found.astype(dict.fromkeys(numbers, float))

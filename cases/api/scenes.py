@@ -1,0 +1,223 @@
+"""Scenes: loaded, looked into, and changed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from catenary.cases.scene.convert.course import resolved
+from catenary.cases.scene.input.origin import shown
+from catenary.cases.scene.input.plain_text import DEEPEST
+from catenary.cases.scene.input.toml_input import REMOVED
+from catenary.cases.scene.keys.error_sentences import unknown_key
+from catenary.cases.scene.keys.keys import is_known, known_keys
+from catenary.cases.scene.load import Draft, read_draft
+from catenary.cases.scene.scene import Scene as CheckedScene
+from catenary.solver.base.errors import InputError
+
+
+class Scene:
+    """A line, a train and a run of it, checked: what ``load`` gives. Nothing changes a scene.
+
+    Keys are those of ``case.toml``, dotted: ``catenary list --keys`` lists them with unit, bounds
+    and meaning. A unit stands at the end of a key; a key without one has no unit.
+
+    Examples
+    --------
+    >>> scene = catenary.load("en50318_2002")
+    >>> scene["train.speed_km_h"]
+    250.0
+    >>> scene.replace(train={"speed_km_h": 275})["train.speed_km_h"]
+    275.0
+    """
+
+    def __init__(self, draft: Draft) -> None:
+        self._draft = draft
+        self._checked = draft.scene()
+
+    @property
+    def name(self) -> str:
+        """What the case is called.
+
+        Examples
+        --------
+        >>> catenary.load("ac_simple").name
+        'ac_simple'
+        """
+        return self._checked.case.name
+
+    @property
+    def title(self) -> str:
+        """One line that says what the case is.
+
+        Examples
+        --------
+        >>> catenary.load("en50318_2002").title
+        'Reference model of EN 50318:2002'
+        """
+        return self._checked.case.title
+
+    def replace(self, changes: Mapping[str, Any] | None = None, /, **tables: Any) -> Scene:
+        """This scene with other values, checked at once. Not collective.
+
+        Parameters
+        ----------
+        changes : mapping, optional
+            Values by dotted keys, such as ``{"train.speed_km_h": 275}``. A table changes the keys
+            that it names and no others; a list replaces the whole list, unless its number is part
+            of the key (``train.pantographs.1.behind_m``). ``None`` takes a key away, so that its
+            default holds.
+        **tables : Any
+            The same by tables: ``train={"speed_km_h": 275}``.
+
+        Returns
+        -------
+        Scene
+            Another one; this one stays as it is.
+
+        Raises
+        ------
+        InputError
+            With the sentence that ``catenary check`` prints; ``faults`` has all of them.
+
+        Examples
+        --------
+        >>> scene = catenary.load("en50318_2002")
+        >>> other = scene.replace({"line.contact_wire.tension_N": 25e3}, train={"speed_km_h": 300})
+        >>> other["line.contact_wire.tension_N"], other["train.speed_km_h"]
+        (25000.0, 300.0)
+        >>> scene.replace(train={"sped_km_h": 300})
+        Traceback (most recent call last):
+        catenary.solver.base.errors.InputError: train.sped_km_h in replace() is unknown; did you mean train.speed_km_h?
+        """  # noqa: E501
+        return Scene(self._draft.assigned(_values({**(changes or {}), **tables}, "in replace()")))
+
+    def __getitem__(self, key: str) -> Any:
+        """The value that holds of a dotted key, None where none does.
+
+        Tables are dictionaries, and the number of an entry of a list is part of the key.
+        """
+        here: Any = resolved(self._checked)
+        for part in key.split("."):
+            if isinstance(here, list) and part.isdigit() and int(part) < len(here):
+                here = here[int(part)]
+            elif isinstance(here, dict) and part in here:
+                here = here[part]
+            elif is_known(key, known := known_keys(CheckedScene)):
+                return None
+            else:
+                raise InputError(unknown_key(key, "in the scene", known))
+        return here
+
+    def to_dict(self) -> dict[str, Any]:
+        """The scene as it is written, with what was replaced, as nested dictionaries.
+
+        ``load`` takes them for the same scene. Defaults are not among them: see ``scene[key]``.
+
+        Examples
+        --------
+        >>> faster = catenary.load("en50318_2002").replace(train={"speed_km_h": 275})
+        >>> faster.to_dict()["train"]["speed_km_h"]
+        275
+        >>> catenary.load(faster.to_dict())["train.speed_km_h"]
+        275.0
+        """
+        return self._draft.table()
+
+    def __repr__(self) -> str:
+        return f"<catenary.Scene {self.name}: {self.title}>"
+
+
+# What every function that takes a scene accepts.
+SceneLike = Scene | str | Path | Mapping[str, Any]
+
+
+def load(scene: str | Path | Mapping[str, Any], *, short: bool = False) -> Scene:
+    """Load a scene and check it. Not collective.
+
+    Parameters
+    ----------
+    scene : str, Path or mapping
+        The name of a shipped case (``catenary list``), a case file or its folder, or the tables of
+        a scene as nested dictionaries. Paths in these are relative to the working directory.
+    short : bool
+        Whether to apply the ``[test]`` table of the case, which shortens its run to seconds.
+
+    Returns
+    -------
+    Scene
+
+    Raises
+    ------
+    InputError
+        With the sentence that ``catenary check`` prints; ``faults`` has all of them.
+
+    Examples
+    --------
+    >>> catenary.load("en50318_2002", short=True)["line.n_spans"]
+    16
+    >>> try:
+    ...     catenary.load({"line": {"n_spans": 0}, "train": {}})
+    ... except catenary.InputError as error:
+    ...     print(len(error.faults) > 1, error.faults[0].key)
+    True line.n_spans
+    """
+    if isinstance(scene, Mapping):
+        raw = plain_value(scene, "the scene")
+        case = raw.setdefault("case", {})
+        if isinstance(case, dict):
+            case.setdefault("name", "scene")
+        draft = Draft(raw, "the table given to load()")
+    else:
+        draft = read_draft(scene)
+    return Scene(draft.shortened() if short else draft)
+
+
+def scene_of(scene: SceneLike) -> Scene:
+    """A scene, loaded unless it is one."""
+    return scene if isinstance(scene, Scene) else load(scene)
+
+
+def checked(scene: SceneLike) -> CheckedScene:
+    """The tables of a scene."""
+    return scene_of(scene)._checked
+
+
+def draft_of(scene: SceneLike) -> Draft:
+    """A scene as it is written."""
+    return scene_of(scene)._draft
+
+
+def _values(
+    table: Mapping[str, Any], where: str, above: str = ""
+) -> Iterator[tuple[str, Any, str]]:
+    """Dotted key, value and place of all that a nested table names."""
+    for name, value in table.items():
+        key = f"{above}{name}"
+        if key.count(".") >= DEEPEST:
+            raise InputError(f"{shown(key)[1:-1]} {where} has more than {DEEPEST} parts")
+        if isinstance(value, Mapping) and value:
+            yield from _values(value, where, f"{key}.")
+        else:
+            yield key, REMOVED if value is None else plain_value(value, f"{key} {where}"), where
+
+
+def plain_value(value: Any, where: str, depth: int = 0) -> Any:
+    """A value as TOML would give it: numbers, texts, lists and tables of Python."""
+    if depth > DEEPEST:
+        raise InputError(f"{where} is nested too deeply")
+    if isinstance(value, Mapping):
+        return {
+            str(key): plain_value(own, f"{where}.{key}", depth + 1) for key, own in value.items()
+        }
+    if isinstance(value, list | tuple):
+        return [plain_value(own, where, depth + 1) for own in value]
+    if isinstance(value, Path):
+        return str(value)
+    if hasattr(value, "tolist"):  # arrays and scalars of NumPy, series of pandas
+        return value.tolist()
+    if isinstance(value, bool | int | float | str):
+        return value
+    kind = type(value).__name__
+    raise InputError(f"{where} is a {kind}; it must be a number, a text, a list or a table")

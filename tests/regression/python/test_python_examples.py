@@ -1,0 +1,85 @@
+"""Every public name of ``catenary`` has a docstring with an example, and the examples are true."""
+
+from __future__ import annotations
+
+import doctest
+import inspect
+import pydoc
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import catenary
+
+# What is no function and no class of its own: errors say what they are for.
+WITHOUT_EXAMPLE = {"__version__", "CatenaryError", "Fault", "InputError", "RunBroken"}
+PUBLIC = [name for name in catenary.__all__ if name not in WITHOUT_EXAMPLE]
+FLAGS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
+
+
+def members(owner: Any) -> Iterator[tuple[str, Any]]:
+    """What a public class offers by name: methods and properties that it has itself."""
+    for name, value in vars(owner).items():
+        if not name.startswith("_"):
+            yield f"{owner.__name__}.{name}", value
+
+
+def described() -> dict[str, Any]:
+    """All that a docstring is wanted of, by name."""
+    found: dict[str, Any] = {}
+    for name in PUBLIC:
+        value = getattr(catenary, name)
+        found[name] = value
+        if inspect.isclass(value):
+            found |= dict(members(value))
+    return found
+
+
+DESCRIBED = described()
+
+
+@pytest.fixture(scope="module")
+def names(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    """What examples take for given: a scene, its run, the folder of another, steps that go on."""
+    folder = tmp_path_factory.mktemp("run")
+    scene = catenary.load("en50318_2002", short=True)
+    catenary.run(scene, folder)
+    sim = catenary.Simulation(scene)
+    sim.step(100)
+    run = catenary.run(scene)
+    return {"catenary": catenary, "scene": scene, "run": run, "folder": folder, "sim": sim}
+
+
+@pytest.mark.parametrize("name", DESCRIBED)
+def test_the_example_is_true(name: str, names: dict[str, Any]) -> None:
+    text = pydoc.getdoc(DESCRIBED[name])
+    parser, told = doctest.DocTestParser(), []
+    test = parser.get_doctest(text, dict(names), name, name, 0)
+    assert test.examples, f"{name} has no example"
+    doctest.DocTestRunner(verbose=False, optionflags=FLAGS).run(test, out=told.append)
+    assert not told, "".join(told)
+
+
+@pytest.mark.parametrize("name", PUBLIC)
+def test_a_function_says_what_it_takes_gives_and_refuses(name: str) -> None:
+    value, text = getattr(catenary, name), pydoc.getdoc(getattr(catenary, name))
+    if inspect.isclass(value):
+        return
+    parameters = inspect.signature(value).parameters
+    for heading in ("Parameters", "Returns", "Raises", "Examples"):
+        assert f"\n{heading}\n---" in text, heading
+    for parameter in parameters:
+        assert parameter in text.split("Returns\n---")[0], parameter
+    assert "ollective" in text, "whether it is collective"
+
+
+def test_names_that_are_not_there_are_refused() -> None:
+    with pytest.raises(AttributeError, match="no attribute 'lod'"):
+        catenary.lod  # noqa: B018
+    assert set(dir(catenary)) == set(catenary.__all__)
+
+
+def test_examples_leave_nothing_behind(names: dict[str, Any]) -> None:
+    assert not list(Path.cwd().glob("catenary_*"))

@@ -1,0 +1,375 @@
+"""Runs, sweeps and results in Python, beside what the program writes of the same scenes."""
+
+from __future__ import annotations
+
+import json
+import logging
+import os
+import signal
+import tempfile
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from acting_scenes import SCENES
+from program import SHORT_SCENE, catenary_started
+from program import catenary as program
+
+import catenary
+from catenary.cases.scene.input.toml_input import parse_assignment
+from catenary.postproc.read.results import Results
+
+WALL = {"march_wall_s", "march_cpu_s", "records_wall_s", "phase_wall_s"}
+WALL |= {"real_time_factor", "real_time_factor_with_records"}
+
+
+def with_words(case: str, words: tuple[str, ...] | list[str]) -> catenary.Scene:
+    """A scene with the assignments of a command line."""
+    return catenary.load(case).replace(dict(parse_assignment(word) for word in words))
+
+
+def without_times(summary: dict[str, Any]) -> dict[str, Any]:
+    """What two runs of a scene have in common."""
+    return {key: value for key, value in summary.items() if key not in WALL}
+
+
+@pytest.fixture(scope="module")
+def scene() -> catenary.Scene:
+    return with_words("en50318_2002", SHORT_SCENE)
+
+
+@pytest.fixture(scope="module")
+def in_memory(scene: catenary.Scene) -> catenary.Run:
+    return catenary.run(scene)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The same scene, run by the program."""
+    out = tmp_path_factory.mktemp("program")
+    words = ["run", "en50318_2002", "-o", str(out / "run"), "--set", *SHORT_SCENE]
+    assert program(*words, cwd=out).code == 0
+    return out / "run"
+
+
+@pytest.fixture
+def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """The folder of temporary files, which a test is to leave empty."""
+    place = tmp_path / "temporary"
+    place.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(place))
+    yield place
+    assert not list(place.iterdir())
+
+
+def test_a_run_in_memory_has_the_figures_of_the_program(
+    in_memory: catenary.Run, folder: Path
+) -> None:
+    """The same kernels on the same numbers: equal to the last bit."""
+    written = json.loads((folder / "summary.json").read_text())
+    assert without_times(in_memory.summary) == without_times(written)
+    assert in_memory.passed is written["passed"]
+    for table, rows in (("statistics", "pantographs"), ("verdict", "acceptance")):
+        own = getattr(in_memory, table).reset_index()
+        for name in written[rows][0]:
+            expected = [row[name] for row in written[rows]]
+            found = [None if pd.isna(value) else value for value in own[name]]
+            assert found == expected, name
+
+
+def test_an_opened_run_has_the_figures_of_its_summary(folder: Path) -> None:
+    written = json.loads((folder / "summary.json").read_text())
+    with catenary.open(folder) as run:
+        assert run.summary == written
+        assert run.folder == folder and run.outcome == "done"
+    with catenary.open(folder / "run.h5") as run:
+        assert run.folder == folder and str(folder) in repr(run)
+
+
+def test_every_channel_is_that_of_the_file(in_memory: catenary.Run, folder: Path) -> None:
+    with Results(folder) as results:
+        names = set(in_memory.channels)
+        energies = results.energies()
+        assert {"contact_force", "arm_uplift", "dropper_force", "kinetic"} <= names
+        for name in names:
+            found = in_memory.channel(name)
+            expected = energies[name] if name in energies else results.channel(name)
+            assert np.array_equal(found, expected, equal_nan=True), name
+            assert found.attrs["units"] and found.attrs["long_name"]
+            assert found.coords["time"].attrs["units"] == "s"
+        uplift, force = in_memory.channel("arm_uplift"), in_memory.channel("dropper_force")
+        assert np.array_equal(uplift.steady_arm, results.line("arm_x"))
+        assert np.array_equal(force.dropper, results.line("dropper_x"))
+        assert np.array_equal(in_memory.force.position, results.channel("contact_position"))
+        assert in_memory.channel("kinetic").dims == ("time",)
+    with pytest.raises(catenary.InputError, match="no record spam; it has contact_position, "):
+        in_memory.channel("spam")
+
+
+def test_droppers_and_arms_are_those_of_the_summary(in_memory: catenary.Run) -> None:
+    own, told = in_memory.droppers, in_memory.summary["droppers"]
+    inside = own.where(own.evaluated, drop=True)
+    assert float(inside.largest.max()) == told["max_force_N"]
+    assert float(inside.smallest.min()) == told["min_force_N"]
+    assert int(own.slackened[own.evaluated].sum()) == told["n_slackened"] > 0
+    # Extremes are kept of every step, and every step is recorded.
+    assert np.array_equal(own.force.max("time"), own.largest)
+    assert np.array_equal(own.force[0], own.force_at_rest)
+    assert set(own.span.values.tolist()) == set(range(1, 11))
+    arms = in_memory.uplift
+    assert np.array_equal(arms.uplift.max("time"), arms.largest)
+    assert 1e3 * float(arms.largest[arms.evaluated].max()) == pytest.approx(
+        in_memory.summary["supports"]["max_uplift_mm"], rel=1e-15
+    )
+
+
+def test_several_pantographs_strips_and_wires_have_names() -> None:
+    table = SCENES["overlap"]
+    words = [*table["set"]]
+    run = catenary.run(with_words(table["case"], words))
+    names = run.statistics.index.tolist()
+    assert names == run.force.pantograph.values.tolist()
+    of_wires = run.channel("contact_wire_force")
+    total = of_wires.groupby("pantograph").sum()
+    # Shares of a force of 1e2 N sum up to it within the round-off of a sum.
+    for name in names:
+        apart = np.abs(total.sel(pantograph=name) - run.force.sel(pantograph=name)).max()
+        assert float(apart) < 1e-12 * float(run.force.max())
+
+
+def test_a_run_knows_its_scene(in_memory: catenary.Run, scene: catenary.Scene) -> None:
+    assert in_memory.scene["train.end_m"] == scene["train.end_m"] == 260.0
+    faster = in_memory.scene.replace(train={"speed_km_h": 255})
+    assert faster["train.speed_km_h"] == 255.0
+    with pytest.raises(catenary.InputError, match="in the scene of the run|in replace"):
+        in_memory.scene.replace({"evaluation.to_m": 1e5})
+
+
+def test_a_folder_is_written_as_the_program_writes_it(
+    scene: catenary.Scene, folder: Path, tmp_path: Path
+) -> None:
+    """Pictures are not painted by the program of tests."""
+    run = catenary.run(scene, tmp_path / "out")
+    assert run.folder == tmp_path / "out"
+    found = {path.name for path in (tmp_path / "out").iterdir() if path.suffix != ".png"}
+    assert found == {path.name for path in folder.iterdir() if path.suffix != ".png"}
+    assert (tmp_path / "out" / "contact_force.png").stat().st_size > 1000
+    with pytest.raises(catenary.InputError, match="holds the results of an earlier run"):
+        catenary.run(scene, tmp_path / "out")
+    again = catenary.run(scene, str(tmp_path / "out"), force=True)
+    assert np.array_equal(again.force, run.force)
+
+
+def test_memory_holds_all_and_the_disk_nothing(scene: catenary.Scene, temporary: Path) -> None:
+    run = catenary.run(scene.replace({"train.end_m": 245.0}))
+    assert not list(temporary.iterdir())
+    assert run.plot.force().axes and run.folder is None and "in memory" in repr(run)
+
+
+def test_a_refused_scene_leaves_nothing(scene: catenary.Scene, temporary: Path) -> None:
+    loose = {"line.dropper.pre_sag_mid_mm": 900.0, "case.accept_unusual": True}
+    with pytest.raises(catenary.InputError, match="slack"):
+        catenary.run(scene.replace(loose))
+
+
+BREAKS = {
+    "numerics.scheme": "fixed_point",
+    "numerics.max_iterations": 2,
+    "numerics.eps_d_m": 1e-12,
+}
+
+
+def test_a_run_that_breaks_says_so_and_has_what_it_recorded(
+    scene: catenary.Scene, temporary: Path
+) -> None:
+    with pytest.raises(catenary.RunBroken, match="iterations") as broken:
+        catenary.run(scene.replace(BREAKS))
+    run = broken.value.run  # type: ignore[attr-defined]
+    assert run.outcome == str(broken.value) and run.passed is None
+    assert not list(temporary.iterdir())
+
+
+def test_a_signal_ends_a_run_as_it_ends_python(scene: catenary.Scene, temporary: Path) -> None:
+    """Ctrl-C, sent once the march has begun, which takes it for its own until it ends."""
+    from catenary.solver.time_loop.march import March
+
+    begun, own = threading.Event(), March.run
+    wait = threading.Thread(
+        target=lambda: (begun.wait(60), time.sleep(0.05), os.kill(os.getpid(), signal.SIGINT))
+    )
+
+    def run(*args: Any, **kwargs: Any) -> Any:
+        begun.set()
+        return own(*args, **kwargs)
+
+    long = scene.replace({"line.n_spans": 400, "train.end_m": 20000.0})
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(March, "run", run)
+        wait.start()
+        with pytest.raises(KeyboardInterrupt):
+            catenary.run(long)
+    wait.join()
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_options_of_a_scene_are_those_of_its_run_alone(scene: catenary.Scene) -> None:
+    from catenary.cases.process.petsc_options import options_of
+    from catenary.solver.base.petsc import PETSc
+
+    PETSc.Options().setValue("ts_view_of_mine", "1")
+    with options_of({"ts_view_of_mine": 2, "log_of_mine": True}) as words:
+        assert words == ["-ts_view_of_mine", "2", "-log_of_mine"]
+        inside = PETSc.Options().getAll()
+        assert inside["ts_view_of_mine"] == "2" and "log_of_mine" in inside
+    after = PETSc.Options().getAll()
+    assert after["ts_view_of_mine"] == "1" and "log_of_mine" not in after
+    PETSc.Options().delValue("ts_view_of_mine")
+
+
+def test_progress_is_shown_where_it_is_asked_for(
+    scene: catenary.Scene, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from catenary.postproc.record import progress
+
+    monkeypatch.setattr(progress, "LINE_EVERY", 0.0)
+    monkeypatch.setattr(progress, "_LOOK_AT_LINES", 0.0)
+    logger = logging.getLogger("catenary.progress")
+    before = (logger.level, logger.propagate, list(logger.handlers))
+    catenary.run(scene)
+    assert capfd.readouterr() == ("", "")
+    catenary.run(scene, progress=True)
+    told = capfd.readouterr()
+    assert told.out == "" and "march: " in told.err and "left" in told.err
+    assert (logger.level, logger.propagate, logger.handlers) == before
+
+
+# --- sweeps -------------------------------------------------------------------------------------
+
+VARIED = {"train.speed_km_h": [200, 250], "contact.stiffness_N_per_m": [2e4, 5e4]}
+
+
+@pytest.fixture(scope="module")
+def swept(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The sweep as the program makes it."""
+    out = tmp_path_factory.mktemp("swept")
+    vary = [
+        word for key, own in VARIED.items()
+        for word in ("--vary", f"{key}={','.join(map(str, own))}")
+    ]  # fmt: skip
+    done = program(
+        "sweep", "en50318_2002", "-o", "here", *vary, "--set", *SHORT_SCENE, cwd=out
+    )  # fmt: skip
+    assert done.code == 0, done.stderr
+    return out / "here"
+
+
+def test_a_sweep_is_the_table_of_the_program(scene: catenary.Scene, swept: Path) -> None:
+    table = catenary.sweep(scene, VARIED)
+    expected = pd.DataFrame(json.loads((swept / "sweep.json").read_text())["rows"])
+    drop = ["wall_s"]
+    pd.testing.assert_frame_equal(
+        table.drop(columns=drop), expected.drop(columns=drop), check_exact=True
+    )
+
+
+def test_a_sweep_into_a_folder_goes_on_where_the_program_was(
+    scene: catenary.Scene, swept: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    before = {path: path.stat().st_mtime_ns for path in swept.glob("*/run.h5")}
+    catenary.sweep(scene, VARIED, swept, progress=True)
+    assert capfd.readouterr().err.count("done already") == len(before) == 4
+    assert {path: path.stat().st_mtime_ns for path in before} == before
+    with pytest.raises(catenary.InputError, match="a sweep with other variants"):
+        catenary.sweep(scene, {"train.speed_km_h": [200, 210]}, swept)
+
+
+def test_a_variant_that_does_not_fit_is_told_in_its_row(scene: catenary.Scene) -> None:
+    table = catenary.sweep(scene, {"train.end_m": [250.0, 590.0, 1e4]})
+    assert table.outcome[0] == "done" and "train.end_m" in table.outcome[2]
+    assert np.isnan(table.std_N[2]) and table["train.end_m"].tolist() == [250.0, 590.0, 1e4]
+
+
+@pytest.mark.parametrize(
+    ("vary", "says"),
+    [
+        ({}, "nothing to vary"),
+        ({"train.speed_km_h": []}, "nothing to vary"),
+        ({"train.sped_km_h": [200]}, "train.sped_km_h in vary is unknown; did you mean"),
+        ({"train.speed_km_h": [200, 200]}, "vary train.speed_km_h names 200 twice"),
+        ({"petsc.ksp_type": ["cg"]}, "vary petsc.ksp_type is not possible"),
+        ({"train.speed_km_h": [None]}, "must be a number"),
+        ({"train.speed_km_h": [-1.0, -2.0]}, "must be at least 1"),
+    ],
+)
+def test_what_cannot_be_varied_is_refused(
+    vary: dict[str, list[Any]], says: str, scene: catenary.Scene, temporary: Path
+) -> None:
+    with pytest.raises(catenary.InputError, match=says):
+        catenary.sweep(scene, vary)
+
+
+def test_values_of_all_kinds_reach_their_scenes() -> None:
+    from catenary.cases.studies.sweep.variants import text_of
+
+    for value in (
+        1,
+        2.5,
+        1e-7,
+        True,
+        "plain",
+        "1",
+        "true",
+        "a, b",
+        "",
+        [1, "x", [2.0]],
+        {"a": "1"},
+    ):
+        key, found = parse_assignment(f"key={text_of(value)}")
+        assert (key, found) == ("key", value) and type(found) is type(value)
+
+
+# --- pictures -----------------------------------------------------------------------------------
+
+
+def test_pictures_are_those_of_the_report(in_memory: catenary.Run) -> None:
+    plot = in_memory.plot
+    made = {
+        "contact_force": plot.force(),
+        "statistics": plot.statistics(),
+        "histogram": plot.histogram(),
+        "uplift": plot.uplift(),
+        "droppers": plot.droppers(),
+        "static": plot.at_rest(),
+    }
+    assert set(made) <= set(plot.names)
+    labels = {name: [axes.get_ylabel() for axes in own.axes] for name, own in made.items()}
+    for name, own in labels.items():
+        assert own == [axes.get_ylabel() for axes in plot(name).axes]
+    force = made["contact_force"].axes[0]
+    assert force.get_xlabel() == "position along the track [m]"
+    assert len({str(own) for own in labels.values()}) == len(made)
+    with pytest.raises(catenary.InputError, match="no picture spam; it has contact_force, "):
+        plot("spam")
+
+
+def test_a_run_that_goes_on_can_be_opened(tmp_path: Path) -> None:
+    words = ["run", "en50318_2002", "-o", "out", "--set", *SHORT_SCENE, "line.n_spans=300"]
+    with catenary_started(*words, "train.end_m=15000", cwd=tmp_path) as march:
+        march.wait_for(lambda: (tmp_path / "out/run.h5").is_file())
+        march.wait_for(lambda: _rows(tmp_path / "out") > 100)
+        with catenary.open(tmp_path / "out") as run:
+            assert run.outcome == "running" and run.passed is None
+            assert run.force.sizes["time"] > 100
+        march.send(signal.SIGTERM)
+        march.end()
+
+
+def _rows(folder: Path) -> int:
+    from program import n_rows
+
+    return n_rows(folder / "run.h5")

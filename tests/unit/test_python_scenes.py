@@ -1,0 +1,225 @@
+"""Scenes in Python: what `replace` changes and refuses, beside the command line; tables at rest."""
+
+from __future__ import annotations
+
+import json
+import os
+import pickle
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import catenary
+from catenary.cases.run.checking import check_line
+from catenary.cases.scene.convert.course import resolved
+from catenary.cases.scene.input.case_files import find_case
+from catenary.cases.scene.load import load_scene
+from catenary.scenes import checked
+
+CASE = "en50318_2002"
+
+
+@pytest.fixture(scope="module")
+def scene() -> catenary.Scene:
+    return catenary.load(CASE)
+
+
+@pytest.mark.parametrize(
+    ("words", "changes", "tables"),
+    [
+        (["train.speed_km_h=275"], {"train.speed_km_h": 275}, {}),
+        (["train.speed_km_h=275"], {}, {"train": {"speed_km_h": np.float64(275)}}),
+        (
+            ["line.contact_wire.tension_N=25e3", "line.n_spans=24"],
+            {"line.n_spans": np.int64(24)},
+            {"line": {"contact_wire": {"tension_N": 25e3}}},
+        ),
+        (["line.dropper.positions_m=[15.0,30.0,45.0]"], {},
+         {"line": {"dropper": {"positions_m": np.array([15.0, 30.0, 45.0])}}}),
+        (["train.raise_time_s="], {"train.raise_time_s": None}, {}),
+        (["effects.dropper_slackening=false"], {}, {"effects": {"dropper_slackening": False}}),
+        (["train.pantographs.0.name=reference"], {"train.pantographs.0.name": "reference"}, {}),
+        (["test.line.n_spans=12"], {"test.line.n_spans": 12}, {}),
+    ],
+)  # fmt: skip
+def test_what_is_replaced_is_what_the_command_line_sets(
+    words: list[str], changes: dict[str, object], tables: dict[str, object], scene: catenary.Scene
+) -> None:
+    other = scene.replace(changes, **tables)
+    assert resolved(checked(other)) == resolved(load_scene(CASE, words))
+    assert resolved(checked(scene)) == resolved(load_scene(CASE))  # stays as it was
+
+
+def test_a_change_is_checked_at_once_with_the_sentences_of_the_command_line(
+    scene: catenary.Scene,
+) -> None:
+    for word, change in (
+        ("train.sped_km_h=300", {"train.sped_km_h": 300}),
+        ("train.speed_km_h=-1", {"train.speed_km_h": -1}),
+        ("train.speed_km_h=900", {"train.speed_km_h": 900}),
+        ('train.speed_km_h="fast"', {"train.speed_km_h": "fast"}),
+        ("line.span_m=0.1", {"line.span_m": 0.1}),
+    ):
+        with pytest.raises(catenary.InputError) as expected:
+            load_scene(CASE, [word])
+        with pytest.raises(catenary.InputError) as found:
+            scene.replace(change)
+        said = str(expected.value).replace("on the command line (--set)", "in replace()")
+        assert str(found.value) == said
+        if word != "train.sped_km_h=300":
+            assert found.value.faults[0].key == word.partition("=")[0]
+
+
+def test_all_faults_of_a_scene_are_told(scene: catenary.Scene) -> None:
+    with pytest.raises(catenary.InputError) as found:
+        scene.replace(train={"speed_km_h": -1}, line={"n_spans": 0})
+    assert {fault.key for fault in found.value.faults} == {"train.speed_km_h", "line.n_spans"}
+    with pytest.raises(catenary.InputError) as found:
+        catenary.load("no_such_case")
+    assert [(fault.key, fault.sentence) for fault in found.value.faults] == [("", str(found.value))]
+
+
+@pytest.mark.parametrize("value", [object(), {1, 2}, 1j, [None]])
+def test_what_no_file_can_hold_is_refused(value: object, scene: catenary.Scene) -> None:
+    with pytest.raises(catenary.InputError, match="must be a number, a text, a list or a table"):
+        scene.replace({"train.speed_km_h": value})
+
+
+def test_a_table_nested_without_end_is_refused(scene: catenary.Scene) -> None:
+    table: dict[str, object] = {}
+    table["train"] = table
+    with pytest.raises(catenary.InputError, match="more than 32 parts"):
+        scene.replace(table)
+    endless: list[object] = []
+    endless.append(endless)
+    with pytest.raises(catenary.InputError, match="nested too deeply"):
+        scene.replace({"line.span_m": endless})
+
+
+def test_the_test_table_shortens(scene: catenary.Scene) -> None:
+    short = catenary.load(CASE, short=True)
+    assert resolved(checked(short)) == resolved(load_scene(CASE, shortened=True))
+    assert short["line.n_spans"] < scene["line.n_spans"]
+    again = catenary.load(scene.to_dict(), short=True)
+    assert resolved(checked(again)) == resolved(checked(short))
+
+
+def test_values_are_looked_up_by_their_keys(scene: catenary.Scene) -> None:
+    assert scene["contact"]["stiffness_N_per_m"] == scene["contact.stiffness_N_per_m"] == 5e4
+    assert scene["train.pantographs.0.name"] == "reference"
+    assert scene["wind.speed_m_per_s"] is None and scene["train.end_m"] == 660.0
+    for key in ("train.sped_km_h", "train.pantographs.7.nam"):
+        with pytest.raises(catenary.InputError, match="is unknown"):
+            scene[key]
+
+
+def test_dictionaries_hold_paths_from_everywhere(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of the case file's own folder, and of the working directory where it was replaced."""
+    (tmp_path / "case").mkdir()
+    own = find_case(CASE).read_text().replace("[contact]", '[vehicle.vertical]\n'
+        'by_time_file = "way.csv"\n[effects]\nvehicle_motion = true\n[contact]')  # fmt: skip
+    (tmp_path / "case/case.toml").write_text(own.replace(f'name = "{CASE}"\n', ""))
+    (tmp_path / "case/way.csv").write_text("0,0\n1,0.01\n2,0.01\n20,0\n")
+    (tmp_path / "other.csv").write_text("0,0\n2,0.02\n3,0.02\n20,0\n")
+    monkeypatch.chdir(tmp_path)
+    scene = catenary.load(tmp_path / "case")
+    other = scene.replace({"vehicle.vertical.by_time_file": Path("other.csv")})
+    monkeypatch.chdir("/")
+    assert scene.name == "case" == catenary.load(scene.to_dict()).name
+    again = catenary.load(scene.to_dict())
+    assert again["vehicle.vertical.by_time"] == [[0, 0], [1, 0.01], [2, 0.01], [20, 0]]
+    monkeypatch.chdir(tmp_path)
+    kept = other.to_dict()
+    monkeypatch.chdir("/")
+    assert catenary.load(kept)["vehicle.vertical.by_time"][1] == [2, 0.02]
+
+
+def test_a_scene_goes_to_other_processes(scene: catenary.Scene) -> None:
+    other = pickle.loads(pickle.dumps(scene.replace(train={"speed_km_h": 275})))
+    assert other["train.speed_km_h"] == 275.0
+
+
+def test_warnings_are_those_of_the_command_line(scene: catenary.Scene) -> None:
+    near = scene.replace({"line.n_spans": 11})
+    expected = check_line(load_scene(CASE, ["line.n_spans=11"])).warnings
+    assert expected and catenary.check(near) == expected == catenary.plan(near).warnings
+    loose = {"line.dropper.pre_sag_mid_mm": 900.0, "case.accept_unusual": True}
+    with pytest.raises(catenary.InputError, match="slack"):
+        catenary.check(scene.replace(loose))
+
+
+def test_tables_at_rest_are_those_of_the_line() -> None:
+    rest = catenary.static("dc_twin")
+    droppers = rest.droppers
+    assert droppers.x_m.is_monotonic_increasing and set(droppers.carries) >= {"contact_wire"}
+    assert len(set(droppers.carries)) == 2
+    supports = rest._data["support_x"]
+    assert np.allclose(supports[droppers.span - 1] + droppers.in_span_m, droppers.x_m)
+    # Droppers carry what hangs on them: the force at rest of the whole line is part of its weight.
+    assert droppers.force_N.sum() > 0.0
+    names = rest.contact_wires.wire.unique()
+    assert len(names) == 2
+    for _, own in rest.contact_wires.groupby("wire"):
+        assert own.x_m.is_monotonic_increasing
+    assert "Elasticity from" in str(rest) and "dc_twin" in repr(rest)
+    arms = catenary.static("ac_simple_3d").steady_arms
+    assert (arms.tension_N > 0.0).all() and arms.x_m.is_monotonic_increasing
+
+
+def test_the_plan_is_that_of_the_command_line(scene: catenary.Scene) -> None:
+    from catenary.cases.run.planning.plan import make_plan, plan_text
+
+    own, plan = make_plan(load_scene(CASE)), catenary.plan(scene)
+    assert str(plan) == plan_text(own)
+    assert plan.figures["n_unknowns"] == own.n_dofs and plan.figures["memory_B"] == own.memory
+    assert plan.effects.simulated.sum() == len(own.on) and len(plan.effects) > len(own.on)
+
+
+# --- what an import loads -----------------------------------------------------------------------
+
+HEAVY = {"numpy", "scipy", "h5py", "mpi4py", "petsc4py", "pydantic", "pandas", "xarray", "typer"}
+HEAVY |= {"matplotlib", "gmsh"}
+STAGES = """
+import json, sys
+found = []
+def note():
+    found.append(sorted({name.partition(".")[0] for name in sys.modules}))
+import catenary; note()
+catenary.__version__, catenary.InputError; note()
+scene = catenary.load("en50318_2002"); scene.replace(train={"speed_km_h": 260}); note()
+catenary.check(scene); note()
+print(json.dumps(found))
+"""
+
+
+@pytest.mark.process
+def test_an_import_loads_nothing_that_is_not_used() -> None:
+    """Modules are counted, not seconds: they are what costs."""
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-c", STAGES],
+        capture_output=True, text=True, check=True, env=dict(os.environ),
+    )  # fmt: skip
+    assert done.stderr == ""
+    bare, named, loaded, hung = (set(names) for names in json.loads(done.stdout))
+    assert not HEAVY & bare and not HEAVY & named
+    assert "pydantic" in loaded
+    for later in (loaded, hung):
+        assert not {"petsc4py", "mpi4py", "h5py", "pandas", "xarray", "matplotlib", "typer"} & later
+
+
+@pytest.mark.process
+def test_nothing_is_printed_unless_a_program_asks() -> None:
+    """A warning of a logger of the package: nothing hears it, until logging is set up."""
+    program = (
+        "import catenary, logging; log = logging.getLogger('catenary.runner');"
+        "log.warning('one'); logging.basicConfig(); log.warning('two')"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True
+    )
+    assert done.stdout == "" and done.stderr == "WARNING:catenary.runner:two\n"
