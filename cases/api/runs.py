@@ -97,7 +97,7 @@ def run(
         found = _read(folder, comm, in_memory=out is None)
     if ended.outcome != "done":
         error = RunBroken(ended.outcome)
-        error.run = found  # type: ignore[attr-defined]
+        error.run = found
         raise error
     return found
 

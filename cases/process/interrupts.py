@@ -11,6 +11,7 @@ import contextlib
 import os
 import signal
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 from types import FrameType
@@ -173,7 +174,7 @@ class StopRequest:
     """While entered, the first signal is remembered and ends nothing by itself.
 
     Not collective: the march carries the wish to all ranks. Where no handlers are installed, as in
-    other Python programs, they are while this is entered.
+    other Python programs, they are while this is entered, in the one thread that may have some.
     """
 
     def __init__(self) -> None:
@@ -186,7 +187,7 @@ class StopRequest:
 
     def __enter__(self) -> StopRequest:
         self._scope.__enter__()
-        if not _wish.installed:
+        if not _wish.installed and threading.current_thread() is threading.main_thread():
             self._before = {number: signal.getsignal(number) for number in STOPPING}
             install(several_ranks=False)
         return self

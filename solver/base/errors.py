@@ -1,6 +1,6 @@
 """Errors that a user sees: one sentence, one exit code. A leaf module, importing none of ours."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 
 class Fault(NamedTuple):
@@ -41,9 +41,15 @@ class RunBroken(CatenaryError):
     """The run could not be continued: NaN, no convergence, disk full (exit code 1).
 
     The message names time, place and remedy; the result file stays readable up to the last step.
+
+    Attributes
+    ----------
+    run : catenary.Run or None
+        What was recorded up to there, where ``catenary.run`` raises it.
     """
 
     exit_code = 1
+    run: Any = None
 
 
 class NotConverged(RunBroken):

@@ -189,12 +189,15 @@ def test_a_run_that_breaks_says_so_and_has_what_it_recorded(
 ) -> None:
     with pytest.raises(catenary.RunBroken, match="iterations") as broken:
         catenary.run(scene.replace(BREAKS))
-    run = broken.value.run  # type: ignore[attr-defined]
+    run = broken.value.run
     assert run.outcome == str(broken.value) and run.passed is None
     assert not list(temporary.iterdir())
 
 
-def test_a_signal_ends_a_run_as_it_ends_python(scene: catenary.Scene, temporary: Path) -> None:
+@pytest.mark.parametrize("swept", [False, True])
+def test_a_signal_ends_a_run_as_it_ends_python(
+    swept: bool, scene: catenary.Scene, temporary: Path
+) -> None:
     """Ctrl-C, sent once the march has begun, which takes it for its own until it ends."""
     from catenary.solver.time_loop.march import March
 
@@ -207,14 +210,28 @@ def test_a_signal_ends_a_run_as_it_ends_python(scene: catenary.Scene, temporary:
         begun.set()
         return own(*args, **kwargs)
 
+    before = signal.getsignal(signal.SIGINT)
     long = scene.replace({"line.n_spans": 400, "train.end_m": 20000.0})
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(March, "run", run)
         wait.start()
         with pytest.raises(KeyboardInterrupt):
-            catenary.run(long)
+            if swept:
+                catenary.sweep(long, {"contact.stiffness_N_per_m": [2e4, 5e4]})
+            else:
+                catenary.run(long)
     wait.join()
-    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_a_run_may_stand_in_a_thread(scene: catenary.Scene) -> None:
+    """Only the first thread of a process may handle signals; another one leaves them alone."""
+    found: list[catenary.Run] = []
+    short = scene.replace({"train.end_m": 245.0})
+    thread = threading.Thread(target=lambda: found.append(catenary.run(short)))
+    thread.start()
+    thread.join()
+    assert found and found[0].outcome == "done"
 
 
 def test_options_of_a_scene_are_those_of_its_run_alone(scene: catenary.Scene) -> None:
