@@ -111,6 +111,17 @@ def test_every_channel_is_that_of_the_file(in_memory: catenary.Run, folder: Path
         in_memory.channel("spam")
 
 
+def test_thinned_records_have_times_of_their_own(scene: catenary.Scene) -> None:
+    """Every tenth of the steps of 1 ms; beyond a window around the train nothing is recorded."""
+    thinned = {"line_channels_every_s": 0.01, "line_channels_window_m": [60.0, 60.0]}
+    run = catenary.run(scene.replace({"train.end_m": 245.0}, output=thinned))
+    uplift, force = run.channel("arm_uplift"), run.force
+    assert np.array_equal(uplift.time, force.time[::10])
+    there = np.abs(uplift.steady_arm - force.position[::10, 0]) <= 55.0
+    assert not uplift.where(there).isnull().where(there, False).any()
+    assert bool(uplift.isnull().any()) and not run.uplift.largest.isnull().any()
+
+
 def test_droppers_and_arms_are_those_of_the_summary(in_memory: catenary.Run) -> None:
     own, told = in_memory.droppers, in_memory.summary["droppers"]
     inside = own.where(own.evaluated, drop=True)
@@ -257,8 +268,12 @@ def test_progress_is_shown_where_it_is_asked_for(
     monkeypatch.setattr(progress, "_LOOK_AT_LINES", 0.0)
     logger = logging.getLogger("catenary.progress")
     before = (logger.level, logger.propagate, list(logger.handlers))
+    heard = logging.StreamHandler()  # of a program that hears all that is logged
+    monkeypatch.setattr(logging.getLogger("catenary"), "handlers", [heard])
+    monkeypatch.setattr(logging.getLogger("catenary"), "level", logging.INFO)
     catenary.run(scene)
-    assert capfd.readouterr() == ("", "")
+    told = capfd.readouterr()
+    assert told.out == "" and "march: " not in told.err
     catenary.run(scene, progress=True)
     told = capfd.readouterr()
     assert told.out == "" and "march: " in told.err and "left" in told.err
