@@ -175,5 +175,5 @@ def prepare(
     console.say(
         f"{out}: {n_steps} steps of {scene.numerics.dt_s * 1e3:g} ms, "
         f"{out.stat().st_size / 1e6:.0f} MB\n"
-        f"C programs include {HEADER} and link {LIBRARY}; Python has catenary.solver.simulation"
+        f"C programs include {HEADER} and link {LIBRARY}; Python has catenary.Simulation"
     )

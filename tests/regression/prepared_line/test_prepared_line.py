@@ -257,3 +257,4 @@ def test_example_in_python_steps_a_line(
     names: dict[str, Any] = {}
     exec(program.replace("2000", "200"), names)
     assert names["line"].time == pytest.approx(0.2)
+    assert names["line"].steps_left > 0
