@@ -256,5 +256,4 @@ def test_example_in_python_steps_a_line(
     monkeypatch.chdir(tmp_path)
     names: dict[str, Any] = {}
     exec(program.replace("2000", "200"), names)
-    assert names["line"].time == pytest.approx(0.2)
-    assert names["line"].steps_left > 0
+    assert len(names["state"]) > 10_000 and np.isfinite(names["error"])
