@@ -97,7 +97,8 @@ def test_the_command_line_exits_with_0_or_with_2_and_one_line(key: str, value: f
     if result.exit_code == 2:
         assert all(line.startswith("catenary: ") for line in result.output.splitlines())
     else:
-        # A line of the scene, one of each kind of pantograph, one of the waves that each meets.
+        # A line of the scene, one of each kind of pantograph, one of the ends, one of the waves
+        # that each pantograph meets.
         sound = [line for line in result.output.splitlines() if not line.startswith("WARNING ")]
         assert sound[0].startswith("en50318_2002 is valid: ")
-        assert len(sound) == 3, result.output
+        assert len(sound) == 4, result.output
