@@ -280,7 +280,7 @@ CODE
     else
         pip_install "${wanted[@]}"
     fi
-    compile_kernels "some 30 s"
+    compile_kernels "two to three minutes"
     pip_install --no-deps --no-build-isolation --editable .
     begin "compiling the packages to bytecode"
     # Bytecode on all cores at once: pip makes it on one, which took a third of its time. Packages
@@ -303,7 +303,7 @@ if [ ! "$newest" ] && is_current; then
     kernels_are_current || compile_kernels
     exit 0
 fi
-say "setup: preparing .venv, which takes one to three minutes the first time"
+say "setup: preparing .venv, which takes three to five minutes the first time"
 choose_python
 make_environment
 install_python_packages

@@ -81,6 +81,13 @@ constexpr Shipped kTensioned = [] {
     of.factors.strands[1] = {3, 4, 6, 9, 10};
     return of;
 }();
+/// The same by M, and two wires that stretch in their plane.
+constexpr Shipped kThreePlanes = {rows_of({10}, {0, 1}), kTensioned.factors};
+constexpr Shipped kStretching = [] {
+    Shipped of = sparse(rows_of({6}, {0, 1}));
+    of.factors.beside = bits({0, 1, 4, 5, 6, 7});
+    return of;
+}();
 constexpr Shipped kShipped[] = {
     dense(rows_of({2}, {0, 1})),                  // one wire
     dense(rows_of({2, 2}, {0, 1})),               // in two planes
@@ -98,7 +105,9 @@ constexpr Shipped kShipped[] = {
     mixed(sparse(rows_of({8}, {0, 1}))),          // two wires in planes that arms join, by M
     sparse(rows_of({8}, {0, 1, 2, 4, 6}, true)),  // in wind
     sparse(rows_of({12}, {0, 1})),                // three wires in planes that arms join, by M
-    mixed(sparse(rows_of({16}, {0, 1}))),         // an overlap of such lines of two wires
+    sparse(rows_of({16}, {0, 1})),                // an overlap of such lines of two wires
+    kStretching,
+    kThreePlanes,
     kTensioned,
 };
 

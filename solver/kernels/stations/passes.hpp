@@ -13,6 +13,9 @@ inline Then then_of(const Work& work) {
     if (work.right) return Then::kStore;
     return work.motion.known ? Then::kAlpha : Then::kNewmark;
 }
+// What is done is an argument of passes: a constant of these types where a pass is compiled for it.
+using Newmark = std::integral_constant<Then, Then::kNewmark>;
+using IsProduct = std::false_type;
 
 /// What a chain works on, by values that a compiler keeps in registers.
 template <class Blocks>
@@ -120,8 +123,8 @@ struct Chained {
         return blocks.is_sparse ? divided(i, left) : left;
     }
     /// Unknowns from those of the station inwards, from which the chain comes.
-    template <Then T>
-    CATENARY_INLINE X solved(int64_t i, int step, const X& inward) const {
+    template <class T>
+    CATENARY_INLINE X solved(int64_t i, int step, const X& inward, T then) const {
         double* at = answer + i * blocks.pitch;
         X own = blocks.load(at);
         if (blocks.is_sparse) {
@@ -135,10 +138,10 @@ struct Chained {
             blocks.add_whole(sums, numbers + blocks.whole_size, inward);
             own = blocks.total_of(sums);
         }
-        if constexpr (T == Then::kStore)
+        if (then == Then::kStore)
             blocks.store(at, own);
         else
-            go_on<T>(i, own);
+            go_on(i, own, then);
         return own;
     }
     /// Unknowns of the station where both chains meet, from what is left of it and of the one
@@ -156,13 +159,13 @@ struct Chained {
     }
     /// Take a station from one prediction to the next. What was solved for is its acceleration but
     /// for damping on mass, and for its share of x if the right-hand side was made by M.
-    template <Then T>
-    CATENARY_INLINE void go_on(int64_t i, X solution) const {
+    template <class T>
+    CATENARY_INLINE void go_on(int64_t i, X solution, T then) const {
         const Changes& c = changes;
         const int64_t at = i * blocks.pitch;
         const X here = blocks.load(x + at);
         if (c.by_mass != 0.0) solution = solution.plus(c.by_mass, here);
-        if constexpr (T == Then::kAlpha) return go_on_by_alpha(at, here, solution);
+        if (then == Then::kAlpha) return go_on_by_alpha(at, here, solution);
         const X v = blocks.load(y + at), a = solution.plus(-c.damping_share, v);
         blocks.store(z + at, a);
         blocks.store(x + at, here.plus(-c.dt, v).plus(c.by_position, a));
@@ -184,13 +187,13 @@ struct Chained {
 };
 
 /// The pass forth through one chain; its right-hand sides are given, or products.
-template <bool FromRight, class Blocks>
-void go_forth(const Blocks& blocks, const Work& work, Chain& chain, int step) {
+template <class Given, class Blocks>
+void go_forth(const Blocks& blocks, const Work& work, Chain& chain, int step, Given is_given) {
     using X = typename Blocks::X;
     const Chained<Blocks> one(blocks, work, *chain.run);
     X x = blocks.load(chain.beside->unknowns);
     int64_t i = chain.first;
-    if constexpr (FromRight) {
+    if (is_given) {
         for (int64_t k = 0; k < chain.n; ++k, i += step)
             x = one.eliminate(i, step, one.right(i), x);
     } else {
@@ -207,14 +210,15 @@ void go_forth(const Blocks& blocks, const Work& work, Chain& chain, int step) {
 }
 
 /// The same through two chains of equal length, side by side.
-template <bool FromRight, class Blocks>
-void go_forth(const Blocks& blocks, const Work& work, Chain& from_start, Chain& from_end) {
+template <class Given, class Blocks>
+void go_forth(const Blocks& blocks, const Work& work, Chain& from_start, Chain& from_end,
+              Given is_given) {
     using X = typename Blocks::X;
     const Chained<Blocks> one(blocks, work, *from_start.run), other(blocks, work, *from_end.run);
     X x = blocks.load(from_start.beside->unknowns), y = blocks.load(from_end.beside->unknowns);
     int64_t i = from_start.first, j = from_end.first;
     const int64_t n = from_start.n;
-    if constexpr (FromRight) {
+    if (is_given) {
         for (int64_t k = 0; k < n; ++k, ++i, --j) {
             x = one.eliminate(i, 1, one.right(i), x);
             y = other.eliminate(j, -1, other.right(j), y);
@@ -236,24 +240,24 @@ void go_forth(const Blocks& blocks, const Work& work, Chain& from_start, Chain& 
 }
 
 /// The pass back through one chain.
-template <Then T, class Blocks>
-void go_back(const Blocks& blocks, const Work& work, Chain& chain, int step) {
+template <class T, class Blocks>
+void go_back(const Blocks& blocks, const Work& work, Chain& chain, int step, T then) {
     const Chained<Blocks> one(blocks, work, *chain.run);
     auto x = blocks.load(chain.beside->unknowns);
     for (int64_t k = 0, i = chain.first; k < chain.n; ++k, i += step)
-        x = one.template solved<T>(i, step, x);
+        x = one.solved(i, step, x, then);
     blocks.store(chain.beside->unknowns, x);
 }
 
 /// The same through two chains of equal length, side by side.
-template <Then T, class Blocks>
-void go_back(const Blocks& blocks, const Work& work, Chain& to_start, Chain& to_end) {
+template <class T, class Blocks>
+void go_back(const Blocks& blocks, const Work& work, Chain& to_start, Chain& to_end, T then) {
     const Chained<Blocks> one(blocks, work, *to_start.run), other(blocks, work, *to_end.run);
     auto x = blocks.load(to_start.beside->unknowns), y = blocks.load(to_end.beside->unknowns);
     int64_t i = to_start.first, j = to_end.first;
     for (int64_t k = 0; k < to_start.n; ++k, --i, ++j) {
-        x = one.template solved<T>(i, -1, x);
-        y = other.template solved<T>(j, 1, y);
+        x = one.solved(i, -1, x, then);
+        y = other.solved(j, 1, y, then);
     }
     blocks.store(to_start.beside->unknowns, x);
     blocks.store(to_end.beside->unknowns, y);
@@ -285,42 +289,37 @@ class KernelsOf final : public Kernels {
         multiply_rows(blocks_, work, chain, result);
     }
     void forth(const Work& work, Chain& chain, int step) const override {
-        work.right ? go_forth<true>(blocks_, work, chain, step)
-                   : go_forth<false>(blocks_, work, chain, step);
+        go_forth(blocks_, work, chain, step, work.right != nullptr);
     }
     void forth(const Work& work, Chain& from_start, Chain& from_end) const override {
-        work.right ? go_forth<true>(blocks_, work, from_start, from_end)
-                   : go_forth<false>(blocks_, work, from_start, from_end);
+        if constexpr (kSideBySide) {
+            go_forth(blocks_, work, from_start, from_end, work.right != nullptr);
+        } else {
+            forth(work, from_start, 1);
+            forth(work, from_end, -1);
+        }
     }
     void meet(const Work& work, const Run& run, int64_t middle, Station& from_end) const override {
         const Chained<Blocks> one(blocks_, work, run);
         const auto own = one.met(middle, blocks_.load(from_end.unknowns));
         blocks_.store(from_end.unknowns, own);
-        if (then_of(work) == Then::kNewmark) one.template go_on<Then::kNewmark>(middle, own);
-        if (then_of(work) == Then::kAlpha) one.template go_on<Then::kAlpha>(middle, own);
+        if (!work.right) one.go_on(middle, own, then_of(work));
     }
     void back(const Work& work, Chain& chain, int step) const override {
-        switch (then_of(work)) {
-            case Then::kStore:
-                return go_back<Then::kStore>(blocks_, work, chain, step);
-            case Then::kNewmark:
-                return go_back<Then::kNewmark>(blocks_, work, chain, step);
-            case Then::kAlpha:
-                return go_back<Then::kAlpha>(blocks_, work, chain, step);
-        }
+        go_back(blocks_, work, chain, step, then_of(work));
     }
     void back(const Work& work, Chain& to_start, Chain& to_end) const override {
-        switch (then_of(work)) {
-            case Then::kStore:
-                return go_back<Then::kStore>(blocks_, work, to_start, to_end);
-            case Then::kNewmark:
-                return go_back<Then::kNewmark>(blocks_, work, to_start, to_end);
-            case Then::kAlpha:
-                return go_back<Then::kAlpha>(blocks_, work, to_start, to_end);
+        if constexpr (kSideBySide) {
+            go_back(blocks_, work, to_start, to_end, then_of(work));
+        } else {
+            back(work, to_start, -1);
+            back(work, to_end, 1);
         }
     }
 
   private:
+    /// Whether a station leaves the processor waiting for itself: a wide one has work enough.
+    static constexpr bool kSideBySide = sizeof(typename Blocks::X) <= 12 * sizeof(double);
     Blocks blocks_;
 };
 
@@ -339,12 +338,12 @@ class QuickKernels final : public Kernels {
     }
     void forth(const Work& work, Chain& chain, int step) const override {
         if constexpr (IsMixed)
-            if (!work.right) return go_forth<false>(blocks_, work, chain, step);
+            if (!work.right) return go_forth(blocks_, work, chain, step, IsProduct{});
         rest_->forth(work, chain, step);
     }
     void forth(const Work& work, Chain& from_start, Chain& from_end) const override {
         work.right ? rest_->forth(work, from_start, from_end)
-                   : go_forth<false>(blocks_, work, from_start, from_end);
+                   : go_forth(blocks_, work, from_start, from_end, IsProduct{});
     }
     void meet(const Work& work, const Run& run, int64_t middle, Station& from_end) const override {
         rest_->meet(work, run, middle, from_end);
@@ -352,11 +351,11 @@ class QuickKernels final : public Kernels {
     void back(const Work& work, Chain& chain, int step) const override {
         if constexpr (IsMixed)
             if (then_of(work) == Then::kNewmark)
-                return go_back<Then::kNewmark>(blocks_, work, chain, step);
+                return go_back(blocks_, work, chain, step, Newmark{});
         rest_->back(work, chain, step);
     }
     void back(const Work& work, Chain& to_start, Chain& to_end) const override {
-        then_of(work) == Then::kNewmark ? go_back<Then::kNewmark>(blocks_, work, to_start, to_end)
+        then_of(work) == Then::kNewmark ? go_back(blocks_, work, to_start, to_end, Newmark{})
                                         : rest_->back(work, to_start, to_end);
     }
 
