@@ -106,6 +106,11 @@ constexpr Shipped kShipped[] = {
     sparse(rows_of({8}, {0, 1, 2, 4, 6}, true)),  // in wind
     sparse(rows_of({12}, {0, 1})),                // three wires in planes that arms join, by M
     sparse(rows_of({16}, {0, 1})),                // an overlap of such lines of two wires
+    // Lines whose wires and droppers are damped each in its own way.
+    dense(rows_of({2}, {0, 1}, true)),
+    dense(rows_of({4}, {0, 1, 2}, true)),
+    sparse(rows_of({4}, {0, 1, 2}, true)),
+    dense(rows_of({6}, {0, 1, 2, 6}, true)),
     kStretching,
     kThreePlanes,
     kTensioned,
