@@ -36,8 +36,8 @@ MARCHES = {
     FULL: (TWO, *LATERAL, *AXIAL),
 }
 # Times the vertical march that motion in all planes may take, and times real time at least. Three
-# planes take 57 us beside vertical steps of 9.8: 5.8 times.
-MOST, LEAST = 6.5, 12.0
+# planes take 82 us beside vertical steps of 15.5: 5.3 times.
+MOST, LEAST = 6.5, 10.0
 STEPS, ROUNDS = 300, 12
 
 
