@@ -42,12 +42,17 @@ def write_line(path: Path, blocks: CompiledSteps, dt: float, steps: tuple[int, i
     Raises
     ------
     InputError
-        If loads are made while they are stepped, or only a part of the line is there.
+        If loads are made while they are stepped, links have bends, or only a part of the line is
+        there.
     RunBroken
         If the file cannot be written.
     """
     scheme = blocks.scheme
     line, pantographs = scheme.interaction.line, scheme.pantographs
+    if (scheme.interaction.links.table.bent >= 0).any():
+        raise InputError(
+            "droppers with a curve may pass several of its points in a step, which Python finds out"
+        )
     if line.loads is not None and line.loads.are_sampled:
         raise InputError(
             "gusts are made under way, and a prepared line has none; take them away (wind.gusts=)"

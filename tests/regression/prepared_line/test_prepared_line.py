@@ -30,6 +30,7 @@ FEW = ("ac_simple", "ac_simple_3d", "ambrosio2012", "overlap", "rich_train", "n_
 REFUSED = {
     "w_wind": "gusts are made under way, .*wind.gusts=",
     "d_incidents": "incidents change the line",
+    "dropper_curve": "droppers with a curve may pass several of its points in a step",
     "n_fixed": "numerics.scheme is not one_solve",
     "n_newmark": "numerics.adaptive_tolerance_N lets steps be halved",
     "f_planes": "the model joins stations further apart",
