@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Protocol
@@ -181,7 +182,7 @@ class NodeMotion(Protocol):
 NEVER = 2**62
 
 
-class Observer:
+class Observer(ABC):
     """Watches a run. All methods are called on all ranks at the same steps.
 
     Each step is shown once, in order, the initial state first. Many are shown at once, which costs
@@ -189,16 +190,16 @@ class Observer:
     those of ``next_motion``.
     """
 
-    def start(self, stage: Stage) -> None:
+    def start(self, stage: Stage) -> None:  # noqa: B027  (many need nothing)
         """Before the initial state is shown."""
 
+    @abstractmethod
     def next_state(self, step: int) -> int:
         """The next step after ``step`` whose state is to be shown, ``NEVER`` if rows will do.
 
         Called when all steps up to ``step`` are shown. Steps of which each state is wanted take
         many times as long.
         """
-        raise NotImplementedError
 
     def next_motion(self, step: int) -> int:
         """The next step after ``step`` of which the motion of nodes, the places of pantographs or
@@ -208,12 +209,12 @@ class Observer:
         """
         return NEVER
 
+    @abstractmethod
     def observe(self, view: StepView) -> None:
         """After the steps of ``view``, the last of which may be one that was asked for.
 
         May be collective at steps that depend only on ``view.step`` and ``next_state``.
         """
-        raise NotImplementedError
 
-    def finish(self, outcome: str) -> None:
+    def finish(self, outcome: str) -> None:  # noqa: B027  (many need nothing)
         """After the last step: "done", "interrupted" or the sentence of what broke."""
