@@ -151,9 +151,9 @@ types:
 mypy:
 	@mkdir -p build/typing/catenary
 	@find build/typing/catenary -type l -delete
-	@for part in $(PARTS) cases/api/*.py*; do \
+	@for part in $(PARTS) solver/base cases/api/*.py*; do \
 	    ln -sfn ../../../$$part build/typing/catenary/$$(basename $$part); done
-	MYPYPATH=build/typing $(PYTHON) -m mypy --exclude /cases/api/ -p catenary
+	MYPYPATH=build/typing $(PYTHON) -m mypy --exclude '/(cases/api|solver/base)/' -p catenary
 
 format: setup ## bring all files into the format of ruff and clang-format
 	$(PYTHON) -m ruff check --fix .

@@ -1,7 +1,7 @@
 """Maps the five folders of the repository into the package ``catenary``, whose own files stand in
-``cases/api``, and builds the kernels of the time loop, ``catenary.solver.kernels.native``, from
-C++; those that step a prepared line from outside become the library ``libcatenary.so`` besides,
-without Python.
+``cases/api`` and ``solver/base``, and builds the kernels of the time loop,
+``catenary.solver.kernels.native``, from C++; those that step a prepared line from outside become
+the library ``libcatenary.so`` besides, without Python.
 
 setuptools builds them with pybind11, because this file describes all packages already. nanobind
 wants CMake, which would describe them a second time.
@@ -24,8 +24,9 @@ from setuptools.command.build_ext import build_ext
 from setuptools.errors import CompileError, LinkError
 
 PARTS = ("meshgen", "solver", "mbs", "postproc", "cases")
-# The package itself: what ``import catenary`` gives. It is no part of ``catenary.cases``.
-FACE = "cases/api"
+# Folders that are installed above the part in which they stand: what ``import catenary`` gives, and
+# what every part imports.
+PLACED = {"catenary": "cases/api", "catenary.base": "solver/base"}
 KERNELS = "solver/kernels"
 
 # No target is named: a wheel runs on every processor of its architecture, and a source that has
@@ -155,15 +156,15 @@ ParallelCompile(default=0).install()
 
 setup(
     packages=[
-        "catenary",
+        *PLACED,
         *(
             f"catenary.{package}"
             for part in PARTS
             for package in (part, *(f"{part}.{inner}" for inner in find_packages(part)))
-            if package.replace(".", "/") != FACE
+            if package.replace(".", "/") not in PLACED.values()
         ),
     ],
-    package_dir={"catenary": FACE, **{f"catenary.{part}": part for part in PARTS}},
+    package_dir={**PLACED, **{f"catenary.{part}": part for part in PARTS}},
     package_data={
         "catenary": ["py.typed"],
         "catenary.cases": [
@@ -177,7 +178,7 @@ setup(
         "catenary.postproc": ["report/templates/*", "paraview/*.template"],
         "catenary.solver": ["kernels/simulation/catenary.h"],
     },
-    exclude_package_data={"catenary.cases": ["api/*"]},
+    exclude_package_data={"catenary.cases": ["api/*"], "catenary.solver": ["base/*"]},
     # What is installed is named above; the source archive has the sources of the extension too.
     include_package_data=False,
     ext_modules=[extension("native", SOURCES), extension("libcatenary", WITHOUT_PYTHON)],

@@ -72,7 +72,7 @@ fingerprint() {
 
 is_current() {
     [ -f "$STAMP" ] && [ "$(cat "$STAMP")" = "$(fingerprint)" ] &&
-        .venv/bin/python -c 'import petsc4py, mpi4py, catenary.solver.base.errors' 2>/dev/null
+        .venv/bin/python -c 'import petsc4py, mpi4py, catenary.base.errors' 2>/dev/null
 }
 
 # What the kernels are compiled from; their order and names too.

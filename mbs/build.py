@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 import numpy as np
 
+from catenary.base.errors import InputError
 from catenary.mbs.air.air_forces import AirForces, SteadyForces
 from catenary.mbs.air.airflow import Airflow
 from catenary.mbs.control.regulation import Regulator
@@ -21,7 +22,6 @@ from catenary.mbs.lumped import LumpedPantograph
 from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.roll import roll_of
 from catenary.mbs.vehicle.base_motion import BaseMotion
-from catenary.solver.base.errors import InputError
 
 if TYPE_CHECKING:
     from catenary.mbs.mechanism.full_pantograph import FullPantograph

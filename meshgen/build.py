@@ -7,12 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
+from catenary.base.errors import InputError
 from catenary.meshgen.chains import assemble, names_of
 from catenary.meshgen.division import check_counts, divide, divisions_of
 from catenary.meshgen.geometry import find_cuts
 from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import LineMesh
-from catenary.solver.base.errors import InputError
 
 # A user's mesh may differ from the scene by this much along the track [m].
 _FIT = 0.01

@@ -7,6 +7,7 @@ from itertools import combinations
 
 import numpy as np
 
+from catenary.base.errors import InputError
 from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import (
     ANCHORS,
@@ -18,7 +19,6 @@ from catenary.meshgen.mesh import (
     LineMesh,
 )
 from catenary.meshgen.wires import End
-from catenary.solver.base.errors import InputError
 
 # Nodes closer than this are taken for one place [m].
 _SAME_PLACE = 1e-6

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from catenary.base.errors import InputError
 from catenary.meshgen.chains import Groups
 from catenary.meshgen.geometry import Cuts
 from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import ANCHORS
-from catenary.solver.base.errors import InputError
 
 
 def check_counts(elements_per_gap: int, support_refinement: int) -> None:

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from catenary.base.errors import InputError
 from catenary.meshgen.hardware import Droppers
 from catenary.meshgen.line import Line
 from catenary.meshgen.wires import End
-from catenary.solver.base.errors import InputError
 
 # Places closer than this along the track are one cut [m].
 SAME_CUT = 1e-6

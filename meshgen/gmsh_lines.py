@@ -9,13 +9,13 @@ from pathlib import Path
 import gmsh
 import numpy as np
 
+from catenary.base.errors import InputError
+from catenary.base.python_signals import python_signals_kept
 from catenary.meshgen.division import check_counts, divisions_of
 from catenary.meshgen.geometry import Cuts, find_cuts
 from catenary.meshgen.hardware import Droppers
 from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import ANCHORS
-from catenary.solver.base.errors import InputError
-from catenary.solver.base.python_signals import python_signals_kept
 
 
 def write_mesh(

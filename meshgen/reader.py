@@ -11,9 +11,9 @@ from pathlib import Path
 import meshio
 import numpy as np
 
+from catenary.base.errors import InputError
 from catenary.meshgen.chains import SIMPLE, Groups, Names, assemble
 from catenary.meshgen.mesh import ANCHORS, LineMesh
-from catenary.solver.base.errors import InputError
 
 # A mesh of four million nodes takes half of it.
 MOST_BYTES = 500_000_000

@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from string import Template
 from typing import TYPE_CHECKING, Any
 
+from catenary.base.errors import InputError
 from catenary.cases.ambrosio2012.variations import (
     TABLE,
     VARIED,
@@ -22,7 +23,6 @@ from catenary.cases.ambrosio2012.variations import (
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.case_study import StudyRun, StudyVariant
 from catenary.cases.studies.sweep.variants import Variant, check_keys
-from catenary.solver.base.errors import InputError
 
 if TYPE_CHECKING:
     from catenary.postproc.read.results import Results

@@ -17,12 +17,12 @@ if __name__ != "catenary":
     )
 
 if TYPE_CHECKING:
+    from catenary.base.errors import CatenaryError, Fault, InputError, RunBroken
     from catenary.line_tables import AtRest, Plan, check, plan, static
     from catenary.pictures import Pictures
     from catenary.results import Run, open
     from catenary.runs import run, sweep
     from catenary.scenes import Scene, load
-    from catenary.solver.base.errors import CatenaryError, Fault, InputError, RunBroken
     from catenary.steps import Simulation
 
 __all__ = [
@@ -52,7 +52,7 @@ _FILES = {
     "results": ("Run", "open"),
     "runs": ("run", "sweep"),
     "scenes": ("Scene", "load"),
-    "solver.base.errors": ("CatenaryError", "Fault", "InputError", "RunBroken"),
+    "base.errors": ("CatenaryError", "Fault", "InputError", "RunBroken"),
     "steps": ("Simulation",),
 }
 _FILE_OF = {name: file for file, names in _FILES.items() for name in names}

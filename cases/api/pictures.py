@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
+from catenary.base.errors import InputError
 from catenary.postproc.evaluate.statistics import RunStatistics
 from catenary.postproc.read.results import Results
 from catenary.postproc.report.report import drawings
-from catenary.solver.base.errors import InputError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from catenary.base.errors import InputError
 from catenary.cases.scene.load import Draft
 from catenary.pictures import Pictures
 from catenary.postproc.evaluate import statistics as stats
@@ -17,7 +18,6 @@ from catenary.postproc.read.results import Results
 from catenary.postproc.report.report import judge
 from catenary.postproc.report.summary import summarise
 from catenary.scenes import Scene
-from catenary.solver.base.errors import InputError
 from catenary.solver.time_loop.views import channels
 
 if TYPE_CHECKING:

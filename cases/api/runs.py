@@ -10,12 +10,12 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from catenary.base.errors import InputError, RunBroken
+from catenary.base.lone_process import alone, world
+from catenary.base.parallel import launched_by_mpirun, on_root
 from catenary.cases.process.petsc_options import options_of
 from catenary.cases.studies.sweep.variants import check_keys, product, text_of, varied_key
 from catenary.scenes import SceneLike, checked, draft_of, plain_value
-from catenary.solver.base.errors import InputError, RunBroken
-from catenary.solver.base.lone_process import alone, world
-from catenary.solver.base.parallel import launched_by_mpirun, on_root
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from catenary.base.errors import InputError
 from catenary.cases.scene.convert.course import resolved
 from catenary.cases.scene.input.origin import shown
 from catenary.cases.scene.input.plain_text import DEEPEST
@@ -14,7 +15,6 @@ from catenary.cases.scene.keys.error_sentences import unknown_key
 from catenary.cases.scene.keys.keys import is_known, known_keys
 from catenary.cases.scene.load import Draft, read_draft
 from catenary.cases.scene.scene import Scene as CheckedScene
-from catenary.solver.base.errors import InputError
 
 
 class Scene:
@@ -89,7 +89,7 @@ class Scene:
         (25000.0, 300.0)
         >>> scene.replace(train={"sped_km_h": 300})
         Traceback (most recent call last):
-        catenary.solver.base.errors.InputError: train.sped_km_h in replace() is unknown; did you mean train.speed_km_h?
+        catenary.base.errors.InputError: train.sped_km_h in replace() is unknown; did you mean train.speed_km_h?
         """  # noqa: E501
         return Scene(self._draft.assigned(_values({**(changes or {}), **tables}, "in replace()")))
 

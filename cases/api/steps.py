@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from catenary.base.errors import InputError, RunBroken
+from catenary.base.lone_process import alone
 from catenary.scenes import SceneLike, checked
-from catenary.solver.base.errors import InputError, RunBroken
-from catenary.solver.base.lone_process import alone
 from catenary.solver.kernels import native
 
 _SUFFIX = ".line"

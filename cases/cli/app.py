@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
+from catenary.base.errors import InputError
 from catenary.cases.cli import completion
 from catenary.cases.terminal import console
-from catenary.solver.base.errors import InputError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -138,14 +138,14 @@ def begin(
     Collective. ``read`` also gives the command line's options for PETSc, ``scene_of`` the scene
     whose ``[petsc]`` table stands before them.
     """
-    from catenary.cases.process.batch_tasks import lone_task
-    from catenary.cases.process.petsc_options import as_arguments, idle_options, start_petsc
-    from catenary.solver.base.parallel import (
+    from catenary.base.parallel import (
         abort_on_unforeseen_error,
         launched_by_mpirun,
         on_root,
         set_up_logging,
     )
+    from catenary.cases.process.batch_tasks import lone_task
+    from catenary.cases.process.petsc_options import as_arguments, idle_options, start_petsc
 
     # A process of its own is refused before MPI has started.
     read_before = None if launched_by_mpirun() else read()

@@ -7,10 +7,10 @@ from typing import Annotated
 
 import typer
 
+from catenary.base.errors import InputError
 from catenary.cases.cli.app import Assignments, Case, Force, MoreAssignments, Shortened, app, load
 from catenary.cases.terminal import console
 from catenary.postproc.evaluate.wording import counted
-from catenary.solver.base.errors import InputError
 
 
 @app.command(

@@ -6,10 +6,10 @@ from typing import Annotated
 
 import typer
 
+from catenary.base.errors import InputError
 from catenary.cases.cli import completion
 from catenary.cases.cli.app import app
 from catenary.cases.terminal import console
-from catenary.solver.base.errors import InputError
 
 
 @app.command(

@@ -56,7 +56,7 @@ def _complain_of_usage(error: Any) -> None:
 
 def main() -> None:
     """Entry point. Exit codes: 0 done, 1 the run broke, 2 bad input, 3 not accepted (--strict)."""
-    from catenary.solver.base.parallel import launched_by_mpirun
+    from catenary.base.parallel import launched_by_mpirun
 
     console.open_closed_streams()
     # Modules, tables and pictures make many objects and little garbage: a short run ends before the

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from catenary.base.errors import InputError
 from catenary.cases.cli.app import (
     Assignments,
     Case,
@@ -18,7 +19,6 @@ from catenary.cases.cli.app import (
     load,
 )
 from catenary.cases.terminal import console
-from catenary.solver.base.errors import InputError
 
 if TYPE_CHECKING:
     from catenary.cases.studies.choice.study import Costs, Wish
@@ -117,11 +117,11 @@ def _cost(wish: Wish, out: Path | None, as_json: bool, force: bool) -> int:
     """What --cost does; returns the exit code."""
     import tempfile
 
+    from catenary.base.parallel import launched_by_mpirun
     from catenary.cases.process.petsc_options import as_arguments, start_petsc
     from catenary.cases.result_folder.folder_lock import held
     from catenary.cases.result_folder.output_folder import refuse_impossible
     from catenary.cases.scene.load import load_scene
-    from catenary.solver.base.parallel import launched_by_mpirun
 
     if launched_by_mpirun() and console.world().size > 1:
         raise InputError(

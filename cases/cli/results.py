@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from catenary.base.errors import InputError
 from catenary.cases.cli.app import RunFolder, app
 from catenary.cases.terminal import console
 from catenary.postproc.film.view import View
-from catenary.solver.base.errors import InputError
 
 if TYPE_CHECKING:
     from catenary.mbs.shape import Shape

@@ -17,7 +17,7 @@ from collections.abc import Callable, Iterator
 from types import FrameType
 from typing import Any, TypeVar
 
-from catenary.solver.base.errors import RunBroken
+from catenary.base.errors import RunBroken
 
 T = TypeVar("T")
 

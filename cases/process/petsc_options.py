@@ -9,9 +9,9 @@ import sys
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import Any
 
+from catenary.base.errors import InputError
 from catenary.cases.scene.input.origin import shown
 from catenary.cases.scene.keys.keys import nearest
-from catenary.solver.base.errors import InputError
 
 # Options that PETSc looks up when the process ends, after `idle_options` was called.
 _LOOKED_UP_LAST = frozenset(
@@ -70,12 +70,12 @@ def start_petsc(arguments: Sequence[str]) -> None:
     """
     import petsc4py
 
-    from catenary.solver.base.python_signals import python_signals_kept
+    from catenary.base.python_signals import python_signals_kept
 
     running = "petsc4py.PETSc" in sys.modules
     with python_signals_kept():
         petsc4py.init(["catenary", "-skip_petscrc", *arguments])
-    from catenary.solver.base.petsc import PETSc
+    from catenary.base.petsc import PETSc
 
     if running and arguments:
         PETSc.Options().insertString(shlex.join(arguments))
@@ -89,7 +89,7 @@ def options_of(table: Mapping[str, Any]) -> Iterator[list[str]]:
     """
     before = {}
     if "petsc4py.PETSc" in sys.modules:
-        from catenary.solver.base.petsc import PETSc
+        from catenary.base.petsc import PETSc
 
         before = PETSc.Options().getAll()
     arguments = as_arguments(table)
@@ -97,7 +97,7 @@ def options_of(table: Mapping[str, Any]) -> Iterator[list[str]]:
     try:
         yield arguments
     finally:
-        from catenary.solver.base.petsc import PETSc
+        from catenary.base.petsc import PETSc
 
         for name in table:
             PETSc.Options().delValue(name)
@@ -116,8 +116,8 @@ def idle_options(of_scene: Collection[str]) -> list[str]:
     of_scene : names of the scene's ``[petsc]`` table, which has correct names alone; no sentence
         is made of them
     """
+    from catenary.base.petsc import PETSc
     from catenary.cases.scene.tables.run.petsc import PetscTable
-    from catenary.solver.base.petsc import PETSc
 
     library = ctypes.CDLL(PETSc.__file__)
     known = [*PetscTable.model_fields, *_OTHER_OPTIONS]

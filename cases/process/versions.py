@@ -18,7 +18,7 @@ def versions() -> dict[str, str]:
     import mpi4py
     from mpi4py import MPI
 
-    from catenary.solver.base.petsc import PETSc
+    from catenary.base.petsc import PETSc
 
     hdf5 = ".".join(str(part) for part in h5py.h5.get_libversion())
     petsc = ".".join(str(part) for part in PETSc.Sys.getVersion())

@@ -18,10 +18,10 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from catenary.base.errors import InputError
+from catenary.base.parallel import on_root
 from catenary.cases.result_folder.lock_owner import Owner, myself, read_owner
 from catenary.postproc.files.disk_errors import code_of, reason, remedy
-from catenary.solver.base.errors import InputError
-from catenary.solver.base.parallel import on_root
 
 LOCK_FILE = ".catenary.lock"
 # Time between two signs of life [s], and after how many of them a lock counts as left behind.

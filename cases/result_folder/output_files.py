@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from catenary.base.errors import InputError, RunBroken
 from catenary.postproc.files.csv_text import csv_text
 from catenary.postproc.read.registration import Registration
-from catenary.solver.base.errors import InputError, RunBroken
 
 DROPPER_COLUMNS = ("dropper_span", "dropper_x", "dropper_length", "dropper_force")
 DROPPER_WIRES = ("dropper_upper", "dropper_lower")

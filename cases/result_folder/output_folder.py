@@ -11,6 +11,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
+from catenary.base.errors import InputError
 from catenary.cases.result_folder.folder_lock import refusal
 from catenary.postproc.files.own_files import (
     FIELD_FILES,
@@ -20,7 +21,6 @@ from catenary.postproc.files.own_files import (
     part_of,
     remove_parts,
 )
-from catenary.solver.base.errors import InputError
 
 logger = logging.getLogger("catenary.run")
 

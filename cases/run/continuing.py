@@ -10,13 +10,13 @@ from typing import Any
 
 import numpy as np
 
+from catenary.base.errors import InputError
 from catenary.postproc.channels.header import Header
 from catenary.postproc.files.hdf5.self_contained import open_own
 from catenary.postproc.files.own_files import FIELD_FILES
 from catenary.postproc.files.result_file import fault_to_continue
 from catenary.postproc.read.guard import survives
 from catenary.postproc.read.results import Results
-from catenary.solver.base.errors import InputError
 from catenary.solver.model.model import Model
 from catenary.solver.time_loop.views.channels import CHANNELS
 

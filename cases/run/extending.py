@@ -6,10 +6,10 @@ import copy
 import math
 from typing import Any
 
+from catenary.base.errors import InputError
 from catenary.cases.scene.input.origin import Origin
 from catenary.cases.scene.load import scene_from
 from catenary.cases.scene.scene import Scene
-from catenary.solver.base.errors import InputError
 
 UNTIL, EVALUATED = "--until-m", "--evaluate"
 

@@ -6,9 +6,9 @@ import logging
 from collections.abc import Callable
 from typing import Any, TypeVar
 
+from catenary.base.parallel import on_root
 from catenary.cases.process.interrupts import StopRequest
 from catenary.cases.scene.scene import Scene
-from catenary.solver.base.parallel import on_root
 from catenary.solver.problem.window import OFF
 
 logger = logging.getLogger("catenary.runner")

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
+from catenary.base.petsc import PETSc
 from catenary.postproc.record.progress import Progress
-from catenary.solver.base.petsc import PETSc
 from catenary.solver.time_loop.march import Outcome
 
 

@@ -16,6 +16,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from catenary.base.errors import CatenaryError, RunBroken
+from catenary.base.freed_memory import give_back_long_line
+from catenary.base.parallel import on_root
 from catenary.cases.process.interrupts import Phase, StopRequest
 from catenary.cases.result_folder.folder_lock import held
 from catenary.cases.result_folder.output_folder import (
@@ -44,9 +47,6 @@ from catenary.postproc.record.recorder import Recorder
 from catenary.postproc.record.run_watch import RunWatch, watch_cadence, watched
 from catenary.postproc.record.snapshots.blocks import RecordedLine
 from catenary.postproc.record.snapshots.fields import FieldRecorder
-from catenary.solver.base.errors import CatenaryError, RunBroken
-from catenary.solver.base.freed_memory import give_back_long_line
-from catenary.solver.base.parallel import on_root
 from catenary.solver.problem.problem import Problem
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest_on_all
 from catenary.solver.statics.stability_of_rest import refuse_lost_wire

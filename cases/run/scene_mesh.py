@@ -5,13 +5,13 @@ from __future__ import annotations
 import logging
 from pathlib import Path
 
+from catenary.base.errors import InputError
 from catenary.cases.result_folder.output_files import new_file
 from catenary.cases.scene.checks.line.mesh_size import MANY_NODES, size_of
 from catenary.cases.scene.convert.line.line import line_of
 from catenary.cases.scene.scene import Scene
 from catenary.meshgen.build import make_mesh, use_mesh
 from catenary.meshgen.mesh import LineMesh
-from catenary.solver.base.errors import InputError
 
 # Suffixes of drawings.
 DRAWN = (".png", ".svg")

@@ -10,6 +10,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from catenary.base.errors import InputError
 from catenary.cases.scene.checks.scene import check
 from catenary.cases.scene.input.case_files import find_case
 from catenary.cases.scene.input.faults import SceneError
@@ -21,7 +22,6 @@ from catenary.cases.scene.input.toml_input import Assigned, assign, parse_assign
 from catenary.cases.scene.keys.error_sentences import schema_faults, unknown_key
 from catenary.cases.scene.keys.keys import is_known, known_keys, with_kinds
 from catenary.cases.scene.scene import Scene
-from catenary.solver.base.errors import InputError
 
 
 @dataclass(frozen=True)

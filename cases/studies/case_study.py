@@ -19,6 +19,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, NamedTuple
 
+from catenary.base.errors import InputError
+from catenary.base.parallel import on_root
 from catenary.cases.scene.input.case_files import find_case
 from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.scene import Scene
@@ -31,8 +33,6 @@ from catenary.cases.studies.sweep.jobs import (
     make_jobs,
 )
 from catenary.cases.studies.sweep.variants import Variant, slug
-from catenary.solver.base.errors import InputError
-from catenary.solver.base.parallel import on_root
 
 STUDY_FILE = "study.py"
 RUNS = "runs"

@@ -15,12 +15,12 @@ from typing import Annotated, Any, TextIO
 
 import typer
 
+from catenary.base.errors import CatenaryError, InputError
+from catenary.base.lone_process import alone as alone
+from catenary.base.lone_process import world as world
+from catenary.base.parallel import NO_MEMORY, launched_by_mpirun, on_root
 from catenary.cases.scene.input.plain_text import plain, shown
 from catenary.postproc.files.disk_errors import reason
-from catenary.solver.base.errors import CatenaryError, InputError
-from catenary.solver.base.lone_process import alone as alone
-from catenary.solver.base.lone_process import world as world
-from catenary.solver.base.parallel import NO_MEMORY, launched_by_mpirun, on_root
 
 DONE, BROKEN, BAD_INPUT, NOT_ACCEPTED = 0, 1, 2, 3
 _RANK_VARIABLES = ("OMPI_COMM_WORLD_RANK", "PMI_RANK", "PMIX_RANK")

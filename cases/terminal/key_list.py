@@ -13,12 +13,12 @@ from pydantic import BaseModel, TypeAdapter
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
+from catenary.base.errors import InputError
 from catenary.cases.scene.keys.keys import ANY, kind_of, tables_in
 from catenary.cases.scene.keys.typical_values import TYPICAL
 from catenary.cases.scene.keys.usual_ranges import usual_range
 from catenary.cases.scene.tables.units import unit_of
 from catenary.postproc.standards.en50367 import EDITIONS, SYSTEMS
-from catenary.solver.base.errors import InputError
 from catenary.solver.effects import all_effects as effects
 
 # Words that a check takes, where the key's type is plain text.

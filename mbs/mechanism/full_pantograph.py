@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from catenary.base.errors import InputError, RunBroken
 from catenary.mbs.air.air_forces import ON_FRAME, ON_HEAD, SQUARE, AirForces
 from catenary.mbs.head.newmark_head import Raising
 from catenary.mbs.head.wire_crossing import CrossingPath
@@ -29,7 +30,6 @@ from catenary.mbs.rigid.system import System
 from catenary.mbs.time_steps.implicit_steps import Stepper
 from catenary.mbs.time_steps.step_solvers import StepSolver
 from catenary.mbs.vehicle.base_motion import BaseMotion
-from catenary.solver.base.errors import InputError, RunBroken
 from catenary.solver.kernels import native
 
 ARM, HEAD = "arm held at its place", "head moved from its place"

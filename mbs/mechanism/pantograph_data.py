@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from catenary.base.errors import InputError, RunBroken
 from catenary.mbs.air.uplift import Uplift
 from catenary.mbs.head.laws import Law
 from catenary.mbs.head.strips import ONE_STRIP, Strips
@@ -23,7 +24,6 @@ from catenary.mbs.rigid.forces import Force, Gravity, PointForce, SpringDamper
 from catenary.mbs.rigid.joints import Joint, PrescribedPoint, constant
 from catenary.mbs.rigid.statics import calibrate_actuator, equilibrium, held_force, unheld_force
 from catenary.mbs.rigid.system import Miss, System
-from catenary.solver.base.errors import InputError, RunBroken
 
 logger = logging.getLogger("catenary.multibody")
 

@@ -20,6 +20,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from catenary.base.errors import RunBroken
 from catenary.mbs.air.air_forces import SQUARE, AirForces
 from catenary.mbs.head.drives import named
 from catenary.mbs.head.head_arrays import MechanismArrays, SprungMasses
@@ -30,7 +31,6 @@ from catenary.mbs.head.wire_crossing import CrossingPath
 from catenary.mbs.interface import HeadState
 from catenary.mbs.mechanism.reduction import ReducedMechanism
 from catenary.mbs.vehicle.base_motion import BaseMotion
-from catenary.solver.base.errors import RunBroken
 from catenary.solver.kernels import native
 
 

@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from catenary.base.errors import InputError, RunBroken
 from catenary.mbs.head.head_arrays import SplineTables
 from catenary.mbs.rigid.bodies import Motion, Vector
 from catenary.mbs.rigid.forces import Force
@@ -23,7 +24,6 @@ from catenary.mbs.rigid.kinematics import Law, point
 from catenary.mbs.rigid.least_squares import least_squares
 from catenary.mbs.rigid.statics import at_rest
 from catenary.mbs.rigid.system import System
-from catenary.solver.base.errors import InputError, RunBroken
 
 # Closer than this no heights are put in [m]: a stop of 1e5 N/m is then off by some 5 N over 1 mm.
 FINEST = 5e-4

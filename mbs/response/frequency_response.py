@@ -9,6 +9,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 from scipy.signal import find_peaks
 
+from catenary.base.errors import InputError, RunBroken
 from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.mechanism.pantograph_data import MultibodyData, reduced, stand
 from catenary.mbs.response.linearisation import LinearModel, linearise, of_chain, with_strips
@@ -17,7 +18,6 @@ from catenary.mbs.rigid.forces import PointForce
 from catenary.mbs.rigid.joints import PrescribedPoint, constant
 from catenary.mbs.rigid.statics import equilibrium
 from catenary.mbs.rigid.system import System
-from catenary.solver.base.errors import InputError, RunBroken
 
 # Names of what is added to the mechanism here.
 WIRE, HELD = "wire on the head", "arm held for a moment"

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy import linalg
 
+from catenary.base.errors import InputError, RunBroken
 from catenary.mbs.head.strips import Strips
 from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.rigid.bodies import Motion, Vector
@@ -20,7 +21,6 @@ from catenary.mbs.rigid.joints import ORIGIN, unit
 from catenary.mbs.rigid.kinematics import point
 from catenary.mbs.rigid.least_squares import least_squares, null_space
 from catenary.mbs.rigid.system import System
-from catenary.solver.base.errors import InputError, RunBroken
 
 # Largest displacement [m or rad] and velocity [m/s or rad/s] for differences of forces.
 STEP, SPEED = 1e-5, 1e-4

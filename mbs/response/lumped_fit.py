@@ -11,10 +11,10 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import least_squares
 
+from catenary.base.errors import InputError, RunBroken
 from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.response.linearisation import apparent_mass, of_chain
 from catenary.mbs.rigid.bodies import Vector
-from catenary.solver.base.errors import InputError, RunBroken
 
 MOST_MASSES = 3
 # Bounds of masses [kg], stiffnesses [N/m] and dampings [N s/m]. A lower bound stands for "none".

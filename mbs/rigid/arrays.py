@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from catenary.base.errors import InputError
 from catenary.mbs.rigid.bodies import SPACE, Motion, Vector, rotation_matrix
 from catenary.mbs.rigid.forces import Actuator, BumpStop, Force, SpringDamper
 from catenary.mbs.rigid.joints import (
@@ -33,7 +34,6 @@ from catenary.mbs.rigid.joints import (
     unit,
 )
 from catenary.mbs.rigid.kinematics import Quantity, cross, number_of
-from catenary.solver.base.errors import InputError
 from catenary.solver.kernels import native
 
 

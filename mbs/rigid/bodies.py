@@ -10,8 +10,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from catenary.base.errors import InputError
 from catenary.mbs.frame import SPACE
-from catenary.solver.base.errors import InputError
 from catenary.solver.kernels import native
 
 Vector = Sequence[float] | np.ndarray

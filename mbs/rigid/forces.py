@@ -15,10 +15,10 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from scipy.interpolate import BSpline, make_interp_spline
 
+from catenary.base.errors import InputError
 from catenary.mbs.rigid.bodies import Motion, Vector
 from catenary.mbs.rigid.joints import ORIGIN
 from catenary.mbs.rigid.kinematics import difference, point
-from catenary.solver.base.errors import InputError
 
 
 class Force(Protocol):

@@ -17,6 +17,7 @@ from typing import ClassVar, Protocol
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from catenary.base.errors import InputError
 from catenary.mbs.rigid.bodies import SPACE, Motion, Vector, rotation_matrix
 from catenary.mbs.rigid.kinematics import (
     Law,
@@ -33,7 +34,6 @@ from catenary.mbs.rigid.kinematics import (
     stacked,
     total,
 )
-from catenary.solver.base.errors import InputError
 
 ORIGIN = (0.0, 0.0, 0.0)
 AXES = np.eye(3)

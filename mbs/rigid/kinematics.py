@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from catenary.base.errors import InputError
 from catenary.mbs.rigid.bodies import Motion, Vector
-from catenary.solver.base.errors import InputError
 
 
 class Quantity(NamedTuple):

@@ -11,13 +11,13 @@ from typing import NamedTuple
 import numpy as np
 from scipy import linalg
 
+from catenary.base.errors import InputError, RunBroken
 from catenary.mbs.rigid.bodies import Motion, Vector
 from catenary.mbs.rigid.forces import Actuator
 from catenary.mbs.rigid.joints import ORIGIN, Joint, unit
 from catenary.mbs.rigid.kinematics import point
 from catenary.mbs.rigid.least_squares import least_squares, null_space
 from catenary.mbs.rigid.system import System
-from catenary.solver.base.errors import InputError, RunBroken
 
 # Displacement of a degree of freedom for differences of forces [m or rad].
 STEP = 1e-5

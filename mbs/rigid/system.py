@@ -19,13 +19,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy import linalg
 
+from catenary.base.errors import InputError, RunBroken
 from catenary.mbs.rigid.arrays import FlatLines, FlatRows, line_of
 from catenary.mbs.rigid.bodies import Body, Motion, initial_motion
 from catenary.mbs.rigid.forces import Force
 from catenary.mbs.rigid.joints import Joint
 from catenary.mbs.rigid.kinematics import Quantity
 from catenary.mbs.rigid.least_squares import least_squares
-from catenary.solver.base.errors import InputError, RunBroken
 from catenary.solver.kernels import native
 
 # A row of Phi_q that the rows before it explain but for this part of its length is redundant.

@@ -15,10 +15,10 @@ from typing import Protocol
 import numpy as np
 from scipy import linalg
 
+from catenary.base.errors import InputError, RunBroken
 from catenary.mbs.rigid.bodies import Motion
 from catenary.mbs.rigid.kinematics import Quantity
 from catenary.mbs.rigid.system import System, independent_rows
-from catenary.solver.base.errors import InputError, RunBroken
 
 
 class ConstraintHandling(Protocol):

@@ -28,11 +28,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from catenary.base.errors import InputError, NotConverged, RunBroken
 from catenary.mbs.rigid.bodies import Motion
 from catenary.mbs.rigid.kinematics import Quantity
 from catenary.mbs.rigid.system import System
 from catenary.mbs.time_steps.step_solvers import StepSolver, step_solver
-from catenary.solver.base.errors import InputError, NotConverged, RunBroken
 
 # Generalised forces (6 n, s) of unit forces at a motion.
 Ways = Callable[[Motion], np.ndarray]

@@ -26,8 +26,8 @@ from typing import Protocol
 import numpy as np
 from scipy import linalg
 
+from catenary.base.errors import InputError, NotConverged
 from catenary.mbs.rigid.system import independent_rows
-from catenary.solver.base.errors import InputError, NotConverged
 
 # A pivot of dependent coordinates below this part of the largest one: others are chosen.
 WORN = 1e-4

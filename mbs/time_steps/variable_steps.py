@@ -8,10 +8,10 @@ from typing import NamedTuple
 import numpy as np
 from scipy.integrate import solve_ivp
 
+from catenary.base.errors import InputError, RunBroken
 from catenary.mbs.rigid.bodies import Motion
 from catenary.mbs.rigid.system import System
 from catenary.mbs.time_steps.constraint_handling import ConstraintHandling, project
-from catenary.solver.base.errors import InputError, RunBroken
 
 
 class Trajectory(NamedTuple):

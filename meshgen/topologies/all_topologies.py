@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from catenary.base.errors import InputError
 from catenary.meshgen.line import Line
 from catenary.meshgen.topologies import (  # noqa: F401  register themselves
     compound,
@@ -16,7 +17,6 @@ from catenary.meshgen.topologies import (  # noqa: F401  register themselves
 from catenary.meshgen.topologies.line_data import LineData
 from catenary.meshgen.topologies.overlaps import with_overlaps
 from catenary.meshgen.topologies.registry import registered
-from catenary.solver.base.errors import InputError
 
 
 def make_line(data: LineData) -> Line:

@@ -9,6 +9,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from catenary.base.errors import InputError
 from catenary.meshgen.hardware import Clamps, Droppers, SteadyArms, Supports
 from catenary.meshgen.line import Line
 from catenary.meshgen.topologies.free_data import FreeDroppers, FreeLink, FreeWire
@@ -16,7 +17,6 @@ from catenary.meshgen.topologies.line_data import LineData
 from catenary.meshgen.topologies.registry import register
 from catenary.meshgen.topologies.sag import Loads, sag_between
 from catenary.meshgen.wires import End, Piece, Profile, Role, Wire
-from catenary.solver.base.errors import InputError
 
 FREE = "free"
 _Group = TypeVar("_Group", FreeDroppers, Clamps, SteadyArms, Supports)

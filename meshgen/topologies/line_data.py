@@ -7,12 +7,12 @@ from functools import cached_property
 
 import numpy as np
 
+from catenary.base.errors import InputError
 from catenary.meshgen.curve import Curve
 from catenary.meshgen.hardware import DropperKind, SteadyArm
 from catenary.meshgen.spans import Spans
 from catenary.meshgen.topologies.free_data import FreeDroppers, FreeLink, FreeWire
 from catenary.meshgen.wires import Conductor, Profile, Role, Section
-from catenary.solver.base.errors import InputError
 
 # Two cuts of a wire closer than this are taken for a slip of the pen [m].
 SHORTEST_GAP = 1e-3

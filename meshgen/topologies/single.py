@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from catenary.base.errors import InputError
 from catenary.meshgen.hardware import Clamps, SteadyArms, Supports
 from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import CONTACT_WIRE, STEADY_ARMS, SUPPORTS
@@ -11,7 +12,6 @@ from catenary.meshgen.topologies.line_data import Bridle, LineData
 from catenary.meshgen.topologies.registry import register
 from catenary.meshgen.topologies.sag import GRAVITY
 from catenary.meshgen.wires import End, Piece, Role, Wire
-from catenary.solver.base.errors import InputError
 
 SINGLE = "single"
 BRIDLE_WIRE = "bridle_wire"

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from catenary.base.errors import InputError
 from catenary.meshgen.hardware import Clamps
 from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import MESSENGER_WIRE
@@ -14,7 +15,6 @@ from catenary.meshgen.topologies.registry import HUNG, register
 from catenary.meshgen.topologies.sag import GRAVITY
 from catenary.meshgen.topologies.simple import simple_catenary
 from catenary.meshgen.wires import End, Piece, Role, Wire
-from catenary.solver.base.errors import InputError
 
 STITCHED = "stitched"
 STITCH_WIRE = "stitch_wire"

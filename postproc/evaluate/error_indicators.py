@@ -14,13 +14,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy import linalg, optimize, signal
 
+from catenary.base.errors import InputError
 from catenary.meshgen.slowest_wave import bends
 from catenary.meshgen.wires import Role
 from catenary.postproc.channels.facts import FACTS, WIRE
 from catenary.postproc.evaluate import filters
 from catenary.postproc.evaluate.statistics import covers
 from catenary.postproc.read.results import Results
-from catenary.solver.base.errors import InputError
 from catenary.solver.model.elements import beam
 from catenary.solver.problem.integrator_parameters import (
     AVERAGE_ACCELERATION,

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from scipy import signal
 
-from catenary.solver.base.errors import InputError
+from catenary.base.errors import InputError
 
 CUT_OFF = 20.0
 BAND_LIMIT = 5.0

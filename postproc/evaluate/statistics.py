@@ -13,10 +13,10 @@ from typing import Any
 
 import numpy as np
 
+from catenary.base.errors import InputError
 from catenary.postproc.evaluate import filters
 from catenary.postproc.evaluate.lateral_places import LateralRange, lateral_ranges
 from catenary.postproc.read.results import Results
-from catenary.solver.base.errors import InputError
 
 SHORTEST_ARC = 5e-3
 HISTOGRAM_BIN, MOST_BINS = 10.0, 1000

@@ -14,12 +14,12 @@ from typing import Any
 import h5py
 import numpy as np
 
+from catenary.base.errors import RunBroken
 from catenary.postproc.files.disk_errors import code_of, reason, remedy
 from catenary.postproc.files.hdf5.checked import FORMAT_BOUNDS
 from catenary.postproc.files.hdf5.self_contained import open_own
 from catenary.postproc.files.own_files import new_part
 from catenary.postproc.files.trimming import trimmed
-from catenary.solver.base.errors import RunBroken
 
 # What a file system without locks says to flock.
 _NO_LOCKS = (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP)

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import h5py
 
+from catenary.base.errors import RunBroken
 from catenary.postproc.channels.header import Header
 from catenary.postproc.files.disk import as_attribute, open_to_write
 from catenary.postproc.files.disk_errors import reason
@@ -27,7 +28,6 @@ from catenary.postproc.files.hdf5.checked import (
 )
 from catenary.postproc.files.own_files import new_part
 from catenary.postproc.files.result_file import INTERRUPTED
-from catenary.solver.base.errors import RunBroken
 
 # Steps of the run as it was begun: what is recorded follows from them.
 BEGUN_FOR = "n_steps_begun_for"

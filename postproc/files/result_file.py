@@ -18,6 +18,7 @@ from typing import Any, NamedTuple
 import h5py
 import numpy as np
 
+from catenary.base.errors import InputError
 from catenary.postproc.channels.facts import FACTS
 from catenary.postproc.channels.header import Header
 from catenary.postproc.channels.line_record import GZIP, GZIP_LEVEL, LineRecord
@@ -46,7 +47,6 @@ from catenary.postproc.files.hdf5.windowed_rows import write_window
 from catenary.postproc.files.kept_extremes import drop_extremes, extremes_at, store_extremes
 from catenary.postproc.files.own_files import new_part
 from catenary.postproc.files.trimming import trimmed
-from catenary.solver.base.errors import InputError
 from catenary.solver.time_loop.views import channels
 from catenary.solver.time_loop.views.channels import Channel
 from catenary.solver.time_loop.views.observers import Stage

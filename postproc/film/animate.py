@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from tqdm import tqdm
 
+from catenary.base.errors import InputError
 from catenary.mbs.shape import Shape
 from catenary.postproc.film.film_data import FilmData, film_data
 from catenary.postproc.film.pantograph_shape import MovingPantographs
@@ -22,7 +23,6 @@ from catenary.postproc.film.snapshots import Snapshots
 from catenary.postproc.film.view import View
 from catenary.postproc.read.records import Records
 from catenary.postproc.read.results import Results
-from catenary.solver.base.errors import InputError
 from catenary.solver.waves.excitation import Blow
 
 _EGL = "libEGL.so.1"

@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from catenary.base.errors import InputError
 from catenary.meshgen.wires import Role
 from catenary.postproc.evaluate import filters
 from catenary.postproc.read.results import Results
-from catenary.solver.base.errors import InputError
 from catenary.solver.waves.excitation import Excitation, MovingForce, excitation_of_facts
 
 # A place that is that near to the end of a wire is on it [m].

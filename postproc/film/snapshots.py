@@ -9,12 +9,12 @@ from pathlib import Path
 import h5py
 import numpy as np
 
+from catenary.base.errors import InputError
 from catenary.postproc.files.hdf5.self_contained import open_own
 from catenary.postproc.read.guard import survives
 from catenary.postproc.record.snapshots.blocks import ARMS, OTHER_PARTS
 from catenary.postproc.record.snapshots.field_layout import PLACES
 from catenary.postproc.record.snapshots.fields_schema import BlockTables, FieldsFault, read_fields
-from catenary.solver.base.errors import InputError
 
 FIELDS_FILE = "fields.h5"
 # Snapshots that are looked through for the largest uplift.

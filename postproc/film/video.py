@@ -10,7 +10,7 @@ import imageio_ffmpeg
 import numpy as np
 from PIL import Image
 
-from catenary.solver.base.errors import InputError
+from catenary.base.errors import InputError
 
 # A GIF has pictures of this width [px], and so many a second at most.
 _GIF_WIDTH, _GIF_RATE = 640, 12.5

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from catenary.base.errors import InputError
 from catenary.mbs.shape import BODY, HEAD, SPRING, Shape
 from catenary.postproc.files.disk import write_whole
 from catenary.postproc.film.film_data import FilmData, film_data
@@ -20,7 +21,6 @@ from catenary.postproc.paraview import scenery
 from catenary.postproc.read.records import Records
 from catenary.postproc.read.results import Results
 from catenary.postproc.record.snapshots.vtkhdf import write_vtkhdf
-from catenary.solver.base.errors import InputError
 
 SCRIPT, FOLDER = "view.py", "paraview"
 _TEMPLATE = "view.py.template"

@@ -13,9 +13,9 @@ import subprocess
 import sys
 from pathlib import Path
 
+from catenary.base.errors import InputError
 from catenary.postproc.read.records import Records
 from catenary.postproc.read.sound_file import SoundFile
-from catenary.solver.base.errors import InputError
 
 RESULT_FILE = "run.h5"
 # What reading a file may take: so long, and a second for each part of this size [s], [B].
@@ -27,7 +27,7 @@ _WALK = """
 import sys
 from pathlib import Path
 from catenary.postproc.files.hdf5.self_contained import open_own
-from catenary.solver.base.errors import InputError
+from catenary.base.errors import InputError
 try:
     file = open_own(Path(sys.argv[1]), locking=False)
 except InputError:

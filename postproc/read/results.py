@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from catenary.base.errors import InputError
 from catenary.meshgen.wires import Role
 from catenary.postproc.channels.line_record import LineRecord, from_table
 from catenary.postproc.files.hdf5 import block_reading
@@ -18,7 +19,6 @@ from catenary.postproc.files.result_file import DONE, FORMAT, LINE_TIME, RUNNING
 from catenary.postproc.read.line_of_run import LineOfRun
 from catenary.postproc.read.records import Records
 from catenary.postproc.read.sound_file import SoundFile
-from catenary.solver.base.errors import InputError
 from catenary.solver.time_loop.views import channels
 
 logger = logging.getLogger("catenary.results")

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from catenary.base.errors import InputError
 from catenary.meshgen.wires import Role
 from catenary.postproc.files.hdf5.checked import text_of
 from catenary.postproc.files.kept_extremes import extremes_at
@@ -26,7 +27,6 @@ from catenary.postproc.read.file_schema import (
 from catenary.postproc.read.records import Records, scan, table_faults
 from catenary.postproc.read.running_file import opened, opened_image
 from catenary.postproc.read.tables import PartialTable
-from catenary.solver.base.errors import InputError
 
 # More faults of one file than these are not listed.
 _LISTED = 3

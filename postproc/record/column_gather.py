@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from catenary.solver.base.parallel import on_root
+from catenary.base.parallel import on_root
 
 
 class ColumnGather:

@@ -26,7 +26,7 @@ from typing import Any
 
 import numpy as np
 
-from catenary.solver.base.errors import RunBroken
+from catenary.base.errors import RunBroken
 from catenary.solver.model.loads import MemoryLoad
 from catenary.solver.statics.line_at_rest import LineAtRest
 from catenary.solver.time_loop.views.observers import Observer, Stage, StepView

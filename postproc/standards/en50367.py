@@ -12,7 +12,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from catenary.solver.base.errors import InputError
+from catenary.base.errors import InputError
 
 SYSTEMS = {"ac": "AC", "dc_3kv": "DC 3 kV", "dc_1500v": "DC 1.5 kV"}
 KMH = 3.6  # km/h in 1 m/s

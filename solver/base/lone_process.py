@@ -7,7 +7,7 @@ import os
 from collections.abc import Iterator
 from typing import Any
 
-from catenary.solver.base.parallel import launched_by_mpirun
+from catenary.base.parallel import launched_by_mpirun
 
 # Open MPI's daemon for processes that this one might start, its networks, and the search for them
 # take 0.3 s at the start. hwloc, with which it looks for processors, would call at each display and

@@ -10,7 +10,7 @@ import traceback
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from catenary.solver.base.errors import CatenaryError, RunBroken
+from catenary.base.errors import CatenaryError, RunBroken
 
 if TYPE_CHECKING:
     import numpy as np

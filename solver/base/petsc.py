@@ -10,7 +10,7 @@ import sys
 
 import petsc4py
 
-from catenary.solver.base.python_signals import python_signals_kept
+from catenary.base.python_signals import python_signals_kept
 
 with python_signals_kept():
     if "petsc4py.PETSc" not in sys.modules:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple
 
-from catenary.solver.base.petsc import PETSc
+from catenary.base.petsc import PETSc
 
 # Names as -log_view prints them, in the order of a step, and what they hold.
 NAMES = {

@@ -27,7 +27,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from catenary.solver.base.errors import NotConverged, RunBroken
+from catenary.base.errors import NotConverged, RunBroken
 from catenary.solver.contact.line_response import Affine, Coupled, LineResponse, Share, affine
 from catenary.solver.contact.train.head_states import Heads
 from catenary.solver.contact_problem.dense_systems import Room, Signs, System, room_for

@@ -16,7 +16,7 @@ from typing import Protocol
 
 import numpy as np
 
-from catenary.solver.base.errors import NotConverged, RunBroken
+from catenary.base.errors import NotConverged, RunBroken
 from catenary.solver.contact.line_response import Coupled, LineResponse
 from catenary.solver.contact.train.head_states import Heads
 from catenary.solver.contact_problem.complementarity import InnerProblem, InnerSolution

@@ -10,7 +10,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from catenary.solver.base.errors import RunBroken
+from catenary.base.errors import RunBroken
 from catenary.solver.kernels import native
 from catenary.solver.problem.contact_laws import HertzLaw, KinematicLaw, LinearLaw
 from catenary.solver.problem.problem import Problem

@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from catenary.solver.base.errors import NotConverged
+from catenary.base.errors import NotConverged
 from catenary.solver.contact_problem.dense_systems import System, room_for
 from catenary.solver.contact_problem.simplicial_path import find_zero
 from catenary.solver.kernels import native

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from catenary.solver.base.errors import InputError
+from catenary.base.errors import InputError
 from catenary.solver.kernels import native
 
 # Coupling over diagonal at which the rest of a half line is round-off, squared in another pass; and

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from catenary.solver.base.errors import InputError
+from catenary.base.errors import InputError
 from catenary.solver.ends.half_lines import SpanMatrices, span_matrices
 from catenary.solver.model.entries import iterate_entries
 from catenary.solver.model.model import Model

@@ -20,10 +20,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from catenary.solver.base.kernels import aligned_arrays
 from catenary.solver.integrators.line_integrator import LineIntegrator
 from catenary.solver.integrators.line_state import AlphaAhead, AlphaSteps
-from catenary.solver.kernels import native
+from catenary.solver.kernels import aligned_arrays, native
 from catenary.solver.linear.pieces.operator_pieces import WantedPieces
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import Ownership

@@ -15,14 +15,13 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from catenary.solver.base.kernels import aligned_arrays
-from catenary.solver.base.parallel import total
-from catenary.solver.base.petsc import PETSc
+from catenary.base.parallel import total
+from catenary.base.petsc import PETSc
 from catenary.solver.integrators.detour import LIBRARY, PARTS, Detour
 from catenary.solver.integrators.line_state import AlphaSteps, LineState, PredictedLineState, Steps
 from catenary.solver.integrators.loads.line_loads import LineLoads
 from catenary.solver.integrators.two_pass_step import StationPasses
-from catenary.solver.kernels import native
+from catenary.solver.kernels import aligned_arrays, native
 from catenary.solver.linear.decay_length import reach
 from catenary.solver.linear.pieces.operator_pieces import WantedPieces
 from catenary.solver.linear.step_operators import LineOperators, Loads

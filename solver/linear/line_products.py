@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from catenary.solver.base.petsc import PETSc
+from catenary.base.petsc import PETSc
 from catenary.solver.linear.halo import Subdomain
 from catenary.solver.linear.pieces.operator_pieces import OperatorPieces
 from catenary.solver.linear.stations.like_stations import LikeStations

@@ -16,8 +16,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy import sparse
 
-from catenary.solver.base.errors import InputError
-from catenary.solver.base.petsc import PETSc
+from catenary.base.errors import InputError
+from catenary.base.petsc import PETSc
 from catenary.solver.linear.factors.station_factors import StationFactors, station_factors
 from catenary.solver.linear.stations.sections import Sections
 from catenary.solver.linear.stations.station_layout import Layout

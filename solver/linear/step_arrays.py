@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from catenary.solver.base.kernels import aligned_arrays
-from catenary.solver.base.petsc import PETSc
+from catenary.base.petsc import PETSc
+from catenary.solver.kernels import aligned_arrays
 from catenary.solver.linear.halo import Subdomain
 from catenary.solver.linear.petsc_solvers import Wrapped
 

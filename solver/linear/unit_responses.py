@@ -13,7 +13,7 @@ import numpy as np
 from mpi4py import MPI
 from scipy import linalg
 
-from catenary.solver.base.errors import RunBroken
+from catenary.base.errors import RunBroken
 from catenary.solver.kernels import native
 from catenary.solver.linear.operator_bands import OperatorBands
 from catenary.solver.linear.stations.like_stations import LikeStations

@@ -11,7 +11,7 @@ from catenary.solver.model.entries import iterate_entries
 from catenary.solver.model.model import Model
 
 if TYPE_CHECKING:
-    from catenary.solver.base.petsc import PETSc
+    from catenary.base.petsc import PETSc
 
 # Rows whose entries are put together at once, some 50 MB of them.
 _STRETCH = 2**16
@@ -104,7 +104,7 @@ def as_petsc(part: sparse.bsr_matrix, comm: Any) -> PETSc.Mat:
     The caller destroys the matrix.
     """
     # Form finding needs matrices, but no PETSc: commands that load no more start sooner.
-    from catenary.solver.base.petsc import PETSc
+    from catenary.base.petsc import PETSc
 
     rows, columns = part.shape
     csr = (part.indptr.astype(PETSc.IntType), part.indices.astype(PETSc.IntType), part.data)

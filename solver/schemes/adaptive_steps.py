@@ -18,8 +18,8 @@ from typing import Any
 
 import numpy as np
 
-from catenary.solver.base.errors import RunBroken
-from catenary.solver.base.parallel import on_root
+from catenary.base.errors import RunBroken
+from catenary.base.parallel import on_root
 from catenary.solver.problem.problem import Numerics, n_halvings
 from catenary.solver.schemes.fixed_point import FixedPoint
 from catenary.solver.schemes.make_scheme import Parts

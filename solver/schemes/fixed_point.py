@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from catenary.solver.base.errors import NotConverged
-from catenary.solver.base.parallel import on_root
+from catenary.base.errors import NotConverged
+from catenary.base.parallel import on_root
 from catenary.solver.contact.forces_on_line import ForcesOnLine
 from catenary.solver.contact.train.head_states import Heads
 from catenary.solver.contact.train.pantographs import Pantographs

@@ -18,8 +18,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from catenary.solver.base.errors import InputError
-from catenary.solver.base.petsc import PETSc
+from catenary.base.errors import InputError
+from catenary.base.petsc import PETSc
 from catenary.solver.linear.petsc_solvers import PREFIX, refused_options
 
 # The local error of a step of a method of order two falls with the cube of its size.

@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from catenary.solver.base.errors import InputError, NotConverged
-from catenary.solver.base.petsc import PETSc
+from catenary.base.errors import InputError, NotConverged
+from catenary.base.petsc import PETSc
 from catenary.solver.contact.forces_on_line import ForcesOnLine
 from catenary.solver.contact.train.pantographs import Pantographs
 from catenary.solver.linear.petsc_solvers import PREFIX

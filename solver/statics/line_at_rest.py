@@ -7,9 +7,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from catenary.base.freed_memory import give_back
+from catenary.base.parallel import on_root
 from catenary.meshgen.mesh import LineMesh
-from catenary.solver.base.freed_memory import give_back
-from catenary.solver.base.parallel import on_root
 from catenary.solver.effects.all_effects import as_hung
 from catenary.solver.effects.build_model import build
 from catenary.solver.model.model import Model

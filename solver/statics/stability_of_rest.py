@@ -12,8 +12,8 @@ from __future__ import annotations
 import numpy as np
 from scipy import linalg
 
+from catenary.base.errors import InputError
 from catenary.meshgen.wires import Role
-from catenary.solver.base.errors import InputError
 from catenary.solver.model.model import Model
 from catenary.solver.model.rest.rest_shape import Equilibrium
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from catenary.base.errors import InputError
 from catenary.meshgen.mesh import LineMesh
-from catenary.solver.base.errors import InputError
 from catenary.solver.model.model import Model
 from catenary.solver.model.rest.rest_shape import Equilibrium
 from catenary.solver.model.wire_ends import WireEnd, ends_of

@@ -20,15 +20,15 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
+from catenary.base.errors import CatenaryError, InputError, RunBroken
+from catenary.base.freed_memory import give_back
+from catenary.base.petsc import PETSc
 from catenary.meshgen.wires import Role
-from catenary.solver.base.errors import CatenaryError, InputError, RunBroken
-from catenary.solver.base.freed_memory import give_back
-from catenary.solver.base.kernels.flush_to_zero import flushed
-from catenary.solver.base.petsc import PETSc
 from catenary.solver.contact.contact_wire import ContactWires
 from catenary.solver.contact.train.pantographs import Pantographs, nominal_height_rule
 from catenary.solver.effects.all_effects import simulated
 from catenary.solver.integrators.detour import Detour, log_detour
+from catenary.solver.kernels.flush_to_zero import flushed
 from catenary.solver.linear.petsc_solvers import wants_single_steps, wants_solution
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import distribute

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from catenary.solver.base.errors import InputError
-from catenary.solver.base.petsc import PETSc
+from catenary.base.errors import InputError
+from catenary.base.petsc import PETSc
 from catenary.solver.linear.petsc_solvers import PREFIX, refused_options
 from catenary.solver.time_loop.ts_stepper import Stepper
 

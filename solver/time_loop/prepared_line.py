@@ -10,11 +10,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from catenary.base.errors import InputError, RunBroken
 from catenary.mbs.head.drives import N_DRIVE, drive_width
 from catenary.mbs.head.newmark_head import SteppedHead
 from catenary.mbs.interface import Pantograph
 from catenary.mbs.lowering import LoweredPantograph
-from catenary.solver.base.errors import InputError, RunBroken
 from catenary.solver.kernels import native
 from catenary.solver.time_loop.compiled_steps import CompiledSteps
 

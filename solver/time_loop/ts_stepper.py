@@ -5,8 +5,8 @@ from __future__ import annotations
 import time as clock
 from collections.abc import Callable
 
-from catenary.solver.base.errors import NotConverged, RunBroken
-from catenary.solver.base.petsc import PETSc
+from catenary.base.errors import NotConverged, RunBroken
+from catenary.base.petsc import PETSc
 from catenary.solver.schemes.scheme import Scheme
 from catenary.solver.time_loop.compiled_steps import CompiledSteps
 from catenary.solver.time_loop.views.audience import Audience

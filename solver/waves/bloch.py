@@ -15,9 +15,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy import linalg
 
+from catenary.base.errors import InputError
 from catenary.meshgen.slowest_wave import slowest_phase_speed
 from catenary.meshgen.wires import Role
-from catenary.solver.base.errors import InputError
 from catenary.solver.model.matrices import whole_matrix
 from catenary.solver.model.model import Model
 

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from catenary.solver.base.errors import RunBroken
+from catenary.base.errors import RunBroken
 from catenary.solver.kernels import native
 from catenary.solver.linear.factors.station_factors import StationFactors
 from catenary.solver.linear.pieces.operator_pieces import OperatorPieces, WantedPieces

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from catenary.solver.base.errors import InputError
+from catenary.base.errors import InputError
 from catenary.solver.problem.ends import Periodic
 from catenary.solver.problem.problem import Problem
 

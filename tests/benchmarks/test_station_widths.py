@@ -19,10 +19,10 @@ from repeating_line import layout, line
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.load import load_scene
-from catenary.solver.base.kernels import aligned_arrays
 from catenary.solver.integrators.line_state import PredictedLineState, Steps
 from catenary.solver.integrators.newmark import NewmarkLine
 from catenary.solver.integrators.two_pass_step import StationPasses
+from catenary.solver.kernels import aligned_arrays
 from catenary.solver.linear.factors.station_factors import station_factors
 from catenary.solver.linear.stations.station_products import station_product
 from catenary.solver.linear.step_operators import ByStations

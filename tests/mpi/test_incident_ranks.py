@@ -15,13 +15,13 @@ from mpi4py import MPI
 from rank_histories import on_one
 from small_lines import bare_wires
 
+from catenary.base.parallel import on_root
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.load import load_scene
 from catenary.mbs.lowering import Lowering
 from catenary.meshgen.mesh import CONTACT_WIRE, LineMesh
 from catenary.meshgen.topologies.all_topologies import make_line
-from catenary.solver.base.parallel import on_root
 from catenary.solver.model.partition import distribute
 from catenary.solver.problem.incidents import DropperBreak, LineIncident, TensionLoss
 from catenary.solver.problem.problem import Problem

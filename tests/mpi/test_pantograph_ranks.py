@@ -13,12 +13,12 @@ import pytest
 from mpi4py import MPI
 from rank_histories import on_one
 
+from catenary.base.errors import NotConverged, RunBroken
+from catenary.base.parallel import on_root
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.load import load_scene
 from catenary.meshgen.mesh import LineMesh
-from catenary.solver.base.errors import NotConverged, RunBroken
-from catenary.solver.base.parallel import on_root
 from catenary.solver.problem.problem import Problem
 from catenary.solver.statics.line_at_rest import line_at_rest
 from catenary.solver.time_loop.march import March

@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from catenary.base.errors import RunBroken
 from catenary.postproc.channels.header import Header
 from catenary.postproc.channels.line_record import LineRecord
 from catenary.postproc.files import result_file
@@ -26,7 +27,6 @@ from catenary.postproc.record.recorder import Recorder
 from catenary.postproc.record.snapshots.blocks import RecordedLine
 from catenary.postproc.record.snapshots.field_layout import Course, FieldRecord
 from catenary.postproc.record.snapshots.fields import FieldRecorder
-from catenary.solver.base.errors import RunBroken
 from catenary.solver.time_loop.views.observers import NodeMotion, Stage, StepView, row_of
 
 COMM = MPI.COMM_WORLD

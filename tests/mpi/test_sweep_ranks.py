@@ -11,10 +11,10 @@ from pathlib import Path
 import pytest
 from mpi4py import MPI
 
+from catenary.base.errors import InputError
 from catenary.cases.studies.sweep.jobs import make_jobs
 from catenary.cases.studies.sweep.run_jobs import run_jobs
 from catenary.cases.studies.sweep.variants import Variant
-from catenary.solver.base.errors import InputError
 
 COMM = MPI.COMM_WORLD
 CASE = "en50318_2002"

@@ -13,11 +13,11 @@ import pytest
 from mpi4py import MPI
 from rank_histories import largest_difference, relative
 
+from catenary.base.parallel import on_root
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.load import load_scene
 from catenary.meshgen.mesh import LineMesh
-from catenary.solver.base.parallel import on_root
 from catenary.solver.problem.problem import Problem, steps_of
 from catenary.solver.statics.line_at_rest import line_at_rest_on_all
 from catenary.solver.time_loop.march import March

@@ -8,8 +8,8 @@ import time
 import pytest
 from mpi4py import MPI
 
-from catenary.solver.base.errors import InputError
-from catenary.solver.base.parallel import on_root
+from catenary.base.errors import InputError
+from catenary.base.parallel import on_root
 
 COMM = MPI.COMM_WORLD
 

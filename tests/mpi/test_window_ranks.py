@@ -16,11 +16,11 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from catenary.base.errors import InputError
 from catenary.cases.run.one_rank import on_as_many
 from catenary.cases.run.runner import RunOutcome, run_case
 from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.scene import Scene
-from catenary.solver.base.errors import InputError
 
 COMM = MPI.COMM_WORLD
 SPANS = ("window.spans_ahead=2", "window.spans_behind=2")

@@ -35,7 +35,7 @@ def test_an_unforeseen_error_of_one_rank_ends_those_that_wait_for_it(
 ) -> None:
     script = f"""{FAIL}
 from mpi4py import MPI
-from catenary.solver.base.parallel import abort_on_unforeseen_error
+from catenary.base.parallel import abort_on_unforeseen_error
 comm = MPI.COMM_WORLD
 abort_on_unforeseen_error(comm)
 if comm.rank == {failing}:
@@ -81,8 +81,8 @@ def test_an_error_of_ours_on_rank_0_is_raised_on_all_ranks(tmp_path: Path) -> No
     script = """
 import sys
 from mpi4py import MPI
-from catenary.solver.base.errors import InputError, RunBroken
-from catenary.solver.base.parallel import on_root
+from catenary.base.errors import InputError, RunBroken
+from catenary.base.parallel import on_root
 
 def refuse():
     raise InputError("mesh.file is no mesh")
@@ -112,7 +112,7 @@ sys.exit(InputError.exit_code)
 def test_an_unforeseen_error_on_rank_0_is_named_on_the_others(tmp_path: Path) -> None:
     script = """
 from mpi4py import MPI
-from catenary.solver.base.parallel import on_root
+from catenary.base.parallel import on_root
 try:
     on_root(MPI.COMM_WORLD, lambda: [].pop())
 except IndexError as error:

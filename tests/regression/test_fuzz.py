@@ -28,14 +28,14 @@ from fuzzing import (
 from mpi4py import MPI
 from typer.testing import CliRunner
 
+from catenary.base.errors import InputError
+from catenary.base.parallel import on_root
 from catenary.cases.cli.main import app
 from catenary.cases.scene.input.faults import SceneError
 from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.hard import runs as hard_runs
 from catenary.cases.studies.hard.runs import Watched
-from catenary.solver.base.errors import InputError
-from catenary.solver.base.parallel import on_root
 from catenary.solver.problem.incidents import DropperBreak
 from catenary.solver.statics.changed_line.after_incidents import dropper_at
 

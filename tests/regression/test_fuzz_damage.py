@@ -21,13 +21,13 @@ import pytest
 from damaging import as_json, flip, raw_ranges, spoil_chunk, unseal
 from program import catenary, short_run
 
+from catenary.base.errors import InputError
 from catenary.postproc.evaluate import statistics as stats
 from catenary.postproc.evaluate.compare import compare
 from catenary.postproc.read import guard
 from catenary.postproc.read.guard import examined
 from catenary.postproc.read.results import Results
 from catenary.postproc.report import report, summary
-from catenary.solver.base.errors import InputError
 
 FIRST = int(os.environ.get("FUZZ_SEED", "1"))
 FLIPS = int(os.environ.get("FUZZ_FLIPS", "3"))

@@ -15,9 +15,9 @@ import pytest
 from fuzzing_stability import extreme_scene
 from mpi4py import MPI
 
+from catenary.base.errors import InputError, RunBroken
 from catenary.cases.run.runner import run_case
 from catenary.cases.scene.load import load_scene
-from catenary.solver.base.errors import InputError, RunBroken
 
 pytestmark = pytest.mark.study
 

@@ -13,12 +13,12 @@ import pytest
 from fuzzing import RandomScene, topology_scene
 from windowed import COMM, apart, largest, march, nudged
 
+from catenary.base.errors import InputError
 from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.hard import runs as hard_runs
 from catenary.cases.studies.hard.runs import Watched
-from catenary.solver.base.errors import InputError
 from catenary.solver.linear.pieces import pieces
 from catenary.solver.problem.window import BOUNDED, EXACT, WindowChoice
 from catenary.solver.statics.line_at_rest import LineAtRest

@@ -15,6 +15,7 @@ import pytest
 from program import catenary, short_run
 from typer.testing import CliRunner
 
+from catenary.base.errors import InputError
 from catenary.cases.cli.main import app
 from catenary.cases.run import scene_mesh
 from catenary.cases.run.scene_mesh import mesh_of
@@ -27,7 +28,6 @@ from catenary.cases.scene.load import load_scene, scene_from
 from catenary.cases.studies.sweep.variants import read_named
 from catenary.meshgen.mesh import CONTACT_WIRE
 from catenary.meshgen.topologies.twin import second
-from catenary.solver.base.errors import InputError
 from catenary.solver.effects.all_effects import move_together
 
 SOUND = Path(__file__).parent / "broken_scenes" / "sound.toml"

@@ -11,11 +11,11 @@ import pytest
 from damaging import unseal
 from program import MPIRUN, assert_same_histories, assert_sound, catenary, short_run
 
+from catenary.base.errors import InputError
 from catenary.cases.run.extending import extended_scene
 from catenary.cases.scene.convert.course import resolved
 from catenary.cases.scene.load import load_scene
 from catenary.postproc.read.results import Results
-from catenary.solver.base.errors import InputError
 
 # Where the run ends at first, and where the long one and what goes on do [m].
 FIRST, LAST = "train.end_m=170", 200.0

@@ -10,8 +10,8 @@ import pytest
 from petsc4py import PETSc
 from program import MPIRUN, assert_sound, catenary, short_run
 
+from catenary.base.petsc_events import NAMES
 from catenary.postproc.read.results import Results
-from catenary.solver.base.petsc_events import NAMES
 
 # Events of a step whose parts follow one another, in place of two passes, and of several ranks.
 ONE_BY_ONE, OF_RANKS = {"LineProduct", "LineSolve"}, {"ContactReduce", "ContactReply"}

@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 from program import assert_same_histories, catenary
 
+from catenary.base.errors import InputError
 from catenary.cases.run.planning.slurm_script import Job, limit_minutes, slurm_script
 from catenary.postproc.read.results import Results
-from catenary.solver.base.errors import InputError
 
 # Some four seconds of march, so that a signal meets it.
 SCENE = ["numerics.dt_s=5e-5"]

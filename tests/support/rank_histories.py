@@ -8,8 +8,8 @@ from typing import Any, TypeVar
 import numpy as np
 from mpi4py import MPI
 
+from catenary.base.parallel import on_root
 from catenary.meshgen.mesh import LineMesh
-from catenary.solver.base.parallel import on_root
 from catenary.solver.problem.problem import Problem
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest
 from catenary.solver.time_loop.march import March

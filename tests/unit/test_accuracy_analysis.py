@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from measuring import check
 
+from catenary.base.errors import InputError
 from catenary.cases.studies.accuracy.analysis import (
     HISTORY,
     Found,
@@ -22,7 +23,6 @@ from catenary.cases.studies.accuracy.analysis import (
     separate,
     uncertainties,
 )
-from catenary.solver.base.errors import InputError
 
 FIGURES = {
     "mean_N": 120.0,

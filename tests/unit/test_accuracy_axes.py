@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from catenary.base.errors import InputError
 from catenary.cases.cli.main import app
 from catenary.cases.scene.convert.course import resolved
 from catenary.cases.scene.load import load_scene
@@ -15,7 +16,6 @@ from catenary.cases.studies.accuracy import models
 from catenary.cases.studies.accuracy.axes import AXES, parse_axes
 from catenary.cases.studies.accuracy.axis import DISCRETISATION
 from catenary.cases.studies.accuracy.plan import Plan, make_plan
-from catenary.solver.base.errors import InputError
 
 CASE = "en50318_2002"
 

@@ -7,8 +7,8 @@ import sys
 
 import pytest
 
+from catenary.base.errors import InputError
 from catenary.cases.process.petsc_options import as_arguments, split_extras
-from catenary.solver.base.errors import InputError
 
 
 def test_the_table_comes_first_and_the_command_line_wins() -> None:

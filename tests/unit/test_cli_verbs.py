@@ -14,11 +14,11 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from catenary.base.errors import RunBroken
 from catenary.cases.cli.main import app
 from catenary.cases.scene.input.case_files import shipped
 from catenary.cases.scene.load import load_scene
 from catenary.cases.terminal import console
-from catenary.solver.base.errors import RunBroken
 from catenary.solver.effects import all_effects as effects
 
 VERBS = ["run", "restart", "sweep", "list", "plan", "check", "mesh", "static", "pantograph"]

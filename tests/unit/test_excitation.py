@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from small_lines import BARE, bare_wires, mesh_of, problem_of, train
 
+from catenary.base.errors import InputError
 from catenary.cases.studies.waves.excited import Asked, excitation_of, without_train
-from catenary.solver.base.errors import InputError
 from catenary.solver.effects.build_model import build
 from catenary.solver.model.loads import FieldLoad, ShapeLoad
 from catenary.solver.problem.problem import Problem

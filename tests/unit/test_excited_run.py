@@ -11,6 +11,7 @@ import pyvista
 from measuring import check
 from mpi4py import MPI
 
+from catenary.base.errors import InputError
 from catenary.cases.run.continuing import state_to_continue
 from catenary.cases.run.excited_run import ExcitedRun
 from catenary.cases.run.runner import run_case
@@ -27,7 +28,6 @@ from catenary.postproc.paraview import open_in_paraview
 from catenary.postproc.read.file_schema import ATTRIBUTES
 from catenary.postproc.read.results import Results
 from catenary.postproc.report.report import write_report
-from catenary.solver.base.errors import InputError
 from catenary.solver.statics.line_at_rest import LineAtRest
 from catenary.solver.waves.excitation import Blow, MovingForce, as_facts, excitation_of_facts
 

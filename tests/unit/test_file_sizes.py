@@ -9,6 +9,8 @@ import pytest
 import typer
 from mpi4py import MPI
 
+from catenary.base.errors import InputError, RunBroken
+from catenary.base.parallel import on_root
 from catenary.cases.run.planning.needs import (
     Kept,
     needs_before_meshing,
@@ -24,8 +26,6 @@ from catenary.cases.scene.scene import Scene
 from catenary.cases.terminal import console
 from catenary.postproc.channels.line_record import GZIP
 from catenary.postproc.read.results import Results
-from catenary.solver.base.errors import InputError, RunBroken
-from catenary.solver.base.parallel import on_root
 
 # 0.45 s on a line of 22 spans.
 SHORT = (

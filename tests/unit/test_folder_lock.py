@@ -12,10 +12,10 @@ from pathlib import Path
 
 import pytest
 
+from catenary.base.errors import InputError
 from catenary.cases.result_folder import folder_lock, lock_owner
 from catenary.cases.result_folder.folder_lock import LOCK_FILE, FolderLock
 from catenary.cases.result_folder.lock_owner import Owner, myself, read_owner
-from catenary.solver.base.errors import InputError
 
 HOLD = """
 import sys

@@ -7,11 +7,11 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
+from catenary.base.errors import InputError
 from catenary.cases.cli.main import app
 from catenary.cases.scene.keys.typical_values import TYPICAL
 from catenary.cases.scene.load import load_scene
 from catenary.cases.terminal.key_list import key_details, key_table, keys_of_a_scene
-from catenary.solver.base.errors import InputError
 
 WIRES = ("contact", "messenger", "auxiliary", "stitch")
 

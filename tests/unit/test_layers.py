@@ -15,20 +15,19 @@ PARTS = ("meshgen", "mbs", "solver", "postproc", "cases")
 
 # meshgen, mbs <- solver <- postproc <- cases
 MAY_IMPORT = {
-    "meshgen": {"meshgen"},
-    "mbs": {"mbs"},
-    "solver": {"meshgen", "mbs", "solver"},
-    "postproc": {"meshgen", "mbs", "solver", "postproc"},
-    "cases": set(PARTS),
+    "base": {"base"},
+    "meshgen": {"base", "meshgen"},
+    "mbs": {"base", "mbs"},
+    "solver": {"base", "meshgen", "mbs", "solver"},
+    "postproc": {"base", "meshgen", "mbs", "solver", "postproc"},
+    "cases": {"base", *PARTS},
 }
 # The package itself, installed as ``catenary``, stands above all: nothing below imports it.
 FACE = "api"
-LEAVES = {
-    "catenary.solver.base.errors",
-    "catenary.solver.base.python_signals",
-    "catenary.solver.base.parallel",
-    "catenary.solver.kernels",
-}
+# What every part imports; it stands in solver/base and imports only itself.
+BASE = "base"
+# Compiled kernels, and what goes with them, are no part of the order.
+LEAVES = {"catenary.solver.kernels"}
 # The rooms of each part from below to above: each imports only itself and those before it. A file
 # beside sub-packages is a room of its own.
 ROOMS = {
@@ -41,7 +40,7 @@ ROOMS = {
         "build",
     ),
     "solver": (
-        "kernels", "base", "problem", "model", "wind", "ends", "effects", "linear", "statics",
+        "kernels", "problem", "model", "wind", "ends", "effects", "linear", "statics",
         "waves", "window", "integrators", "contact", "contact_problem", "schemes", "time_loop",
     ),
     "postproc": ("standards", "channels", "files", "read", "record", "evaluate", "film", "paraview",
@@ -105,7 +104,7 @@ def imports_of(path: Path) -> list[str]:
 def test_the_checks_find_what_they_are_for() -> None:
     tree = ast.parse(
         "import catenary.solver.time_loop.march\n"
-        "def late():\n    from catenary.solver.base.errors import InputError\n    import solver\n"
+        "def late():\n    from catenary.base.errors import InputError\n    import solver\n"
     )
     found = list(imports_in(tree))
     assert broken_arrows("meshgen", found) == [
@@ -133,6 +132,8 @@ def wrong_in(files: Iterable[Path], find: Callable[[Path], Sequence[object]]) ->
 def test_files_import_only_layers_before_their_own() -> None:
     def broken(path: Path) -> list[str]:
         part, *rest = path.relative_to(ROOT).parts
+        if rest[0] == BASE:
+            part = BASE
         return broken_arrows(part, imports_of(path), rest[0] == FACE)
 
     assert wrong_in(FILES, broken) == {}
@@ -202,7 +203,7 @@ def arrows_up(path: Path) -> list[str]:
     """What a file imports from rooms above its own."""
     part, *rest = path.relative_to(ROOT).with_suffix("").parts
     own = room_of(".".join(("catenary", part, *rest)))
-    if own is None:
+    if own is None or rest[0] == BASE:
         return []
     order = ROOMS[part]
     found = []
@@ -217,7 +218,7 @@ def arrows_up(path: Path) -> list[str]:
 def test_the_order_of_rooms_names_each_of_them() -> None:
     for path in FILES:
         part, *rest = path.relative_to(ROOT).with_suffix("").parts
-        if ROOMS[part] and rest[-1] != "__init__":
+        if ROOMS[part] and rest[0] != BASE and rest[-1] != "__init__":
             assert room_of(".".join(("catenary", part, *rest))), path
 
 
@@ -234,7 +235,7 @@ def first_line(path: Path) -> str:
 
 def inner_rooms(part: str) -> list[Path]:
     """Folders within the rooms of a part."""
-    rooms = {ROOT / part / room.replace(".", "/") for room in ROOMS[part]}
+    rooms = {ROOT / part / room.replace(".", "/") for room in ROOMS[part]} | {ROOT / part / BASE}
     folders = {path.parent for path in FILES if path.is_relative_to(ROOT / part)}
     return sorted(
         folder for folder in folders if folder not in rooms and rooms & set(folder.parents)
@@ -281,6 +282,7 @@ def test_files_and_folders_of_a_folder_import_each_other_one_way() -> None:
 def module_of(path: Path) -> str:
     parts = path.relative_to(ROOT).with_suffix("").parts
     name = ".".join(("catenary", *parts)).removesuffix(".__init__")
+    name = name.replace(f"catenary.solver.{BASE}", f"catenary.{BASE}")
     return name.replace(f"catenary.cases.{FACE}", "catenary")
 
 

@@ -25,6 +25,7 @@ from more_wires import (
 from numpy.polynomial.legendre import leggauss
 from small_lines import HANGING, mesh_of, problem_of
 
+from catenary.base.errors import InputError
 from catenary.meshgen.build import make_mesh, use_mesh
 from catenary.meshgen.hardware import DropperKind, Droppers
 from catenary.meshgen.line import Line
@@ -33,7 +34,6 @@ from catenary.meshgen.topologies.all_topologies import make_line
 from catenary.meshgen.wires import Role
 from catenary.postproc.channels.header import line_datasets
 from catenary.postproc.record.snapshots.blocks import RecordedLine, blocks_of
-from catenary.solver.base.errors import InputError
 from catenary.solver.model.elements.beam import uniform_load
 from catenary.solver.problem.problem import Damping
 from catenary.solver.statics.form_finding.equilibrium import Equilibrium, find_form

@@ -9,6 +9,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from catenary.base.errors import InputError
 from catenary.cases.result_folder import output_folder
 from catenary.cases.result_folder.folder_lock import FolderLock
 from catenary.cases.result_folder.output_folder import (
@@ -23,7 +24,6 @@ from catenary.cases.result_folder.output_folder import (
     refuse_earlier,
     refuse_impossible,
 )
-from catenary.solver.base.errors import InputError
 
 SMALL = RunSize(1e6, 10.0, 2000)
 

@@ -54,19 +54,19 @@ def must(done: subprocess.CompletedProcess[str]) -> str:
 
 def installed_name(path: Path) -> str:
     """Under which name a file of the checkout is installed."""
-    return f"catenary/{path.relative_to(ROOT)}".replace(f"/{FACE}/", "/")
+    name = f"catenary/{path.relative_to(ROOT)}"
+    return name.replace(f"/{FACE}/", "/").replace("catenary/solver/base/", "catenary/base/")
 
 
-def library_files() -> set[str]:
-    """Python files of the checkout, by the names under which they are to be installed."""
-    files = (
+def python_files() -> list[Path]:
+    """Python files of the checkout that are to be installed."""
+    return [
         path for part in PARTS for end in ("py", "pyi") for path in (ROOT / part).rglob(f"*.{end}")
-    )
-    return {installed_name(path) for path in files}
+    ]
 
 
-def data_files() -> set[str]:
-    """Data of the checkout that a run or a report reads, likewise."""
+def data() -> list[Path]:
+    """Data of the checkout that a run or a report reads."""
     patterns = (
         f"{FACE}/py.typed",
         "cases/*/case.toml",
@@ -78,12 +78,7 @@ def data_files() -> set[str]:
         "postproc/paraview/*.template",
         "solver/kernels/simulation/catenary.h",
     )
-    return {
-        installed_name(path)
-        for pattern in patterns
-        for path in ROOT.glob(pattern)
-        if path.is_file()
-    }
+    return [path for pattern in patterns for path in ROOT.glob(pattern) if path.is_file()]
 
 
 def kernel_files() -> set[str]:
@@ -134,7 +129,7 @@ def test_the_wheel_is_imported_from_where_it_is_installed(installed: Path, tmp_p
         "catenary.scenes",
         "catenary.meshgen",
         "catenary.meshgen.line",
-        "catenary.solver.base.errors",
+        "catenary.base.errors",
         "catenary.solver.problem.problem",
         "catenary.solver.kernels.native",
         "catenary.mbs.lumped",
@@ -152,7 +147,7 @@ def test_the_wheel_is_imported_from_where_it_is_installed(installed: Path, tmp_p
 def test_the_wheel_holds_all_modules_and_data_and_no_tests(installed: Path) -> None:
     there = {str(path.relative_to(installed)) for path in installed.rglob("*") if path.is_file()}
     ours = {name for name in there if name.startswith("catenary/") and "__pycache__" not in name}
-    assert ours == library_files() | data_files() | {KERNELS, LIBRARY}
+    assert ours == set(map(installed_name, (*python_files(), *data()))) | {KERNELS, LIBRARY}
     # beside it only the metadata and the program
     tops = {Path(name).parts[0] for name in there}
     assert {top for top in tops if not top.endswith(".dist-info")} == {"catenary", "bin"}
@@ -165,9 +160,7 @@ def test_the_source_archive_can_build_the_wheel(sources: Path, tmp_path: Path) -
     (archive,) = tmp_path.glob("catenary-*.tar.gz")
     with tarfile.open(archive) as content:
         names = {name.partition("/")[2] for name in content.getnames()}
-    wanted = {name.removeprefix("catenary/") for name in library_files() | data_files()}
-    face = {path.name for path in (ROOT / FACE).iterdir() if path.is_file()}
-    wanted = {f"{FACE}/{name}" if name in face else name for name in wanted}
+    wanted = {str(path.relative_to(ROOT)) for path in (*python_files(), *data())}
     assert wanted | kernel_files() | {"pyproject.toml", "setup.py", "LICENSE"} <= names
     assert not [name for name in names if name.endswith(".so")]
 

@@ -13,6 +13,7 @@ from measuring import registered
 from mpi4py import MPI
 from typer.testing import CliRunner
 
+from catenary.base.errors import InputError
 from catenary.cases.cli.main import app
 from catenary.cases.run.runner import run_case
 from catenary.cases.run.scene_mesh import mesh_of
@@ -30,7 +31,6 @@ from catenary.cases.studies.choice.study import (
 )
 from catenary.cases.studies.choice.switches import Choice, Switch, choice_of
 from catenary.cases.studies.choice.turns import RepeatedMarch, beside
-from catenary.solver.base.errors import InputError
 from catenary.solver.effects import all_effects as effects
 from catenary.solver.effects.build_model import build
 from catenary.solver.effects.effect import Effect

@@ -9,12 +9,12 @@ from mpi4py import MPI
 from program import MPIRUN, catenary
 from typer.testing import CliRunner
 
+from catenary.base.errors import InputError
 from catenary.cases.cli.main import app
 from catenary.cases.scene.load import load_scene
 from catenary.cases.studies.scaling import messages, prediction
 from catenary.cases.studies.scaling.messages import Sizes, Wire
 from catenary.cases.studies.scaling.prediction import Work, as_text, predict
-from catenary.solver.base.errors import InputError
 from catenary.solver.contact.line_response import Bounds, LineResponse
 from catenary.solver.contact_problem.force_exchange import Exchange
 

@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from catenary.base.errors import InputError
 from catenary.cases.scene.convert.course import resolved
 from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.input.case_files import find_case
 from catenary.cases.scene.input.origin import Origin
 from catenary.cases.scene.load import load_scene, scene_from
 from catenary.cases.scene.scene import Scene
-from catenary.solver.base.errors import InputError
 
 NO_STIFFNESS = "line.dropper.stiffness_N_per_m="
 POINTS = [[0.0, 0.0], [5e-4, 15.0], [1e-3, 60.0], [3e-3, 400.0]]

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from catenary.base.errors import InputError
 from catenary.cases.scene.checks.scene import MIN_SEPARATION
 from catenary.cases.scene.convert.course import end_of, resolved
 from catenary.cases.scene.convert.problem import problem_of
@@ -19,7 +20,6 @@ from catenary.mbs.head.strips import Strips, Suspension, Turning
 from catenary.mbs.mechanism.pantograph_data import MultibodyData
 from catenary.mbs.vehicle.irregularity import Irregularity
 from catenary.mbs.vehicle.motion_sources import Harmonic, Table, VehicleMotion
-from catenary.solver.base.errors import InputError
 
 CASE = "ac_simple"
 KIND = "pantographs.three_masses"

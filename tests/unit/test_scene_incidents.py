@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from catenary.base.errors import InputError
 from catenary.cases.run.describe.incidents import incident_facts
 from catenary.cases.run.planning.plan import make_plan, plan_text
 from catenary.cases.scene.convert.course import resolved
@@ -12,7 +13,6 @@ from catenary.cases.scene.input.origin import Origin
 from catenary.cases.scene.load import load_scene, scene_from
 from catenary.cases.scene.scene import Scene
 from catenary.mbs.lowering import Lowering
-from catenary.solver.base.errors import InputError
 from catenary.solver.problem.incidents import DropperBreak, TensionLoss
 
 INCIDENTS = (

@@ -9,13 +9,13 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from typer.testing import CliRunner
 
+from catenary.base.errors import InputError
 from catenary.cases.cli.main import app
 from catenary.cases.scene.convert.course import resolved
 from catenary.cases.scene.input.origin import Origin
 from catenary.cases.scene.keys.keys import known_keys
 from catenary.cases.scene.load import load_scene, scene_from
 from catenary.cases.scene.scene import Scene
-from catenary.solver.base.errors import InputError
 
 KEYS = [key.replace("*", "0") for key in known_keys(Scene)]
 NUMBERS = st.one_of(

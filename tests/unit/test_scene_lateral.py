@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from free_tables import as_free
 
+from catenary.base.errors import InputError
 from catenary.cases.run.planning.plan import effect_rows
 from catenary.cases.scene.convert.line.line import line_data_of
 from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.input.origin import Origin
 from catenary.cases.scene.load import load_scene, scene_from
-from catenary.solver.base.errors import InputError
 from catenary.solver.effects.all_effects import active
 
 ON = "effects.lateral_motion=true"

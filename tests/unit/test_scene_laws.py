@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from catenary.base.errors import InputError
 from catenary.cases.run.describe.pantographs import kind_lines
 from catenary.cases.scene.convert.course import resolved
 from catenary.cases.scene.convert.problem import problem_of
@@ -12,7 +13,6 @@ from catenary.cases.scene.load import load_scene, scene_from
 from catenary.cases.scene.scene import Scene
 from catenary.mbs.control.regulation import Regulation
 from catenary.mbs.head.laws import Law
-from catenary.solver.base.errors import InputError
 from catenary.solver.effects import all_effects as effects
 
 CASE, KIND = "en50318_2002", "pantographs.reference"

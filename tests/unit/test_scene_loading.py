@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from catenary.base.errors import InputError
 from catenary.cases.scene.convert.course import end_of, resolved
 from catenary.cases.scene.convert.line.line import line_data_of
 from catenary.cases.scene.convert.problem import problem_of
@@ -16,7 +17,6 @@ from catenary.cases.scene.input.origin import Origin
 from catenary.cases.scene.load import load_scene, scene_from
 from catenary.cases.scene.scene import Scene
 from catenary.cases.scene.tables.units import unit_of
-from catenary.solver.base.errors import InputError
 
 # Keys that other programs rely on.
 CONTRACT = [

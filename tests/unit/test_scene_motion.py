@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from catenary.base.errors import InputError, RunBroken
 from catenary.cases.run.planning.plan import make_plan, plan_text
 from catenary.cases.scene.convert.course import resolved
 from catenary.cases.scene.convert.problem import problem_of
@@ -18,7 +19,6 @@ from catenary.mbs.mechanism.full_pantograph import FullPantograph
 from catenary.mbs.mechanism.pantograph_data import AllBodies, MultibodyData, reduced
 from catenary.mbs.mechanism.reduced_pantograph import RaisingPantograph
 from catenary.mbs.rigid.joints import PrescribedPoint, constant
-from catenary.solver.base.errors import InputError, RunBroken
 
 CASE, KIND = "ambrosio2012", "pantographs.seven_body"
 ALL = f"{KIND}.motion=all_bodies"

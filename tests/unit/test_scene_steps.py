@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from catenary.base.errors import InputError
 from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.load import load_scene
-from catenary.solver.base.errors import InputError
 
 GIVEN = ("numerics.adaptive_tolerance_N=0.5", "numerics.smallest_dt_s=1e-4")
 

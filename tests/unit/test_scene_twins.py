@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from catenary.base.errors import InputError
 from catenary.cases.run.planning.needs import needs_before_meshing
 from catenary.cases.run.planning.plan import make_plan, plan_text
 from catenary.cases.run.scene_mesh import mesh_of
@@ -15,7 +16,6 @@ from catenary.cases.scene.load import load_scene
 from catenary.cases.studies.accuracy.models import planes
 from catenary.cases.studies.choice.switches import choice_of
 from catenary.cases.studies.waves.excited import Asked, excitation_of
-from catenary.solver.base.errors import InputError
 from catenary.solver.effects import all_effects as effects
 from catenary.solver.effects.build_model import numbering_of
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
+from catenary.base.errors import InputError
 from catenary.cases.run.describe.pantographs import kind_lines
 from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.load import load_scene
-from catenary.solver.base.errors import InputError
 from catenary.solver.effects.all_effects import active
 
 CALM = "wind.speed_m_per_s=0"

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
+from catenary.base.errors import InputError
 from catenary.cases.run.planning.plan import make_plan, plan_text
 from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.load import load_scene
-from catenary.solver.base.errors import InputError
 from catenary.solver.problem.window import WindowChoice
 from catenary.solver.window.choice import estimated_error
 

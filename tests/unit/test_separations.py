@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from program import catenary
 
+from catenary.base.errors import InputError
 from catenary.cases.scene.load import load_scene
 from catenary.cases.studies.sweep.jobs import Ended
 from catenary.cases.studies.sweep.variants import Variant, parse_vary
 from catenary.cases.studies.waves import separation
 from catenary.cases.studies.waves.theory import WaveTheory
-from catenary.solver.base.errors import InputError
 from catenary.solver.waves.bloch import BlochWaves
 
 pytestmark = pytest.mark.study

@@ -9,10 +9,10 @@ import pytest
 from PIL import Image
 from typer.testing import CliRunner
 
+from catenary.base.errors import InputError
 from catenary.cases.cli.main import app
 from catenary.cases.run.at_rest.temperatures import range_of
 from catenary.cases.run.describe.temperatures import temperature_text
-from catenary.solver.base.errors import InputError
 from catenary.solver.model.wire_ends import WireEnd
 from catenary.solver.statics.tension_along import LineAtTemperature, WireAtRest
 

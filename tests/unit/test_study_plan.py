@@ -13,6 +13,7 @@ import pytest
 from matplotlib.figure import Figure
 from typer.testing import CliRunner
 
+from catenary.base.errors import InputError
 from catenary.cases.ambrosio2012.conclusion import changes_of
 from catenary.cases.ambrosio2012.study import variants
 from catenary.cases.ambrosio2012.variations import read_table, searched
@@ -33,7 +34,6 @@ from catenary.postproc.report.study_report import (
     verdict_text,
     write_study,
 )
-from catenary.solver.base.errors import InputError
 
 
 @pytest.fixture(autouse=True)

@@ -15,6 +15,7 @@ from matplotlib.figure import Figure
 from measuring import COMM
 from typer.testing import CliRunner
 
+from catenary.base.errors import InputError
 from catenary.cases.cli.main import app
 from catenary.cases.result_folder import output_folder
 from catenary.cases.run.planning.needs import needs_before_meshing
@@ -27,7 +28,6 @@ from catenary.cases.studies.sweep.run_jobs import run_jobs
 from catenary.cases.studies.sweep.sweep import refuse_other_sweep
 from catenary.cases.studies.sweep.variants import Variant, parse_vary, product
 from catenary.postproc.read.results import Results
-from catenary.solver.base.errors import InputError
 
 CASE = "en50318_2002"
 # Six spans with one element a gap, run through in 460 steps.

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from catenary.base.errors import InputError
 from catenary.cases.studies.sweep.variants import (
     Variant,
     check_keys,
@@ -16,7 +17,6 @@ from catenary.cases.studies.sweep.variants import (
     read_named,
     slug,
 )
-from catenary.solver.base.errors import InputError
 
 
 @pytest.mark.parametrize(

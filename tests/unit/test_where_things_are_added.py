@@ -14,12 +14,12 @@ from measuring import march, registered
 from small_lines import HANGING, en50318_line, mesh_of, problem_of, train
 from typer.testing import CliRunner
 
+from catenary.base.errors import InputError
 from catenary.cases.cli.app import app
 from catenary.cases.scene.load import load_scene
 from catenary.cases.terminal import console
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
 from catenary.meshgen.wires import Profile
-from catenary.solver.base.errors import InputError
 from catenary.solver.effects.build_model import build
 from catenary.solver.effects.effect import Effect, Limit, register, unregister
 from catenary.solver.model.builder import ModelBuilder

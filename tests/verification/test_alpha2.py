@@ -25,8 +25,8 @@ from small_lines import (
     train,
 )
 
+from catenary.base.errors import InputError
 from catenary.meshgen.mesh import CONTACT_WIRE, LineMesh
-from catenary.solver.base.errors import InputError
 from catenary.solver.problem.contact_laws import LinearLaw
 from catenary.solver.problem.problem import Damping, Problem
 from catenary.solver.schemes.monolithic_system import WholeSystem

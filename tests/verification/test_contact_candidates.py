@@ -16,13 +16,13 @@ from dense_line import DenseLine
 from measuring import History, check, march, start_march
 from small_lines import WHOLE, mesh_of, numerics, train
 
+from catenary.base.errors import InputError
 from catenary.mbs.head.flexure import Flexure
 from catenary.mbs.head.strips import Strips, Suspension, Turning
 from catenary.mbs.head.wire_crossing import LateralPath, SeveralPaths
 from catenary.mbs.lumped import LumpedPantograph
 from catenary.mbs.lumped_data import LumpedData
 from catenary.meshgen.mesh import LineMesh
-from catenary.solver.base.errors import InputError
 from catenary.solver.contact.contact_wire import ContactWires
 from catenary.solver.kernels import native
 from catenary.solver.model.partition import distribute

@@ -10,10 +10,10 @@ from measuring import History, check, march, print_table, start_march
 from scipy import signal
 from small_lines import HANGING, WHOLE, en50318_line, mesh_of, numerics, problem_of, train
 
+from catenary.base.errors import RunBroken
 from catenary.mbs.lumped import LumpedPantograph
 from catenary.mbs.lumped_data import LumpedData
 from catenary.meshgen.mesh import LineMesh
-from catenary.solver.base.errors import RunBroken
 from catenary.solver.contact.followed_links import no_links
 from catenary.solver.contact.line_response import LineResponse
 from catenary.solver.contact.train.head_states import Heads

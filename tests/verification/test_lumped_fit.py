@@ -7,10 +7,10 @@ import pytest
 from measuring import check
 from seven_bodies import HEAD, at_rest, calibrated, pressed
 
+from catenary.base.errors import InputError
 from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.response.linearisation import linearise, of_chain
 from catenary.mbs.response.lumped_fit import BOUNDS, fit_chain
-from catenary.solver.base.errors import InputError
 
 FREQUENCIES = np.geomspace(0.1, 25.0, 120)
 CHAINS = {

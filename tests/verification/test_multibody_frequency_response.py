@@ -12,6 +12,7 @@ from measuring import check
 from seven_bodies import ARM, HEAD, at_rest, calibrated, pressed
 from typer.testing import CliRunner
 
+from catenary.base.errors import InputError
 from catenary.cases.cli.main import app
 from catenary.cases.scene.input.toml_input import read_toml
 from catenary.mbs.build import raising_data
@@ -28,7 +29,6 @@ from catenary.mbs.rigid.system import System
 from catenary.mbs.time_steps.constraint_handling import Baumgarte
 from catenary.mbs.time_steps.implicit_steps import Stepper
 from catenary.mbs.time_steps.variable_steps import integrate
-from catenary.solver.base.errors import InputError
 
 G = 9.81
 FREQUENCIES = np.array([0.3, 1.0, 4.0, 11.0, 25.0])

@@ -10,6 +10,7 @@ import pytest
 from measuring import check
 from seven_bodies import at_rest, calibrated, pressed
 
+from catenary.base.errors import CatenaryError, InputError, RunBroken
 from catenary.mbs.build import raising_data
 from catenary.mbs.head.strips import Strips, Suspension
 from catenary.mbs.head.wire_crossing import LateralPath
@@ -23,7 +24,6 @@ from catenary.mbs.rigid.spin_locks import without_spins
 from catenary.mbs.time_steps.step_solvers import METHODS
 from catenary.mbs.vehicle.base_motion import BaseMotion
 from catenary.mbs.vehicle.motion_sources import Table, VehicleMotion
-from catenary.solver.base.errors import CatenaryError, InputError, RunBroken
 
 STATIC, HEIGHT, DT = 150.0, 5.08, 1e-3
 WIRE = 5e4  # [N/m] contact, on a wire that does not give way

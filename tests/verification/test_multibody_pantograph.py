@@ -10,6 +10,7 @@ import paper_pantograph as ambrosio
 import pytest
 from measuring import check
 
+from catenary.base.errors import InputError
 from catenary.mbs.rigid.forces import PointForce
 from catenary.mbs.rigid.joints import PrescribedPoint, constant
 from catenary.mbs.rigid.kinematics import point
@@ -22,7 +23,6 @@ from catenary.mbs.time_steps.constraint_handling import (
     CoordinatePartitioning,
 )
 from catenary.mbs.time_steps.variable_steps import integrate
-from catenary.solver.base.errors import InputError
 
 ARM, HEAD = ambrosio.STABILISATION_ARM, ambrosio.HEAD
 HOLDER = PrescribedPoint("holder", ARM, constant(ambrosio.INITIAL_ARM_HEIGHT))

@@ -8,6 +8,7 @@ import pytest
 from measuring import check
 from scipy.integrate import solve_ivp
 
+from catenary.base.errors import InputError, RunBroken
 from catenary.mbs.mechanism.reduction import reduce_mechanism
 from catenary.mbs.rigid.bodies import SPACE, Body
 from catenary.mbs.rigid.forces import Gravity, SpringDamper
@@ -17,7 +18,6 @@ from catenary.mbs.rigid.statics import equivalent_mass
 from catenary.mbs.rigid.system import System
 from catenary.mbs.time_steps.constraint_handling import Baumgarte
 from catenary.mbs.time_steps.variable_steps import integrate
-from catenary.solver.base.errors import InputError, RunBroken
 
 ARM = ambrosio.STABILISATION_ARM
 G = 9.81

@@ -7,6 +7,7 @@ import pytest
 from measuring import check, print_table
 from scipy.special import ellipk
 
+from catenary.base.errors import InputError, RunBroken
 from catenary.mbs.rigid.bodies import SPACE, Body, Motion
 from catenary.mbs.rigid.forces import BumpStop, Gravity, PointForce, SpringDamper
 from catenary.mbs.rigid.joints import PrescribedAngle, Prismatic, Revolute, Spherical, steady
@@ -20,7 +21,6 @@ from catenary.mbs.time_steps.step_solvers import (
     WithFeedback,
     step_solver,
 )
-from catenary.solver.base.errors import InputError, RunBroken
 
 G = 9.81
 each_method = pytest.mark.parametrize("method", METHODS)

@@ -18,7 +18,7 @@ from measuring import check, march, start_march
 from scipy.sparse.linalg import spsolve
 from small_lines import WHOLE, ac_simple_line, en50318_line, mesh_of, numerics, problem_of, train
 
-from catenary.solver.base.errors import InputError
+from catenary.base.errors import InputError
 from catenary.solver.effects.build_model import build
 from catenary.solver.ends import periodic_end
 from catenary.solver.ends.half_lines import Chain, half_lines

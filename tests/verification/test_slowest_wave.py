@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from measuring import check
 
+from catenary.base.errors import InputError
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.convert.line.line import line_of
 from catenary.cases.scene.convert.problem import problem_of
@@ -15,7 +16,6 @@ from catenary.cases.scene.input.case_files import shipped
 from catenary.cases.scene.load import load_scene
 from catenary.meshgen.slowest_wave import slowest_wave, supported_wave
 from catenary.meshgen.wires import Role
-from catenary.solver.base.errors import InputError
 from catenary.solver.statics.elasticity import elasticity, middle_span
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest
 from catenary.solver.waves.bloch import bloch_waves, period_of

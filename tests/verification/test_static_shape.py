@@ -17,11 +17,11 @@ from small_lines import (
     problem_of,
 )
 
+from catenary.base.errors import InputError
 from catenary.meshgen.hardware import Fittings
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
 from catenary.meshgen.topologies.all_topologies import make_line
 from catenary.meshgen.topologies.line_data import LineData
-from catenary.solver.base.errors import InputError
 from catenary.solver.statics.elasticity import middle_span
 from catenary.solver.statics.form_finding.equilibrium import find_form, lengths_to_cut
 

@@ -20,9 +20,9 @@ from measuring import check, line_alone, march, matrix_of, release, step
 from scipy import optimize
 from small_lines import mesh_of, numerics, problem_of, train
 
+from catenary.base.errors import InputError
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
 from catenary.meshgen.topologies.line_data import LineData
-from catenary.solver.base.errors import InputError
 from catenary.solver.model.model import Model
 from catenary.solver.model.rest.rest_shape import Equilibrium
 from catenary.solver.problem.along_track import AlongTrack, Tensioner

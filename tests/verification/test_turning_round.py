@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from measuring import check
 
+from catenary.base.errors import InputError
 from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.load import load_scene
 from catenary.mbs.mechanism.pantograph_data import MultibodyData, reduced, stand
 from catenary.mbs.rigid.forces import PointForce
 from catenary.mbs.rigid.reversed_system import turned_round
-from catenary.solver.base.errors import InputError
 
 EPS = np.finfo(float).eps
 KNEE = (-0.820, 0.0, 0.0)

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from catenary.base.errors import InputError
 from catenary.cases.scene.load import load_scene
 from catenary.cases.studies.waves import window_error
-from catenary.solver.base.errors import InputError
 
 # The paper's line with average damping, on which waves fade within a few spans.
 SHORT = (

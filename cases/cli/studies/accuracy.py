@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from catenary.base.errors import InputError
 from catenary.cases.cli import completion
 from catenary.cases.cli.app import (
     Assignments,
@@ -20,7 +21,6 @@ from catenary.cases.cli.app import (
 )
 from catenary.cases.result_folder.output_folder import refuse_impossible
 from catenary.cases.terminal import console
-from catenary.solver.base.errors import InputError
 
 if TYPE_CHECKING:
     from catenary.cases.studies.accuracy.plan import Plan
@@ -86,12 +86,12 @@ def accuracy(
         return plan, options
 
     comm, plan, arguments = begin(read, verbose, lambda made: made.jobs[0].scene)
+    from catenary.base.parallel import on_root
     from catenary.cases.result_folder.folder_lock import held
     from catenary.cases.studies.accuracy import output as accuracy_output
     from catenary.cases.studies.accuracy import runs as study
     from catenary.cases.studies.sweep.jobs import RunOptions
     from catenary.postproc.evaluate.wording import counted
-    from catenary.solver.base.parallel import on_root
 
     with held(out, comm, f"catenary accuracy {case}"):
         found, ended = study.run(plan, out, comm, RunOptions(force, arguments, console.say))

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from catenary.base.errors import InputError
 from catenary.cases.cli.app import Force, Verbose, app, begin, folder_option
 from catenary.cases.result_folder.output_folder import refuse_impossible
 from catenary.cases.terminal import console
 from catenary.postproc.files.csv_text import csv_text
-from catenary.solver.base.errors import InputError
 
 if TYPE_CHECKING:
     from catenary.cases.studies.hard.cases import HardCase
@@ -64,10 +64,10 @@ def hard(
     comm, cases, _ = begin(lambda: (read(), []), verbose, lambda cases: cases[0].scene())
     from mpi4py import MPI
 
+    from catenary.base.parallel import on_root
     from catenary.cases.studies.hard.checks import check_case
     from catenary.cases.studies.told_remarks import remark_lines
     from catenary.postproc.files.disk import write_all
-    from catenary.solver.base.parallel import on_root
 
     found: list[Criterion] = []
     told: dict[str, dict[str, list[str]]] = {}

@@ -6,9 +6,9 @@ from typing import Annotated
 
 import typer
 
+from catenary.base.errors import InputError
 from catenary.cases.cli.app import Assignments, Case, MoreAssignments, Shortened, app, load
 from catenary.cases.terminal import console
-from catenary.solver.base.errors import InputError
 
 
 @app.command(
@@ -38,8 +38,8 @@ def scaling(
     ] = None,
 ) -> int:
     """Collective."""
+    from catenary.base.parallel import launched_by_mpirun, on_root
     from catenary.cases.studies.scaling import messages, prediction
-    from catenary.solver.base.parallel import launched_by_mpirun, on_root
 
     if (latency is None) != (bandwidth is None):
         raise InputError("--latency-us and --bandwidth-GB-per-s belong together; give both")

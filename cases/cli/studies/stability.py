@@ -6,10 +6,10 @@ from typing import Annotated
 
 import typer
 
+from catenary.base.errors import InputError
 from catenary.cases.cli.app import Assignments, Case, Force, MoreAssignments, Out, Shortened, app
 from catenary.cases.result_folder.output_folder import refuse_impossible
 from catenary.cases.terminal import console
-from catenary.solver.base.errors import InputError
 
 TABLE, PICTURE = "stability_map.csv", "stability_map.png"
 

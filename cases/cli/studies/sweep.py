@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from catenary.base.errors import InputError
 from catenary.cases.cli import completion
 from catenary.cases.cli.app import (
     Assignments,
@@ -21,7 +22,6 @@ from catenary.cases.cli.app import (
 )
 from catenary.cases.result_folder.output_folder import refuse_impossible
 from catenary.cases.terminal import console
-from catenary.solver.base.errors import InputError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from catenary.base.errors import InputError
 from catenary.cases.cli.app import (
     Assignments,
     Force,
@@ -18,7 +19,6 @@ from catenary.cases.cli.app import (
 )
 from catenary.cases.result_folder.output_folder import refuse_impossible
 from catenary.cases.terminal import console
-from catenary.solver.base.errors import InputError
 
 EXCITATIONS = ("pantograph", "force", "pulse", "hammer")
 

@@ -13,7 +13,7 @@ import shlex
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from catenary.solver.base.errors import InputError
+from catenary.base.errors import InputError
 
 # How much longer than its estimate a job may take, what a start and a report take at most, and the
 # least that a job asks for [s].

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from catenary.base.errors import InputError
 from catenary.cases.scene.checks.effects import (
     check_chosen_act,
     check_effect_data,
@@ -58,7 +59,6 @@ from catenary.cases.scene.keys.keys import is_known, known_keys
 from catenary.meshgen.slowest_wave import bends, slowest_wave
 from catenary.meshgen.topologies.all_topologies import make_line
 from catenary.meshgen.topologies.line_data import LineData
-from catenary.solver.base.errors import InputError
 from catenary.solver.effects.effect import Limit
 
 if TYPE_CHECKING:

@@ -6,9 +6,9 @@ import difflib
 from dataclasses import dataclass
 from pathlib import Path
 
+from catenary.base.errors import InputError
 from catenary.cases.scene.input.plain_text import plain
 from catenary.cases.scene.input.toml_input import read_toml
-from catenary.solver.base.errors import InputError
 
 CASES = Path(__file__).resolve().parents[2]
 CASE_FILE = "case.toml"

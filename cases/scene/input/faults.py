@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from catenary.solver.base.errors import Fault, InputError
+from catenary.base.errors import Fault, InputError
 
 # More sentences than these nobody reads; the rest is counted.
 MOST_TOLD = 50

@@ -8,7 +8,7 @@ import unicodedata
 from pathlib import Path
 from typing import Any
 
-from catenary.solver.base.errors import InputError
+from catenary.base.errors import InputError
 
 MOST_BYTES = 10_000_000  # an input file is written by hand or is a table; more is some other file
 DEEPEST = 32  # tables in tables; the schema has no more than eight

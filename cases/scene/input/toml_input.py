@@ -7,9 +7,9 @@ import tomllib
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from catenary.base.errors import InputError
 from catenary.cases.scene.input.origin import COMMAND_LINE, shown
 from catenary.cases.scene.input.plain_text import DEEPEST, decode, plain, read_whole
-from catenary.solver.base.errors import InputError
 
 # A key part and its dot; more of them in a row make a table that is nested too deeply, which would
 # take the parser a time that grows with their square.

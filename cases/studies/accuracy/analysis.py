@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from catenary.solver.base.errors import InputError
+from catenary.base.errors import InputError
 
 
 class Quantity(NamedTuple):

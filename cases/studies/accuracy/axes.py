@@ -10,10 +10,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from catenary.base.errors import InputError
 from catenary.cases.scene.input.origin import shown
 from catenary.cases.studies.accuracy import models
 from catenary.cases.studies.accuracy.axis import DISCRETISATION, MODEL, Axis, Level, Reference
-from catenary.solver.base.errors import InputError
 
 if TYPE_CHECKING:
     from catenary.cases.scene.scene import Scene

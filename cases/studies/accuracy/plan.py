@@ -6,6 +6,7 @@ import json
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
+from catenary.base.errors import InputError
 from catenary.cases.scene.convert.course import resolved
 from catenary.cases.scene.input.case_files import find_case
 from catenary.cases.scene.load import load_scene
@@ -14,7 +15,6 @@ from catenary.cases.studies.accuracy.axis import MODEL, Axis, Level, Reference
 from catenary.cases.studies.sweep.jobs import Job
 from catenary.cases.studies.sweep.variants import Variant, slug
 from catenary.postproc.files.disk import plain
-from catenary.solver.base.errors import InputError
 
 # Nothing but channels is recorded, so that what is timed is the march.
 _ALWAYS = ("output.field_every_s=0", "output.energy_every_s=0")

@@ -13,6 +13,7 @@ from typing import Any
 
 from mpi4py import MPI
 
+from catenary.base.errors import InputError, RunBroken
 from catenary.cases.process.interrupts import Phase
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.convert.course import end_of
@@ -25,7 +26,6 @@ from catenary.cases.studies.choice.turns import RepeatedMarch, beside, in_turns
 from catenary.cases.studies.sweep.jobs import Job, RunOptions, interrupted
 from catenary.cases.studies.sweep.run_jobs import run_jobs
 from catenary.cases.studies.sweep.variants import Variant
-from catenary.solver.base.errors import InputError, RunBroken
 from catenary.solver.problem.problem import Problem, steps_of
 from catenary.solver.statics.line_at_rest import line_at_rest
 

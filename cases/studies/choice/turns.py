@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from catenary.solver.base.errors import RunBroken
+from catenary.base.errors import RunBroken
 from catenary.solver.problem.problem import steps_of
 from catenary.solver.statics.line_at_rest import LineAtRest
 from catenary.solver.time_loop.march import March

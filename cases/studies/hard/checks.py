@@ -12,11 +12,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from catenary.base.parallel import on_root
 from catenary.cases.studies.hard import runs as hard_runs
 from catenary.cases.studies.hard.cases import HardCase
 from catenary.cases.studies.hard.energy import energy_that_left
 from catenary.cases.studies.hard.runs import Watched, cut_of, node_places, rest_height
-from catenary.solver.base.parallel import on_root
 from catenary.solver.problem.incidents import in_steps
 from catenary.solver.statics.line_at_rest import LineAtRest
 

@@ -15,13 +15,13 @@ from typing import Any
 import numpy as np
 from scipy.sparse.linalg import spsolve
 
+from catenary.base.errors import RunBroken
+from catenary.base.parallel import on_root
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.hard.balance import LineBalance
 from catenary.postproc.record.run_watch import RunWatch, watch_cadence, watched
-from catenary.solver.base.errors import RunBroken
-from catenary.solver.base.parallel import on_root
 from catenary.solver.contact.contact_wire import ContactWires
 from catenary.solver.integrators.make_line import make_line
 from catenary.solver.model.matrices import stiffness_matrix, whole_matrix

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
+from catenary.base.errors import InputError
 from catenary.cases.result_folder.output_folder import refuse_impossible
 from catenary.cases.studies.pantograph.study import PantographStudy, fit_error
 from catenary.postproc.files.disk import write_all
@@ -21,7 +22,6 @@ from catenary.postproc.report.pictures.figures import (
     painted,
     tidy,
 )
-from catenary.solver.base.errors import InputError
 
 HEADER = "frequency_hz,receptance_real_m_per_N,receptance_imag_m_per_N"
 FILES = ("receptance.csv", "receptance.png", "lumped.toml")

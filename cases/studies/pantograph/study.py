@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from catenary.base.errors import InputError
 from catenary.cases.run.describe.pantographs import description_of
 from catenary.cases.scene.convert.train.pantograph import pantograph_of, static_force
 from catenary.cases.scene.scene import Scene
@@ -14,7 +15,6 @@ from catenary.mbs.build import PantographData
 from catenary.mbs.mechanism.pantograph_data import MultibodyData, stand
 from catenary.mbs.response.frequency_response import HeadResponse, head_response, peaks
 from catenary.mbs.response.lumped_fit import ChainFit, fit_chain
-from catenary.solver.base.errors import InputError
 
 # Frequencies for the search of peaks and for the fit.
 N_SEARCHED, N_FITTED = 400, 200

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from mpi4py import MPI
 
-from catenary.solver.base.parallel import wait_for_all
+from catenary.base.parallel import wait_for_all
 
 # Sizes of messages that latency and bandwidth are found from [B].
 SIZES = (8, 512, 4096, 32768, 262144)

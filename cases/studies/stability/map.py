@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from catenary.base.errors import InputError
 from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.scene import Scene
 from catenary.cases.scene.tables.run.numerics import MAX_DT
@@ -26,7 +27,6 @@ from catenary.cases.studies.stability.by_marching import (
     Bench,
 )
 from catenary.mbs.lumped_data import LumpedData
-from catenary.solver.base.errors import InputError
 from catenary.solver.contact.contact_wire import ContactWires
 from catenary.solver.model.partition import distribute
 from catenary.solver.statics.elasticity import middle_span

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
+from catenary.base.errors import InputError
 from catenary.cases.scene.input.faults import UnfitScene
 from catenary.cases.scene.input.origin import shown
 from catenary.cases.scene.input.toml_input import Assigned
@@ -13,7 +14,6 @@ from catenary.cases.scene.keys.keys import nearest
 from catenary.cases.scene.load import Draft, load_scene
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.sweep.variants import NAMES, Variant
-from catenary.solver.base.errors import InputError
 
 # Columns of a sweep's table: of a row's pantograph, and of the line.
 PANTOGRAPH_COLUMNS = (

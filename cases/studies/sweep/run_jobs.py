@@ -12,6 +12,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+from catenary.base.errors import CatenaryError, InputError
+from catenary.base.parallel import on_root
 from catenary.cases.process.interrupts import Interrupted
 from catenary.cases.result_folder.output_folder import (
     check_room_of_runs,
@@ -28,8 +30,6 @@ from catenary.postproc.files.disk import plain, write_all
 from catenary.postproc.files.own_files import VARIANT_FILE as RECORD
 from catenary.postproc.files.result_file import DONE, INTERRUPTED
 from catenary.postproc.read.results import Results
-from catenary.solver.base.errors import CatenaryError, InputError
-from catenary.solver.base.parallel import on_root
 
 # What is taken from an open result file beside the summary: plain values by name.
 Measure = Callable[[Results], dict[str, Any]]

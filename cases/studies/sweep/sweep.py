@@ -7,11 +7,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from catenary.base.errors import InputError
 from catenary.cases.result_folder.output_folder import refuse_impossible
 from catenary.cases.scene.load import Draft
 from catenary.cases.studies.sweep.jobs import Ended, Job, RunOptions, in_order, jobs_and_refused
 from catenary.cases.studies.sweep.variants import Variant
-from catenary.solver.base.errors import InputError
 
 
 class Sweep(NamedTuple):
@@ -59,10 +59,10 @@ def run_sweep(
     -------
     How all variants ended, in their order, and the files.
     """
+    from catenary.base.parallel import on_root
     from catenary.cases.result_folder.folder_lock import held
     from catenary.cases.studies.sweep import output
     from catenary.cases.studies.sweep.run_jobs import run_jobs
-    from catenary.solver.base.parallel import on_root
 
     name, show = sweep.jobs[0].scene.case.name, plotted or output.PLOTTED
     with held(out, comm, command):

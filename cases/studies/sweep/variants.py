@@ -12,13 +12,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from catenary.base.errors import InputError
 from catenary.cases.scene.input.origin import shown
 from catenary.cases.scene.input.plain_text import steers
 from catenary.cases.scene.input.toml_input import parse_assignment, read_toml
 from catenary.cases.scene.keys.error_sentences import unknown_key
 from catenary.cases.scene.keys.keys import is_known, known_keys
 from catenary.postproc.files.csv_text import begins_formula
-from catenary.solver.base.errors import InputError
 
 MAX_VARIANTS = 10_000
 MOST_LETTERS = 200  # in a variant's name

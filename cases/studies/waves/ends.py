@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from catenary.base.errors import InputError
 from catenary.cases.studies.waves.theory import HIGHEST
 from catenary.postproc.report.pictures import figures
-from catenary.solver.base.errors import InputError
 from catenary.solver.ends.line_beyond import SIDES
 from catenary.solver.problem.ends import AbsorbingLayer, EndCondition, Periodic
 from catenary.solver.statics.line_at_rest import LineAtRest

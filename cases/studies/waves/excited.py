@@ -13,10 +13,10 @@ from typing import NamedTuple
 import numpy as np
 from mpi4py import MPI
 
+from catenary.base.errors import InputError, RunBroken
 from catenary.cases.studies.waves.seen import NodeMotion
 from catenary.mbs.lumped_data import LumpedData
 from catenary.meshgen.slowest_wave import slowest_wave_of
-from catenary.solver.base.errors import InputError, RunBroken
 from catenary.solver.contact_problem.coupling import DIVERGED
 from catenary.solver.effects.all_effects import move_together
 from catenary.solver.problem.contact_laws import LinearLaw

@@ -8,9 +8,9 @@ from typing import Protocol
 
 import numpy as np
 
+from catenary.base.errors import InputError
 from catenary.postproc.film.film_data import FilmData
 from catenary.postproc.film.snapshots import Snapshots
-from catenary.solver.base.errors import InputError
 from catenary.solver.waves.excitation import Excitation, MovingForce
 
 # Distance of points along the wire between which the motion is interpolated [m].

@@ -21,6 +21,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from matplotlib.figure import Figure
 
+from catenary.base.errors import InputError
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.sweep.axis_words import value_in_words
 from catenary.cases.studies.sweep.jobs import Ended, Job, RunOptions, make_jobs
@@ -30,7 +31,6 @@ from catenary.cases.studies.sweep.variants import Variant, VariedKey, product, s
 from catenary.cases.studies.waves.theory import WaveTheory
 from catenary.postproc.files.disk import write_all
 from catenary.postproc.report.pictures import figures
-from catenary.solver.base.errors import InputError
 
 RUNS, TABLE, PICTURE, PERIODS = "runs", "separations.csv", "separations.png", "periods.csv"
 SEPARATION, WITH = "separation_m", "with"

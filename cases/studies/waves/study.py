@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from mpi4py import MPI
 
+from catenary.base.errors import InputError, RunBroken
 from catenary.cases.result_folder.output_folder import refuse_earlier
 from catenary.cases.run.excited_run import ExcitedRun
 from catenary.cases.run.runner import run_case
@@ -39,7 +40,6 @@ from catenary.postproc.film.snapshots import Snapshots
 from catenary.postproc.read.guard import examined
 from catenary.postproc.read.results import Results
 from catenary.postproc.report.pictures import figures
-from catenary.solver.base.errors import InputError, RunBroken
 from catenary.solver.statics.elasticity import middle_span
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest
 from catenary.solver.time_loop.views.observers import Observer

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from catenary.base.errors import InputError
 from catenary.meshgen.slowest_wave import bends, slowest_wave_of
 from catenary.meshgen.wires import Role
-from catenary.solver.base.errors import InputError
 from catenary.solver.problem.problem import Problem
 from catenary.solver.statics.elasticity import middle_span
 from catenary.solver.statics.line_at_rest import LineAtRest

@@ -16,6 +16,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from mpi4py import MPI
 
+from catenary.base.errors import InputError, RunBroken
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.scene import Scene
@@ -25,7 +26,6 @@ from catenary.postproc.evaluate.filters import low_pass
 from catenary.postproc.files.disk import write_all
 from catenary.postproc.record.run_watch import RunWatch, watch_cadence, watched
 from catenary.postproc.report.pictures import figures
-from catenary.solver.base.errors import InputError, RunBroken
 from catenary.solver.problem.window import WindowChoice
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest
 from catenary.solver.time_loop.march import March

@@ -14,7 +14,7 @@ from typing import Any
 import h5py
 from h5py import h5d, h5l, h5o, h5s
 
-from catenary.solver.base.errors import InputError
+from catenary.base.errors import InputError
 
 # How a link or a table that leads elsewhere is described in the error.
 _LINKS = {h5l.TYPE_SOFT: "is a soft link", h5l.TYPE_EXTERNAL: "is a link into another file"}

@@ -11,14 +11,14 @@ from typing import Any
 
 import numpy as np
 
+from catenary.base.errors import RunBroken
+from catenary.base.parallel import on_root
 from catenary.postproc.files.disk import broken_write
 from catenary.postproc.record.column_gather import ColumnGather, next_flush
 from catenary.postproc.record.snapshots.blocks import Block, RecordedLine, blocks_of
 from catenary.postproc.record.snapshots.field_layout import FieldRecord
 from catenary.postproc.record.snapshots.field_values import FieldValues, Gathered
 from catenary.postproc.record.snapshots.fields_file import FieldsFile, LineSize
-from catenary.solver.base.errors import RunBroken
-from catenary.solver.base.parallel import on_root
 from catenary.solver.time_loop.views.observers import Observer, Stage, StepView
 
 _MAX_BUFFER = 32 * 1024 * 1024

@@ -25,7 +25,7 @@ from matplotlib.ticker import AutoLocator, LogLocator, MaxNLocator, NullFormatte
 from matplotlib.transforms import ScaledTranslation
 from PIL import Image
 
-from catenary.solver.base.errors import CatenaryError
+from catenary.base.errors import CatenaryError
 
 logger = logging.getLogger("catenary.pictures")
 

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from catenary.base.errors import InputError
 from catenary.postproc.evaluate import filters
 from catenary.postproc.evaluate.statistics import RunStatistics
 from catenary.postproc.read.results import Results
@@ -22,7 +23,6 @@ from catenary.postproc.report.pictures.figures import (
     tidy,
 )
 from catenary.postproc.report.pictures.marks import mark_line, travelled
-from catenary.solver.base.errors import InputError
 
 
 @own_style()

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
 
+from catenary.base.parallel import on_root
 from catenary.mbs.build import Operation, has_joints, make_pantograph, steady_forces
 from catenary.mbs.called_model import CalledModel
 from catenary.mbs.head.drives import N_DRIVE, named
@@ -20,7 +21,6 @@ from catenary.mbs.lowering import LoweredPantograph
 from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.roll import roll_of
 from catenary.mbs.vehicle.base_motion import BaseMotion
-from catenary.solver.base.parallel import on_root
 from catenary.solver.contact.contact_wire import Candidates, ContactWires
 from catenary.solver.contact.contacts import no_work
 from catenary.solver.contact.train.air_around import airflow

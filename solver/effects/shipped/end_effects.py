@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from catenary.solver.base.errors import InputError
+from catenary.base.errors import InputError
 from catenary.solver.effects.effect import Effect, register
 from catenary.solver.effects.shipped import defect_effects, lateral_effects  # noqa: F401  (built before)
 from catenary.solver.model.absorbing_layers import layer_blocks

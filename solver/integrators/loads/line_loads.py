@@ -9,10 +9,9 @@ import numpy as np
 from mpi4py import MPI
 from scipy import sparse
 
-from catenary.solver.base.kernels import aligned_arrays
 from catenary.solver.integrators.line_state import LineState
 from catenary.solver.integrators.loads.end_memory import NO_MEMORIES, EndMemories, Memories
-from catenary.solver.kernels import native
+from catenary.solver.kernels import aligned_arrays, native
 from catenary.solver.linear.halo import Subdomain
 from catenary.solver.model.loads import (
     CONSTANT,

@@ -15,7 +15,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse import csgraph
 
-from catenary.solver.base.petsc import PETSc
+from catenary.base.petsc import PETSc
 from catenary.solver.kernels import native
 from catenary.solver.linear.factors.elimination import StationBlocks, eliminate_stations
 from catenary.solver.linear.factors.meeting_station import (

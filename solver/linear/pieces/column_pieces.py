@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from catenary.solver.base.errors import RunBroken
+from catenary.base.errors import RunBroken
 from catenary.solver.linear.pieces.operator_pieces import OperatorPieces
 from catenary.solver.linear.pieces.pieces import Piece
 from catenary.solver.linear.unit_responses import (

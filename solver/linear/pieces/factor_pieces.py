@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from catenary.solver.base.errors import RunBroken
+from catenary.base.errors import RunBroken
 from catenary.solver.linear.factors.meeting_station import MIDDLES, Turning, softened
 from catenary.solver.linear.factors.station_factors import (
     NO_BESIDES,

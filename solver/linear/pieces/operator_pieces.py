@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from catenary.solver.base.errors import RunBroken
+from catenary.base.errors import RunBroken
 from catenary.solver.linear.factors.station_factors import (
     layout_of_factors,
     station_factors,

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from catenary.solver.base.kernels import aligned_arrays
+from catenary.solver.kernels import aligned_arrays
 from catenary.solver.linear.factors.meeting_station import MIDDLES
 from catenary.solver.model.unknowns.registry import Unknowns
 

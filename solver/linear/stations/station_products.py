@@ -15,8 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy import sparse
 
-from catenary.solver.base.kernels import aligned_arrays
-from catenary.solver.kernels import native
+from catenary.solver.kernels import aligned_arrays, native
 from catenary.solver.linear.stations.sections import Places, Sections
 from catenary.solver.linear.stations.station_layout import (
     MOST_LANES,

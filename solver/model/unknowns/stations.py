@@ -14,8 +14,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from catenary.base.errors import InputError
 from catenary.meshgen.mesh import LineMesh
-from catenary.solver.base.errors import InputError
 
 # Nodes closer than this along the track belong to one station [m].
 SAME_STATION = 1e-6

@@ -38,8 +38,8 @@ from typing import Any
 
 import numpy as np
 
+from catenary.base.errors import InputError, RunBroken
 from catenary.meshgen.mesh import DROPPERS
-from catenary.solver.base.errors import InputError, RunBroken
 from catenary.solver.effects import all_effects as effects
 from catenary.solver.effects.build_model import build
 from catenary.solver.linear.decay_length import reach

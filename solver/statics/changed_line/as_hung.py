@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from catenary.solver.base.errors import InputError
+from catenary.base.errors import InputError
 from catenary.solver.effects.all_effects import simulated
 from catenary.solver.effects.build_model import build
 from catenary.solver.model.model import Model

@@ -18,7 +18,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse import linalg as sparse_linalg
 
-from catenary.solver.base.errors import InputError
+from catenary.base.errors import InputError
 from catenary.solver.effects import all_effects as effects
 from catenary.solver.effects.build_model import build
 from catenary.solver.model.model import Model

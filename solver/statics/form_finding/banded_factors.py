@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.linalg import lapack
 
-from catenary.solver.base.errors import InputError
+from catenary.base.errors import InputError
 from catenary.solver.statics.form_finding.sparse_sum import Part
 
 # Elements whose matrices are summed at once.

@@ -12,11 +12,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from catenary.base.errors import InputError
 from catenary.meshgen.geometry import SAME_CUT
 from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import LineMesh, reduced, with_nodes_at
 from catenary.meshgen.wires import Wire
-from catenary.solver.base.errors import InputError
 from catenary.solver.effects import all_effects as effects
 from catenary.solver.effects.build_model import build
 from catenary.solver.model.model import Model

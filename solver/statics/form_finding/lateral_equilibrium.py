@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.sparse import linalg as sparse_linalg
 
+from catenary.base.errors import InputError
 from catenary.meshgen.hardware import SteadyArms
-from catenary.solver.base.errors import InputError
 from catenary.solver.model.model import Model
 from catenary.solver.model.rest.lateral_shape import LateralShape
 from catenary.solver.model.rest.rest_shape import Equilibrium

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from catenary.solver.base.errors import InputError
+from catenary.base.errors import InputError
 from catenary.solver.model.model import Model
 from catenary.solver.model.unknowns.stations import SAME_STATION
 

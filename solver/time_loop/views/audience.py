@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
-from catenary.solver.base.errors import RunBroken
-from catenary.solver.base.petsc_events import event
+from catenary.base.errors import RunBroken
+from catenary.base.petsc_events import event
 from catenary.solver.time_loop.views.observers import NEVER, Observer, Stage, StepView
 
 

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from catenary.solver.base.errors import InputError
-from catenary.solver.base.parallel import on_root
+from catenary.base.errors import InputError
+from catenary.base.parallel import on_root
 from catenary.solver.contact.train.pantographs import Pantographs
 from catenary.solver.integrators.line_integrator import MOTION, LineIntegrator
 from catenary.solver.model.model import Model

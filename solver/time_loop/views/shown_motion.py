@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from catenary.solver.base.kernels import aligned_arrays
 from catenary.solver.integrators.line_integrator import LineIntegrator
-from catenary.solver.kernels import native
+from catenary.solver.kernels import aligned_arrays, native
 from catenary.solver.window.moving_columns import Columns, widen
 
 

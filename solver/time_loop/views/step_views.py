@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from catenary.base.parallel import total
 from catenary.meshgen.mesh import DROPPERS
-from catenary.solver.base.parallel import total
 from catenary.solver.contact.followed_links import FollowedLinks
 from catenary.solver.contact.forces_on_line import ForcesOnLine
 from catenary.solver.contact.train.pantographs import Pantographs

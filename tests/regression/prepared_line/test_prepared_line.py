@@ -16,12 +16,12 @@ from acting_scenes import SCENES, acting_scene
 from documents import blocks_of
 from mpi4py import MPI
 
+from catenary.base.errors import InputError, RunBroken
 from catenary.cases.run.prepared import HEADER, LIBRARY, prepare_line
 from catenary.cases.scene.input.case_files import find_case
 from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.hard import runs
-from catenary.solver.base.errors import InputError, RunBroken
 from catenary.solver.kernels.native import Simulation
 
 # Lumped masses on droppers that slacken; three planes; a mechanism; two pantographs and several

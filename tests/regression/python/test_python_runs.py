@@ -246,8 +246,8 @@ def test_a_run_may_stand_in_a_thread(scene: catenary.Scene) -> None:
 
 
 def test_options_of_a_scene_are_those_of_its_run_alone(scene: catenary.Scene) -> None:
+    from catenary.base.petsc import PETSc
     from catenary.cases.process.petsc_options import options_of
-    from catenary.solver.base.petsc import PETSc
 
     PETSc.Options().setValue("ts_view_of_mine", "1")
     with options_of({"ts_view_of_mine": 2, "log_of_mine": True}) as words:

@@ -7,13 +7,13 @@ import pytest
 from scipy import linalg
 from scipy.interpolate import CubicSpline
 
+from catenary.base.errors import RunBroken
 from catenary.mbs.head.strips import Strips, Suspension, Turning, head_parts
 from catenary.mbs.head.wire_crossing import LateralPath
 from catenary.mbs.lumped import LumpedPantograph
 from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.mechanism.reduced_pantograph import RaisingData, RaisingPantograph
 from catenary.mbs.mechanism.reduction import ReducedMechanism
-from catenary.solver.base.errors import RunBroken
 
 EPS = np.finfo(float).eps
 DT, BETA, GAMMA = 2e-3, 0.3, 0.55

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from measuring import check
 
+from catenary.base.errors import InputError
 from catenary.mbs.rigid.bodies import SPACE, Body, Motion
 from catenary.mbs.rigid.forces import (
     Actuator,
@@ -34,7 +35,6 @@ from catenary.mbs.rigid.joints import (
 )
 from catenary.mbs.rigid.kinematics import stacked
 from catenary.mbs.rigid.system import System, independent_rows
-from catenary.solver.base.errors import InputError
 
 EPS = np.finfo(float).eps
 TIME = 0.7

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from measuring import check
 
+from catenary.base.errors import InputError
 from catenary.mbs.rigid.bodies import SPACE, Body, Motion, initial_motion
 from catenary.mbs.rigid.forces import (
     Actuator,
@@ -17,7 +18,6 @@ from catenary.mbs.rigid.forces import (
     Table,
 )
 from catenary.mbs.rigid.kinematics import point
-from catenary.solver.base.errors import InputError
 
 EPS = np.finfo(float).eps
 AT_I, AT_J = (0.3, -0.2, 0.5), (-0.4, 0.1, 0.2)

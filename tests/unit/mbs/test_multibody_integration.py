@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from measuring import check
 
+from catenary.base.errors import InputError, RunBroken
 from catenary.mbs.rigid.bodies import SPACE, Body
 from catenary.mbs.rigid.forces import Gravity
 from catenary.mbs.rigid.joints import Prismatic, Revolute
@@ -16,7 +17,6 @@ from catenary.mbs.time_steps.constraint_handling import (
     CoordinatePartitioning,
 )
 from catenary.mbs.time_steps.variable_steps import integrate
-from catenary.solver.base.errors import InputError, RunBroken
 
 BODY = Body("slider", 1.0, (1.0, 1.0, 1.0))
 RAIL = System((BODY,), (Prismatic("rail", SPACE, "slider"),))

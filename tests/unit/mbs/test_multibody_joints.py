@@ -7,6 +7,7 @@ import pytest
 from measuring import check
 from scipy.spatial.transform import Rotation
 
+from catenary.base.errors import InputError
 from catenary.mbs.rigid.bodies import (
     SPACE,
     Body,
@@ -31,7 +32,6 @@ from catenary.mbs.rigid.joints import (
     steady,
     tabulated,
 )
-from catenary.solver.base.errors import InputError
 
 EPS = np.finfo(float).eps
 TIME = 0.7

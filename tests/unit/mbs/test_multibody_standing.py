@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from measuring import check
 
+from catenary.base.errors import InputError, RunBroken
 from catenary.mbs.air.airflow import Airflow
 from catenary.mbs.build import Operation, make_pantograph, raising_data
 from catenary.mbs.mechanism.pantograph_data import MultibodyData, describe, reduced, stand
@@ -17,7 +18,6 @@ from catenary.mbs.rigid.bodies import SPACE, Body
 from catenary.mbs.rigid.forces import Actuator, BumpStop, Gravity, PointForce, SpringDamper
 from catenary.mbs.rigid.joints import Prismatic, Revolute
 from catenary.mbs.rigid.system import System
-from catenary.solver.base.errors import InputError, RunBroken
 
 G = 9.81
 UP, ACROSS = (0.0, 0.0, 1.0), (1.0, 0.0, 0.0)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from measuring import check
 
+from catenary.base.errors import InputError, RunBroken
 from catenary.mbs.rigid.bodies import SPACE, Body
 from catenary.mbs.rigid.forces import Actuator, Gravity, PointForce, SpringDamper
 from catenary.mbs.rigid.joints import (
@@ -17,7 +18,6 @@ from catenary.mbs.rigid.joints import (
 )
 from catenary.mbs.rigid.statics import calibrate_actuator, equilibrium, equivalent_mass, held_force
 from catenary.mbs.rigid.system import System
-from catenary.solver.base.errors import InputError, RunBroken
 
 G = 9.81
 UP, ACROSS = (0.0, 0.0, 1.0), (1.0, 0.0, 0.0)

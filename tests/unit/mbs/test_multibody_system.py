@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from measuring import check
 
+from catenary.base.errors import InputError
 from catenary.mbs.rigid.bodies import SPACE, Body, Motion
 from catenary.mbs.rigid.forces import Gravity, PointForce
 from catenary.mbs.rigid.joints import (
@@ -19,7 +20,6 @@ from catenary.mbs.rigid.joints import (
     steady,
 )
 from catenary.mbs.rigid.system import System, independent_rows
-from catenary.solver.base.errors import InputError
 
 EPS = np.finfo(float).eps
 G = 9.81

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from catenary.base.errors import NotConverged, RunBroken
 from catenary.mbs.mechanism.reduction import ReducedMechanism
 from catenary.mbs.rigid.bodies import SPACE, Body
 from catenary.mbs.rigid.forces import Gravity
@@ -12,7 +13,6 @@ from catenary.mbs.rigid.joints import Revolute
 from catenary.mbs.rigid.system import System
 from catenary.mbs.time_steps.implicit_steps import Stepper
 from catenary.mbs.time_steps.step_solvers import Augmented, Partitioned
-from catenary.solver.base.errors import NotConverged, RunBroken
 
 # A pendulum of 1 m that is let go from level.
 PENDULUM = System(

@@ -10,12 +10,12 @@ import gmsh
 import numpy as np
 import pytest
 
+from catenary.base.errors import InputError
 from catenary.meshgen.build import make_mesh, use_mesh
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
 from catenary.meshgen.reader import read_mesh
 from catenary.meshgen.topologies.all_topologies import make_line as line_from
 from catenary.meshgen.topologies.line_data import LineData
-from catenary.solver.base.errors import InputError
 
 
 def test_a_file_in_any_order_and_numbering_is_read(by_hand: Any, tmp_path: Path) -> None:

@@ -12,13 +12,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from catenary.base.errors import InputError
 from catenary.meshgen.build import make_mesh
 from catenary.meshgen.gmsh_lines import write_mesh
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
 from catenary.meshgen.reader import read_mesh
 from catenary.meshgen.topologies.all_topologies import make_line as line_from
 from catenary.meshgen.topologies.line_data import LineData
-from catenary.solver.base.errors import InputError
 
 # Gmsh finds the parameter of each node to 1e-12 of the line's length, and writes 16 digits.
 PLACE = 1e-8

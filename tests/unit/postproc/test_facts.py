@@ -15,6 +15,7 @@ import h5py
 import numpy as np
 import pytest
 
+from catenary.base.errors import InputError
 from catenary.cases.scene.keys.keys import known_keys
 from catenary.cases.scene.scene import Scene
 from catenary.cases.scene.tables.units import unit_of
@@ -27,7 +28,6 @@ from catenary.postproc.evaluate.statistics import evaluate
 from catenary.postproc.files.hdf5.checked import seal_arrays
 from catenary.postproc.read.results import Results
 from catenary.postproc.report.report import write_report
-from catenary.solver.base.errors import InputError
 from catenary.solver.problem.contact_laws import HertzLaw, KinematicLaw
 from catenary.solver.problem.problem import Damping, Placement, Problem
 from catenary.solver.time_loop.views.channels import PANTOGRAPH, RUN

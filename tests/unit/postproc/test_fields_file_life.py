@@ -12,10 +12,10 @@ import pytest
 import pyvista
 from watched_fields import BLOCKS, blocks_at, times_in, watch
 
+from catenary.base.errors import RunBroken
 from catenary.meshgen.mesh import CONTACT_WIRE
 from catenary.postproc.record.snapshots import fields_file, growing_xdmf
 from catenary.postproc.record.snapshots.blocks import MASTS
-from catenary.solver.base.errors import RunBroken
 
 
 def test_files_are_valid_after_every_flush(tmp_path: Path, make_march: Any) -> None:

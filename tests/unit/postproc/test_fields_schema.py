@@ -12,11 +12,11 @@ import h5py
 import numpy as np
 import pytest
 
+from catenary.base.errors import InputError
 from catenary.postproc.film.snapshots import Snapshots
 from catenary.postproc.record.snapshots.field_layout import Course, FieldRecord
 from catenary.postproc.record.snapshots.fields import FieldRecorder
 from catenary.postproc.record.snapshots.fields_schema import FieldsFault, read_fields
-from catenary.solver.base.errors import InputError
 
 pytestmark = pytest.mark.process
 WIRE = "contact_wire"

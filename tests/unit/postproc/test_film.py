@@ -13,6 +13,7 @@ import pytest
 import pyvista
 from PIL import Image
 
+from catenary.base.errors import InputError
 from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.shape import BODY, HEAD, shape_of
 from catenary.postproc.files.hdf5.checked import seal_attributes, set_attribute
@@ -29,7 +30,6 @@ from catenary.postproc.read.results import Results
 from catenary.postproc.record.snapshots.field_layout import Course, FieldRecord
 from catenary.postproc.record.snapshots.fields import FieldRecorder
 from catenary.postproc.record.snapshots.vtkhdf import write_vtkhdf
-from catenary.solver.base.errors import InputError
 
 # HDF5's files are examined, and films written, by processes of their own.
 pytestmark = pytest.mark.process

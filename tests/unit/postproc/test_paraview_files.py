@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 import pyvista
 
+from catenary.base.errors import InputError
 from catenary.postproc.film.film_data import film_data
 from catenary.postproc.film.view import View
 from catenary.postproc.paraview import open_in_paraview
 from catenary.postproc.read.results import Results
 from catenary.postproc.record.snapshots.fields import FieldRecorder
-from catenary.solver.base.errors import InputError
 
 # HDF5's files are examined by a process of its own.
 pytestmark = pytest.mark.process

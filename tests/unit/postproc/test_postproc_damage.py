@@ -18,10 +18,10 @@ import numpy as np
 import pytest
 from damaging import attribute_mutations, dataset_mutations, flip, raw_ranges, unseal
 
+from catenary.base.errors import InputError
 from catenary.postproc.evaluate.compare import compare
 from catenary.postproc.read.results import Results
 from catenary.postproc.report import report
-from catenary.solver.base.errors import InputError
 
 SEED = int(os.environ.get("FUZZ_SEED", "1"))
 MUTATIONS = int(os.environ.get("FUZZ_DAMAGE", "15"))

@@ -10,6 +10,7 @@ from typing import Any
 import h5py
 import pytest
 
+from catenary.base.errors import RunBroken
 from catenary.postproc.files.disk import broken_write
 from catenary.postproc.files.disk_errors import reason, remedy
 from catenary.postproc.files.own_files import (
@@ -22,7 +23,6 @@ from catenary.postproc.files.own_files import (
 from catenary.postproc.read.results import Results
 from catenary.postproc.record.recorder import Recorder
 from catenary.postproc.record.snapshots.fields import FieldRecorder
-from catenary.solver.base.errors import RunBroken
 from catenary.solver.problem.watched_links import GAUGES
 
 

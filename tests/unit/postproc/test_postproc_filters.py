@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from catenary.base.errors import InputError
 from catenary.postproc.evaluate import filters
-from catenary.solver.base.errors import InputError
 
 DT = 1e-3
 TIME = DT * np.arange(12001)

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from catenary.base.parallel import set_up_logging
 from catenary.postproc.record.progress import Progress, duration
-from catenary.solver.base.parallel import set_up_logging
 from catenary.solver.time_loop.views.observers import Stage
 
 RANK_0 = types.SimpleNamespace(rank=0)

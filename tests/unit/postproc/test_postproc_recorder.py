@@ -13,13 +13,13 @@ import h5py
 import numpy as np
 import pytest
 
+from catenary.base.errors import InputError, RunBroken
 from catenary.postproc.channels.header import Header
 from catenary.postproc.files import result_file
 from catenary.postproc.files.disk import NoRoom
 from catenary.postproc.read.results import Results
 from catenary.postproc.record.recorder import Recorder
 from catenary.postproc.report.summary import real_time_factor
-from catenary.solver.base.errors import InputError, RunBroken
 from catenary.solver.time_loop.views import channels
 
 CONFTEST = Path(__file__).with_name("conftest.py")
@@ -240,7 +240,7 @@ def test_a_full_disk_ends_the_run_with_a_sentence_and_keeps_the_record(
     )
     last = program.stderr.strip().splitlines()[-1]
     assert program.returncode == 1
-    assert last.startswith(f"catenary.solver.base.errors.RunBroken: writing {path} failed at t = ")
+    assert last.startswith(f"catenary.base.errors.RunBroken: writing {path} failed at t = ")
     assert "(File too large): raise the limit on the size of a file" in last
     with Results(path) as results:
         # Everything up to the step at which the run broke is there, and the file says why.

@@ -15,12 +15,12 @@ import numpy as np
 import pytest
 
 import catenary.postproc.report.report
+from catenary.base.errors import InputError
 from catenary.postproc.evaluate.compare import compare
 from catenary.postproc.read.results import Results
 from catenary.postproc.report import csv_tables
 from catenary.postproc.report.pictures import line_pictures
 from catenary.postproc.report.report import write_report
-from catenary.solver.base.errors import InputError
 
 TEMPLATES = Path(catenary.postproc.report.report.__file__).parent / "templates"
 PNG = b"\x89PNG\r\n\x1a\n"

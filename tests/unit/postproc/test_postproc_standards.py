@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from catenary.base.errors import InputError
 from catenary.postproc.evaluate.statistics import (
     DropperStatistics,
     PantographStatistics,
@@ -15,7 +16,6 @@ from catenary.postproc.evaluate.statistics import (
 )
 from catenary.postproc.evaluate.verdict import Criterion, judge, verdict
 from catenary.postproc.standards import en50367 as standards
-from catenary.solver.base.errors import InputError
 
 SPEED = 300.0 / 3.6
 WAVE = 441.0 / 3.6

@@ -13,6 +13,7 @@ import h5py
 import pytest
 from h5py import h5d, h5p, h5s, h5t
 
+from catenary.base.errors import InputError
 from catenary.postproc.files import disk
 from catenary.postproc.files.hdf5.self_contained import open_own
 from catenary.postproc.files.own_files import new_part
@@ -21,7 +22,6 @@ from catenary.postproc.film.snapshots import Snapshots
 from catenary.postproc.read.results import Results
 from catenary.postproc.record.snapshots.fields import FieldRecorder
 from catenary.postproc.record.snapshots.vtkhdf import write_vtkhdf
-from catenary.solver.base.errors import InputError
 
 pytestmark = pytest.mark.process
 PRECIOUS = b"precious" * 4000

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from catenary.solver.base.kernels import aligned_arrays
+from catenary.solver.kernels import aligned_arrays
 
 
 @pytest.mark.parametrize("size", [0, 1, 7, 5000, 200_000])

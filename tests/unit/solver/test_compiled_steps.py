@@ -12,6 +12,7 @@ import pytest
 from measuring import registered, start_march
 from small_lines import WHOLE, ac_simple_line, mesh_of, numerics, problem_of, train
 
+from catenary.base.errors import RunBroken
 from catenary.mbs.air.airflow import Tunnel
 from catenary.mbs.air.uplift import Polynomial, Uplift
 from catenary.mbs.control.regulation import Regulation
@@ -25,7 +26,6 @@ from catenary.mbs.rigid.forces import PointForce
 from catenary.mbs.vehicle.irregularity import Irregularity
 from catenary.mbs.vehicle.motion_sources import Harmonic, VehicleMotion
 from catenary.meshgen.mesh import CONTACT_WIRE, LineMesh
-from catenary.solver.base.errors import RunBroken
 from catenary.solver.contact_problem import complementarity
 from catenary.solver.effects.effect import Effect
 from catenary.solver.integrators.loads import line_loads

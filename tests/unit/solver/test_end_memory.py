@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from catenary.solver.base.errors import InputError
+from catenary.base.errors import InputError
 from catenary.solver.integrators.line_state import LineState
 from catenary.solver.integrators.loads.end_memory import NEAR
 from catenary.solver.integrators.loads.line_loads import LineLoads

@@ -6,7 +6,7 @@ import os
 
 import pytest
 
-from catenary.solver.base.lone_process import SETTINGS, settings
+from catenary.base.lone_process import SETTINGS, settings
 
 
 @pytest.fixture(autouse=True)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
+from catenary.base.errors import InputError
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.load import load_scene
-from catenary.solver.base.errors import InputError
 from catenary.solver.statics.line_at_rest import line_at_rest
 
 FIXED = (

@@ -7,7 +7,7 @@ import pytest
 from measuring import check
 from petsc4py import PETSc
 
-from catenary.solver.base.errors import InputError
+from catenary.base.errors import InputError
 from catenary.solver.problem.problem import n_halvings
 from catenary.solver.schemes.step_error import StepError
 from catenary.solver.schemes.ts_adapt import StepControl

@@ -10,7 +10,7 @@ import pytest
 from measuring import History, start_march
 from small_lines import en50318_line, mesh_of, numerics, problem_of, train
 
-from catenary.solver.base.kernels.flush_to_zero import flushed
+from catenary.solver.kernels.flush_to_zero import flushed
 from catenary.solver.time_loop import march
 
 TINY = np.finfo(float).tiny

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from small_lines import WHOLE, ac_simple_line, mesh_of, problem_of
 
+from catenary.base.errors import InputError
 from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import CONTACT_WIRE, LineMesh
 from catenary.meshgen.topologies.all_topologies import make_line
 from catenary.meshgen.topologies.line_data import Overlaps, Twin
-from catenary.solver.base.errors import InputError
 from catenary.solver.effects import all_effects as effects
 from catenary.solver.effects.build_model import build, numbering_of, with_wires_apart
 from catenary.solver.model.matrices import whole_matrix

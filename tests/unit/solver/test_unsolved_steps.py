@@ -14,7 +14,7 @@ from measuring import History, start_march
 from petsc4py import PETSc
 from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of, train
 
-from catenary.solver.base.errors import InputError, NotConverged, RunBroken
+from catenary.base.errors import InputError, NotConverged, RunBroken
 from catenary.solver.contact.followed_links import no_links
 from catenary.solver.contact.line_response import LineResponse
 from catenary.solver.contact.train.head_states import Heads

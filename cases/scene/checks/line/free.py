@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from catenary.base.errors import InputError
 from catenary.cases.scene.convert.line.free import FIXED, TENSIONER, stretches_of
 from catenary.cases.scene.convert.line.line import span_lengths
 from catenary.cases.scene.input.faults import Fault
@@ -21,7 +22,6 @@ from catenary.cases.scene.tables.line.free import (
 )
 from catenary.meshgen.mesh import ANCHORS
 from catenary.meshgen.topologies.free import in_order
-from catenary.solver.base.errors import InputError
 
 if TYPE_CHECKING:
     from catenary.cases.scene.scene import Scene

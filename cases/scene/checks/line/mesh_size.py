@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from catenary.base.errors import InputError
 from catenary.cases.scene.checks.line.free_places import free_counts
 from catenary.cases.scene.checks.line.twins import RELATIVE_MOTION
 from catenary.cases.scene.convert.line.free import free_wires
@@ -20,7 +21,6 @@ from catenary.meshgen.division import divisions_of
 from catenary.meshgen.geometry import find_cuts
 from catenary.meshgen.line import Line
 from catenary.meshgen.wires import Wire
-from catenary.solver.base.errors import InputError
 from catenary.solver.effects import all_effects as effects
 
 if TYPE_CHECKING:

@@ -6,6 +6,7 @@ import difflib
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+from catenary.base.errors import InputError, RunBroken
 from catenary.cases.scene.convert.train.static_force import wanted_force
 from catenary.cases.scene.input.faults import Fault
 from catenary.cases.scene.input.origin import shown
@@ -14,7 +15,6 @@ from catenary.cases.scene.tables.train.mechanism import ActuatorTable
 from catenary.cases.scene.tables.train.pantograph import MultibodyTable
 from catenary.mbs.frame import SPACE
 from catenary.meshgen.topologies.line_data import LineData
-from catenary.solver.base.errors import InputError, RunBroken
 
 if TYPE_CHECKING:
     from catenary.cases.scene.scene import Scene

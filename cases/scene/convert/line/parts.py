@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from catenary.base.errors import InputError
 from catenary.cases.scene.scene import Scene
 from catenary.cases.scene.tables.line.droppers import DropperTable, HangingTable
 from catenary.cases.scene.tables.line.free import FreeArmsTable, FreeDroppersTable
@@ -11,7 +12,6 @@ from catenary.cases.scene.tables.line.wires import WireTable
 from catenary.cases.scene.tables.units import angle_from_deg, length_from_mm
 from catenary.meshgen.hardware import DropperKind, SteadyArm
 from catenary.meshgen.wires import Conductor
-from catenary.solver.base.errors import InputError
 
 # Span lengths are written in decimal; two that differ by less are the same one.
 _SAME_SPAN = 1e-6

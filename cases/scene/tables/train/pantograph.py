@@ -14,6 +14,7 @@ from pydantic import (
     model_validator,
 )
 
+from catenary.base.errors import InputError
 from catenary.cases.scene.input.toml_input import assign
 from catenary.cases.scene.tables.table import TAKE_AWAY, Table, ascending, exactly_one
 from catenary.cases.scene.tables.train.aerodynamics import AerodynamicsTable
@@ -21,7 +22,6 @@ from catenary.cases.scene.tables.train.head import RollTable, SomeMass, StripsTa
 from catenary.cases.scene.tables.train.laws import LawTable, RegulationTable
 from catenary.cases.scene.tables.train.mechanism import BodyTable, ForceTable, JointTable, Name
 from catenary.mbs.library import READY
-from catenary.solver.base.errors import InputError
 
 Mass = Annotated[float, Field(gt=0, le=1000), SomeMass]
 Stiffness = Annotated[float, Field(ge=0, le=1e8)]
