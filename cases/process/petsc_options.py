@@ -20,7 +20,7 @@ _LOOKED_UP_LAST = frozenset(
 # Options outside of a scene's table that a misspelt one may stand for.
 _OTHER_OPTIONS = (
     "march_ts_max_steps", "march_ts_max_time", "march_ts_monitor", "march_ts_monitor_solution",
-    "march_ts_view", "march_ts_adapt_clip", "march_ts_adapt_monitor", "march_ksp_view",
+    "march_ts_view", "march_ksp_view",
     "march_ksp_monitor", "march_ksp_converged_reason", "log_view", "log_view_memory", "log_trace",
     "options_left", "options_view", "malloc_debug", "malloc_dump", "malloc_view", "memory_view",
 )  # fmt: skip

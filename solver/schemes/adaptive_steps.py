@@ -6,7 +6,7 @@ when it is first needed and kept. Level 0 holds the state whenever an interval e
 records, checkpoints and incidents are independent of the others.
 
 A step is repeated with a shorter one if its estimated error is above the tolerance (`step_error`),
-or if it has no solution; which size is next is up to PETSc's TSAdapt (`ts_adapt`).
+or if it has no solution; `step_size` controls the size of the next.
 """
 
 from __future__ import annotations
@@ -19,14 +19,13 @@ from typing import Any
 import numpy as np
 
 from catenary.base.errors import RunBroken
-from catenary.base.parallel import on_root
 from catenary.solver.problem.problem import Numerics, n_halvings
 from catenary.solver.schemes.fixed_point import FixedPoint
 from catenary.solver.schemes.make_scheme import Parts
 from catenary.solver.schemes.one_solve import OneSolve
 from catenary.solver.schemes.scheme import Counters, Decision, StepRejected
 from catenary.solver.schemes.step_error import StepError
-from catenary.solver.schemes.ts_adapt import StepControl
+from catenary.solver.schemes.step_size import StepSize
 
 # A size that is shorter than a level's by less than this share of a halving is taken for it, so
 # that the safety factor alone does not shorten steps that are good enough.
@@ -90,13 +89,7 @@ class StepLevels:
         self.pantographs = whole.pantographs
         self._active = self._wanted = self._tried = 0
         self._before: dict[int, list[np.ndarray]] = {}
-        smallest = self._dt / 2**self._finest
-        self._control: StepControl | None = None
-
-        def control() -> None:
-            self._control = StepControl(self._tolerance, self._dt, smallest)
-
-        on_root(comm, control)  # options may be refused, on all ranks
+        self._size = StepSize(self._tolerance, self._dt, self._dt / 2**self._finest)
         self._take_in(0, whole)
 
     @property
@@ -141,8 +134,7 @@ class StepLevels:
         error = self._error.of(time, depth, force, stiffness, compliance)
         decision = Decision(True, level)
         if error is not None:
-            assert self._control is not None  # on rank 0
-            accepted, wanted = self._control.choose(error, time, size)
+            accepted, wanted = self._size.after_step(error, size)
             accepted |= level == self._finest
             decision = Decision(accepted, self._level_of(wanted))
             self._counters.steps_above_tolerance += accepted and error > self._tolerance
@@ -174,8 +166,6 @@ class StepLevels:
 
     def destroy(self) -> None:
         """Free all PETSc objects but those of the line at level 0. Collective."""
-        if self._control is not None:
-            self._control.destroy()
         self._levels.pop(0).scheme.destroy()
         for parts in self._levels.values():
             parts.destroy()
@@ -193,22 +183,13 @@ class StepLevels:
             if level == self._finest:
                 raise
             self._counters.failed_steps += 1
-            self._wanted = self._after_failure(time, level)
+            self._wanted = self._level_of(self._size.after_failure(self._dt / 2**level))
         else:
             self._counters.taken[level] += 1
             return goes_on
         take_back()
         self._wanted = max(self._wanted, level + 1)
         return None
-
-    def _after_failure(self, time: float, level: int) -> int:
-        """The level with which to repeat a step to ``time`` [s] that failed. Collective."""
-
-        def wanted() -> int:
-            assert self._control is not None
-            return self._level_of(self._control.after_failure(time, self._dt / 2**level))
-
-        return on_root(self._comm, wanted)
 
     def _level_of(self, size: float) -> int:
         """The level whose steps are at most of this size [s], or nearly."""

@@ -1,62 +1,34 @@
-"""PETSc's controller of step sizes, and the estimate that it is given."""
+"""The controller of step sizes, and the estimate that it is given."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 from measuring import check
-from petsc4py import PETSc
 
-from catenary.base.errors import InputError
 from catenary.solver.problem.problem import n_halvings
 from catenary.solver.schemes.step_error import StepError
-from catenary.solver.schemes.ts_adapt import StepControl
-
-
-@pytest.fixture
-def option():
-    """Sets an option under -march_ until the test ends."""
-    options, given = PETSc.Options("march_"), []
-
-    def put(name: str, value: object) -> None:
-        options.setValue(name, value)
-        given.append(name)
-
-    yield put
-    for name in given:
-        options.delValue(name)
+from catenary.solver.schemes.step_size import StepSize
 
 
 def test_the_next_size_is_that_of_petscs_basic_controller() -> None:
-    """PETSc manual, TSADAPTBASIC: h 0.9 e^(-1/3), within a tenth and ten times h."""
-    control = StepControl(0.5, 1e-3, 1e-5)
+    """PETSc manual, TSADAPTBASIC: h 0.9 e^(-1/3), within a tenth and ten times h, and half of that
+    where a step is rejected twice."""
+    control = StepSize(0.5, 1e-3, 1e-5)
     for error in (0.1, 0.4, 0.6, 4.0):
-        accepted, size = control.choose(error, 1.0, 1e-4)
+        accepted, size = control.after_step(error, 1e-4)
         assert accepted == (error <= 0.5)
         check(
             f"next size after {error} N [s]", size, 0.9e-4 * (error / 0.5) ** (-1 / 3), within=1e-12
         )
-        control.choose(0.1, 1.0, 1e-4)  # a step that is taken: PETSc is stricter after a rejection
-    assert control.choose(0.0, 1.0, 1e-3).size == 1e-3
-    assert control.choose(1e9, 1.0, 1e-5) == (True, 1e-5)  # the smallest is taken whatever happens
-    check("size after a failure [s]", control.after_failure(1.0, 8e-4), 2e-4, within=1e-16)
-    control.destroy()
-
-
-def test_petscs_options_reach_it(option) -> None:
-    option("ts_adapt_safety", 0.5)
-    option("ts_adapt_scale_solve_failed", 0.125)
-    control = StepControl(1.0, 1e-3, 1e-5)
-    check("next size [s]", control.choose(1.0, 1.0, 1e-4).size, 0.5e-4, within=1e-16)
-    check("size after a failure [s]", control.after_failure(1.0, 8e-4), 1e-4, within=1e-16)
-    control.destroy()
-
-
-@pytest.mark.parametrize("name", ["ts_atol", "ts_rtol", "ts_adapt_dt_min", "ts_adapt_dt_max"])
-def test_options_that_the_scene_says_are_refused(name: str, option) -> None:
-    option(name, 2e-4)
-    with pytest.raises(InputError, match=f"-march_{name} is 0.0002; the scene says it"):
-        StepControl(1.0, 1e-3, 1e-5)
+        control.after_step(0.1, 1e-4)
+    assert control.after_step(4.0, 1e-4) == (False, pytest.approx(0.45e-4))
+    assert control.after_step(4.0, 1e-4) == (False, pytest.approx(0.225e-4))
+    assert control.after_step(0.0, 1e-3) == (True, 1e-3)
+    assert control.after_step(1e-9, 2e-5) == (True, 2e-4)  # ten times at most
+    assert control.after_step(1e9, 1e-5) == (True, 1e-5)  # the smallest is taken whatever happens
+    check("size after a failure [s]", control.after_failure(8e-4), 2e-4, within=1e-16)
+    assert not control.after_step(4.0, 1e-4)[0]
 
 
 def test_the_estimate_is_what_average_acceleration_misses() -> None:

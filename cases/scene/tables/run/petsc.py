@@ -27,7 +27,6 @@ _Tolerance = Annotated[float | None, Field(gt=0, le=1e-3)]
 _Iterations = Annotated[int | None, Field(ge=1, le=100_000)]
 _Levels = Annotated[int | None, Field(ge=0, le=20)]
 _Fill = Annotated[float | None, Field(ge=1, le=100)]
-_Safety = Annotated[float | None, Field(ge=0.1, le=1)]
 
 
 def _option(description: str, **bounds: Any) -> Any:
@@ -73,11 +72,6 @@ class PetscTable(Table):
     march_sub_pc_factor_levels: _Levels = _on_rank(_LEVELS)
     march_sub_pc_factor_fill: _Fill = _on_rank(_FILL)
     march_sub_pc_factor_shift_type: _Shift = _on_rank(_SHIFT)
-    march_ts_adapt_type: Literal["basic", "dsp"] | None = _option(
-        "controller of numerics.adaptive_tolerance_N"
-    )
-    march_ts_adapt_safety: _Safety = _option("share of the estimated step that is taken")
-    march_ts_adapt_reject_safety: _Safety = _option("the same after a rejected step")
     march_alpha2_snes_atol: float | None = _option(
         "scheme ts_alpha2: residual that ends a step", gt=0, le=1
     )
