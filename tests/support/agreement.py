@@ -8,18 +8,18 @@ from typing import NamedTuple
 import numpy as np
 import paper_pantograph as ambrosio
 import plane_pantograph
-from seven_bodies import HEAD, UPRIGHT, at_rest, calibrated, lively_load, pressed
-
-from catenary.mbs.rigid.forces import Actuator
-from catenary.mbs.time_steps.constraint_handling import (
+from constraint_handling import (
     AugmentedLagrangian,
     Baumgarte,
     ConstraintHandling,
     CoordinatePartitioning,
 )
+from seven_bodies import HEAD, UPRIGHT, at_rest, calibrated, lively_load, pressed
+from variable_steps import integrate
+
+from catenary.mbs.rigid.forces import Actuator
 from catenary.mbs.time_steps.implicit_steps import Stepper
 from catenary.mbs.time_steps.step_solvers import METHODS
-from catenary.mbs.time_steps.variable_steps import integrate
 
 # Heights are kept at these intervals [s].
 EVERY = 0.25

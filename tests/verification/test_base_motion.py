@@ -7,10 +7,12 @@ from dataclasses import replace
 import numpy as np
 import paper_pantograph as paper
 import pytest
+from constraint_handling import Baumgarte
 from measuring import History, check, start_march
 from scipy import signal
 from scipy.integrate import quad
 from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of, train
+from variable_steps import integrate
 
 from catenary.mbs.build import raising_data
 from catenary.mbs.head.wire_crossing import LateralPath
@@ -22,8 +24,6 @@ from catenary.mbs.rigid.forces import PointForce
 from catenary.mbs.rigid.joints import Fixed, PrescribedPoint, Prismatic, constant
 from catenary.mbs.rigid.kinematics import Law
 from catenary.mbs.rigid.statics import equilibrium
-from catenary.mbs.time_steps.constraint_handling import Baumgarte
-from catenary.mbs.time_steps.variable_steps import integrate
 from catenary.mbs.vehicle.base_motion import BaseMotion
 from catenary.mbs.vehicle.irregularity import SPECTRA, Irregularity
 from catenary.mbs.vehicle.motion_sources import Harmonic, Table, VehicleMotion

@@ -4,9 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from constraint_handling import (
+    AugmentedLagrangian,
+    Baumgarte,
+    ConstraintHandling,
+    CoordinatePartitioning,
+)
 from measuring import check
 from scipy.integrate import solve_ivp
 from scipy.special import ellipk
+from variable_steps import integrate
 
 from catenary.mbs.rigid.bodies import SPACE, Body
 from catenary.mbs.rigid.forces import Gravity, SpringDamper
@@ -20,13 +27,6 @@ from catenary.mbs.rigid.joints import (
 )
 from catenary.mbs.rigid.kinematics import point
 from catenary.mbs.rigid.system import System
-from catenary.mbs.time_steps.constraint_handling import (
-    AugmentedLagrangian,
-    Baumgarte,
-    ConstraintHandling,
-    CoordinatePartitioning,
-)
-from catenary.mbs.time_steps.variable_steps import integrate
 
 G = 9.81
 METHODS: list[ConstraintHandling] = [

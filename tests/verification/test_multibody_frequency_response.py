@@ -8,9 +8,11 @@ from pathlib import Path
 import numpy as np
 import paper_pantograph as paper
 import pytest
+from constraint_handling import Baumgarte
 from measuring import check
 from seven_bodies import ARM, HEAD, at_rest, calibrated, pressed
 from typer.testing import CliRunner
+from variable_steps import integrate
 
 from catenary.base.errors import InputError
 from catenary.cases.cli.main import app
@@ -26,9 +28,7 @@ from catenary.mbs.rigid.forces import Gravity, PointForce, SpringDamper
 from catenary.mbs.rigid.joints import Prismatic, Revolute, Spherical
 from catenary.mbs.rigid.kinematics import point
 from catenary.mbs.rigid.system import System
-from catenary.mbs.time_steps.constraint_handling import Baumgarte
 from catenary.mbs.time_steps.implicit_steps import Stepper
-from catenary.mbs.time_steps.variable_steps import integrate
 
 G = 9.81
 FREQUENCIES = np.array([0.3, 1.0, 4.0, 11.0, 25.0])

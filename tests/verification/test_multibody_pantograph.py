@@ -8,7 +8,14 @@ from __future__ import annotations
 import numpy as np
 import paper_pantograph as ambrosio
 import pytest
+from constraint_handling import (
+    AugmentedLagrangian,
+    Baumgarte,
+    ConstraintHandling,
+    CoordinatePartitioning,
+)
 from measuring import check
+from variable_steps import integrate
 
 from catenary.base.errors import InputError
 from catenary.mbs.rigid.forces import PointForce
@@ -16,13 +23,6 @@ from catenary.mbs.rigid.joints import PrescribedPoint, constant
 from catenary.mbs.rigid.kinematics import point
 from catenary.mbs.rigid.statics import calibrate_actuator, equilibrium, equivalent_mass, held_force
 from catenary.mbs.rigid.system import System
-from catenary.mbs.time_steps.constraint_handling import (
-    AugmentedLagrangian,
-    Baumgarte,
-    ConstraintHandling,
-    CoordinatePartitioning,
-)
-from catenary.mbs.time_steps.variable_steps import integrate
 
 ARM, HEAD = ambrosio.STABILISATION_ARM, ambrosio.HEAD
 HOLDER = PrescribedPoint("holder", ARM, constant(ambrosio.INITIAL_ARM_HEIGHT))

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import paper_pantograph as ambrosio
+from constraint_handling import Baumgarte
 from measuring import check, orders, print_table
+from variable_steps import integrate
 
 from catenary.mbs.head.strips import Strips, Suspension, Turning
 from catenary.mbs.head.wire_crossing import LateralPath
@@ -15,8 +17,6 @@ from catenary.mbs.mechanism.reduction import ReducedMechanism, reduce_mechanism
 from catenary.mbs.rigid.forces import PointForce
 from catenary.mbs.rigid.joints import PrescribedPoint, constant
 from catenary.mbs.rigid.statics import calibrate_actuator, equilibrium
-from catenary.mbs.time_steps.constraint_handling import Baumgarte
-from catenary.mbs.time_steps.variable_steps import integrate
 from catenary.mbs.vehicle.base_motion import BaseMotion
 from catenary.mbs.vehicle.motion_sources import Harmonic, VehicleMotion
 

@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 import paper_pantograph as ambrosio
 import pytest
+from constraint_handling import Baumgarte
 from measuring import check
 from scipy.integrate import solve_ivp
+from variable_steps import integrate
 
 from catenary.base.errors import InputError, RunBroken
 from catenary.mbs.mechanism.reduction import reduce_mechanism
@@ -16,8 +18,6 @@ from catenary.mbs.rigid.joints import PrescribedPoint, Revolute, constant
 from catenary.mbs.rigid.kinematics import point
 from catenary.mbs.rigid.statics import equivalent_mass
 from catenary.mbs.rigid.system import System
-from catenary.mbs.time_steps.constraint_handling import Baumgarte
-from catenary.mbs.time_steps.variable_steps import integrate
 
 ARM = ambrosio.STABILISATION_ARM
 G = 9.81

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from constraint_handling import (
+    AugmentedLagrangian,
+    Baumgarte,
+    CoordinatePartitioning,
+)
 from measuring import check
+from variable_steps import integrate
 
 from catenary.base.errors import InputError, RunBroken
 from catenary.mbs.rigid.bodies import SPACE, Body
 from catenary.mbs.rigid.forces import Gravity
 from catenary.mbs.rigid.joints import Prismatic, Revolute
 from catenary.mbs.rigid.system import System
-from catenary.mbs.time_steps.constraint_handling import (
-    AugmentedLagrangian,
-    Baumgarte,
-    CoordinatePartitioning,
-)
-from catenary.mbs.time_steps.variable_steps import integrate
 
 BODY = Body("slider", 1.0, (1.0, 1.0, 1.0))
 RAIL = System((BODY,), (Prismatic("rail", SPACE, "slider"),))

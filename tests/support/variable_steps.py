@@ -6,12 +6,12 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from constraint_handling import ConstraintHandling, project
 from scipy.integrate import solve_ivp
 
 from catenary.base.errors import InputError, RunBroken
 from catenary.mbs.rigid.bodies import Motion
 from catenary.mbs.rigid.system import System
-from catenary.mbs.time_steps.constraint_handling import ConstraintHandling, project
 
 
 class Trajectory(NamedTuple):
