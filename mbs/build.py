@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 import numpy as np
 
 from catenary.base.errors import InputError
-from catenary.mbs.air.air_forces import AirForces, SteadyForces
-from catenary.mbs.air.airflow import Airflow
-from catenary.mbs.control.regulation import Regulator
+from catenary.mbs.air import Airflow, AirForces, SteadyForces
+from catenary.mbs.control import Regulator
 from catenary.mbs.head.newmark_head import SteppedHead
 from catenary.mbs.head.wire_crossing import CrossingPath
 from catenary.mbs.interface import Pantograph

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from catenary.mbs.called_model import CalledModel
-from catenary.mbs.head.drives import drive_width, named
+from catenary.mbs.head.head_arrays import drive_width, named
 from catenary.mbs.head.newmark_head import SteppedHead, raised
 from catenary.mbs.interface import HeadState, Pantograph
 from catenary.mbs.vehicle.base_motion import BaseMotion

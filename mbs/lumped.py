@@ -10,9 +10,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from scipy import linalg
 
-from catenary.mbs.air.air_forces import ON_FRAME, ON_HEAD, AirForces
-from catenary.mbs.head.drives import named
-from catenary.mbs.head.head_arrays import LinearStep, SprungMasses
+from catenary.mbs.air import ON_FRAME, ON_HEAD, AirForces
+from catenary.mbs.head.head_arrays import LinearStep, SprungMasses, named
 from catenary.mbs.head.laws import LawsInPlace, in_place
 from catenary.mbs.head.newmark_head import Raising, SteppedHead, parts_of
 from catenary.mbs.head.wire_crossing import CrossingPath

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from catenary.mbs.air.uplift import Uplift
+from catenary.mbs.air import Uplift
 from catenary.mbs.head.laws import Law
 from catenary.mbs.head.strips import ONE_STRIP, HeadParts, Strips, Turning, head_parts
 

@@ -11,8 +11,7 @@ import numpy as np
 from catenary.cases.scene.input.case_files import CaseEntry
 from catenary.meshgen.line import Line
 from catenary.meshgen.wires import Role, Wire
-from catenary.postproc.evaluate.comparing import decimals_that_tell
-from catenary.postproc.evaluate.wording import counted, fixed
+from catenary.postproc.evaluate.wording import counted, decimals_that_tell, fixed
 from catenary.postproc.read.registration import Registration
 
 

@@ -1,4 +1,4 @@
-"""Arrays and numbers of heads as kernels take them; `solver/kernels/heads` says what each holds."""
+"""Records of heads, and rows that drive them, as kernels take them (`solver/kernels/heads`)."""
 
 from __future__ import annotations
 
@@ -67,3 +67,16 @@ class MechanismArrays(NamedTuple):
     tables: SplineTables
     weight: float
     zero: float
+
+
+N_DRIVE = native.DRIVE.itemsize // 8
+
+
+def drive_width(n_strips: int) -> int:
+    """Numbers of a step's row for a head with so many strips."""
+    return N_DRIVE + 2 * n_strips
+
+
+def named(rows: np.ndarray) -> np.ndarray:
+    """The numbers that have names of ``rows`` (..., width), a view of shape (...)."""
+    return rows[..., :N_DRIVE].view(native.DRIVE)[..., 0]

@@ -9,10 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from catenary.mbs.control.control_arrays import ControlArrays
-from catenary.mbs.control.regulation import Controller, Regulation, Regulator
-from catenary.mbs.head.drives import N_DRIVE, drive_width, named
-from catenary.mbs.head.head_arrays import HeadArrays, NewmarkFactors
+from catenary.mbs.control import ControlArrays, Controller, Regulation, Regulator
+from catenary.mbs.head.head_arrays import N_DRIVE, HeadArrays, NewmarkFactors, drive_width, named
 from catenary.mbs.head.laws import LawsInPlace, in_place
 from catenary.mbs.head.strips import HeadParts
 from catenary.mbs.head.wire_crossing import CrossingPath

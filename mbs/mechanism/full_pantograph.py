@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from catenary.base.errors import InputError, RunBroken
-from catenary.mbs.air.air_forces import ON_FRAME, ON_HEAD, SQUARE, AirForces
+from catenary.mbs.air import ON_FRAME, ON_HEAD, SQUARE, AirForces
 from catenary.mbs.head.newmark_head import Raising
 from catenary.mbs.head.wire_crossing import CrossingPath
 from catenary.mbs.interface import HeadState

@@ -1,4 +1,4 @@
-"""How the head of a multibody pantograph turns on its arm: inertia, springs and dampers of it.
+"""Roll and pitch of a head on its arm: inertia, stiffness and damping.
 
 All follow from the bodies, joints and forces themselves: the head turns as its joints allow, around
 where it rests, with the arm held.

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from catenary.base.errors import InputError, RunBroken
-from catenary.mbs.air.uplift import Uplift
+from catenary.mbs.air import Uplift
 from catenary.mbs.head.laws import Law
 from catenary.mbs.head.strips import ONE_STRIP, Strips
 from catenary.mbs.mechanism.reduction import ReducedMechanism, reduce_mechanism

@@ -21,9 +21,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from catenary.base.errors import RunBroken
-from catenary.mbs.air.air_forces import SQUARE, AirForces
-from catenary.mbs.head.drives import named
-from catenary.mbs.head.head_arrays import MechanismArrays, SprungMasses
+from catenary.mbs.air import SQUARE, AirForces
+from catenary.mbs.head.head_arrays import MechanismArrays, SprungMasses, named
 from catenary.mbs.head.laws import Law, in_place
 from catenary.mbs.head.newmark_head import Raising, SteppedHead, parts_of
 from catenary.mbs.head.strips import ONE_STRIP, Strips, Turning, head_parts

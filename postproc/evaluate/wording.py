@@ -1,6 +1,8 @@
-"""Numbers in sentences and tables: no negative zero, one rank and two ranks."""
+"""Numbers in sentences and tables: no negative zero, one rank and two ranks, decimals that tell."""
 
 from __future__ import annotations
+
+import math
 
 
 def fixed(value: float, digits: int) -> str:
@@ -12,3 +14,25 @@ def fixed(value: float, digits: int) -> str:
 def counted(number: int, noun: str, plural: str = "") -> str:
     """``1 rank``, ``2 ranks``; ``plural`` where an s at the end does not make it."""
     return f"{number} {noun if number == 1 else plural or f'{noun}s'}"
+
+
+# Further digits after which two numbers are printed in full.
+_MOST_MORE = 9
+
+
+def decimals_that_tell(value: float | None, limit: float | None, fewest: int) -> int:
+    """Decimals of a value and its limit with which different numbers print differently.
+
+    Parameters
+    ----------
+    value, limit : numbers in one unit; NaN and None are printed with ``fewest``
+    fewest : decimals where the two differ by enough [-]
+    """
+    if value is None or limit is None or not math.isfinite(value) or not math.isfinite(limit):
+        return fewest
+    if value == limit:
+        return fewest
+    for decimals in range(fewest, fewest + _MOST_MORE):
+        if f"{value:.{decimals}f}" != f"{limit:.{decimals}f}":
+            return decimals
+    return fewest + _MOST_MORE

@@ -19,12 +19,11 @@ from catenary.meshgen.slowest_wave import bends
 from catenary.postproc.channels.line_record import says
 from catenary.postproc.evaluate import statistics as stats
 from catenary.postproc.evaluate import verdict as acceptance
-from catenary.postproc.evaluate.comparing import decimals_that_tell
 from catenary.postproc.evaluate.error_indicators import Indicators, indicate
 from catenary.postproc.evaluate.remarks import all_remarks
 from catenary.postproc.evaluate.statistics import RunStatistics
 from catenary.postproc.evaluate.verdict import Criterion
-from catenary.postproc.evaluate.wording import counted, fixed
+from catenary.postproc.evaluate.wording import counted, decimals_that_tell, fixed
 from catenary.postproc.files.disk import write_into
 from catenary.postproc.read.records import Records
 from catenary.postproc.read.results import Results

@@ -6,19 +6,68 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from mpi4py import MPI
 
 from catenary.solver.contact.contact_wire import Candidates, ContactWires
-from catenary.solver.contact.contacts import Answers, Contacts, ContactWork, Gains, no_sideways
+from catenary.solver.contact.contacts import (
+    Across,
+    Answers,
+    Contacts,
+    ContactWork,
+    Gains,
+    Sideways,
+    no_sideways,
+)
 from catenary.solver.contact.followed_links import FollowedLinks, LinkCoupling
 from catenary.solver.contact.line_response import LineResponse
-from catenary.solver.contact.wires_across import WiresAcross, sideways_of
 from catenary.solver.integrators.line_integrator import LineIntegrator
 from catenary.solver.kernels import native
 from catenary.solver.linear.pieces.column_pieces import columns_of
 from catenary.solver.linear.unit_responses import NO_COLUMNS, STRETCH, ShortColumns
 from catenary.solver.model.model import Model
+from catenary.solver.model.partition import Ownership
 from catenary.solver.model.switching_links import LinkTable
 from catenary.solver.statics.form_finding.equilibrium import Equilibrium
+
+
+def sideways_of(
+    model: Model, form: Equilibrium, wires: ContactWires, ownership: Ownership
+) -> Sideways:
+    """Of a line with lateral motion, which is at rest in ``form``."""
+    dofs = np.stack([model.dofs(wires.mesh_nodes, name) for name in ("v", "theta_z")], axis=1)
+    mine = ownership.owned(dofs)
+    local = np.where(mine, dofs - ownership.first, 0).astype(np.int64)
+    assert form.lateral is not None
+    rest = np.stack([form.lateral.y, form.lateral.slope], axis=1)[wires.mesh_nodes]
+    return Sideways(local, mine, rest)
+
+
+class WiresAcross:
+    """Lateral motion of the contact wires at n contacts, summed over ranks.
+
+    It is taken after a free step, without what the step's contact forces and slack droppers add:
+    beside an arm h^2 / 4 times a force on some kilograms, less than 1e-4 m in steps of 1 ms.
+
+    Parameters
+    ----------
+    across : (3, n) what ``Across`` is on rank 0, row by row; overwritten
+
+    Attributes
+    ----------
+    share : Across of this rank
+    """
+
+    def __init__(self, comm: Any, across: np.ndarray) -> None:
+        self._comm, self._across = comm, across
+        self._share = across if comm.size == 1 else np.zeros(across.shape)
+        self.share = Across(*self._share)
+
+    def find(self, contacts: Contacts) -> None:
+        """Fill in where the contacts, which are located, meet the wires. Collective."""
+        native.find_across(contacts)
+        if self._comm.size > 1:
+            everything = self._across if self._comm.rank == 0 else None
+            self._comm.Reduce(self._share, everything, op=MPI.SUM, root=0)
 
 
 class ForcesOnLine:

@@ -1,8 +1,9 @@
 """The line advanced by the generalized-alpha method, of which HHT is a member.
 
-The method balances forces between two states, M a(1 - a_m) + C v(1 - a_f) + K d(1 - a_f) =
-f(1 - a_f). Let b be the acceleration that balances the forces at the end of each step itself,
-M b = f - C v - K d. As the equations are linear in M, C, K and f, the method is the same as
+The method balances forces between two states,
+M a(1 - a_m) + C v(1 - a_f) + K d(1 - a_f) = f(1 - a_f). Let b be the acceleration that balances
+the forces at the end of each step itself, M b = f - C v - K d. As the equations are linear in
+M, C, K and f, the method is the same as
 
     (1 - a_m) a_new + a_m a_old = (1 - a_f) b_new + a_f b_old                            (*)
 

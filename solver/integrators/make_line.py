@@ -1,4 +1,4 @@
-"""The one place that knows all methods that advance the line."""
+"""Newmark's method for the line (paper eqs. 2.4-2.6), and the choice between all methods."""
 
 from __future__ import annotations
 
@@ -13,12 +13,49 @@ from catenary.solver.integrators.detour import (
     method_detour,
 )
 from catenary.solver.integrators.line_integrator import LineIntegrator
-from catenary.solver.integrators.newmark import NewmarkLine
+from catenary.solver.integrators.line_state import PredictedLineState, Steps
+from catenary.solver.kernels import native
 from catenary.solver.linear.pieces.operator_pieces import WantedPieces
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import Ownership
 from catenary.solver.problem.integrator_parameters import NEWMARK, integration_of
 from catenary.solver.problem.problem import Numerics
+
+
+class NewmarkLine(LineIntegrator):
+    """The line by Newmark's method: sigma = beta dt^2, tau = gamma dt. Collective to make."""
+
+    def __init__(
+        self,
+        comm: Any,
+        model: Model,
+        ownership: Ownership,
+        numerics: Numerics,
+        wanted: WantedPieces | None = None,
+    ) -> None:
+        dt, beta, gamma = numerics.dt, numerics.beta, numerics.gamma
+        super().__init__(comm, model, ownership, beta * dt**2, gamma * dt, wanted)
+        self._steps = Steps(
+            dt,
+            0.5 * dt**2 * (1.0 - 2.0 * beta),
+            dt * (1.0 - gamma),
+            self._alpha_share,
+            self.position_factor,
+            self.velocity_factor,
+            self._beta_share,
+        )
+
+    def _ahead(self) -> tuple[PredictedLineState, Steps]:
+        operators, (shown, velocity, acceleration, _) = self.operators, self.motion.read
+        if not self._proportional:
+            velocity = operators.rate  # which products with C read
+        ahead = operators.factor, velocity, acceleration, shown
+        return PredictedLineState(*ahead, self._steps), self._steps
+
+    def predict(self) -> None:
+        """Turn displacement and velocity into their predictions of eq. (2.5)."""
+        arrays = self.displacement, self.velocity, self.acceleration, self.operators.factor
+        native.predict(*arrays, self._steps)
 
 
 def make_line(

@@ -15,9 +15,9 @@ import numpy as np
 from catenary.meshgen.mesh import LineMesh
 from catenary.meshgen.slopes import Slopes
 from catenary.meshgen.wires import Role
-from catenary.solver.model.links.links import Links
+from catenary.solver.model.links import Links
 from catenary.solver.model.loads import Load
-from catenary.solver.model.rest.rest_shape import Equilibrium
+from catenary.solver.model.rest_shape import Equilibrium
 from catenary.solver.model.unknowns.registry import Unknowns
 from catenary.solver.problem.problem import Problem
 from catenary.solver.problem.simulated import Simulated

@@ -23,8 +23,8 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from catenary.solver.kernels import native
-from catenary.solver.model.links.leaning import swings_of_droppers
-from catenary.solver.model.links.links import BOTH, NO_BENDS, PUSHES, Bends, Links
+from catenary.solver.model.link_directions import swings_of_droppers
+from catenary.solver.model.links import BOTH, NO_BENDS, PUSHES, Bends, Links
 from catenary.solver.model.model import Model
 
 _SIDES: tuple[Literal["left"], Literal["right"]] = ("left", "right")

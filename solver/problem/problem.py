@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from catenary.mbs.air.airflow import Tunnel
-from catenary.mbs.vehicle.motion_sources import VehicleMotion
+from catenary.mbs.air import Tunnel
+from catenary.mbs.vehicle.base_motion import VehicleMotion
 from catenary.meshgen.line import Line
 from catenary.meshgen.slowest_wave import slowest_wave
 from catenary.meshgen.wires import Role
@@ -23,8 +23,9 @@ from catenary.solver.problem.window import WindowChoice
 
 if TYPE_CHECKING:
     from catenary.mbs.build import PantographData
-    from catenary.mbs.control.regulation import Regulator
+    from catenary.mbs.control import Regulator
     from catenary.mbs.lowering import Lowering
+
 
 # Halvings of a step where the scene names no smallest one.
 DEFAULT_HALVINGS = 5

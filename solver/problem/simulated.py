@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from catenary.mbs.vehicle.motion_sources import VehicleMotion
+from catenary.mbs.vehicle.base_motion import VehicleMotion
 from catenary.mbs.vehicle.suspension import Vehicle
 from catenary.meshgen.wires import Profile, Role, Wire
 from catenary.solver.problem.along_track import Tensioner

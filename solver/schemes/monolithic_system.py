@@ -16,19 +16,19 @@ from collections.abc import Callable
 import numpy as np
 from scipy import sparse
 
-from catenary.mbs.air.air_forces import AirForces
+from catenary.mbs.air import AirForces
 from catenary.mbs.build import steady_forces
 from catenary.mbs.head.newmark_head import raised, raising_rate
 from catenary.mbs.lumped_data import LumpedData
-from catenary.solver.contact.train.air_around import airflow
 from catenary.solver.integrators.loads.line_loads import LineLoads
-from catenary.solver.model.elements.shape_functions import shape_slopes, shape_values
+from catenary.solver.model.elements.beam import shape_slopes, shape_values
 from catenary.solver.model.entries import iterate_entries
 from catenary.solver.model.model import Model
 from catenary.solver.model.switching_links import switching_links
 from catenary.solver.problem.contact_laws import LinearLaw
 from catenary.solver.problem.problem import Placement, Problem
 from catenary.solver.statics.form_finding.equilibrium import Equilibrium
+from catenary.solver.wind.wind_at import airflow
 
 
 class WholeSystem:

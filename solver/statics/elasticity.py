@@ -12,8 +12,8 @@ from scipy.sparse import linalg as sparse_linalg
 from catenary.meshgen.line import Line
 from catenary.meshgen.wires import Role
 from catenary.solver.effects.build_model import with_wires_apart
-from catenary.solver.model.links.directions import at_nodes, at_places
-from catenary.solver.model.links.links import Direction
+from catenary.solver.model.link_directions import at_nodes, at_places
+from catenary.solver.model.links import Direction
 from catenary.solver.model.matrices import part_of
 from catenary.solver.model.model import Model
 

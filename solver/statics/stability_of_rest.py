@@ -15,7 +15,7 @@ from scipy import linalg
 from catenary.base.errors import InputError
 from catenary.meshgen.wires import Role
 from catenary.solver.model.model import Model
-from catenary.solver.model.rest.rest_shape import Equilibrium
+from catenary.solver.model.rest_shape import Equilibrium
 
 
 def refuse_unstable(model: Model) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 from catenary.base.errors import InputError
 from catenary.meshgen.mesh import LineMesh
 from catenary.solver.model.model import Model
-from catenary.solver.model.rest.rest_shape import Equilibrium
+from catenary.solver.model.rest_shape import Equilibrium
 from catenary.solver.model.wire_ends import WireEnd, ends_of
 from catenary.solver.problem.problem import Problem
 from catenary.solver.statics.form_finding.equilibrium import find_form

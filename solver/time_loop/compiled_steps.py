@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from catenary.base.petsc_events import event
-from catenary.mbs.head.drives import drive_width
+from catenary.mbs.head.head_arrays import drive_width
 from catenary.solver.contact.contacts import Contacts
 from catenary.solver.contact.line_response import affine
 from catenary.solver.contact.train.pantographs import Pantographs, TrainPlaces

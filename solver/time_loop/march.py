@@ -46,9 +46,8 @@ from catenary.solver.statics.changed_line.after_incidents import (
 from catenary.solver.statics.elasticity import Elasticity
 from catenary.solver.statics.form_finding.equilibrium import Equilibrium
 from catenary.solver.time_loop.compiled_steps import compiled_steps
-from catenary.solver.time_loop.petsc_ts import ts_of
 from catenary.solver.time_loop.single_steps import single_steps_of
-from catenary.solver.time_loop.ts_stepper import Stepper
+from catenary.solver.time_loop.ts_stepper import Stepper, ts_of
 from catenary.solver.time_loop.views.audience import Audience
 from catenary.solver.time_loop.views.observers import Observer
 from catenary.solver.time_loop.views.step_views import Showing

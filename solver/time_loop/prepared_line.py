@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from catenary.base.errors import InputError, RunBroken
-from catenary.mbs.head.drives import N_DRIVE, drive_width
+from catenary.mbs.head.head_arrays import N_DRIVE, drive_width
 from catenary.mbs.head.newmark_head import SteppedHead
 from catenary.mbs.interface import Pantograph
 from catenary.mbs.lowering import LoweredPantograph

@@ -1,14 +1,60 @@
-"""The wind at moving places, such as those of pantographs."""
+"""Wind at moving places, and the airflow at the pantographs of the train."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
+
 import numpy as np
 
-from catenary.mbs.air.airflow import WindAt
+from catenary.mbs.air import Airflow, Tunnel, WindAt
+from catenary.meshgen.wires import Wire
+from catenary.solver.problem.problem import Placement, Problem
+from catenary.solver.problem.simulated import Simulated
 from catenary.solver.problem.wind import Wind
 from catenary.solver.wind.gust_field import GustField
-from catenary.solver.wind.mean_wind import directions, exposure
 from catenary.solver.wind.spectra import ACROSS, ALONG
+
+
+def exposure(wind: Wind, places: np.ndarray, tunnels: Sequence[Tunnel] = ()) -> np.ndarray:
+    """Speeds of mean and gusts at places [m] over those outside of stretches, shape as ``places``.
+
+    In tunnels there is no wind.
+    """
+    found = np.ones(places.shape)
+    for stretch in wind.stretches:
+        inside = (places >= stretch.start) & (places < stretch.end)
+        height = wind.height if stretch.height is None else stretch.height
+        found[inside] = stretch.factor * float(wind.profile.growth(height, wind.height))
+    for tunnel in tunnels:
+        found *= 1.0 - tunnel.depth(places)
+    return found
+
+
+def directions(wind: Wind) -> tuple[float, float]:
+    """Parts of a unit of mean wind with the train and to the left of it."""
+    along, across = math.cos(wind.direction), math.sin(wind.direction)
+    # Of a wind straight across nothing is left along the track but round-off, and so the other way.
+    return (0.0 if abs(along) < 1e-12 else along), (0.0 if abs(across) < 1e-12 else across)
+
+
+def across_at(wind: Wind, tunnels: tuple[Tunnel, ...], places: np.ndarray) -> np.ndarray:
+    """Mean wind to the left of the track at places [m/s], shape as ``places``."""
+    return directions(wind)[1] * wind.mean * exposure(wind, places, tunnels)
+
+
+def mean_load(
+    wind: Wind, tunnels: tuple[Tunnel, ...], wire: Wire, places: np.ndarray
+) -> np.ndarray:
+    """Mean lateral load on a wire at places [N/m], shape as ``places``; to the left positive."""
+    speed = across_at(wind, tunnels, places)
+    return np.asarray(0.5 * wind.density * drag_width(wire) * np.abs(speed) * speed)
+
+
+def drag_width(wire: Wire) -> float:
+    """Diameter times drag coefficient of a wire [m]."""
+    assert wire.diameter is not None  # check_wind has refused scenes without
+    return wire.diameter * wire.drag_coefficient
 
 
 def gust_points(spacing: float, start: float, end: float) -> np.ndarray:
@@ -63,3 +109,19 @@ def _sampled(
     now = (1.0 - share) * slices[row, column] + share * slices[row, column + 1]
     then = (1.0 - share) * slices[row + 1, column] + share * slices[row + 1, column + 1]
     return np.asarray((1.0 - later) * now + later * then)
+
+
+def airflow(problem: Problem, simulated: Simulated, placement: Placement) -> Airflow | None:
+    """The air that a pantograph meets on its way, None if it has no forces. Not collective."""
+    if not (simulated.meets_air and placement.data.meets_air):
+        return None
+    train, wind = problem.train, simulated.wind
+    masts = problem.line.support_positions
+    blowing = None if wind is None else wind_at(wind, float(masts[0]), float(masts[-1]))
+    return Airflow(
+        train.speed,
+        train.start - placement.behind,
+        problem.tunnels,
+        blowing,
+        placement.data.crosswind_factor,
+    )

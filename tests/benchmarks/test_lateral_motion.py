@@ -20,10 +20,10 @@ from catenary.cases.studies.choice.turns import RepeatedMarch, in_turns
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
 from catenary.solver.effects.effect import Effect
 from catenary.solver.model.builder import ModelBuilder
-from catenary.solver.model.distributed_loads import along
-from catenary.solver.model.links.links import Direction, law
+from catenary.solver.model.links import Direction, law
 from catenary.solver.model.loads import FieldLoad, FunctionLoad, ShapeLoad, harmonics
 from catenary.solver.statics.line_at_rest import line_at_rest
+from catenary.solver.wind.drag import along
 
 PLANE = ("v", "theta_z")
 WIND = 8.0  # [N/m]

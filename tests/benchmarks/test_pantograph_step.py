@@ -21,9 +21,8 @@ from catenary.mbs.build import Operation, PantographData, make_pantograph
 from catenary.mbs.head.strips import Strips, Suspension, Turning
 from catenary.mbs.head.wire_crossing import LateralPath
 from catenary.mbs.lumped_data import LumpedData
-from catenary.mbs.vehicle.base_motion import BaseMotion
+from catenary.mbs.vehicle.base_motion import BaseMotion, VehicleMotion
 from catenary.mbs.vehicle.irregularity import Irregularity
-from catenary.mbs.vehicle.motion_sources import VehicleMotion
 from catenary.solver.statics.elasticity import elasticity, middle_span
 from catenary.solver.statics.form_finding.equilibrium import find_form
 from catenary.solver.time_loop.march import March

@@ -20,7 +20,7 @@ from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.load import load_scene
 from catenary.solver.integrators.line_state import PredictedLineState, Steps
-from catenary.solver.integrators.newmark import NewmarkLine
+from catenary.solver.integrators.make_line import NewmarkLine
 from catenary.solver.integrators.two_pass_step import StationPasses
 from catenary.solver.kernels import aligned_arrays
 from catenary.solver.linear.factors.station_factors import station_factors

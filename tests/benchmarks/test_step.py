@@ -23,7 +23,7 @@ from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.load import load_scene
 from catenary.postproc.read.results import Results
-from catenary.solver.integrators.newmark import NewmarkLine
+from catenary.solver.integrators.make_line import NewmarkLine
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import distribute
 from catenary.solver.statics.line_at_rest import line_at_rest

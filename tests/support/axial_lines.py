@@ -9,7 +9,7 @@ from small_lines import HANGING, WHOLE, bare_wires, en50318_line
 
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE, LineMesh
 from catenary.meshgen.topologies.line_data import LineData
-from catenary.solver.model.rest.rest_shape import Equilibrium
+from catenary.solver.model.rest_shape import Equilibrium
 from catenary.solver.problem.problem import Problem
 
 AXIAL = frozenset({"axial_motion", "tensioners", "temperature"})

@@ -9,13 +9,13 @@ from dataclasses import replace
 import numpy as np
 from small_lines import BARE, EN_PANTOGRAPH, ac_simple_line, problem_of, train
 
-from catenary.mbs.air.uplift import Polynomial, Uplift
-from catenary.mbs.control.regulation import Regulation
+from catenary.mbs.air import Polynomial, Uplift
+from catenary.mbs.control import Regulation
 from catenary.mbs.head.flexure import Flexure
 from catenary.mbs.head.laws import Law
 from catenary.mbs.head.strips import Strips, Suspension, Turning
 from catenary.mbs.lowering import Lowering
-from catenary.mbs.vehicle.motion_sources import Harmonic, VehicleMotion
+from catenary.mbs.vehicle.base_motion import Harmonic, VehicleMotion
 from catenary.mbs.vehicle.suspension import Vehicle
 from catenary.meshgen.hardware import Fittings
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE, LineMesh

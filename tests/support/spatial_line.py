@@ -12,7 +12,7 @@ import numpy as np
 from axial_lines import square_of_curvature, square_of_slope
 
 from catenary.solver.model.model import Model
-from catenary.solver.model.rest.rest_shape import Equilibrium
+from catenary.solver.model.rest_shape import Equilibrium
 
 # Of a bar along itself [N/m].
 BAR = 1e7

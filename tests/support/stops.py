@@ -7,8 +7,8 @@ import numpy as np
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
 from catenary.solver.effects.effect import Effect
 from catenary.solver.model.builder import ModelBuilder
-from catenary.solver.model.links.directions import at_nodes, at_places, difference
-from catenary.solver.model.links.links import PULLS, PUSHES, law
+from catenary.solver.model.link_directions import at_nodes, at_places, difference
+from catenary.solver.model.links import PULLS, PUSHES, law
 from catenary.solver.time_loop.views.channels import ARM, Channel
 
 GAP, STIFFNESS = 4e-3, 2e5  # [m], [N/m] of an uplift stop

@@ -35,9 +35,8 @@ ROOMS = {
                 "topologies", "geometry", "chains", "division", "gmsh_lines", "reader", "build"),
     "mbs": (
         "frame", "interface", "rigid", "time_steps", "vehicle", "control", "head", "air",
-        "mechanism",
-        "lumped_data", "library", "response", "lumped", "called_model", "lowering", "roll", "shape",
-        "build",
+        "lumped_data", "mechanism", "library", "response", "lumped", "called_model", "lowering",
+        "roll", "shape", "build",
     ),
     "solver": (
         "kernels", "problem", "model", "wind", "ends", "effects", "linear", "statics",

@@ -18,8 +18,8 @@ from catenary.cases.scene.scene import Scene
 from catenary.mbs.head.flexure import Flexure
 from catenary.mbs.head.strips import Strips, Suspension, Turning
 from catenary.mbs.mechanism.pantograph_data import MultibodyData
+from catenary.mbs.vehicle.base_motion import Harmonic, Table, VehicleMotion
 from catenary.mbs.vehicle.irregularity import Irregularity
-from catenary.mbs.vehicle.motion_sources import Harmonic, Table, VehicleMotion
 
 CASE = "ac_simple"
 KIND = "pantographs.three_masses"

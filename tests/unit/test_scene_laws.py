@@ -11,7 +11,7 @@ from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.input.origin import Origin
 from catenary.cases.scene.load import load_scene, scene_from
 from catenary.cases.scene.scene import Scene
-from catenary.mbs.control.regulation import Regulation
+from catenary.mbs.control import Regulation
 from catenary.mbs.head.laws import Law
 from catenary.solver.effects import all_effects as effects
 

@@ -23,8 +23,8 @@ from catenary.meshgen.wires import Profile
 from catenary.solver.effects.build_model import build
 from catenary.solver.effects.effect import Effect, Limit, register, unregister
 from catenary.solver.model.builder import ModelBuilder
-from catenary.solver.model.links.directions import between_nodes
-from catenary.solver.model.links.links import law
+from catenary.solver.model.link_directions import between_nodes
+from catenary.solver.model.links import law
 from catenary.solver.model.matrices import whole_matrix
 from catenary.solver.problem.problem import Problem
 from catenary.solver.problem.simulated import Simulated

@@ -24,9 +24,8 @@ from catenary.mbs.rigid.forces import PointForce
 from catenary.mbs.rigid.joints import Fixed, PrescribedPoint, Prismatic, constant
 from catenary.mbs.rigid.kinematics import Law
 from catenary.mbs.rigid.statics import equilibrium
-from catenary.mbs.vehicle.base_motion import BaseMotion
+from catenary.mbs.vehicle.base_motion import BaseMotion, Harmonic, Table, VehicleMotion
 from catenary.mbs.vehicle.irregularity import SPECTRA, Irregularity
-from catenary.mbs.vehicle.motion_sources import Harmonic, Table, VehicleMotion
 
 SHORTEST, LONGEST = 3.0, 100.0
 

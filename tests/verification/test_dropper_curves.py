@@ -24,7 +24,7 @@ from catenary.meshgen.topologies.line_data import LineData
 from catenary.solver.contact_problem.dense_systems import Signs, System, room_for
 from catenary.solver.contact_problem.pivoting import pivot
 from catenary.solver.kernels import native
-from catenary.solver.model.elements.shape_functions import shape_values
+from catenary.solver.model.elements.beam import shape_values
 from catenary.solver.model.matrices import whole_matrix
 from catenary.solver.model.model import Model
 from catenary.solver.problem.defects import LooseClamp

@@ -25,8 +25,8 @@ from catenary.solver.effects.effect import Effect
 from catenary.solver.effects.shipped import lateral_effects
 from catenary.solver.model import switching_links
 from catenary.solver.model.builder import ModelBuilder
-from catenary.solver.model.links.leaning import sideways_of_droppers
-from catenary.solver.model.links.links import Direction
+from catenary.solver.model.link_directions import sideways_of_droppers
+from catenary.solver.model.links import Direction
 from catenary.solver.model.model import Block, Model
 
 README = (shipped()["ac_simple_3d"].parent / "README.md").read_text(encoding="utf-8")

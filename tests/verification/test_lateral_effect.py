@@ -19,11 +19,11 @@ from catenary.solver.effects import all_effects as effects
 from catenary.solver.effects.effect import Effect, register
 from catenary.solver.integrators.make_line import make_line
 from catenary.solver.model.builder import ModelBuilder
-from catenary.solver.model.distributed_loads import along
 from catenary.solver.model.loads import ShapeLoad
 from catenary.solver.model.partition import distribute
 from catenary.solver.problem.problem import Damping, Problem
 from catenary.solver.statics.form_finding.equilibrium import find_form
+from catenary.solver.wind.drag import along
 
 NAME = "lateral_wind"
 PLANE = ("v", "theta_z")

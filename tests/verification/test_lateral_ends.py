@@ -20,8 +20,7 @@ from catenary.solver.ends.half_lines import chain_at, half_lines
 from catenary.solver.ends.line_beyond import END, START, span_between
 from catenary.solver.model.loads import ShapeLoad, table
 from catenary.solver.model.model import Model
-from catenary.solver.model.rest.lateral_shape import LateralShape
-from catenary.solver.model.rest.rest_shape import Equilibrium
+from catenary.solver.model.rest_shape import Equilibrium, LateralShape
 from catenary.solver.problem.ends import EndCondition, Fixed, Periodic
 from catenary.solver.problem.problem import Damping
 from catenary.solver.statics.form_finding.equilibrium import find_form

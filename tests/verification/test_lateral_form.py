@@ -20,7 +20,7 @@ from catenary.meshgen.hardware import DropperKind, SteadyArm
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
 from catenary.meshgen.topologies.line_data import LineData
 from catenary.meshgen.wires import Conductor
-from catenary.solver.model.rest.lateral_shape import LateralShape
+from catenary.solver.model.rest_shape import LateralShape
 from catenary.solver.statics.elasticity import elasticity
 from catenary.solver.statics.form_finding.equilibrium import Equilibrium, find_form
 

@@ -31,8 +31,8 @@ from small_lines import (
 
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
 from catenary.meshgen.wires import Conductor
-from catenary.solver.model.distributed_loads import along
 from catenary.solver.statics.form_finding.equilibrium import find_form
+from catenary.solver.wind.drag import along
 
 LATERAL = frozenset({"lateral_motion"})
 EPS = np.finfo(float).eps

@@ -16,8 +16,8 @@ from catenary.meshgen.wires import worn_bending
 from catenary.solver.effects.effect import Effect
 from catenary.solver.model.builder import ModelBuilder
 from catenary.solver.model.elements import beam
-from catenary.solver.model.links.directions import between_nodes
-from catenary.solver.model.links.links import PULLS, law
+from catenary.solver.model.link_directions import between_nodes
+from catenary.solver.model.links import PULLS, law
 from catenary.solver.model.model import Model
 from catenary.solver.problem.defects import (
     Defect,

@@ -32,8 +32,8 @@ from stops import (
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE, LineMesh
 from catenary.solver.effects.effect import Effect
 from catenary.solver.model.builder import ModelBuilder
-from catenary.solver.model.links.directions import at_nodes
-from catenary.solver.model.links.links import BOTH, NO_BENDS, PULLS, PUSHES, Bends, law
+from catenary.solver.model.link_directions import at_nodes
+from catenary.solver.model.links import BOTH, NO_BENDS, PULLS, PUSHES, Bends, law
 from catenary.solver.problem.problem import Damping, Problem
 from catenary.solver.schemes.monolithic_system import WholeSystem
 from catenary.solver.statics.form_finding.equilibrium import find_form

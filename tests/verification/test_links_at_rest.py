@@ -11,8 +11,8 @@ from small_lines import HANGING, en50318_line, mesh_of, problem_of
 from catenary.meshgen.mesh import CONTACT_WIRE
 from catenary.solver.effects.effect import Effect
 from catenary.solver.model.builder import ModelBuilder
-from catenary.solver.model.links.directions import at_nodes
-from catenary.solver.model.links.links import law
+from catenary.solver.model.link_directions import at_nodes
+from catenary.solver.model.links import law
 from catenary.solver.statics.form_finding.equilibrium import find_form
 
 PULL, PLACE = 80.0, 86.75

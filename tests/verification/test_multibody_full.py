@@ -22,8 +22,7 @@ from catenary.mbs.response.linearisation import linearise
 from catenary.mbs.rigid.joints import PrescribedAngle
 from catenary.mbs.rigid.spin_locks import without_spins
 from catenary.mbs.time_steps.step_solvers import METHODS
-from catenary.mbs.vehicle.base_motion import BaseMotion
-from catenary.mbs.vehicle.motion_sources import Table, VehicleMotion
+from catenary.mbs.vehicle.base_motion import BaseMotion, Table, VehicleMotion
 
 STATIC, HEIGHT, DT = 150.0, 5.08, 1e-3
 WIRE = 5e4  # [N/m] contact, on a wire that does not give way

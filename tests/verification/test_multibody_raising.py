@@ -17,8 +17,7 @@ from catenary.mbs.mechanism.reduction import ReducedMechanism, reduce_mechanism
 from catenary.mbs.rigid.forces import PointForce
 from catenary.mbs.rigid.joints import PrescribedPoint, constant
 from catenary.mbs.rigid.statics import calibrate_actuator, equilibrium
-from catenary.mbs.vehicle.base_motion import BaseMotion
-from catenary.mbs.vehicle.motion_sources import Harmonic, VehicleMotion
+from catenary.mbs.vehicle.base_motion import BaseMotion, Harmonic, VehicleMotion
 
 EPS = np.finfo(float).eps
 ARM, HEAD = ambrosio.STABILISATION_ARM, ambrosio.HEAD

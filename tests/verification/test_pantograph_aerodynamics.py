@@ -10,8 +10,7 @@ import pytest
 from measuring import check, march
 from small_lines import EN_PANTOGRAPH, WHOLE, en50318_line, mesh_of, numerics, problem_of, train
 
-from catenary.mbs.air.airflow import Airflow, Tunnel
-from catenary.mbs.air.uplift import Polynomial, Uplift
+from catenary.mbs.air import Airflow, Polynomial, Tunnel, Uplift
 from catenary.mbs.build import Operation, make_pantograph, steady_forces
 from catenary.mbs.head.strips import Strips, Suspension
 from catenary.mbs.interface import Pantograph

@@ -30,7 +30,7 @@ from catenary.solver.contact.train.head_states import Heads
 from catenary.solver.contact_problem.complementarity import InnerProblem
 from catenary.solver.contact_problem.law_tangents import LinearInSteps
 from catenary.solver.kernels import native
-from catenary.solver.model.links.leaning import swings_of_droppers
+from catenary.solver.model.link_directions import swings_of_droppers
 from catenary.solver.problem.contact_laws import LinearLaw
 from catenary.solver.statics.form_finding.equilibrium import find_form
 

@@ -19,7 +19,7 @@ from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.load import load_scene
 from catenary.solver.model.model import Model
-from catenary.solver.model.rest.rest_shape import Equilibrium
+from catenary.solver.model.rest_shape import Equilibrium
 from catenary.solver.statics.form_finding.equilibrium import find_form
 
 TENSION, SPAN, BENDING = 10e3, 30.0, 110.0

@@ -9,7 +9,7 @@ import pytest
 from measuring import History, check, start_march
 from small_lines import EN_PANTOGRAPH, WHOLE, en50318_line, mesh_of, numerics, problem_of, train
 
-from catenary.mbs.control.regulation import Regulation
+from catenary.mbs.control import Regulation
 from catenary.mbs.head.laws import Law
 from catenary.solver.problem.contact_laws import LinearLaw
 

@@ -17,7 +17,7 @@ from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of, trai
 
 from catenary.meshgen.mesh import CONTACT_WIRE, LineMesh
 from catenary.meshgen.topologies.line_data import LineData
-from catenary.solver.model.elements.shape_functions import shape_values
+from catenary.solver.model.elements.beam import shape_values
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import distribute
 from catenary.solver.problem.incidents import DropperBreak

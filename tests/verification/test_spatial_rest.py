@@ -15,7 +15,7 @@ from catenary.meshgen.curve import Curve
 from catenary.meshgen.mesh import CONTACT_WIRE
 from catenary.meshgen.topologies.line_data import LineData
 from catenary.solver.model.model import Model
-from catenary.solver.model.rest.rest_shape import Equilibrium
+from catenary.solver.model.rest_shape import Equilibrium
 from catenary.solver.problem.along_track import AlongTrack
 from catenary.solver.problem.irregularities import Irregularities, LengthErrors
 from catenary.solver.problem.problem import Problem

@@ -10,9 +10,8 @@ import pytest
 from measuring import check
 from scipy.integrate import solve_ivp
 
-from catenary.mbs.vehicle.base_motion import BaseMotion
+from catenary.mbs.vehicle.base_motion import BaseMotion, Table, VehicleMotion
 from catenary.mbs.vehicle.irregularity import Irregularity
-from catenary.mbs.vehicle.motion_sources import Table, VehicleMotion
 from catenary.mbs.vehicle.suspension import GRAVITY, Sideways, Vehicle, matrices, transfer
 
 # Of a coach, after the Manchester benchmarks (S. Iwnicki, Vehicle System Dynamics 30, 1998).

@@ -8,7 +8,7 @@ from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import LineMesh
 from catenary.meshgen.wires import End
 from catenary.postproc.read.registration import Registration
-from catenary.solver.model.rest.rest_shape import Equilibrium
+from catenary.solver.model.rest_shape import Equilibrium
 
 
 def installed(line: Line, mesh: LineMesh, height: np.ndarray) -> dict[str, np.ndarray]:

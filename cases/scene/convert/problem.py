@@ -24,7 +24,7 @@ from catenary.cases.scene.convert.train.vehicle import vehicle_of
 from catenary.cases.scene.tables.line.line import LineTable
 from catenary.cases.scene.tables.run.window import WindowTable
 from catenary.cases.scene.tables.units import speed_from_km_h
-from catenary.mbs.vehicle.motion_sources import VehicleMotion
+from catenary.mbs.vehicle.base_motion import VehicleMotion
 from catenary.solver.problem.problem import Damping, Numerics, Placement, Problem, Train
 from catenary.solver.problem.window import BOUNDED, WindowChoice
 from catenary.solver.window.choice import spans_of_window

@@ -13,8 +13,8 @@ from scipy.sparse import csr_matrix
 
 from catenary.solver.integrators.loads.line_loads import LineLoads
 from catenary.solver.linear.halo import Subdomain
-from catenary.solver.model.links.leaning import swings_of_droppers
-from catenary.solver.model.links.links import Direction
+from catenary.solver.model.link_directions import swings_of_droppers
+from catenary.solver.model.links import Direction
 from catenary.solver.model.loads import MemoryLoad
 from catenary.solver.model.matrices import whole_matrix
 from catenary.solver.model.model import Model

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from catenary.cases.studies.hard.runs import Watched
-from catenary.solver.model.elements.shape_functions import shape_slopes
+from catenary.solver.model.elements.beam import shape_slopes
 from catenary.solver.problem.incidents import DropperBreak, LineIncident, in_steps
 from catenary.solver.statics.line_at_rest import LineAtRest
 

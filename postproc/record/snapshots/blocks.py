@@ -14,7 +14,7 @@ import numpy as np
 from catenary.meshgen.curve import Curve
 from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import DROPPERS, LineMesh
-from catenary.solver.model.rest.lateral_shape import LateralShape
+from catenary.solver.model.rest_shape import LateralShape
 
 CLAMPS, ARMS, MASTS = "clamps", "steady_arms", "masts"
 # Parts of a line that are no wires.

@@ -13,7 +13,7 @@ import numpy as np
 from catenary.base.parallel import on_root
 from catenary.mbs.build import Operation, has_joints, make_pantograph, steady_forces
 from catenary.mbs.called_model import CalledModel
-from catenary.mbs.head.drives import N_DRIVE, named
+from catenary.mbs.head.head_arrays import N_DRIVE, named
 from catenary.mbs.head.newmark_head import SteppedHead
 from catenary.mbs.head.wire_crossing import CrossingPath, FollowedPath, LateralPath, SeveralPaths
 from catenary.mbs.interface import Pantograph
@@ -23,7 +23,6 @@ from catenary.mbs.roll import roll_of
 from catenary.mbs.vehicle.base_motion import BaseMotion
 from catenary.solver.contact.contact_wire import Candidates, ContactWires
 from catenary.solver.contact.contacts import no_work
-from catenary.solver.contact.train.air_around import airflow
 from catenary.solver.contact.train.head_states import Heads
 from catenary.solver.contact.train.raked_strips import Leads, leads_of
 from catenary.solver.kernels import native
@@ -31,6 +30,7 @@ from catenary.solver.problem.contact_laws import ContactLaw, KinematicLaw
 from catenary.solver.problem.problem import Placement, Problem
 from catenary.solver.problem.simulated import Simulated
 from catenary.solver.statics.elasticity import Elasticity
+from catenary.solver.wind.wind_at import airflow
 
 if TYPE_CHECKING:
     from catenary.mbs.mechanism.full_pantograph import FullPantograph

@@ -11,9 +11,8 @@ from catenary.meshgen.wires import End
 from catenary.solver.effects.effect import Effect, register
 from catenary.solver.effects.shipped import vertical_effects  # noqa: F401  (built before)
 from catenary.solver.model import axial_elements, wire_ends
-from catenary.solver.model.links.directions import between_nodes
-from catenary.solver.model.links.leaning import across_droppers
-from catenary.solver.model.links.links import PULLS, PUSHES, Direction, law, slips
+from catenary.solver.model.link_directions import across_droppers, between_nodes
+from catenary.solver.model.links import PULLS, PUSHES, Direction, law, slips
 from catenary.solver.model.model import Block
 from catenary.solver.model.unknowns.stations import SAME_STATION
 from catenary.solver.problem.problem import Problem

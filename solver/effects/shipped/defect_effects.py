@@ -11,7 +11,7 @@ import numpy as np
 from catenary.meshgen.line import Line
 from catenary.solver.effects.effect import Effect, register
 from catenary.solver.effects.shipped import irregularity_effects  # noqa: F401  (built before)
-from catenary.solver.model.links.directions import at_places
+from catenary.solver.model.link_directions import at_places
 from catenary.solver.model.model import Block
 from catenary.solver.problem.defects import (
     HardSpot,

@@ -9,8 +9,8 @@ import numpy as np
 
 from catenary.solver.effects.effect import Effect, register
 from catenary.solver.effects.shipped import vertical_effects  # noqa: F401  (built before)
-from catenary.solver.model.links.directions import at_nodes, at_places
-from catenary.solver.model.links.links import PULLS, law
+from catenary.solver.model.link_directions import at_nodes, at_places
+from catenary.solver.model.links import PULLS, law
 from catenary.solver.problem.watched_links import UPLIFT_STOPS
 
 if TYPE_CHECKING:

@@ -9,9 +9,8 @@ import numpy as np
 
 from catenary.solver.effects.effect import Effect, register
 from catenary.solver.effects.shipped import vertical_effects  # noqa: F401  (built before)
-from catenary.solver.model.links.directions import between_nodes
-from catenary.solver.model.links.leaning import sideways_of_droppers
-from catenary.solver.model.links.links import Direction, law
+from catenary.solver.model.link_directions import between_nodes, sideways_of_droppers
+from catenary.solver.model.links import Direction, law
 from catenary.solver.model.model import Block
 
 if TYPE_CHECKING:

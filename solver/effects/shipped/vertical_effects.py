@@ -5,11 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from catenary.mbs.roll import roll_of
+from catenary.meshgen.wires import Profile
 from catenary.solver.effects.effect import Effect, Limit, register
-from catenary.solver.effects.shipped import target_heights
-from catenary.solver.model.links.directions import between_nodes
-from catenary.solver.model.links.links import law
+from catenary.solver.model.link_directions import between_nodes
+from catenary.solver.model.links import law
 from catenary.solver.problem.contact_laws import KinematicLaw
 from catenary.solver.problem.incidents import DropperBreak, LineIncident, TensionLoss
 from catenary.solver.problem.problem import Problem, slowest_wave_speed
@@ -18,6 +20,16 @@ from catenary.solver.problem.simulated import Simulated, TargetHeight
 if TYPE_CHECKING:
     from catenary.meshgen.hardware import SteadyArms
     from catenary.solver.model.builder import ModelBuilder
+
+
+def pre_sag(wanted: Profile, x: np.ndarray) -> np.ndarray:
+    """Minus the pre-sag at positions ``x``, shape as ``x`` [m]."""
+    return -wanted.pre_sag(x)
+
+
+def transition(wanted: Profile, x: np.ndarray) -> np.ndarray:
+    """Rise towards the tensioners in the transition spans, shape as ``x`` [m]."""
+    return np.asarray(wanted.level(x) - wanted.base(x))
 
 
 def _vertical(builder: ModelBuilder) -> None:
@@ -152,7 +164,7 @@ register(
         default=True,
         requires=("gravity",),
         applies=lambda p: any(any(wanted.sag) for wanted in p.line.profiles),
-        law=lambda laws, p: _shaped(laws, target_heights.pre_sag),
+        law=lambda laws, p: _shaped(laws, pre_sag),
         data="line.dropper.pre_sag_mm or pre_sag_mid_mm other than 0",
     )
 )
@@ -164,7 +176,7 @@ register(
         "paper section 5, figure 4",
         default=True,
         applies=lambda p: any(wanted.rises for wanted in p.line.profiles),
-        law=lambda laws, p: _shaped(laws, target_heights.transition),
+        law=lambda laws, p: _shaped(laws, transition),
         data="line.transition with a rise_m",
     )
 )

@@ -1,5 +1,5 @@
 #pragma once
-// A regulated lift: filter, samples, gains, limits, delay. See mbs/control/regulation.py.
+// A regulated lift: filter, samples, gains, limits, delay. See mbs/control.py.
 #include "base/arrays.hpp"
 #include "base/record.hpp"
 

@@ -47,12 +47,12 @@ from catenary.solver.linear.step_operators import LineOperators
 from catenary.solver.linear.unit_responses import Windows
 from catenary.solver.model.elements import beam
 from catenary.solver.model.entries import iterate_entries
-from catenary.solver.model.links.links import Direction
+from catenary.solver.model.links import Direction
 from catenary.solver.model.loads import ShapeLoad
 from catenary.solver.model.matrices import whole_matrix
 from catenary.solver.model.model import Model, wire_elements
 from catenary.solver.model.partition import Ownership
-from catenary.solver.model.rest.rest_shape import Equilibrium
+from catenary.solver.model.rest_shape import Equilibrium
 from catenary.solver.model.switching_links import switching_links
 from catenary.solver.model.wire_ends import tensioned_ends
 from catenary.solver.problem.incidents import DropperBreak, LineIncident

@@ -8,7 +8,7 @@ from catenary.base.errors import InputError
 from catenary.solver.effects.all_effects import simulated
 from catenary.solver.effects.build_model import build
 from catenary.solver.model.model import Model
-from catenary.solver.model.rest.rest_shape import Equilibrium
+from catenary.solver.model.rest_shape import Equilibrium
 from catenary.solver.problem.problem import Problem
 from catenary.solver.statics.changed_line.potential import Potential
 from catenary.solver.statics.changed_line.rest_nearby import RestNearby, where

@@ -21,7 +21,7 @@ from catenary.meshgen.wires import Wire
 from catenary.solver.model.axial_elements import curve_rows, shape_of
 from catenary.solver.model.elements import beam
 from catenary.solver.model.model import Model, wire_elements
-from catenary.solver.model.rest.rest_shape import Equilibrium
+from catenary.solver.model.rest_shape import Equilibrium
 
 # Components of a dropper's vector and of an arm's.
 _DROPPER, _ARM = ("u", "v", "w"), ("v", "w", "u")

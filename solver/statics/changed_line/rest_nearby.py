@@ -22,7 +22,7 @@ from catenary.base.errors import InputError
 from catenary.solver.effects import all_effects as effects
 from catenary.solver.effects.build_model import build
 from catenary.solver.model.model import Model
-from catenary.solver.model.rest.rest_shape import Equilibrium
+from catenary.solver.model.rest_shape import Equilibrium
 from catenary.solver.model.wire_ends import tensioned_ends
 from catenary.solver.statics.changed_line.potential import Potential
 from catenary.solver.statics.changed_line.tensioned_end import TensionedEnd

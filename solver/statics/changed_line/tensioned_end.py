@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from catenary.solver.model.model import Model
-from catenary.solver.model.rest.rest_shape import Equilibrium
+from catenary.solver.model.rest_shape import Equilibrium
 from catenary.solver.model.wire_ends import WireEnd
 
 # Forces that are one [N].

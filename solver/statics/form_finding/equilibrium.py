@@ -20,8 +20,8 @@ from catenary.meshgen.wires import Wire
 from catenary.solver.effects import all_effects as effects
 from catenary.solver.effects.build_model import build
 from catenary.solver.model.model import Model
-from catenary.solver.model.rest.lateral_shape import LateralShape
-from catenary.solver.model.rest.rest_shape import Equilibrium as Equilibrium
+from catenary.solver.model.rest_shape import Equilibrium as Equilibrium
+from catenary.solver.model.rest_shape import LateralShape
 from catenary.solver.problem.problem import Problem
 from catenary.solver.statics.changed_line.as_hung import errors_of_length, hang
 from catenary.solver.statics.form_finding.banded_factors import BandedFactors

@@ -13,8 +13,7 @@ from scipy.sparse import linalg as sparse_linalg
 from catenary.base.errors import InputError
 from catenary.meshgen.hardware import SteadyArms
 from catenary.solver.model.model import Model
-from catenary.solver.model.rest.lateral_shape import LateralShape
-from catenary.solver.model.rest.rest_shape import Equilibrium
+from catenary.solver.model.rest_shape import Equilibrium, LateralShape
 from catenary.solver.statics.form_finding.repeated_ends import repeated_ends, settled
 from catenary.solver.statics.form_finding.sparse_sum import (
     clamp_parts,

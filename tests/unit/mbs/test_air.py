@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 from measuring import check
 
-from catenary.mbs.air.air_forces import AirForces
-from catenary.mbs.air.airflow import Airflow, Tunnel
-from catenary.mbs.air.uplift import Polynomial, Table, Uplift
+from catenary.mbs.air import Airflow, AirForces, Polynomial, Table, Tunnel, Uplift
 
 # DSA380, by the speed in km/h: 0.00095 v^2 + 0.0017 v - 0.2 N.
 DSA380 = Polynomial((-0.2, 0.0017 * 3.6, 0.00095 * 3.6**2))

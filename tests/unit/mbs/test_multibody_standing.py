@@ -10,7 +10,7 @@ import pytest
 from measuring import check
 
 from catenary.base.errors import InputError, RunBroken
-from catenary.mbs.air.airflow import Airflow
+from catenary.mbs.air import Airflow
 from catenary.mbs.build import Operation, make_pantograph, raising_data
 from catenary.mbs.mechanism.pantograph_data import MultibodyData, describe, reduced, stand
 from catenary.mbs.mechanism.reduced_pantograph import RaisingPantograph

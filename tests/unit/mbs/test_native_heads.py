@@ -7,8 +7,14 @@ import gc
 import numpy as np
 import pytest
 
-from catenary.mbs.head.drives import drive_width, named
-from catenary.mbs.head.head_arrays import HeadArrays, LinearStep, NewmarkFactors, SplineTables
+from catenary.mbs.head.head_arrays import (
+    HeadArrays,
+    LinearStep,
+    NewmarkFactors,
+    SplineTables,
+    drive_width,
+    named,
+)
 from catenary.mbs.lumped import LumpedPantograph
 from catenary.mbs.lumped_data import LumpedData
 from catenary.solver.kernels import native

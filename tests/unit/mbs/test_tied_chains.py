@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from catenary.cases.run.describe.pantographs import description_of
-from catenary.mbs.head.drives import drive_width
+from catenary.mbs.head.head_arrays import drive_width
 from catenary.mbs.library import READY
 from catenary.mbs.lowering import Lowering
 from catenary.mbs.lumped import LumpedPantograph

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from catenary.cases.terminal.terminal_text import summary_text
-from catenary.postproc.evaluate.comparing import decimals_that_tell
+from catenary.postproc.evaluate.wording import decimals_that_tell
 
 
 @pytest.mark.parametrize(

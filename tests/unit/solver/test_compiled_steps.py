@@ -13,9 +13,8 @@ from measuring import registered, start_march
 from small_lines import WHOLE, ac_simple_line, mesh_of, numerics, problem_of, train
 
 from catenary.base.errors import RunBroken
-from catenary.mbs.air.airflow import Tunnel
-from catenary.mbs.air.uplift import Polynomial, Uplift
-from catenary.mbs.control.regulation import Regulation
+from catenary.mbs.air import Polynomial, Tunnel, Uplift
+from catenary.mbs.control import Regulation
 from catenary.mbs.head.flexure import Flexure
 from catenary.mbs.head.laws import Law
 from catenary.mbs.head.strips import Strips, Suspension, Turning
@@ -23,14 +22,13 @@ from catenary.mbs.lowering import Lowering
 from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.mechanism.full_pantograph import FullPantograph
 from catenary.mbs.rigid.forces import PointForce
+from catenary.mbs.vehicle.base_motion import Harmonic, VehicleMotion
 from catenary.mbs.vehicle.irregularity import Irregularity
-from catenary.mbs.vehicle.motion_sources import Harmonic, VehicleMotion
 from catenary.meshgen.mesh import CONTACT_WIRE, LineMesh
 from catenary.solver.contact_problem import complementarity
 from catenary.solver.effects.effect import Effect
 from catenary.solver.integrators.loads import line_loads
 from catenary.solver.model.builder import ModelBuilder
-from catenary.solver.model.distributed_loads import along
 from catenary.solver.model.loads import FieldLoad, FunctionLoad, ShapeLoad, harmonics, table
 from catenary.solver.problem.contact_laws import HertzLaw, KinematicLaw, LinearLaw
 from catenary.solver.problem.problem import Placement, Problem
@@ -38,6 +36,7 @@ from catenary.solver.schemes.one_solve import OneSolve
 from catenary.solver.time_loop import march as time_loop
 from catenary.solver.time_loop.march import Outcome
 from catenary.solver.time_loop.views.observers import Observer, Stage, StepView
+from catenary.solver.wind.drag import along
 
 LINE = replace(ac_simple_line(4), stagger=(0.2, -0.2, 0.2, -0.2, 0.2))
 TWO = LumpedData((7.2, 15.0), (4200.0, 50.0), (10.0, 90.0))

@@ -12,7 +12,6 @@ from catenary.solver.effects.build_model import build
 from catenary.solver.integrators.loads import line_loads
 from catenary.solver.integrators.loads.line_loads import LineLoads
 from catenary.solver.linear.halo import Subdomain
-from catenary.solver.model.distributed_loads import along
 from catenary.solver.model.loads import (
     FieldLoad,
     FunctionLoad,
@@ -21,6 +20,7 @@ from catenary.solver.model.loads import (
     harmonics,
     table,
 )
+from catenary.solver.wind.drag import along
 
 NOBODY = np.zeros(0, dtype=np.int64)
 WHOLE = Subdomain(0, 12, 0, 12, 0, 12)

@@ -7,8 +7,7 @@ from collections.abc import Sequence
 from catenary.cases.scene.tables.line.track.tunnels import TunnelTable
 from catenary.cases.scene.tables.train.aerodynamics import AerodynamicsTable, UpliftTable
 from catenary.cases.scene.tables.units import speed_from_km_h
-from catenary.mbs.air.airflow import Tunnel
-from catenary.mbs.air.uplift import Polynomial, Table, Uplift
+from catenary.mbs.air import Polynomial, Table, Tunnel, Uplift
 
 
 def uplift_of(table: AerodynamicsTable | None, reversed: bool) -> Uplift | None:

@@ -11,7 +11,7 @@ from catenary.cases.scene.tables.train.laws import (
     PneumaticDamperTable,
     RegulationTable,
 )
-from catenary.mbs.control.regulation import Regulation
+from catenary.mbs.control import Regulation
 from catenary.mbs.head.laws import Law
 
 # Where the free side of a limiter begins [m]: its force is zero from there up to its rise.

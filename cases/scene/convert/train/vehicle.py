@@ -10,8 +10,8 @@ from catenary.cases.scene.tables.train.vehicle import (
     VehicleTable,
 )
 from catenary.cases.scene.tables.units import angle_from_deg
+from catenary.mbs.vehicle.base_motion import Harmonic, Source, Table, VehicleMotion
 from catenary.mbs.vehicle.irregularity import Irregularity
-from catenary.mbs.vehicle.motion_sources import Harmonic, Source, Table, VehicleMotion
 from catenary.mbs.vehicle.suspension import Sideways, Vehicle
 
 

@@ -1,4 +1,4 @@
-"""Droppers that lean: their directions, and what their force does across them."""
+"""Directions of links in the unknowns of a model: at nodes, between them, and within elements."""
 
 from __future__ import annotations
 
@@ -6,17 +6,55 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from catenary.solver.model.links.directions import between_nodes
-from catenary.solver.model.links.links import Direction
+from catenary.solver.model.elements.beam import shape_values
+from catenary.solver.model.links import Direction
 
 if TYPE_CHECKING:
     from catenary.solver.model.model import Model
+
+
+def at_nodes(model: Model, nodes: np.ndarray, unknown: str = "w") -> Direction:
+    """Stretch that is the displacement of a node each, ``nodes`` (n,): links to the ground."""
+    unknowns = model.dofs(nodes, unknown)[:, None]
+    return Direction(unknowns, np.ones(unknowns.shape))
+
+
+def between_nodes(model: Model, pairs: np.ndarray, unknown: str = "w") -> Direction:
+    """Displacement of the first node less that of the second, ``pairs`` (n, 2)."""
+    unknowns = model.dofs(pairs, unknown)
+    return Direction(unknowns, np.broadcast_to(np.array([1.0, -1.0]), unknowns.shape))
+
+
+def at_places(
+    model: Model, wire: str, x: np.ndarray, plane: tuple[str, str] = ("w", "theta_y")
+) -> Direction:
+    """Deflection of a wire at places ``x`` (n,) [m], which may be between its nodes.
+
+    By the Hermite functions of the element there, in a ``plane`` of deflection and slope.
+    """
+    nodes = model.mesh.wires[wire]
+    at = model.mesh.x(nodes)
+    element = np.clip(np.searchsorted(at, x) - 1, 0, at.size - 2)
+    length = np.diff(at)[element]
+    weights = shape_values((x - at[element]) / length, length).T
+    ends = nodes[element[:, None] + [0, 1]]
+    unknowns = np.stack([model.dofs(ends, name) for name in plane], axis=2).reshape(-1, 4)
+    return Direction(unknowns, np.ascontiguousarray(weights))
+
+
+def difference(upper: Direction, lower: Direction) -> Direction:
+    """Stretch of links from ``lower`` to ``upper`` places."""
+    return Direction(
+        np.concatenate([upper.unknowns, lower.unknowns], axis=1),
+        np.concatenate([upper.weights, -lower.weights], axis=1),
+    )
+
 
 # Displacements along the components of a dropper's vector.
 _ALONG, _SIDEWAYS, _UP = range(3)
 _NAMES = ("u", "v", "w")
 # Parts of unit vectors below this are none: what round-off leaves of upright droppers [-].
-_NONE = 1e-9
+_LEAST = 1e-9
 
 
 def dropper_directions(model: Model) -> Direction:
@@ -80,7 +118,7 @@ def _along(model: Model, unit: np.ndarray, needed: tuple[int, ...]) -> Direction
     """Motion of upper less lower ends along vectors (n, 3), in ``needed`` components first and in
     others that any vector has."""
     pairs = model.mesh.droppers
-    large = np.abs(unit).max(axis=0, initial=0.0) > _NONE
+    large = np.abs(unit).max(axis=0, initial=0.0) > _LEAST
     others = [k for k in (_UP, _ALONG, _SIDEWAYS) if large[k] and k not in needed]
     parts = (*needed, *others)
     unknowns = [model.dofs(pairs, _NAMES[k]) for k in parts]

@@ -1,1 +1,0 @@
-"""Regulated lifts: controllers that change a pantograph's static force under way."""

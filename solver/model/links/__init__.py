@@ -1,1 +1,0 @@
-"""Links between unknowns: droppers, clamps, arms, stops, and droppers that lean."""

@@ -1,1 +1,0 @@
-"""The line at rest as arrays, vertical and lateral."""
