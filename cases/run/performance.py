@@ -51,5 +51,5 @@ def performance(outcome: Outcome, phases: Phases, n_ranks: int) -> dict[str, Any
         "records_wall_s": outcome.finishing,
         "phase_wall_s": phases.wall,
         "inner_iterations": counted,
-        "detour": outcome.detour,
+        "detour": outcome.slow_path,
     }

@@ -48,8 +48,8 @@ def as_cut(problem: Problem, but: Set[str] = frozenset()) -> Problem:
     return replace(problem, effects=problem.effects - befallen) if befallen else problem
 
 
-def as_hung(problem: Problem) -> Problem:
-    """A problem whose wires are those that hang, after what befell them."""
+def with_defects(problem: Problem) -> Problem:
+    """The problem with defects applied to its wires."""
     for effect in after_cutting(problem):
         if effect.hangs is not None:
             problem = replace(problem, line=effect.hangs(problem.line, problem))

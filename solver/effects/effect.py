@@ -62,7 +62,7 @@ class Effect:
     lifts : limits of a scene that do not hold with the effect
     data : what a scene has to hold for it to act on, by its keys; empty if any scene does
     after_cutting : True for what befalls a line whose droppers are cut: form finding leaves it out,
-        and the line then hangs with it (`statics.as_hung`)
+        and the line then hangs with it (`statics.with_defects`)
     hangs : of an effect after cutting, what the line's wires become with it
     """
 

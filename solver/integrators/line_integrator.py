@@ -17,9 +17,9 @@ from mpi4py import MPI
 
 from catenary.base.parallel import total
 from catenary.base.petsc import PETSc
-from catenary.solver.integrators.detour import LIBRARY, PARTS, Detour
 from catenary.solver.integrators.line_state import AlphaSteps, LineState, PredictedLineState, Steps
 from catenary.solver.integrators.loads.line_loads import LineLoads
+from catenary.solver.integrators.slow_path import LIBRARY, PARTS, SlowPath
 from catenary.solver.integrators.two_pass_step import StationPasses
 from catenary.solver.kernels import aligned_arrays, native
 from catenary.solver.linear.decay_length import reach
@@ -50,7 +50,7 @@ class LineIntegrator(ABC):
     responses : UnitResponses of the step operator
     loads : LineLoads, None if there are none
     solution : the displacement as a PETSc vector, once ``fill_solution`` has filled it
-    detour : why ``keep_ahead`` could not, None if it could; the same on all ranks
+    slow_path : why ``keep_ahead`` could not, None if it could; the same on all ranks
     window : MovingWindow, None if all stations move
 
     Parameters
@@ -100,7 +100,7 @@ class LineIntegrator(ABC):
         self.loads: LineLoads | None = None
         if model.loads:
             self.loads = LineLoads(model.loads, self.operators.domain, model.constrained, comm)
-        self.detour: Detour | None = None
+        self.slow_path: SlowPath | None = None
         self.window: MovingWindow | None = None
         self.motion = LineState(
             aligned_arrays.zeros(n, 2), aligned_arrays.zeros(n, 3), self.operators.answer, gains
@@ -128,7 +128,9 @@ class LineIntegrator(ABC):
         """
         ahead = self._ahead()
         if ahead is None:
-            self.detour = Detour("the method does not keep its state one prediction ahead", PARTS)
+            self.slow_path = SlowPath(
+                "the method does not keep its state one prediction ahead", PARTS
+            )
             return
         motion, steps = ahead
         loads = np.zeros(0) if self.loads is None else self.loads.values
@@ -138,7 +140,7 @@ class LineIntegrator(ABC):
         # A rank without stations has no passes; it keeps its state like the others.
         can = passes is not None or self.ownership.n_local == 0
         if not self._comm.allreduce(int(can), op=MPI.MIN):
-            self.detour = Detour(self.operators.why_not_by_stations(), LIBRARY)
+            self.slow_path = SlowPath(self.operators.why_not_by_stations(), LIBRARY)
             return
         self._passes = passes
         if passes is not None:

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from typing import Any
 
-from catenary.solver.integrators.detour import (
-    CALLED,
-    PARTS,
-    Detour,
-    load_detour,
-    log_detour,
-    method_detour,
-)
 from catenary.solver.integrators.line_integrator import LineIntegrator
 from catenary.solver.integrators.line_state import PredictedLineState, Steps
+from catenary.solver.integrators.slow_path import (
+    CALLED,
+    PARTS,
+    SlowPath,
+    slow_load,
+    slow_method,
+    warn_of_slow_path,
+)
 from catenary.solver.kernels import native
 from catenary.solver.linear.pieces.operator_pieces import WantedPieces
 from catenary.solver.model.model import Model
@@ -82,12 +82,12 @@ def make_line(
         line = GeneralizedAlphaLine(comm, model, ownership, numerics.dt, chosen, wanted)
     if only_free:
         line.keep_ahead()
-    reason = method_detour(numerics)
+    reason = slow_method(numerics)
     if reason and numerics.scheme == "one_solve":
-        line.detour = Detour(reason, PARTS)
-    reason = load_detour(model)
-    if reason and line.detour is None:
-        line.detour = Detour(reason, CALLED)
-    if line.detour is not None and comm.rank == 0:
-        log_detour(line.detour)
+        line.slow_path = SlowPath(reason, PARTS)
+    reason = slow_load(model)
+    if reason and line.slow_path is None:
+        line.slow_path = SlowPath(reason, CALLED)
+    if line.slow_path is not None and comm.rank == 0:
+        warn_of_slow_path(line.slow_path)
     return line

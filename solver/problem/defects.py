@@ -1,6 +1,6 @@
-"""Defects of a line: what befalls it once its droppers have been cut.
+"""Defects of a line, which act on it once its droppers are cut.
 
-Data only. The line hangs with the droppers that were cut for the sound one (`statics.as_hung`).
+Data only. Droppers keep the lengths to which they were cut for the sound line.
 """
 
 from __future__ import annotations

@@ -10,7 +10,7 @@ import numpy as np
 from catenary.base.freed_memory import give_back
 from catenary.base.parallel import on_root
 from catenary.meshgen.mesh import LineMesh
-from catenary.solver.effects.all_effects import as_hung
+from catenary.solver.effects.all_effects import with_defects
 from catenary.solver.effects.build_model import build
 from catenary.solver.model.model import Model
 from catenary.solver.problem.problem import Problem
@@ -95,5 +95,5 @@ def line_at_rest_on_all(
         return rest.model.dropper_lengths, rest.model.dropper_gap, rest.form, rest.lift
 
     lengths, gap, form, lift = on_root(comm, alone(work), takes_long=True)
-    hung = as_hung(problem)
+    hung = with_defects(problem)
     return LineAtRest(hung, build(hung, mesh, lengths, form=form, gap=gap), form, lift)

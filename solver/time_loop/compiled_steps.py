@@ -23,7 +23,7 @@ from catenary.solver.integrators.loads.line_loads import LoadArguments
 from catenary.solver.kernels import native
 from catenary.solver.schemes.one_solve import OneSolve
 from catenary.solver.schemes.scheme import Scheme
-from catenary.solver.time_loop.views.audience import Audience
+from catenary.solver.time_loop.views.observer_list import ObserverList
 from catenary.solver.time_loop.views.observers import StepView
 from catenary.solver.time_loop.views.step_views import Showing, Shown
 from catenary.solver.window.moving_columns import MovedStations
@@ -219,13 +219,15 @@ class CompiledSteps:
         self.rows[at] = self._showing.view(self._first + self._done, time, followed=True).row
         return not self._keep_motion(int(self._kept.motion_of[at]))
 
-    def show_to(self, audience: Audience, step: int, kept: Sequence[int], *, broke: bool) -> None:
+    def show_to(
+        self, observer_list: ObserverList, step: int, kept: Sequence[int], *, broke: bool
+    ) -> None:
         """Show the steps of the latest block, which are those after the one of number ``step``.
 
         ``kept`` are those of ``take``. A block that ``broke`` has left its state amid a step.
         """
         times, rows = self.times[self._block], self.rows[self._block]
-        audience.show_block(step, times, rows, self._views(step, times, rows, kept, broke))
+        observer_list.show_block(step, times, rows, self._views(step, times, rows, kept, broke))
 
     def _views(
         self, step: int, times: np.ndarray, rows: np.ndarray, kept: Sequence[int], broke: bool

@@ -27,7 +27,7 @@ from catenary.meshgen.wires import Role
 from catenary.solver.contact.contact_wire import ContactWires
 from catenary.solver.contact.train.pantographs import Pantographs, nominal_height_rule
 from catenary.solver.effects.all_effects import simulated
-from catenary.solver.integrators.detour import Detour, log_detour
+from catenary.solver.integrators.slow_path import SlowPath, warn_of_slow_path
 from catenary.solver.kernels.flush_to_zero import flushed
 from catenary.solver.linear.petsc_solvers import wants_single_steps, wants_solution
 from catenary.solver.model.model import Model
@@ -48,7 +48,7 @@ from catenary.solver.statics.form_finding.equilibrium import Equilibrium
 from catenary.solver.time_loop.compiled_steps import compiled_steps
 from catenary.solver.time_loop.single_steps import single_steps_of
 from catenary.solver.time_loop.ts_stepper import Stepper, ts_of
-from catenary.solver.time_loop.views.audience import Audience
+from catenary.solver.time_loop.views.observer_list import ObserverList
 from catenary.solver.time_loop.views.observers import Observer
 from catenary.solver.time_loop.views.step_views import Showing
 from catenary.solver.window.moving_columns import MovingColumns
@@ -63,7 +63,7 @@ class Outcome:
     process computed, whatever else the machine did; ``simulated`` [s]; ``n_steps`` taken;
     ``counters`` of the scheme; ``traffic`` is how many messages and bytes a rank sent a step since
     the line changed last, the one that sent most: to its neighbours, and each sum and broadcast as
-    one; None on one rank, or if not counted; ``detour`` says why steps of the line took longer than
+    one; None on one rank, or if not counted; ``slow_path`` says why steps took longer than
     they could, empty if they did not; ``finishing`` [s] is the time after the loop in which
     observers wrote what they still held.
     """
@@ -75,7 +75,7 @@ class Outcome:
     n_steps: int
     counters: dict[str, int] = field(default_factory=dict)
     traffic: tuple[float, float] | None = None
-    detour: str = ""
+    slow_path: str = ""
     finishing: float = 0.0
 
 
@@ -133,8 +133,8 @@ class March:
         self._first_step = 0
         self._happened: tuple[LineIncident, ...] = ()
         self._ahead = self._happening()
-        if self.detour is not None and comm.rank == 0:
-            log_detour(self.detour)
+        if self.slow_path is not None and comm.rank == 0:
+            warn_of_slow_path(self.slow_path)
 
     def _set_up(self, changed: ChangedLine, wires: ContactWires | None = None) -> None:
         """Make all that steps a line and shows it, from a line that is at rest. Collective."""
@@ -215,10 +215,10 @@ class March:
         return self._line.operators.station_widths
 
     @property
-    def detour(self) -> Detour | None:
+    def slow_path(self) -> SlowPath | None:
         """Why steps take longer than they could, None if they do not; of ranks, see the line's."""
-        if self._line.detour is not None or self._comm.size > 1:
-            return self._line.detour
+        if self._line.slow_path is not None or self._comm.size > 1:
+            return self._line.slow_path
         return single_steps_of(self._problem, self._showing.layout)
 
     @property
@@ -278,16 +278,16 @@ class March:
         ends = [*(happened.step for happened in ahead), self.n_steps]
         # PETSc's monitors of the solution look at each.
         fill = self._line_fills_solution if wants_solution() else None
-        audience = Audience(observers, fill)
-        ts = self._make_ts(audience, stop_requested, first, ends[0])
+        observer_list = ObserverList(observers, fill)
+        ts = self._make_ts(observer_list, stop_requested, first, ends[0])
         try:
-            audience.start(self._showing.stage(dt, first * dt, self.n_steps))
+            observer_list.start(self._showing.stage(dt, first * dt, self.n_steps))
         except RunBroken:
             ts.destroy()
             raise
         begin, computed = clock.perf_counter(), clock.process_time()
         try:
-            audience.show(lambda: self._showing.view(first, first * dt))
+            observer_list.show(lambda: self._showing.view(first, first * dt))
         except RunBroken as error:
             self._stepper.broken = str(error)
         else:
@@ -302,7 +302,7 @@ class March:
                 self._stepper.broken = str(error)
                 break
             since = happened.step
-            ts = self._make_ts(audience, stop_requested, since, end)
+            ts = self._make_ts(observer_list, stop_requested, since, end)
             self._advance(ts)
         wall, cpu = clock.perf_counter() - begin, clock.process_time() - computed
         if self._stepper.broken:
@@ -317,7 +317,7 @@ class March:
             # The latter if an option of PETSc ends early, for instance -march_ts_max_steps.
             outcome = "interrupted"
         begin = clock.perf_counter()
-        outcome = audience.finish(outcome)
+        outcome = observer_list.finish(outcome)
         finishing = clock.perf_counter() - begin
         n_steps = self._stepper.step_number - first
         return Outcome(
@@ -328,7 +328,7 @@ class March:
             n_steps,
             self._scheme.counters.as_dict(),
             self._traffic(max(1, self._stepper.step_number - since)),
-            "" if self.detour is None else str(self.detour),
+            "" if self.slow_path is None else str(self.slow_path),
             finishing,
         )
 
@@ -351,7 +351,11 @@ class March:
             raise InputError("incidents change the line, and a prepared line stays as it is")
         blocks = compiled_steps(self._scheme, self._showing, dt, shows=False)
         if blocks is None:
-            why = "numerics.scheme is not one_solve" if self.detour is None else self.detour.reason
+            why = (
+                "numerics.scheme is not one_solve"
+                if self.slow_path is None
+                else self.slow_path.reason
+            )
             raise InputError(f"its steps are not those of the compiled loop: {why}")
         write_line(path, blocks, dt, (self._first_step, self.n_steps))
         return self.n_steps - self._first_step
@@ -394,7 +398,7 @@ class March:
 
     def _make_ts(
         self,
-        audience: Audience,
+        observer_list: ObserverList,
         stop_requested: Callable[[], bool],
         first: int,
         end: int,
@@ -403,8 +407,8 @@ class March:
         dt = self._problem.numerics.dt
         blocks = None
         if not wants_single_steps():
-            blocks = compiled_steps(self._scheme, self._showing, dt, audience.is_there)
+            blocks = compiled_steps(self._scheme, self._showing, dt, observer_list.is_there)
         self._stepper = Stepper(
-            self._scheme, self._showing, audience, stop_requested, dt, (first, end), blocks
+            self._scheme, self._showing, observer_list, stop_requested, dt, (first, end), blocks
         )
         return ts_of(self._comm, self._stepper, dt, (first, end), self.n_steps)

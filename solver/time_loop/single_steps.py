@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from catenary.mbs.build import has_joints
 from catenary.solver.effects.all_effects import simulated
-from catenary.solver.integrators.detour import Detour
+from catenary.solver.integrators.slow_path import SlowPath
 from catenary.solver.problem.problem import Problem
 from catenary.solver.problem.simulated import Simulated
 
@@ -59,7 +59,7 @@ REASONS = (
 )
 
 
-def single_steps_of(problem: Problem, layout: RowLayout | None = None) -> Detour | None:
+def single_steps_of(problem: Problem, layout: RowLayout | None = None) -> SlowPath | None:
     """Why steps of a problem take longer on one rank than in kernels alone, None if they do not.
 
     Not collective. A scheme other than ``one_solve``, and a coupling that is not implicit, step in
@@ -71,5 +71,5 @@ def single_steps_of(problem: Problem, layout: RowLayout | None = None) -> Detour
     stepped = _Stepped(problem, simulated(problem), layout)
     for reason in REASONS:
         if reason.holds(stepped):
-            return Detour(reason.says, reason.factor)
+            return SlowPath(reason.says, reason.factor)
     return None

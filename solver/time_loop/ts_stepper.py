@@ -11,7 +11,7 @@ from catenary.base.petsc import PETSc
 from catenary.solver.linear.petsc_solvers import PREFIX, refused_options
 from catenary.solver.schemes.scheme import Scheme
 from catenary.solver.time_loop.compiled_steps import CompiledSteps
-from catenary.solver.time_loop.views.audience import Audience
+from catenary.solver.time_loop.views.observer_list import ObserverList
 from catenary.solver.time_loop.views.step_views import Showing
 
 # Wall time of a block [s], after which a wish to stop is seen, and steps of the first one.
@@ -28,7 +28,7 @@ class Stepper:
 
     Parameters
     ----------
-    audience : is shown each good step; it raises RunBroken, on all ranks, if nobody can watch any
+    observer_list : is shown each good step; raises RunBroken, on all ranks, if none can watch any
         longer
     steps : number of the first step, which is shown already, and of the last one
     blocks : takes steps of the scheme many at once, None to take each for itself
@@ -44,7 +44,7 @@ class Stepper:
         self,
         scheme: Scheme,
         showing: Showing,
-        audience: Audience,
+        observer_list: ObserverList,
         stop_requested: Callable[[], bool],
         dt: float,
         steps: tuple[int, int],
@@ -52,7 +52,7 @@ class Stepper:
     ) -> None:
         self._scheme = scheme
         self._showing = showing
-        self._audience = audience
+        self._observer_list = observer_list
         self._stop_requested = stop_requested
         self._dt = dt
         self.step_number, self._end = steps
@@ -97,13 +97,13 @@ class Stepper:
         except RunBroken as error:
             raise self._placed(error) from error
         self.step_number = number
-        self._audience.show(lambda: self._showing.view(number, time))
+        self._observer_list.show(lambda: self._showing.view(number, time))
         return goes_on
 
     def _take(self, blocks: CompiledSteps, ts: PETSc.TS) -> None:
         """Take steps up to the next state that an observer needs, and show them."""
         first = self.step_number
-        until = min(self._end, self._audience.next_state(first))
+        until = min(self._end, self._observer_list.next_state(first))
         n_steps = min(until - first, blocks.most, self._most)
         n_steps, kept = self._motions_of(blocks, first, n_steps)
         begin, broken = clock.perf_counter(), None
@@ -115,7 +115,7 @@ class Stepper:
         allowed = int(_BLOCK_TIME * n_steps / max(spent, 1e-9))
         self._most = max(1, min(_GROWTH * self._most, allowed))
         self.step_number = first + blocks.taken
-        blocks.show_to(self._audience, first, kept, broke=broken is not None)
+        blocks.show_to(self._observer_list, first, kept, broke=broken is not None)
         if broken is not None:
             raise self._placed(broken) from broken
         ts.setStepNumber(self.step_number - 1)  # PETSc adds one
@@ -124,12 +124,12 @@ class Stepper:
         """Steps of a block after step ``first`` that wants ``n_steps``, and which of them keep the
         motion; it ends where there is no room for a further one."""
         kept: list[int] = []
-        at = self._audience.next_motion(first)
+        at = self._observer_list.next_motion(first)
         while at < first + n_steps:
             if len(kept) == blocks.most_motions:
                 return at - first, kept
             kept.append(at - first - 1)
-            at = self._audience.next_motion(at)
+            at = self._observer_list.next_motion(at)
         return n_steps, kept
 
     def _placed(self, error: RunBroken) -> RunBroken:

@@ -125,7 +125,7 @@ def test_a_sound_scene_has_nothing_of_it() -> None:
     assert defect_facts(sound, problem) == []
     assert problem.line == make_line(line_data_of(sound))
     assert all_effects.after_cutting(problem) == []
-    assert all_effects.as_hung(problem) is problem
+    assert all_effects.with_defects(problem) is problem
     wrong = load_scene(
         "en50318_2002",
         [*WORDS[:1], "line.n_spans=9", "train.end_m=450", "evaluation.to_m=430", "defects.5=",

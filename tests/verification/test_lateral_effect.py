@@ -122,7 +122,7 @@ def test_an_effect_of_one_wire_makes_stations_no_wider_than_it_needs(mesh: LineM
     with pytest.raises(ValueError, match="has no unknown v"):
         model.dofs(messenger, "v")
     line = make_line(COMM, model, distribute(model, 1, 0), problem.numerics)
-    assert line.passes is not None and line.detour is None
+    assert line.passes is not None and line.slow_path is None
     line.destroy()
 
 

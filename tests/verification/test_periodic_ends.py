@@ -203,7 +203,7 @@ def test_one_end_may_go_on_and_the_other_absorb() -> None:
     model = struck_line(6, numerics(DT), 10, (AbsorbingLayer(3, 2.0), Periodic()))
     line = line_of(model)
     try:
-        assert line.remembers and line.detour is None
+        assert line.remembers and line.slow_path is None
         past = line.past()
         assert past is not None and past.shape == (4, 11)
     finally:

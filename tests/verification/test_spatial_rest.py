@@ -42,7 +42,7 @@ def staggered_line(curve: Curve | None = None) -> LineData:
     )
 
 
-def as_hung(problem: Problem) -> tuple[Model, Equilibrium, Equilibrium, SpatialLine]:
+def with_defects(problem: Problem) -> tuple[Model, Equilibrium, Equilibrium, SpatialLine]:
     """The model and its rest, that for which it was cut, and the energy of the line as it hangs."""
     mesh = mesh_of(problem.line, 1)
     sound = replace(problem, effects=problem.effects - {"dropper_lengths", "wind"})
@@ -89,7 +89,7 @@ def test_the_rest_in_three_planes_is_where_the_energy_is_least(name: str) -> Non
     problem = problem_of(line, SPATIAL, along=along, wind=wind)
     if irregular is not None:
         problem = replace(problem, irregularities=irregular)
-    model, form, first, energy = as_hung(problem)
+    model, form, first, energy = with_defects(problem)
     if along.end:
         # The weights pull with the tension of the installation.
         for wire in problem.line.wires:

@@ -27,7 +27,7 @@ from catenary.mbs.lumped_data import LumpedData
 from catenary.meshgen.mesh import LineMesh
 from catenary.solver.effects import all_effects as effects
 from catenary.solver.effects.build_model import numbering_of
-from catenary.solver.integrators.detour import Detour, detour_of
+from catenary.solver.integrators.slow_path import SlowPath, slow_path_of
 from catenary.solver.problem.problem import Problem
 from catenary.solver.problem.watched_links import GAUGES
 from catenary.solver.time_loop.single_steps import single_steps_of
@@ -58,7 +58,7 @@ class Needs:
     march : wall time of the time loop on one rank [s]
     files : sizes of the files
     recording : what is recorded
-    detour : why steps of the line take longer than they could, None if they do not
+    slow_path : why steps of the line take longer than they could, None if they do not
     """
 
     n_steps: int
@@ -66,7 +66,7 @@ class Needs:
     march: float
     files: FileSizes
     recording: Recording
-    detour: Detour | None = None
+    slow_path: SlowPath | None = None
 
 
 class Kept(NamedTuple):
@@ -83,7 +83,7 @@ def needs_of(
     extent: Extent,
     n_dofs: int,
     stations: Mapping[int, int] | None = None,
-    detour: Detour | None = None,
+    slow_path: SlowPath | None = None,
 ) -> Needs:
     """What a run of a scene needs. Not collective.
 
@@ -94,7 +94,7 @@ def needs_of(
     n_dofs : unknowns of the line
     stations : how many have each number of unknowns; by default all have a node of each wire that
         has unknowns of its own
-    detour : why steps take longer than they could
+    slow_path : why steps take longer than they could
     """
     active = effects.active(problem)
     if not stations:
@@ -111,17 +111,17 @@ def needs_of(
     return Needs(
         n_steps=n_steps,
         memory=estimate_memory(n_dofs, n_steps, problem.window.moves and not by_motion),
-        march=_slower(detour, n_substeps)
+        march=_slower(slow_path, n_substeps)
         * estimate_march(n_moving, n_steps, scheme, n_substeps, stations, gusts),
         files=estimate_files(scene, problem, recording, n_dofs, flush_every),
         recording=recording,
-        detour=detour,
+        slow_path=slow_path,
     )
 
 
-def _slower(detour: Detour | None, n_substeps: int) -> float:
-    """By how much a detour lengthens the march; substeps are counted by themselves."""
-    return 1.0 if detour is None or n_substeps else detour.factor
+def _slower(slow_path: SlowPath | None, n_substeps: int) -> float:
+    """By how much a slow path lengthens the march; substeps are counted by themselves."""
+    return 1.0 if slow_path is None or n_substeps else slow_path.factor
 
 
 def simulated_time(problem: Problem) -> float:
@@ -147,12 +147,12 @@ def needs_with_mesh(scene: Scene, mesh: LineMesh) -> Needs:
     """What a run on a mesh needs. Not collective."""
     problem = problem_of(scene)
     numbering = numbering_of(problem, mesh)
-    detour = detour_of(problem, numbering) or single_steps_of(problem)
+    slow_path = slow_path_of(problem, numbering) or single_steps_of(problem)
     extent = extent_of(mesh)
     stations: Counter[int] = Counter()
     for places, count in zip(numbering.make_ups, np.bincount(numbering.make_up), strict=True):
         stations[len(places)] += int(count)
-    return needs_of(scene, problem, extent, numbering.n_unknowns, stations, detour)
+    return needs_of(scene, problem, extent, numbering.n_unknowns, stations, slow_path)
 
 
 def run_size(needs: Needs) -> RunSize:

@@ -106,7 +106,7 @@ class Plan:
     warnings: tuple[str, ...]
     dt: float
     scheme: str
-    detour: str
+    slow_path: str
     halved: str
     slack: str
     window: str
@@ -187,7 +187,7 @@ def make_plan(scene: Scene, mesh: LineMesh | None = None) -> Plan:
         warnings=tuple(waves["warnings"]),
         dt=dt,
         scheme=problem.numerics.scheme,
-        detour="" if needs.detour is None else str(needs.detour),
+        slow_path="" if needs.slow_path is None else str(needs.slow_path),
         halved=_halved(problem.numerics),
         slack=_slack(problem),
         window=window_sentence(problem),
@@ -279,7 +279,7 @@ def plan_text(plan: Plan) -> str:
             f"{plan.simulated:.2f} s in {counted(plan.n_steps, 'step')} of {1e3 * plan.dt:g} ms, "
             f"scheme {plan.scheme}",
         ),
-        *([("slower", plan.detour)] if plan.detour else []),
+        *([("slower", plan.slow_path)] if plan.slow_path else []),
         *([("slack", f"of a slack dropper, {plan.slack}")] if plan.slack else []),
         *([("adapted", plan.halved)] if plan.halved else []),
         *([("window", plan.window), ("moving", plan.moving)] if plan.window else []),

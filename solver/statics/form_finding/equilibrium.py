@@ -23,7 +23,7 @@ from catenary.solver.model.model import Model
 from catenary.solver.model.rest_shape import Equilibrium as Equilibrium
 from catenary.solver.model.rest_shape import LateralShape
 from catenary.solver.problem.problem import Problem
-from catenary.solver.statics.changed_line.as_hung import errors_of_length, hang
+from catenary.solver.statics.changed_line.rest_with_defects import errors_of_length, hang
 from catenary.solver.statics.form_finding.banded_factors import BandedFactors
 from catenary.solver.statics.form_finding.lateral_equilibrium import lateral_shape
 from catenary.solver.statics.form_finding.repeated_ends import repeated_ends, settled
@@ -64,7 +64,7 @@ def find_form(problem: Problem, mesh: LineMesh) -> tuple[Model, Equilibrium]:
     sound = _cut(effects.as_cut(problem), mesh)
     if _cut_for(problem):
         sound = _cut(_as_installed(problem), mesh, pushing=True)
-    return hang(effects.as_hung(problem), *about(*sound))
+    return hang(effects.with_defects(problem), *about(*sound))
 
 
 def lengths_to_cut(problem: Problem, mesh: LineMesh) -> np.ndarray:

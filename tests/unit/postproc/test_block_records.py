@@ -13,7 +13,7 @@ from catenary.postproc.channels.line_record import GZIP, LineRecord
 from catenary.postproc.record.progress import Progress
 from catenary.postproc.record.recorder import Recorder
 from catenary.postproc.record.snapshots.fields import FieldRecorder
-from catenary.solver.time_loop.views.audience import Audience
+from catenary.solver.time_loop.views.observer_list import ObserverList
 from catenary.solver.time_loop.views.observers import Observer
 
 
@@ -22,24 +22,29 @@ def drive_by_blocks(march: Any, *observers: Observer, first: int, most: int) -> 
 
     Returns the steps of each block.
     """
-    stage, step, blocks, audience = march.stage(first), first, [], Audience(observers, None)
-    audience.start(stage)
-    audience.show(lambda: march.view(first))
+    stage, step, blocks, observer_list = (
+        march.stage(first),
+        first,
+        [],
+        ObserverList(observers, None),
+    )
+    observer_list.start(stage)
+    observer_list.show(lambda: march.view(first))
     while step < march.n_steps:
-        until = min(march.n_steps, step + most, audience.next_state(step))
+        until = min(march.n_steps, step + most, observer_list.next_state(step))
         views = [march.view(number) for number in range(step + 1, until + 1)]
         rows = np.array([view.row for view in views])
         times = np.array([view.time for view in views])
-        due = audience.next_motion(step)
+        due = observer_list.next_motion(step)
         shown = [views[-1]]
         while due < until:
             shown.insert(-1, views[due - step - 1])
-            due = audience.next_motion(due)
-        audience.show_block(step, times, rows, shown)
+            due = observer_list.next_motion(due)
+        observer_list.show_block(step, times, rows, shown)
         rows[:] = times[:] = np.nan  # they are overwritten
         blocks.append(len(views))
         step = until
-    audience.finish("done")
+    observer_list.finish("done")
     return blocks
 
 

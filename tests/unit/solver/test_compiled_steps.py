@@ -398,7 +398,7 @@ def test_loads_that_change_with_time_are_taken_in_the_loop(
         rows = Rows()
         found = run(loaded, mesh, rows)
     assert found.outcome == outcome.outcome == "done"
-    assert "slow is a Python function" in found.detour
+    assert "slow is a Python function" in found.slow_path
     assert max(rows.blocks) > 1 and len(rows.rows) == 201
     assert np.array_equal(rows.rows, expected.rows, equal_nan=True)
     without = Rows()

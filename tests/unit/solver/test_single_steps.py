@@ -14,7 +14,7 @@ from small_lines import WHOLE, ac_simple_line, mesh_of, numerics, problem_of, tr
 
 from catenary.mbs.lowering import Lowering
 from catenary.meshgen.mesh import LineMesh
-from catenary.solver.integrators import detour
+from catenary.solver.integrators import slow_path
 from catenary.solver.problem.contact_laws import HertzLaw, KinematicLaw, LinearLaw
 from catenary.solver.problem.problem import Problem
 from catenary.solver.time_loop import march as time_loop
@@ -44,7 +44,7 @@ def loops(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[bool]]:
         return loop
 
     monkeypatch.setattr(time_loop, "compiled_steps", watched)
-    monkeypatch.setattr(detour, "_logged", set())
+    monkeypatch.setattr(slow_path, "_logged", set())
     yield found
 
 
@@ -88,7 +88,7 @@ def test_a_reason_is_told_where_kernels_do_not_take_steps_alone(
     assert told is not None and word in told.reason and told.factor > 1.0
     with caplog.at_level(logging.WARNING):
         outcomes = [marched(scene, mesh) for _ in range(2)]
-    assert [outcome.detour for outcome in outcomes] == 2 * [str(told)]
+    assert [outcome.slow_path for outcome in outcomes] == 2 * [str(told)]
     # Once for both, as for the runs of a sweep.
     assert [record.message for record in caplog.records] == [str(told)]
     assert loops == [False, False]
@@ -103,7 +103,7 @@ def test_nothing_is_told_of_steps_in_the_loop(
 ) -> None:
     with caplog.at_level(logging.WARNING):
         outcome = marched(scene, mesh)
-    assert (outcome.detour, loops, caplog.records) == ("", [True], [])
+    assert (outcome.slow_path, loops, caplog.records) == ("", [True], [])
 
 
 def test_a_channel_that_is_a_function_is_told_by_its_march(
@@ -113,7 +113,7 @@ def test_a_channel_that_is_a_function_is_told_by_its_march(
     monkeypatch.setitem(channels.CHANNELS, "count", count)
     scene = problem()
     assert single_steps_of(scene) is None
-    assert "a channel is a Python function" in marched(scene, mesh).detour
+    assert "a channel is a Python function" in marched(scene, mesh).slow_path
     assert loops == [False]
 
 

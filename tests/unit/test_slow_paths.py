@@ -23,8 +23,8 @@ from catenary.cases.scene.cost_model import (
 )
 from catenary.cases.scene.load import load_scene
 from catenary.solver.effects.build_model import numbering_of
-from catenary.solver.integrators import detour
-from catenary.solver.integrators.detour import PARTS, detour_of
+from catenary.solver.integrators import slow_path
+from catenary.solver.integrators.slow_path import PARTS, slow_path_of
 from catenary.solver.problem.problem import Damping
 
 HHT = 'numerics.integrator="hht"', "numerics.spectral_radius=0.8"
@@ -37,9 +37,9 @@ def test_the_plan_says_what_makes_steps_slower_and_by_how_much() -> None:
         for more in ([], [*HHT, BY_COMPONENT], ['numerics.coupling="explicit"'])
     )
     for plan in (plain, damped):
-        assert plan.detour == "" and "slower" not in plan_text(plan)
-    assert "numerics.coupling" in slow.detour
-    assert slow.detour in plan_text(slow)
+        assert plan.slow_path == "" and "slower" not in plan_text(plan)
+    assert "numerics.coupling" in slow.slow_path
+    assert slow.slow_path in plan_text(slow)
     assert slow.march == pytest.approx(PARTS * plain.march)
 
 
@@ -47,7 +47,7 @@ def test_log_and_outcome_of_a_march_say_the_same(
     caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # Warnings are given once a process, of which other tests are a part.
-    monkeypatch.setattr(detour, "_logged", set())
+    monkeypatch.setattr(slow_path, "_logged", set())
     damping = Damping(1e-4, 0.0125, {"contact_wire": (2e-3, 0.3)})
     line = en50318_line(3)
     for coupling, slower in (("implicit", False), ("explicit", True)):
@@ -60,10 +60,10 @@ def test_log_and_outcome_of_a_march_say_the_same(
             marched, _ = start_march(problem, mesh_of(line, 3))
             with marched:
                 outcome = marched.run([])
-        assert bool(outcome.detour) is slower
-        assert [record.message for record in caplog.records] == [outcome.detour] * slower
-        told = detour_of(problem, numbering_of(problem, mesh_of(line, 3)))
-        assert (str(told) if told else "") == outcome.detour
+        assert bool(outcome.slow_path) is slower
+        assert [record.message for record in caplog.records] == [outcome.slow_path] * slower
+        told = slow_path_of(problem, numbering_of(problem, mesh_of(line, 3)))
+        assert (str(told) if told else "") == outcome.slow_path
 
 
 def test_estimates_know_the_unknowns_of_stations() -> None:

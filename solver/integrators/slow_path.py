@@ -1,4 +1,4 @@
-"""Why free steps of a line are not taken in two passes, and what that costs."""
+"""Slow paths through a step: why free steps are not taken in two passes, and their cost."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ PARTS, LIBRARY = 5.5, 5.6
 CALLED = 1.5
 
 
-class Detour(NamedTuple):
+class SlowPath(NamedTuple):
     """A slower way through a step: its reason, its time in terms of the compiled loop."""
 
     reason: str
@@ -32,37 +32,37 @@ class Detour(NamedTuple):
 _logged: set[str] = set()
 
 
-def log_detour(detour: Detour) -> None:
-    """Warn of a detour, once in a process: not for each line of a sweep, or each length of steps.
+def warn_of_slow_path(slow_path: SlowPath) -> None:
+    """Warn of a slow path, once in a process and not for each line of a sweep.
 
     Not collective; on rank 0.
     """
-    if detour.reason not in _logged:
-        _logged.add(detour.reason)
-        logger.warning("%s", detour)
+    if slow_path.reason not in _logged:
+        _logged.add(slow_path.reason)
+        logger.warning("%s", slow_path)
 
 
-def detour_of(problem: Problem, numbering: Unknowns) -> Detour | None:
-    """The detour that a problem calls for by itself, None if it calls for none. Not collective.
+def slow_path_of(problem: Problem, numbering: Unknowns) -> SlowPath | None:
+    """The slow path that a problem calls for by itself, None if it calls for none. Not collective.
 
-    A scheme other than ``one_solve`` steps in its own way, which is no detour.
+    A scheme other than ``one_solve`` steps in its own way, which is no slow path.
     """
     if problem.numerics.scheme != "one_solve":
         return None
     if not numbering.in_stations:
-        return Detour("the nodes of the wires are too many or too few to form stations", LIBRARY)
-    reason = method_detour(problem.numerics)
-    return Detour(reason, PARTS) if reason else None
+        return SlowPath("the nodes of the wires are too many or too few to form stations", LIBRARY)
+    reason = slow_method(problem.numerics)
+    return SlowPath(reason, PARTS) if reason else None
 
 
-def method_detour(numerics: Numerics) -> str:
+def slow_method(numerics: Numerics) -> str:
     """Why a method cannot take steps in two passes, empty if it can."""
     if numerics.coupling == "explicit":
         return 'numerics.coupling = "explicit" needs heights of the wire within a step'
     return ""
 
 
-def load_detour(model: Model) -> str:
+def slow_load(model: Model) -> str:
     """Why loads of a model take longer than they could, empty if they do not."""
     names = [load.name for load in model.loads if isinstance(load, FunctionLoad)]
     return f"the load {names[0]} is a Python function, called for each step" if names else ""

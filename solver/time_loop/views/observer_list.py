@@ -1,4 +1,4 @@
-"""All who watch a march: they are shown blocks of steps, which end where they need a state."""
+"""The observers of a march: they get blocks of steps, which end where one needs a state."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from catenary.base.petsc_events import event
 from catenary.solver.time_loop.views.observers import NEVER, Observer, Stage, StepView
 
 
-class Audience:
+class ObserverList:
     """The observers of a run. Methods are called on all ranks at the same steps.
 
     Parameters
@@ -39,7 +39,7 @@ class Audience:
             try:
                 observer.start(stage)
             except RunBroken as error:
-                Audience(self._observers[:number], None).finish(str(error))
+                ObserverList(self._observers[:number], None).finish(str(error))
                 raise
 
     def next_state(self, step: int) -> int:

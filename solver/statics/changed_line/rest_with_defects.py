@@ -1,4 +1,4 @@
-"""The line at rest with the droppers that were cut, after what befell it: its profile follows."""
+"""The line at rest with defects: droppers keep the lengths to which they were cut."""
 
 from __future__ import annotations
 
