@@ -27,7 +27,7 @@ from catenary.postproc.files.hdf5.checked import (
     text_of,
 )
 from catenary.postproc.files.own_files import new_part
-from catenary.postproc.files.result_file import INTERRUPTED
+from catenary.postproc.files.run_schema import INTERRUPTED
 
 # Steps of the run as it was begun: what is recorded follows from them.
 BEGUN_FOR = "n_steps_begun_for"

@@ -3,7 +3,8 @@
 Everything that grows does so in ``append`` alone, which leaves a file that is readable as it
 stands; room on the disk is claimed one append ahead, so that a full disk costs no record. HDF5
 writes its tables in no order that helps one who reads a file whose writer was killed: a table may
-have got longer, and its rows not be there yet. Hence ``COMPLETE``, which is told after the rows.
+have got longer, and its rows not be there yet. Hence the committed row counts ``COMPLETE``, which
+are written after the rows.
 """
 
 from __future__ import annotations
@@ -46,6 +47,14 @@ from catenary.postproc.files.hdf5.shortening import DamagedClock, rows_before, s
 from catenary.postproc.files.hdf5.windowed_rows import write_window
 from catenary.postproc.files.kept_extremes import drop_extremes, extremes_at, store_extremes
 from catenary.postproc.files.own_files import new_part
+from catenary.postproc.files.run_schema import (
+    CLOCKS,
+    COMPLETE,
+    FORMAT,
+    LINE_TIME,
+    RUNNING,
+    growing_tables,
+)
 from catenary.postproc.files.trimming import trimmed
 from catenary.solver.time_loop.views import channels
 from catenary.solver.time_loop.views.channels import Channel
@@ -53,14 +62,6 @@ from catenary.solver.time_loop.views.observers import Stage
 
 logger = logging.getLogger("catenary.results")
 
-FORMAT = "catenary-run-3"
-# Rows that are whole, of the channels, of the energies and of the line's channels; a table may be
-# longer after a kill.
-COMPLETE = "complete_rows"
-LINE_TIME = "line_channels/time"
-RUNNING, DONE, INTERRUPTED = "running", "done", "interrupted"
-# What tells the times of the three kinds of rows.
-_CLOCKS = ("time", "energy/time", LINE_TIME)
 # The state to continue from is kept twice and written in turn: a run that is killed while it
 # writes one still has the other.
 _SLOTS = ("0", "1")
@@ -191,7 +192,7 @@ class ResultFile:
             append_rows(dataset, dataset.id.shape[0], block)
         self._append_line(line)
         store_extremes(self._file, self._growing["time"].shape[0], line.extremes)
-        self._settle()
+        self._order_writes()
         put_array(self._file, COMPLETE, _rows(self._growing))
         if state is not None:
             self._store(state)
@@ -268,12 +269,12 @@ class ResultFile:
             for array in place.values():
                 if array.ndim:
                     dimensions.hide(array)
-            self._settle()
+            self._order_writes()
             set_attribute(group, "latest", slot)
         self._n_states += 1
 
-    def _settle(self) -> None:
-        """Let what follows be written after what is there; all the same until there is a file."""
+    def _order_writes(self) -> None:
+        """Write all that waits, before what follows; not needed until the file has its name."""
         if self._begun:
             self._file.flush()
 
@@ -286,15 +287,13 @@ def _table(
     stage: Stage, with_energies: bool, record: LineRecord, x: Mapping[str, np.ndarray]
 ) -> dict[str, tuple[Channel, int]]:
     """Growing datasets: path -> channel and columns, 0 columns for one value a row."""
-    table = {"time": (channels.TIME, 0)}
-    for channel in channels.train_channels(stage.train):
-        table[f"channels/{channel.name}"] = (channel, channel.n_columns(stage.train))
-    table[LINE_TIME] = (channels.TIME, 0)
-    for name in record.names:
-        table[f"line_channels/{name}"] = (channels.CHANNELS[name], int(x[name].size))
-    if with_energies:
-        table.update({f"energy/{c.name}": (c, 0) for c in channels.ENERGIES.values()})
-    return table
+    steps, energies, line = growing_tables(record, stage.train)
+    table = {
+        path: (c, 0 if c.per == channels.RUN else c.n_columns(stage.train))
+        for path, c in steps.items()
+    }
+    table |= {path: (c, int(x[c.name].size) if c.name in x else 0) for path, c in line.items()}
+    return table | ({path: (c, 0) for path, c in energies.items()} if with_energies else {})
 
 
 def _refuse_other_tables(
@@ -390,25 +389,18 @@ def _create_growing(
 def _rows(tables: Mapping[str, h5py.Dataset]) -> list[int]:
     """Rows of the channels, of the energies and of the line's channels."""
     # Of damaged files one may be a single value.
-    return [(*tables[name].shape, 0)[0] if name in tables else 0 for name in _CLOCKS]
+    return [(*tables[name].shape, 0)[0] if name in tables else 0 for name in CLOCKS]
 
 
-def complete_rows(file: h5py.File) -> list[int]:
-    """Rows of the channels, of the energies and of the line's channels that are whole; all of them
-    in files of earlier versions."""
-    found = file[COMPLETE][...].tolist() if COMPLETE in file else []
-    return [*found, *_rows(file)[len(found) :]]
-
-
-def _told_rows(file: h5py.File) -> list[int]:
-    """The same of a file that nobody has examined: where the numbers cannot be, the length of the
-    tables counts."""
+def _committed_rows(file: h5py.File) -> list[int]:
+    """Committed rows of a file that was not validated: where the counts cannot be, the length of
+    the tables counts."""
     counted = _rows(file)
     told = np.asarray(file[COMPLETE][...]) if COMPLETE in file else np.zeros(0, dtype=int)
-    if told.ndim != 1 or told.dtype.kind not in "iu" or told.size > len(counted):
+    if told.shape != (len(CLOCKS),) or told.dtype.kind not in "iu":
         return counted
-    rows = [*told.tolist(), *counted[told.size :]]
-    return rows if all(0 <= n <= most for n, most in zip(rows, counted, strict=True)) else counted
+    possible = all(0 <= n <= most for n, most in zip(told.tolist(), counted, strict=True))
+    return told.tolist() if possible else counted
 
 
 def fault_to_continue(path: Path, time: float) -> str:
@@ -448,7 +440,7 @@ def _fault_to_append(table: Any, rows: int) -> str:
 
 
 def _tables_by_clock(file: h5py.File) -> list[list[str]]:
-    """Paths of the growing tables that share each of ``_CLOCKS``."""
+    """Paths of the growing tables that share each of ``CLOCKS``."""
     groups = ("channels", "energy", "line_channels")
     found = [[f"{group}/{name}" for name in file.get(group, ())] for group in groups]
     return [["time", *found[0]], *found[1:]]
@@ -458,7 +450,7 @@ def _rows_to_keep(file: h5py.File, time: float) -> list[int]:
     """Records before ``time`` [s] of each clock."""
     return [
         rows_before(file[clock], complete, time) if clock in file else 0
-        for clock, complete in zip(_CLOCKS, _told_rows(file), strict=True)
+        for clock, complete in zip(CLOCKS, _committed_rows(file), strict=True)
     ]
 
 

@@ -15,9 +15,9 @@ from h5py import h5f
 
 from catenary.postproc.files.hdf5.checked import text_of
 from catenary.postproc.files.hdf5.self_contained import open_own
-from catenary.postproc.files.result_file import RUNNING
-from catenary.postproc.read.attributes import HDF5_ERRORS
+from catenary.postproc.files.run_schema import RUNNING
 from catenary.postproc.read.records import complete_of
+from catenary.postproc.read.validation import HDF5_ERRORS
 
 # How often a file is opened that was written meanwhile, and the pause before [s]: an append takes
 # some milliseconds.

@@ -18,7 +18,8 @@ from catenary.base.parallel import on_root
 from catenary.postproc.channels.header import Header
 from catenary.postproc.channels.line_record import LineRecord
 from catenary.postproc.files.disk import Elsewhere, NoRoom, broken_write
-from catenary.postproc.files.result_file import DONE, INTERRUPTED, LineBlock, ResultFile
+from catenary.postproc.files.result_file import LineBlock, ResultFile
+from catenary.postproc.files.run_schema import DONE, INTERRUPTED
 from catenary.postproc.record.column_gather import next_flush
 from catenary.postproc.record.line_rows import LineGather, LineRows
 from catenary.solver.time_loop.views import channels
