@@ -9,16 +9,17 @@ import numpy as np
 
 from catenary.postproc.channels.line_record import LineRecord
 from catenary.postproc.files.hdf5.block_reading import row_blocks
+from catenary.postproc.files.hdf5.checked import HDF5_ERRORS
+from catenary.postproc.files.result_file import committed_rows
 from catenary.postproc.files.run_schema import (
     ALL_COLUMNS,
     CLOCKS,
     COLUMNS,
-    COMPLETE,
     RUNNING,
     growing_tables,
     largest,
 )
-from catenary.postproc.read.validation import HDF5_ERRORS, is_there
+from catenary.postproc.read.validation import is_there
 from catenary.solver.time_loop.views.channels import RUN, Channel
 
 # A time may be this share of a step off its place.
@@ -103,9 +104,9 @@ def scan(
     record : which of the line's channels are there
     dt : time between two records [s]
     faults : from ``table_faults``
-    complete : what ``complete_of`` found earlier, None to find it now
+    complete : what ``committed_rows`` found earlier, None to find it now
     """
-    n_complete, fault = complete_of(file) if complete is None else complete
+    n_complete, fault = committed_rows(file) if complete is None else complete
     told = [f"{path} {clause}" for path, clause in faults.items()] + ([fault] if fault else [])
     damaged = dict.fromkeys(faults, 0)
     rows = [0, 0, 0]
@@ -191,28 +192,6 @@ def _in_order(table: h5py.Dataset, n: int, dt: float | None) -> int:
             return part.start + int(wrong.argmax())
         before = time[-1]
     return n
-
-
-def complete_of(file: h5py.File) -> tuple[list[int], str]:
-    """Committed rows of the three clocks, all that are there where the counts are damaged, and
-    what is wrong with these."""
-    there = [_length(file, clock) for clock in CLOCKS]
-    try:
-        found = np.asarray(file[COMPLETE][...])
-        if found.shape == (3,) and found.dtype.kind in "iu":
-            told = [int(rows) for rows in found]
-            if all(0 <= n <= most for n, most in zip(told, there, strict=True)):
-                return told, ""
-    except HDF5_ERRORS:
-        pass
-    return there, f"{COMPLETE} is damaged, the length of the tables counts instead"
-
-
-def _length(file: h5py.File, path: str) -> int:
-    try:
-        return int(file[path].shape[0])
-    except (*HDF5_ERRORS, IndexError):
-        return 0
 
 
 def _missing_end(about: dict[str, Any], n: int) -> list[str]:

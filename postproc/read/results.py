@@ -272,16 +272,6 @@ class Results(LineOfRun):
         ends = np.cumsum([0, *self.n_strips()]).tolist()
         return [range(*pair) for pair in itertools.pairwise(ends)]
 
-    def strip_forces(self) -> list[np.ndarray]:
-        """Shares of the strips in the contact force of each pantograph, (n, its strips) each [N].
-
-        Empty if no pantograph has more than one. Reads all of them into memory.
-        """
-        if not self.several_strips:
-            return []
-        whole = self.channel("strip_force")
-        return [whole[:, columns.start : columns.stop] for columns in self.strip_columns()]
-
     def wire_columns(self) -> list[dict[str, int]]:
         """Column of ``contact_wire_force`` by the name of a contact wire, of each pantograph."""
         names = self.wires_of(Role.CONTACT)
@@ -311,15 +301,9 @@ class Results(LineOfRun):
         """Whether a pantograph has joints in the time loop."""
         return self.has("constraint_violation")
 
-    def constraint_violations(self) -> np.ndarray | None:
-        """Largest open joint of each pantograph at each record, (n, n_pantographs) [m].
-
-        NaN where a pantograph has no joints in the time loop, None if none has.
-        """
-        return self.channel("constraint_violation") if self.has_violations else None
-
     def largest_violations(self) -> list[float | None]:
-        """The same over the whole run (n_pantographs,) [m], None without joints in the loop."""
+        """Largest open joint of each pantograph over the whole run, (n_pantographs,) [m]; None
+        without joints in the time loop."""
         if not self.has_violations or not self._length:
             return [None] * self.n_pantographs
         found = self.extremes("constraint_violation")[1]

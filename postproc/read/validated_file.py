@@ -14,7 +14,7 @@ from catenary.base.errors import InputError
 from catenary.meshgen.wires import Role
 from catenary.postproc.channels.facts import NONE
 from catenary.postproc.channels.line_record import LineRecord, from_table
-from catenary.postproc.files.hdf5.checked import sum_is_kept, text_of
+from catenary.postproc.files.hdf5.checked import HDF5_ERRORS, sum_is_kept, text_of
 from catenary.postproc.files.kept_extremes import extremes_at
 from catenary.postproc.files.run_schema import (
     ALL_COLUMNS,
@@ -28,7 +28,6 @@ from catenary.postproc.files.run_schema import (
 from catenary.postproc.read.records import Records, scan, table_faults
 from catenary.postproc.read.running_file import opened, opened_image
 from catenary.postproc.read.validation import (
-    HDF5_ERRORS,
     is_there,
     listed,
     names_in,

@@ -14,11 +14,8 @@ import h5py
 import numpy as np
 from pydantic import BaseModel, ValidationError
 
-from catenary.postproc.files.hdf5.checked import ATTRIBUTE_SUMS, broken_seals, text_of
+from catenary.postproc.files.hdf5.checked import ATTRIBUTE_SUMS, HDF5_ERRORS, broken_seals, text_of
 from catenary.postproc.files.run_schema import JSON, SIZES, Table
-
-# What HDF5 and h5py raise at a damaged file.
-HDF5_ERRORS = (OSError, RuntimeError, ValueError, KeyError, TypeError, AttributeError)
 
 
 def is_number(value: Any, low: float = -math.inf, high: float = math.inf) -> bool:

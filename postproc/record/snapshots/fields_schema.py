@@ -6,7 +6,6 @@ and length here, and for their values snapshot by snapshot. Not collective.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Annotated, Literal, NamedTuple
 
 import h5py
@@ -14,11 +13,12 @@ import numpy as np
 from h5py import h5d
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
+from catenary.postproc.files.hdf5.checked import HDF5_ERRORS
 from catenary.postproc.files.run_schema import JSON, Positive, Table, Text, largest
-from catenary.postproc.read.validation import HDF5_ERRORS, read_attributes, values_fault
+from catenary.postproc.read.validation import read_attributes, values_fault
 from catenary.postproc.record.snapshots.blocks import FIXED, OTHER_PARTS
 from catenary.postproc.record.snapshots.field_kinds import KINDS, FieldKind
-from catenary.postproc.record.snapshots.field_layout import FORMAT, PLACES, SIZES
+from catenary.postproc.record.snapshots.field_layout import FORMAT, PLACES, SIZES, BlockTables
 
 # More snapshots or pantographs' numbers than any run has; nothing larger is read.
 _MOST_SNAPSHOTS, _MOST_PARTS, _MOST_PLACES = 10**7, 10**4, 10**6
@@ -58,22 +58,6 @@ BLOCK: dict[str, Table] = {
     "cell_first": _numbers(("snapshot",)),
     "cell_count": _numbers(("snapshot",)),
 }
-
-
-@dataclass(frozen=True)
-class BlockTables:
-    """The tables of a block beside its fields, sound; see `field_layout.Slots`.
-
-    points (B, 3) [m], nodes (B,), cells (C, 2), the others (T,).
-    """
-
-    points: np.ndarray
-    nodes: np.ndarray
-    cells: np.ndarray
-    first: np.ndarray
-    count: np.ndarray
-    cell_first: np.ndarray
-    cell_count: np.ndarray
 
 
 class FieldTables(NamedTuple):
