@@ -13,7 +13,7 @@ import typer
 
 from catenary.cases.cli import app as application
 from catenary.cases.cli import run  # noqa: F401  (adds its verbs)
-from catenary.cases.process import interrupts, matplotlib_folder, matplotlib_settings, memory_limit
+from catenary.cases.process import interrupts, matplotlib_setup, memory_limit
 from catenary.cases.terminal import console
 
 # Verbs of ``run``. They take no other file: a user waits for the first step of a run.
@@ -78,8 +78,8 @@ def main() -> None:
     os.environ.setdefault("OMPI_MCA_opal_signal", "")
     logging.getLogger("catenary").addHandler(console.LogHandler())
     interrupts.install(several_ranks=launched_by_mpirun())
-    matplotlib_folder.settle()
-    matplotlib_settings.leave_out()
+    matplotlib_setup.choose_folder()
+    matplotlib_setup.leave_out_settings()
     if too_little := memory_limit.complaint():
         console.complain(too_little)
         sys.exit(console.BAD_INPUT)

@@ -4,6 +4,10 @@ A lock is a file that is linked into place, which is one operation on local disk
 names its process; where the kernel has ``flock`` the process also holds that. A lock that a dead
 process of this machine left is taken over. Whether a process on another machine is dead cannot be
 found out: the message has its last sign of life, and the user removes the file.
+
+The package filelock is no replacement. Its flock says nothing on disks that keep locks to one host
+(Lustre with localflock, NFS with local_lock), its soft lock stays after a kill on another host, and
+neither names the process that holds it.
 """
 
 from __future__ import annotations

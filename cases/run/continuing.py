@@ -1,4 +1,4 @@
-"""What a run can be continued from: a sound state of the same line, train and method."""
+"""What a run can be continued from: a valid state of the same line, train and method."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _RELATIVE, _ABSOLUTE = 1e-6, 1e-6
 
 
 def state_to_continue(result: Path, beyond_end: bool = False) -> dict[str, Any]:
-    """The latest sound state of an unfinished run. Not collective.
+    """The latest valid state of an unfinished run. Not collective.
 
     ``beyond_end`` is whether it may have come to its end.
 
@@ -64,7 +64,7 @@ def state_to_continue(result: Path, beyond_end: bool = False) -> dict[str, Any]:
     if survives(result):
         fault = fault_to_continue(result, half_before)
     if fault:
-        raise _refusal(result, f"{fault}; what is sound can be reported")
+        raise _refusal(result, f"{fault}; what is valid can be reported")
     return state
 
 

@@ -44,7 +44,7 @@ from catenary.postproc.channels.header import Header
 from catenary.postproc.files.own_files import remove_stale
 from catenary.postproc.record.progress import Progress
 from catenary.postproc.record.recorder import Recorder
-from catenary.postproc.record.run_watch import RunWatch, watch_cadence, watched
+from catenary.postproc.record.run_watch import RunWatch, StripWatch, watch_cadence, watched
 from catenary.postproc.record.snapshots.blocks import RecordedLine
 from catenary.postproc.record.snapshots.fields import FieldRecorder
 from catenary.solver.problem.problem import Problem
@@ -324,8 +324,6 @@ def _observers(
     first: list[Observer] = [] if fields is None else [fields]
     half_lengths = [place.data.strips.half_length for place in problem.train.placements]
     if "lateral_motion" in problem.effects and np.isfinite(half_lengths).any():
-        from catenary.postproc.record.strip_watch import StripWatch
-
         first.append(StripWatch(half_lengths))
     if excited is not None:
         first += excited.watching(at_rest)

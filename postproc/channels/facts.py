@@ -51,8 +51,6 @@ class Fact(NamedTuple):
     per : ``RUN``, ``PANTOGRAPH`` or ``WIRE``
     low, high : bounds, inclusive
     may_be_nan : whether NaN is a value, which then stands for "none"
-    earlier : where files of earlier formats have it: the root attribute, or the key in each table
-        of the root attribute ``pantographs``; empty if they do not
     """
 
     unit: str
@@ -62,7 +60,6 @@ class Fact(NamedTuple):
     low: float = 0.0
     high: float = _MOST
     may_be_nan: bool = False
-    earlier: str = ""
 
 
 def facts_of(problem: Problem, mesh: LineMesh, dropper_length: np.ndarray) -> dict[str, np.ndarray]:
@@ -168,7 +165,6 @@ FACTS: dict[str, Fact] = {
         lambda source: source.problem.numerics.dt,
         low=_POSITIVE,
         high=1e3,
-        earlier="dt_s",
     ),
     "shortest_step": Fact(
         "s", "shortest step that the run may take", _shortest_step, low=1e-15, high=1e3
@@ -210,7 +206,6 @@ FACTS: dict[str, Fact] = {
         lambda source: source.problem.train.speed,
         low=_POSITIVE,
         high=1e4,
-        earlier="speed_m_per_s",
     ),
     "wave_speed": Fact(
         "m/s",
@@ -219,7 +214,6 @@ FACTS: dict[str, Fact] = {
         lambda source: slowest_wave(source.problem.line),
         low=_POSITIVE,
         high=1e6,
-        earlier="wave_speed_m_per_s",
     ),
     "contact_wire_tension": Fact(
         "N",
@@ -312,7 +306,6 @@ FACTS: dict[str, Fact] = {
         "static force of a pantograph",
         lambda source: [place.static_force for place in source.problem.train.placements],
         per=PANTOGRAPH,
-        earlier="static_force_N",
     ),
     "actuator_force": Fact(
         "N",
@@ -322,7 +315,6 @@ FACTS: dict[str, Fact] = {
         per=PANTOGRAPH,
         low=-_MOST,
         may_be_nan=True,
-        earlier="actuator_force_N",
     ),
     "touching_mass": Fact(
         "kg",
@@ -330,7 +322,6 @@ FACTS: dict[str, Fact] = {
         _touching_masses,
         per=PANTOGRAPH,
         low=1e-9,
-        earlier="touching_mass_kg",
     ),
     "strip_half_length": Fact(
         "m",

@@ -7,6 +7,7 @@ import errno
 import json
 import math
 import os
+import struct
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -19,12 +20,14 @@ from catenary.postproc.files.disk_errors import code_of, reason, remedy
 from catenary.postproc.files.hdf5.checked import FORMAT_BOUNDS
 from catenary.postproc.files.hdf5.self_contained import open_own
 from catenary.postproc.files.own_files import new_part
-from catenary.postproc.files.trimming import trimmed
 
 # What a file system without locks says to flock.
 _NO_LOCKS = (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP)
 # Room for HDF5's own tables and for the last words of a run that has filled the disk [bytes].
 MARGIN = 128 * 1024
+_SIGNATURE = b"\x89HDF\r\n\x1a\n"
+# Where a superblock of each version keeps the end of what the file holds [bytes].
+_END_AT = {0: 40, 1: 44, 2: 28, 3: 28}
 
 
 def plain(value: Any) -> Any:
@@ -160,6 +163,35 @@ def open_to_write(path: Path, mode: str, **how: Any) -> h5py.File:
         if code_of(error) not in _NO_LOCKS:
             raise
     return opener(path, mode, locking=False, **how)
+
+
+@contextlib.contextmanager
+def trimmed(file: h5py.File) -> Iterator[None]:
+    """Cut an open file, which is closed inside, to what it holds. A context manager.
+
+    HDF5 itself gives back only what it has claimed; its file stays as it is if its head is not of
+    a known kind.
+    """
+    handle = os.dup(file.id.get_vfd_handle())
+    try:
+        yield
+        end = _end(os.pread(handle, 64, 0))
+        if end is not None and 0 < end < os.fstat(handle).st_size:
+            os.ftruncate(handle, end)
+    finally:
+        os.close(handle)
+
+
+def _end(head: bytes) -> int | None:
+    """The end of a file by the first bytes of it; None if its superblock is not understood."""
+    if not head.startswith(_SIGNATURE) or head[8] not in _END_AT:
+        return None
+    version = head[8]
+    width = head[13] if version < 2 else head[9]
+    if width != 8:
+        return None
+    (end,) = struct.unpack_from("<Q", head, _END_AT[version])
+    return int(end)
 
 
 @contextlib.contextmanager

@@ -17,17 +17,16 @@ from catenary.base.errors import RunBroken
 from catenary.postproc.channels.header import Header
 from catenary.postproc.files.disk import as_attribute, open_to_write
 from catenary.postproc.files.disk_errors import reason
-from catenary.postproc.files.hdf5.array_writes import put_array
+from catenary.postproc.files.hdf5.array_writes import put_array, set_attribute
 from catenary.postproc.files.hdf5.checked import (
     ATTRIBUTE_SUMS,
     FORMAT_BOUNDS,
     seal_arrays,
     seal_attributes,
-    set_attribute,
     text_of,
 )
 from catenary.postproc.files.own_files import new_part
-from catenary.postproc.files.result_file import INTERRUPTED
+from catenary.postproc.files.run_schema import INTERRUPTED
 
 # Steps of the run as it was begun: what is recorded follows from them.
 BEGUN_FOR = "n_steps_begun_for"

@@ -17,7 +17,7 @@ from catenary.solver.time_loop.views.channels import CHANNELS, ENERGIES
 logger = logging.getLogger("catenary.record")
 
 RUN_FILE = "run.h5"
-FIELD_FILES = ("fields.h5", "fields.xdmf", "fields.vtkhdf")
+FIELD_FILES = ("fields.h5", "fields.xdmf")
 REPORT_FILES = (
     "summary.json",
     "report.html",

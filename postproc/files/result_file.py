@@ -3,7 +3,8 @@
 Everything that grows does so in ``append`` alone, which leaves a file that is readable as it
 stands; room on the disk is claimed one append ahead, so that a full disk costs no record. HDF5
 writes its tables in no order that helps one who reads a file whose writer was killed: a table may
-have got longer, and its rows not be there yet. Hence ``COMPLETE``, which is told after the rows.
+have got longer, and its rows not be there yet. Hence the committed row counts ``COMPLETE``, which
+are written after the rows.
 """
 
 from __future__ import annotations
@@ -30,56 +31,60 @@ from catenary.postproc.files.disk import (
     check_in_place,
     open_to_write,
     reserve,
+    trimmed,
 )
-from catenary.postproc.files.hdf5.array_writes import append_rows, grow, put_array
+from catenary.postproc.files.hdf5.array_writes import put_array, set_attribute
 from catenary.postproc.files.hdf5.checked import (
     FORMAT_BOUNDS,
+    HDF5_ERRORS,
     create_checked,
     put_sealed_arrays,
     seal_arrays,
     seal_attributes,
-    set_attribute,
 )
 from catenary.postproc.files.hdf5.chunk_shapes import Chunk, chunks_of, room_of
 from catenary.postproc.files.hdf5.self_contained import open_own
-from catenary.postproc.files.hdf5.shortening import DamagedClock, rows_before, shorten
-from catenary.postproc.files.hdf5.windowed_rows import write_window
+from catenary.postproc.files.hdf5.table_rows import (
+    DamagedClock,
+    append_rows,
+    grow,
+    rows_before,
+    shorten,
+    write_window,
+)
 from catenary.postproc.files.kept_extremes import drop_extremes, extremes_at, store_extremes
 from catenary.postproc.files.own_files import new_part
-from catenary.postproc.files.trimming import trimmed
+from catenary.postproc.files.run_schema import (
+    CLOCKS,
+    COMPLETE,
+    FORMAT,
+    LINE_TIME,
+    RUNNING,
+    growing_tables,
+)
 from catenary.solver.time_loop.views import channels
 from catenary.solver.time_loop.views.channels import Channel
 from catenary.solver.time_loop.views.observers import Stage
 
 logger = logging.getLogger("catenary.results")
 
-FORMAT = "catenary-run-3"
-# Rows that are whole, of the channels, of the energies and of the line's channels; a table may be
-# longer after a kill.
-COMPLETE = "complete_rows"
-LINE_TIME = "line_channels/time"
-RUNNING, DONE, INTERRUPTED = "running", "done", "interrupted"
-# What tells the times of the three kinds of rows.
-_CLOCKS = ("time", "energy/time", LINE_TIME)
 # The state to continue from is kept twice and written in turn: a run that is killed while it
 # writes one still has the other.
 _SLOTS = ("0", "1")
 
 
-class LineBlock(NamedTuple):
-    """Rows of the line's channels.
+class LineRows(NamedTuple):
+    """What a flush appends of the line's channels.
 
     Attributes
     ----------
-    time : (rows,) [s]
-    position : (rows, n_pantographs) along the track [m], where the window is
-    values : name -> the first of the recorded columns that are given, and these (rows, columns);
+    chosen : (n,) int, which of the flush's steps have a row
+    values : name -> the first of the recorded columns that are given, and these (n, columns);
         all of them if there is no window
     extremes : name -> (2, all columns), smallest and largest of every step up to this flush
     """
 
-    time: np.ndarray
-    position: np.ndarray
+    chosen: np.ndarray
     values: Mapping[str, tuple[int, np.ndarray]]
     extremes: Mapping[str, np.ndarray]
 
@@ -169,7 +174,7 @@ class ResultFile:
             raise
 
     def append(
-        self, blocks: Mapping[str, np.ndarray], line: LineBlock, state: Mapping[str, Any] | None
+        self, blocks: Mapping[str, np.ndarray], line: LineRows, state: Mapping[str, Any] | None
     ) -> None:
         """Append rows to growing datasets and store a state to continue from.
 
@@ -189,9 +194,9 @@ class ResultFile:
         for name, block in blocks.items():
             dataset = self._growing[name]
             append_rows(dataset, dataset.id.shape[0], block)
-        self._append_line(line)
+        self._append_line(line, blocks)
         store_extremes(self._file, self._growing["time"].shape[0], line.extremes)
-        self._settle()
+        self._order_writes()
         put_array(self._file, COMPLETE, _rows(self._growing))
         if state is not None:
             self._store(state)
@@ -231,20 +236,20 @@ class ResultFile:
             self._file.close()
         self._remove_if_empty()
 
-    def _append_line(self, line: LineBlock) -> None:
+    def _append_line(self, line: LineRows, blocks: Mapping[str, np.ndarray]) -> None:
         """Append rows of the line's channels; blocks that are outside of the window are left out,
         so that they take no room."""
         start = self._growing[LINE_TIME].shape[0]
-        edges = self._record.within(line.position)
+        edges = self._record.within(blocks["channels/contact_position"][line.chosen])
         for name, values in line.values.items():
             dataset = self._growing[f"line_channels/{name}"]
             if edges is None:
                 append_rows(dataset, start, values[1])
                 continue
-            grow([dataset], start + line.time.size)
+            grow([dataset], start + line.chosen.size)
             if values[1].size:
                 write_window(dataset, start, values, self._x[name], edges)
-        append_rows(self._growing[LINE_TIME], start, line.time)
+        append_rows(self._growing[LINE_TIME], start, blocks["time"][line.chosen])
 
     def abandon(self) -> None:
         """Close the file without writing to it, after a write has failed."""
@@ -268,12 +273,12 @@ class ResultFile:
             for array in place.values():
                 if array.ndim:
                     dimensions.hide(array)
-            self._settle()
+            self._order_writes()
             set_attribute(group, "latest", slot)
         self._n_states += 1
 
-    def _settle(self) -> None:
-        """Let what follows be written after what is there; all the same until there is a file."""
+    def _order_writes(self) -> None:
+        """Write all that waits, before what follows; not needed until the file has its name."""
         if self._begun:
             self._file.flush()
 
@@ -286,15 +291,13 @@ def _table(
     stage: Stage, with_energies: bool, record: LineRecord, x: Mapping[str, np.ndarray]
 ) -> dict[str, tuple[Channel, int]]:
     """Growing datasets: path -> channel and columns, 0 columns for one value a row."""
-    table = {"time": (channels.TIME, 0)}
-    for channel in channels.train_channels(stage.train):
-        table[f"channels/{channel.name}"] = (channel, channel.n_columns(stage.train))
-    table[LINE_TIME] = (channels.TIME, 0)
-    for name in record.names:
-        table[f"line_channels/{name}"] = (channels.CHANNELS[name], int(x[name].size))
-    if with_energies:
-        table.update({f"energy/{c.name}": (c, 0) for c in channels.ENERGIES.values()})
-    return table
+    steps, energies, line = growing_tables(record, stage.train)
+    table = {
+        path: (c, 0 if c.per == channels.RUN else c.n_columns(stage.train))
+        for path, c in steps.items()
+    }
+    table |= {path: (c, int(x[c.name].size) if c.name in x else 0) for path, c in line.items()}
+    return table | ({path: (c, 0) for path, c in energies.items()} if with_energies else {})
 
 
 def _refuse_other_tables(
@@ -389,26 +392,29 @@ def _create_growing(
 
 def _rows(tables: Mapping[str, h5py.Dataset]) -> list[int]:
     """Rows of the channels, of the energies and of the line's channels."""
-    # Of damaged files one may be a single value.
-    return [(*tables[name].shape, 0)[0] if name in tables else 0 for name in _CLOCKS]
+    return [tables[name].shape[0] if name in tables else 0 for name in CLOCKS]
 
 
-def complete_rows(file: h5py.File) -> list[int]:
-    """Rows of the channels, of the energies and of the line's channels that are whole; all of them
-    in files of earlier versions."""
-    found = file[COMPLETE][...].tolist() if COMPLETE in file else []
-    return [*found, *_rows(file)[len(found) :]]
+def committed_rows(file: h5py.File) -> tuple[list[int], str]:
+    """Committed rows of the three clocks, those that are there where the counts are damaged, and
+    what is wrong with these. The file may be damaged. Not collective."""
+    there = [_length(file, clock) for clock in CLOCKS]
+    try:
+        found = np.asarray(file[COMPLETE][...])
+        if found.shape == (len(CLOCKS),) and found.dtype.kind in "iu":
+            rows = [int(n) for n in found]
+            if all(0 <= n <= most for n, most in zip(rows, there, strict=True)):
+                return rows, ""
+    except HDF5_ERRORS:
+        pass
+    return there, f"{COMPLETE} is damaged, the length of the tables counts instead"
 
 
-def _told_rows(file: h5py.File) -> list[int]:
-    """The same of a file that nobody has examined: where the numbers cannot be, the length of the
-    tables counts."""
-    counted = _rows(file)
-    told = np.asarray(file[COMPLETE][...]) if COMPLETE in file else np.zeros(0, dtype=int)
-    if told.ndim != 1 or told.dtype.kind not in "iu" or told.size > len(counted):
-        return counted
-    rows = [*told.tolist(), *counted[told.size :]]
-    return rows if all(0 <= n <= most for n, most in zip(rows, counted, strict=True)) else counted
+def _length(file: h5py.File, path: str) -> int:
+    try:
+        return int(file[path].shape[0])
+    except (*HDF5_ERRORS, IndexError):
+        return 0
 
 
 def fault_to_continue(path: Path, time: float) -> str:
@@ -448,7 +454,7 @@ def _fault_to_append(table: Any, rows: int) -> str:
 
 
 def _tables_by_clock(file: h5py.File) -> list[list[str]]:
-    """Paths of the growing tables that share each of ``_CLOCKS``."""
+    """Paths of the growing tables that share each of ``CLOCKS``."""
     groups = ("channels", "energy", "line_channels")
     found = [[f"{group}/{name}" for name in file.get(group, ())] for group in groups]
     return [["time", *found[0]], *found[1:]]
@@ -458,7 +464,7 @@ def _rows_to_keep(file: h5py.File, time: float) -> list[int]:
     """Records before ``time`` [s] of each clock."""
     return [
         rows_before(file[clock], complete, time) if clock in file else 0
-        for clock, complete in zip(_CLOCKS, _told_rows(file), strict=True)
+        for clock, complete in zip(CLOCKS, committed_rows(file)[0], strict=True)
     ]
 
 

@@ -17,8 +17,7 @@ from catenary.base.errors import InputError
 from catenary.mbs.shape import Shape
 from catenary.postproc.film.film_data import FilmData, film_data
 from catenary.postproc.film.pantograph_shape import MovingPantographs
-from catenary.postproc.film.projection import Projection
-from catenary.postproc.film.scale import Picture, Scale
+from catenary.postproc.film.projection import Picture, Projection, Scale
 from catenary.postproc.film.snapshots import Snapshots
 from catenary.postproc.film.view import View
 from catenary.postproc.read.records import Records

@@ -10,12 +10,11 @@ from matplotlib.colors import LinearSegmentedColormap
 
 from catenary.mbs.shape import BODY, HEAD, SPRING, Pose, Shape
 from catenary.meshgen.mesh import DROPPERS
+from catenary.postproc.film.beside_line import boxes, contacts, faces_of, rails
 from catenary.postproc.film.film_data import FilmData
 from catenary.postproc.film.pantograph_shape import MovingPantographs
-from catenary.postproc.film.projection import Projection
-from catenary.postproc.film.scale import Colours, room_above
+from catenary.postproc.film.projection import Colours, Projection, room_above
 from catenary.postproc.film.snapshots import Snapshots
-from catenary.postproc.film.train import HALF_WIDTH, coaches
 from catenary.postproc.film.view import View
 from catenary.postproc.record.snapshots.blocks import BESIDE
 
@@ -30,8 +29,8 @@ _MAST_ABOVE = 0.4
 _ARROW = 0.0035
 # Length of line that is seen from behind the train, from behind the first pantograph on [m].
 _SEEN_BEHIND, _SEEN_AHEAD = 2.0, 65.0
-# Half the distance of the rails, and how far lines across the track reach to either side [m].
-_HALF_GAUGE, _ACROSS = 0.75, 50.0
+# How far lines across the track reach to either side [m].
+_ACROSS = 50.0
 # Where what is not seen is put.
 _NOWHERE = -1e6
 
@@ -160,15 +159,22 @@ class LineView:
             mesh["moved"] = 1e3 * moved[:, self._axis]
         if slack is not None and self._droppers.n_cells:
             self._droppers.cell_data["slack"] = slack.astype(float)
-        self._show_train(row)
+        if self._coaches is not None:
+            self._coaches.points[:] = projection.seen(
+                boxes(data.position[row], self.foot), 0.0, 1.0
+            )
+            self._coaches.Modified()
+
+        def moved_at(wire: str, x: float, axis: int = 1) -> float:
+            nodes = data.wires[wire]
+            return float(np.interp(x, data.points[nodes, 0], moved[nodes, axis]))
+
+        heads = contacts(data, row, moved_at)
         for p, (lines, arrow) in enumerate(self._pantographs):
-            x, force = float(data.position[row, p]), max(float(data.force[row, p]), 0.0)
-            nodes = data.wires[data.touched(x)]
-            at, by = (_at(x, data.points[nodes], table[nodes]) for table in (data.points, moved))
-            at[2] = float(data.rest_height(np.array([x]))[0])
-            lifted = float(data.head_height[row, p]) - at[2]
+            at, by = heads[0][p], heads[1][p]
+            x, force, lifted = at[0], max(float(data.force[row, p]), 0.0), by[2]
             # Lines are drawn through nodes, and so is the head in contact with them.
-            by[0], by[2] = 0.0, by[2] if force > 0.0 else lifted
+            by[2] = moved_at(data.touched(x), x, 2) if force > 0.0 else lifted
             pose = _raised(poses[p], self.foot, at[2], by[2] - lifted)
             shape = projection.seen(pose.rest, pose.now - pose.rest, -1.0)
             for mesh in lines:
@@ -207,27 +213,6 @@ class LineView:
             ]
         )  # fmt: skip
 
-    def _show_train(self, row: int) -> None:
-        """Put the coaches under their pantographs."""
-        if self._data.excitation is not None:
-            return
-        begin, end = coaches(self._data.position[row]).T
-        low, high = self.foot - 1.0, self.foot
-        if self._projection.view is View.PLAN:
-            ends, low, high = (begin, end, end, begin), 0.0, 0.0
-            sides = (-HALF_WIDTH, -HALF_WIDTH, HALF_WIDTH, HALF_WIDTH)
-            heights = (0.0,) * 4
-        else:
-            ends, heights = (begin, end, end, begin), (low, low, high, high)
-            sides = (-HALF_WIDTH, HALF_WIDTH, HALF_WIDTH, -HALF_WIDTH)
-        corners = [
-            np.column_stack([x, np.full(x.size, y), np.full(x.size, z)])
-            for x, y, z in zip(ends, sides, heights, strict=True)
-        ]
-        rest = np.stack(corners, axis=1).reshape(-1, 3)
-        self._coaches.points[:] = self._projection.seen(rest, 0.0, 1.0)
-        self._coaches.Modified()
-
     def _add_surroundings(self, plotter: pyvista.Plotter) -> None:
         """Track and masts, which stand still; from above a line across the track at each mast."""
         data, n = self._data, self._data.supports.size
@@ -243,17 +228,16 @@ class LineView:
         width = 2 if self._projection.view is View.PLAN else 6
         plotter.add_mesh(masts, color=MAST, line_width=width, lighting=False)
         if self._projection.view is View.PLAN:
-            x = data.points[[data.points[:, 0].argmin(), data.points[:, 0].argmax()], 0]
-            rails = [[at, side, 0.0] for side in (-_HALF_GAUGE, _HALF_GAUGE) for at in x.tolist()]
-            drawn = self._projection.seen(np.array(rails), 0.0, 2.0)
-            mesh = pyvista.PolyData(drawn, lines=segments(np.array([[0, 1], [2, 3]])))
+            points, lines = rails(data)
+            mesh = pyvista.PolyData(self._projection.seen(points, 0.0, 2.0), lines=segments(lines))
             plotter.add_mesh(mesh, color=TRACK, line_width=2, lighting=False)
-        if data.excitation is not None:
-            return
-        n = len(coaches(data.position[0]))
-        faces = np.column_stack([np.full(n, 4), np.arange(4 * n).reshape(n, 4)])
-        self._coaches = pyvista.PolyData(np.zeros((4 * n, 3)), faces=faces.ravel())
-        plotter.add_mesh(self._coaches, color=VEHICLE, lighting=False)
+        self._coaches: pyvista.PolyData | None = None
+        if data.excitation is None:
+            corners = np.zeros_like(boxes(data.position[0], self.foot))
+            corners_of = faces_of(len(corners) // 8)
+            faces = np.column_stack([np.full(len(corners_of), 4), corners_of])
+            self._coaches = pyvista.PolyData(corners, faces=faces.ravel())
+            plotter.add_mesh(self._coaches, color=VEHICLE, lighting=False)
 
     def _add_pantograph(
         self, plotter: pyvista.Plotter, colour: str, shape: Shape
@@ -270,11 +254,6 @@ class LineView:
         arrow = pyvista.PolyData(np.zeros((4, 3)), lines=joined)
         plotter.add_mesh(arrow, color="black", line_width=2, lighting=False)
         return lines, arrow
-
-
-def _at(x: float, places: np.ndarray, table: np.ndarray) -> np.ndarray:
-    """A row of a table (n, 3), at a place along the track between those of the points (n, 3)."""
-    return np.array([np.interp(x, places[:, 0], column) for column in table.T])
 
 
 def _raised(pose: Pose, foot: float, wire: float, more: float) -> Pose:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,8 +12,8 @@ from catenary.base.errors import InputError
 from catenary.postproc.files.hdf5.self_contained import open_own
 from catenary.postproc.read.guard import survives
 from catenary.postproc.record.snapshots.blocks import ARMS, OTHER_PARTS
-from catenary.postproc.record.snapshots.field_layout import PLACES
-from catenary.postproc.record.snapshots.fields_schema import BlockTables, FieldsFault, read_fields
+from catenary.postproc.record.snapshots.field_layout import PLACES, BlockTables
+from catenary.postproc.record.snapshots.fields_schema import FieldsFault, read_fields
 
 FIELDS_FILE = "fields.h5"
 # Snapshots that are looked through for the largest uplift.
@@ -26,24 +25,46 @@ _UP = 2
 
 @dataclass(frozen=True)
 class _Wire:
-    """What snapshots show of a wire: nodes and places of its points, rows of each snapshot.
+    """A wire in snapshots.
 
-    ``rests`` is whether points that a snapshot does not show are at rest.
+    Attributes
+    ----------
+    block : its points, and which of them each snapshot shows
+    start : (n_snapshots,) rows before those of a snapshot
+    values : ``displacement`` if that was recorded, or ``uplift``
+    rests : whether points that a snapshot does not show are at rest
     """
 
-    nodes: np.ndarray
-    x: np.ndarray
-    first: np.ndarray
-    count: np.ndarray
+    block: BlockTables
     start: np.ndarray
     values: h5py.Dataset
-    vectors: h5py.Dataset | None
     rests: bool
 
-    def rows(self, number: int, first: int, count: int) -> slice:
-        """Rows of its tables with ``count`` points from number ``first`` on in a snapshot."""
-        begin = int(self.start[number]) + first - int(self.first[number])
-        return slice(begin, begin + count)
+    @classmethod
+    def of(cls, block: BlockTables, group: h5py.Group, rests: bool) -> _Wire:
+        """That of a group of the file."""
+        values = group["displacement" if "displacement" in group else "uplift"]
+        return cls(block, np.cumsum(block.count) - block.count, values, rests)
+
+    @property
+    def has_vectors(self) -> bool:
+        """Whether its motion along the track and sideways was recorded."""
+        return self.values.ndim == 2
+
+    @property
+    def x(self) -> np.ndarray:
+        """Places of its points along the track [m]."""
+        return self.block.points[:, 0]
+
+    def shown(self, number: int) -> tuple[int, int]:
+        """Its first point in a snapshot, and the number of points."""
+        return int(self.block.first[number]), int(self.block.count[number])
+
+    def motion(self, number: int, first: int, count: int) -> np.ndarray:
+        """Motion of ``count`` points from number ``first`` on in a snapshot, (count, 3) [m]."""
+        begin = int(self.start[number]) + first - int(self.block.first[number])
+        values = np.asarray(self.values[begin : begin + count], dtype=float)
+        return values if self.has_vectors else values[:, None] * [0.0, 0.0, 1.0]
 
 
 class Snapshots:
@@ -112,13 +133,13 @@ class Snapshots:
                 f"{path} has neither uplift nor displacement; run the scene again with one of "
                 "them in output.fields"
             )
-        self._wires = [
-            _wire(tables.blocks[name], file[name], tables.rests_beyond) for name in wires
-        ]
+        self._wires = {
+            name: _Wire.of(tables.blocks[name], file[name], tables.rests_beyond) for name in wires
+        }
         scalar = all("uplift" in file[name] for name in wires)
         self.field = "uplift" if scalar else "displacement_Z"
-        self.has_vectors = all(wire.vectors is not None for wire in self._wires)
-        shown = sum(wire.x.size if wire.rests else wire.count for wire in self._wires)
+        self.has_vectors = all(wire.has_vectors for wire in self._wires.values())
+        shown = sum(w.x.size if w.rests else w.block.count for w in self._wires.values())
         self.whole = bool(np.all(shown == self._n_nodes))
 
     def __enter__(self) -> Snapshots:
@@ -138,12 +159,10 @@ class Snapshots:
 
     def shown(self, number: int) -> tuple[float, float]:
         """From and to of the wires whose motion a snapshot tells, as far as each reaches [m]."""
-        ends = [
-            wire.x[[0, -1]]
-            if wire.rests
-            else wire.x[[int(wire.first[number]), int(wire.first[number] + wire.count[number]) - 1]]
-            for wire in self._wires
-        ]
+        ends = []
+        for wire in self._wires.values():
+            first, count = (0, wire.x.size) if wire.rests else wire.shown(number)
+            ends.append(wire.x[[first, first + count - 1]])
         low, high = np.array(ends).reshape(-1, 2).T
         return float(low.min(initial=np.inf)), float(high.max(initial=-np.inf))
 
@@ -172,27 +191,15 @@ class Snapshots:
     def largest(self, numbers: np.ndarray, axis: int) -> float:
         """Largest motion along an axis (0, 1, 2 of x, y, z) in some snapshots, of many in so many
         of them that it is not far from that [m]; zero where nothing moves along it."""
-        some = numbers[:: max(1, numbers.size // _SAMPLED)].tolist()
-        if axis == _UP:
-            return max(0.0, *(float(np.nanmax(np.abs(self.uplift(one)))) for one in some))
-        if not self.has_vectors:
+        if axis != _UP and not self.has_vectors:
             return 0.0
-        return max(
-            0.0, *(float(np.nanmax(np.abs(self.displacement(one)[:, axis]))) for one in some)
-        )
+        some = numbers[:: max(1, numbers.size // _SAMPLED)].tolist()
+        moved = (np.abs(self.displacement(one)[:, axis]) for one in some)
+        return max(0.0, *(float(np.nanmax(one)) for one in moved))
 
     def uplift(self, number: int) -> np.ndarray:
-        """Uplift of the nodes in a snapshot, NaN where it is not known, (n_nodes,) [m].
-
-        Raises
-        ------
-        InputError
-            If it is not of this line, or not finite.
-        """
-        uplift = self._before(())
-        for nodes, values in self._shown(number, vectors=False):
-            uplift[nodes] = values if values.ndim == 1 else values[:, _UP]
-        return uplift
+        """Uplift of the nodes in a snapshot, (n_nodes,) [m], as ``displacement``."""
+        return self.displacement(number)[:, _UP]
 
     def displacement(self, number: int) -> np.ndarray:
         """Displacement of the nodes in a snapshot, NaN where it is not known, (n_nodes, 3) [m].
@@ -204,83 +211,44 @@ class Snapshots:
         InputError
             If it is not of this line, or not finite.
         """
-        moved = self._before((3,))
-        for nodes, values in self._shown(number, vectors=self.has_vectors):
-            if values.ndim == 1:
-                moved[nodes, :_UP], moved[nodes, _UP] = 0.0, values
-            else:
-                moved[nodes] = values
-        return moved
-
-    def aside_at(self, number: int, name: str, x: float) -> float:
-        """How far a wire has moved to the left at a place along the track in a snapshot [m]."""
-        if not self.has_vectors or name not in self.parts:
-            return 0.0
-        wire = self._wire(name)
-        assert wire.vectors is not None
-        return _between(wire, number, x, wire.vectors, 1)
-
-    def uplift_at(self, number: int, name: str, x: float) -> float:
-        """How far a wire has risen at a place along the track in a snapshot, NaN where it is not
-        shown [m]."""
-        if name not in self.parts:
-            return np.nan
-        wire = self._wire(name)
-        return _between(wire, number, x, wire.values, _UP)
-
-    def _before(self, shape: tuple[int, ...]) -> np.ndarray:
-        """Motion of the nodes that a snapshot does not show: zero at rest, NaN if not known.
-
-        Parameters
-        ----------
-        shape : of the motion of one node
-        """
-        motion = np.full((self._n_nodes, *shape), np.nan)
-        for wire in self._wires if self._of_this_line else ():
-            if wire.rests:
-                motion[wire.nodes] = 0.0
-        return motion
-
-    def _wire(self, name: str) -> _Wire:
-        return self._wires[[part for part in self.parts if part not in OTHER_PARTS].index(name)]
-
-    def _shown(self, number: int, vectors: bool) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """Nodes of each wire that a snapshot shows, and their values, which are finite."""
-        sound = self._of_this_line
+        moved = np.full((self._n_nodes, 3), np.nan)
+        valid = self._of_this_line
         try:
-            for wire in self._wires if sound else ():
-                first, count = int(wire.first[number]), int(wire.count[number])
-                table = wire.vectors if vectors and wire.vectors is not None else wire.values
-                values = np.asarray(table[wire.rows(number, first, count)], dtype=float)
-                sound = sound and bool(np.isfinite(values).all())
-                if sound:
-                    yield wire.nodes[first : first + count], values
+            for wire in self._wires.values() if valid else ():
+                if wire.rests:
+                    moved[wire.block.nodes] = 0.0
+                first, count = wire.shown(number)
+                shown = wire.motion(number, first, count)
+                moved[wire.block.nodes[first : first + count]] = shown
+                valid = valid and bool(np.isfinite(shown).all())
         except (IndexError, KeyError, OSError, TypeError, ValueError) as error:
             raise InputError(
                 f"{self._path} is damaged at t = {self.times[number]:g} s: {error}"
             ) from error
-        if not sound:
+        if not valid:
             raise InputError(
                 f"{self._path} does not belong to the run.h5 beside it, or is damaged at "
                 f"t = {self.times[number]:g} s"
             )
+        return moved
 
+    def aside_at(self, number: int, name: str, x: float) -> float:
+        """How far a wire has moved to the left at a place along the track in a snapshot, zero
+        where it is not shown [m]."""
+        return float(self._motion_at(number, name, x)[1]) if name in self._wires else 0.0
 
-def _between(wire: _Wire, number: int, x: float, table: h5py.Dataset, axis: int) -> float:
-    """Value of a table in a snapshot between the two points of a wire next to a place."""
-    first = int(wire.first[number])
-    last = first + int(wire.count[number]) - 2
-    if wire.rests and not wire.x[first] <= x <= wire.x[last + 1]:
-        return 0.0
-    at = int(np.clip(wire.x.searchsorted(x) - 1, first, max(first, last)))
-    values = np.asarray(table[wire.rows(number, at, 2)], dtype=float)
-    if values.ndim > 1:
-        values = values[:, axis]
-    return float(np.interp(x, wire.x[at : at + 2], values))
+    def uplift_at(self, number: int, name: str, x: float) -> float:
+        """How far a wire has risen at a place along the track in a snapshot, NaN where it is not
+        shown [m]."""
+        return float(self._motion_at(number, name, x)[_UP]) if name in self._wires else np.nan
 
-
-def _wire(block: BlockTables, group: h5py.Group, rests: bool) -> _Wire:
-    start = np.cumsum(block.count) - block.count
-    values = group["uplift" if "uplift" in group else "displacement"]
-    x, vectors = block.points[:, 0], group.get("displacement")
-    return _Wire(block.nodes, x, block.first, block.count, start, values, vectors, rests)
+    def _motion_at(self, number: int, name: str, x: float) -> np.ndarray:
+        """Motion of a wire between two of its points, (3,) [m]."""
+        wire = self._wires[name]
+        first, count = wire.shown(number)
+        last = first + count - 2
+        if wire.rests and not wire.x[first] <= x <= wire.x[last + 1]:
+            return np.zeros(3)
+        at = int(np.clip(wire.x.searchsorted(x) - 1, first, max(first, last)))
+        values = wire.motion(number, at, 2)
+        return np.array([np.interp(x, wire.x[at : at + 2], column) for column in values.T])

@@ -14,13 +14,12 @@ from catenary.mbs.shape import BODY, HEAD, SPRING, Shape
 from catenary.postproc.files.disk import write_whole
 from catenary.postproc.film.film_data import FilmData, film_data
 from catenary.postproc.film.pantograph_shape import MovingPantographs
-from catenary.postproc.film.scale import Picture, room_above
-from catenary.postproc.film.snapshots import FIELDS_FILE, Snapshots
+from catenary.postproc.film.projection import Picture, room_above
+from catenary.postproc.film.snapshots import Snapshots
 from catenary.postproc.film.view import View
 from catenary.postproc.paraview import scenery
 from catenary.postproc.read.records import Records
 from catenary.postproc.read.results import Results
-from catenary.postproc.record.snapshots.vtkhdf import write_vtkhdf
 
 SCRIPT, FOLDER = "view.py", "paraview"
 _TEMPLATE = "view.py.template"
@@ -61,12 +60,11 @@ def write_script(
                 raise InputError(f"{target} is a link, through which nothing is written; remove it")
             try:
                 target.mkdir(exist_ok=True)
-                vtkhdf = write_vtkhdf(folder / FIELDS_FILE)
                 files = scenery.write(data, pantographs, snapshots, target)
                 write_whole(target / SCRIPT, _script(settings))
             except OSError as error:
                 raise InputError(f"{target} cannot be written: {error}") from error
-    return [target / SCRIPT, *files.files, vtkhdf]
+    return [target / SCRIPT, *files]
 
 
 def _script(settings: dict[str, object]) -> str:

@@ -1,1 +1,1 @@
-"""Reading result files, sound or damaged."""
+"""Reading result files, valid or damaged."""

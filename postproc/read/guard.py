@@ -15,7 +15,7 @@ from pathlib import Path
 
 from catenary.base.errors import InputError
 from catenary.postproc.read.records import Records
-from catenary.postproc.read.sound_file import SoundFile
+from catenary.postproc.read.validated_file import ValidatedFile
 
 RESULT_FILE = "run.h5"
 # What reading a file may take: so long, and a second for each part of this size [s], [B].
@@ -38,7 +38,7 @@ with file:
 
 
 def examined(path: Path, limit: float | None = None) -> Records | None:
-    """Which records of a result file are sound; None if there is no file.
+    """Which records of a result file are valid; None if there is no file.
 
     Parameters
     ----------
@@ -77,11 +77,7 @@ def examined(path: Path, limit: float | None = None) -> Records | None:
         ) from error
     if "refused" in found:
         raise InputError(found["refused"])
-    damaged = {
-        name: [(int(begin), int(end)) for begin, end in parts]
-        for name, parts in found["damaged"].items()
-    }
-    return Records(found["rows"], damaged, found["told"], float(found["last"]))
+    return Records(**found)
 
 
 def _child(words: list[str], limit: float) -> subprocess.CompletedProcess[bytes]:
@@ -112,7 +108,7 @@ def _environment() -> dict[str, str]:
 def examine(path: Path) -> str:
     """What is found in a file as JSON: the fields of ``Records``, or why it is refused."""
     try:
-        file = SoundFile(path)
+        file = ValidatedFile(path)
         found = file.records
         file.read_states()
         file.close()

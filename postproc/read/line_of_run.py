@@ -10,7 +10,7 @@ import numpy as np
 from catenary.meshgen.mesh import elements_of
 from catenary.meshgen.wires import Role
 from catenary.postproc.read.registration import Registration
-from catenary.postproc.read.sound_file import SoundFile
+from catenary.postproc.read.validated_file import ValidatedFile
 
 
 class ContactProfile(NamedTuple):
@@ -37,10 +37,10 @@ class LineOfRun:
 
     Parameters
     ----------
-    file : SoundFile
+    file : ValidatedFile
     """
 
-    def __init__(self, file: SoundFile) -> None:
+    def __init__(self, file: ValidatedFile) -> None:
         self._file = file
 
     def line(self, name: str) -> np.ndarray:
@@ -84,35 +84,26 @@ class LineOfRun:
         return np.asarray(self._file[path][...] if path in self._file else [], dtype=np.int64)
 
     def static(self, name: str) -> np.ndarray:
-        """A dataset of ``/static``, for instance ``dropper_length``.
-
-        ``elasticity_of_wires`` of a file without is that of its one contact wire.
-        """
-        if name == "elasticity_of_wires" and f"static/{name}" not in self._file:
-            return self.static("elasticity")[:, None]
+        """A dataset of ``/static``, for instance ``dropper_length``."""
         return np.asarray(self._file[f"static/{name}"][...])
 
     def has_static(self, name: str) -> bool:
-        """Whether ``/static`` has a dataset, which lines or earlier files may be without."""
+        """Whether ``/static`` has a dataset, which lines may be without."""
         return f"static/{name}" in self._file
 
     def registration(self) -> Registration | None:
-        """Steady arms at rest; None of straight wires, and in files of earlier versions."""
+        """Steady arms at rest; None of straight wires."""
         if not self.has_static("arm_force"):
             return None
         names = ("arm_stagger", "arm_force", "arm_tension")
         table = {name: self.static(name) for name in names}
-        known = {"arm_x": self.line("arm_x"), "arm_wire": self._arm_wire()}
+        known = {"arm_x": self.line("arm_x"), "arm_wire": self.line("arm_wire")}
         return Registration.of({**table, **known}, list(self.roles))
 
-    def _arm_wire(self) -> np.ndarray:
-        """Number of the wire of each steady arm, empty in files of earlier versions."""
-        return self.line("arm_wire") if "line/arm_wire" in self._file else np.zeros(0, dtype=int)
-
-    def arm_wires(self) -> list[str | None]:
-        """Name of the wire that each steady arm holds; None in files of earlier versions."""
-        names, held = list(self.roles), self._arm_wire().tolist()
-        return [names[number] for number in held] or [None] * self.line("arm_x").size
+    def arm_wires(self) -> list[str]:
+        """Name of the wire that each steady arm holds."""
+        names = list(self.roles)
+        return [names[number] for number in self.line("arm_wire").tolist()]
 
     def dropper_wires(self) -> np.ndarray:
         """Numbers of the upper and the lower wire of each dropper, (n_droppers, 2)."""

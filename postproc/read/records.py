@@ -1,4 +1,4 @@
-"""Finds out which records of a result file are sound. Not collective."""
+"""Finds out which records of a result file are valid. Not collective."""
 
 from __future__ import annotations
 
@@ -7,213 +7,68 @@ from typing import Any, NamedTuple
 import h5py
 import numpy as np
 
-from catenary.postproc.files.result_file import COMPLETE
-from catenary.postproc.read.attributes import HDF5_ERRORS, is_there
-from catenary.postproc.read.file_schema import (
-    CLOCK,
-    LINE_CLOCK,
-    Growing,
-    energy_tables,
+from catenary.postproc.channels.line_record import LineRecord
+from catenary.postproc.files.hdf5.block_reading import row_blocks
+from catenary.postproc.files.hdf5.checked import HDF5_ERRORS
+from catenary.postproc.files.result_file import committed_rows
+from catenary.postproc.files.run_schema import (
+    ALL_COLUMNS,
+    CLOCKS,
+    COLUMNS,
+    RUNNING,
+    growing_tables,
     largest,
-    line_tables,
-    step_tables,
 )
-from catenary.postproc.read.tables import damaged_rows
+from catenary.postproc.read.validation import is_there
+from catenary.solver.time_loop.views.channels import RUN, Channel
 
 # A time may be this share of a step off its place.
 _OFF = 1e-3
-# Times that are read and checked together.
-_TIMES = 1 << 18
+# Columns of a wide table that are read at once.
+_COLUMNS = 256
 
 
 class Records(NamedTuple):
-    """Which records are sound.
+    """Which records are valid.
 
-    ``rows`` as the dataset ``complete_rows``, cut to what is sound; ``damaged`` table -> ranges of
-    rows that read as NaN; ``told`` a clause for each thing that is damaged; ``last`` time of the
-    last sound record [s], NaN without one.
+    Attributes
+    ----------
+    rows : of the steps, the energies and the line's channels
+    damaged : path of a damaged table -> its rows before the damage; later ones read as NaN
+    told : a clause for each thing that is damaged
+    last : time of the last valid step [s], NaN without one
     """
 
     rows: list[int]
-    damaged: dict[str, list[tuple[int, int]]]
+    damaged: dict[str, int]
     told: list[str]
     last: float
 
 
-class TableFault(NamedTuple):
-    """A growing dataset that is not what it should be, and whether the run needs it."""
-
-    path: str
-    fault: str
-    essential: bool
-
-
-def table_faults(file: h5py.File, about: dict[str, Any], sizes: dict[str, int]) -> list[TableFault]:
-    """Growing datasets that are missing or have the wrong type or width.
+def table_faults(
+    file: h5py.File, record: LineRecord, sizes: dict[str, int], most: int
+) -> dict[str, str]:
+    """What is wrong with growing tables that are missing or have the wrong type or width, by path.
 
     Parameters
     ----------
-    about : sound root attributes
-    sizes : letter -> number of columns; those of pantographs and strips are added
+    record : which of the line's channels are there
+    sizes : of dimensions by name; those of the columns are added
+    most : rows that the run plans
     """
-    found = []
-    with_steps, apart = line_tables(about)
-    (always, others), energies = step_tables(), _energies(file)
-    most = about["n_steps_planned"] + 1
-    for path, declared in {"time": CLOCK, **always, **with_steps}.items():
-        fault = _shape_fault(file, path, declared, sizes, most)
-        if fault:
-            found.append(TableFault(path, fault, declared.essential))
-    for path, declared in apart.items():
-        fault = _shape_fault(file, path, declared, sizes, most)
-        if fault:
-            found.append(TableFault(path, fault, False))
-    for path, declared in {**others, **energies}.items():
-        fault = _shape_fault(file, path, declared, sizes, most)
-        if fault and is_there(file, path.split("/")[0] if path in energies else path):
-            found.append(TableFault(path, fault, False))
-    return found
-
-
-def scan(
-    file: h5py.File,
-    about: dict[str, Any],
-    dt: float,
-    faults: list[TableFault],
-    complete: tuple[list[int], str] | None = None,
-) -> Records:
-    """Read all records once, by blocks, and find the sound ones.
-
-    Parameters
-    ----------
-    about : sound root attributes
-    dt : time between two records [s]
-    faults : from ``table_faults``, none of them essential
-    complete : what ``complete_of`` found earlier, None to find it now
-    """
-    unusable = {fault.path for fault in faults}
-    told = [f"{path} {fault}" for path, fault, _ in faults]
-    damaged: dict[str, list[tuple[int, int]]] = {}
-    with_steps, apart = line_tables(about)
-    n_complete, fault = complete_of(file) if complete is None else complete
-    told += [fault] if fault else []
-    (always, others), energies = step_tables(), _energies(file)
-    of_steps = {**always, **others, **with_steps}
-    there = {path: d for path, d in of_steps.items() if is_there(file, path)}
-    rows = [0, 0, 0]
-    # What is missing is a fault already, but for a file whose attributes are damaged.
-    energies, lines = (
-        {path: declared for path, declared in tables.items() if is_there(file, path)}
-        for tables in (energies, apart)
-    )
-    parts = ({"time": CLOCK, **there}, energies, lines)
-    for number, tables in enumerate(parts):
-        clock = next(iter(tables), "")
-        if not clock or clock in unusable or not is_there(file, clock):
-            continue
-        if tables is energies and unusable & energies.keys():
-            continue
-        period = dt if number == 0 else None
-        usable = {path: declared for path, declared in tables.items() if path not in unusable}
-        rows[number] = _rows(file, n_complete[number], period, usable, damaged, told)
-    damaged |= {path: [] for path in unusable if path in of_steps or path in apart}
-    told += _missing_end(about, rows[0])
-    last = float(file["time"][rows[0] - 1]) if rows[0] else float("nan")
-    return Records(rows, damaged, told, last)
-
-
-def _energies(file: h5py.File) -> dict[str, Growing]:
-    """The tables of the energies, without those that only some versions record."""
-    return {path: t for path, t in energy_tables().items() if t.essential or is_there(file, path)}
-
-
-def _rows(
-    file: h5py.File,
-    complete: int,
-    dt: float | None,
-    tables: dict[str, Growing],
-    damaged: dict[str, list[tuple[int, int]]],
-    told: list[str],
-) -> int:
-    """Sound rows of tables with a common clock, the first; other damage goes to the lists."""
-    lengths = {path: file[path].shape[0] for path in tables}
-    n = min(complete, *lengths.values(), complete)
-    clock = next(iter(tables))
-    if n < complete:
-        short = min(lengths, key=lambda path: lengths[path])
-        told.append(f"{short} ends after {n} of {complete} records")
-    found: dict[str, list[tuple[int, int]]] = {}
-    for path, declared in tables.items():
-        parts = damaged_rows(file[path], n, largest(declared.unit), declared.may_be_nan)
-        if path == clock:
-            parts = parts or _disorder(file[path], n, dt)
-        if parts and declared.essential:
-            told.append(f"{path} is damaged from record {parts[0][0]} on")
-            n = parts[0][0]
-        elif parts:
-            found[path] = parts
-    for path, parts in found.items():
-        n_bad = sum(min(end, n) - min(begin, n) for begin, end in parts)
-        told.append(f"{path} is damaged in {n_bad} of {n} records, which are left out")
-    damaged |= found
-    return n
-
-
-def _disorder(table: h5py.Dataset, n: int, dt: float | None) -> list[tuple[int, int]]:
-    """From the first time on that is not after the one before, or not a number of steps of
-    ``dt`` [s] after the first."""
-    first = float(table[0]) if n else 0.0
-    before = -np.inf
-    for start in range(0, n, _TIMES):
-        time = np.asarray(table[start : min(start + _TIMES, n)])
-        wrong = np.diff(time, prepend=before) <= 0.0
-        if dt is not None:
-            wrong |= np.abs(time - first - dt * np.arange(start, start + time.size)) > _OFF * dt
-        if wrong.any():
-            return [(start + int(wrong.argmax()), n)]
-        before = time[-1]
-    return []
-
-
-def complete_of(file: h5py.File) -> tuple[list[int], str]:
-    """Rows that are whole, all where that is not known, and what is wrong with the numbers."""
-    there = [_length(file, clock) for clock in ("time", "energy/time", LINE_CLOCK)]
-    if not is_there(file, COMPLETE):  # a file of an earlier version
-        return there, ""
-    try:
-        found = np.asarray(file[COMPLETE][...])
-        if found.ndim == 1 and found.dtype.kind in "iu" and 2 <= found.size <= 3:
-            told = [int(rows) for rows in found]
-            told += there[len(told) :]
-            if all(0 <= n <= most for n, most in zip(told, there, strict=True)):
-                return told, ""
-    except HDF5_ERRORS:
-        pass
-    return there, f"{COMPLETE} is damaged, the length of the tables counts instead"
-
-
-def _missing_end(about: dict[str, Any], n: int) -> list[str]:
-    """That the file says it holds more steps than it does."""
-    wanted = about.get("n_steps")
-    if wanted is None or about["outcome"] == "running" or n == wanted + 1:
-        return []
-    if not n and not wanted:  # it broke before the first step
-        return []
-    return [f"{n} of {wanted + 1} records are sound"]
-
-
-def _length(file: h5py.File, path: str) -> int:
-    try:
-        return int(file[path].shape[0])
-    except (*HDF5_ERRORS, IndexError):
-        return 0
+    faults: dict[str, str] = {}
+    steps, energies, line = growing_tables(record)
+    for tables in (steps, energies if is_there(file, "energy") else {}, line):
+        for path, channel in tables.items():
+            if tables is line or path == "time" or channel.essential or is_there(file, path):
+                fault = _shape_fault(file, path, channel, sizes, most)
+                faults |= {path: fault} if fault else {}
+    return faults
 
 
 def _shape_fault(
-    file: h5py.File, path: str, declared: Growing, sizes: dict[str, int], most: int
+    file: h5py.File, path: str, channel: Channel, sizes: dict[str, int], most: int
 ) -> str:
-    """What is wrong with the shape of a growing table, empty if nothing is; ``most`` rows are
-    planned."""
     try:
         table = file[path]
         shape, kind = table.shape, table.dtype.kind
@@ -221,10 +76,129 @@ def _shape_fault(
         return "is missing or cannot be read"
     if kind != "f":
         return "does not hold numbers"
-    if len(shape) != (2 if declared.columns else 1):
+    if len(shape) != (1 if channel.per == RUN else 2):
         return f"has {len(shape)} dimensions"
     if shape[0] > most:
         return f"has {shape[0]} rows, of {most} that the run plans"
-    if declared.columns and shape[1] != sizes.setdefault(declared.columns, shape[1]):
-        return f"has {shape[1]} columns in place of {sizes[declared.columns]}"
-    return ""
+    if channel.per == RUN:
+        return ""
+    # Without a list of the columns that are recorded all of them are.
+    all_of = sizes.get(ALL_COLUMNS.get(channel.per, ""), shape[1])
+    wanted = sizes.setdefault(COLUMNS[channel.per], all_of)
+    return "" if shape[1] == wanted else f"has {shape[1]} columns in place of {wanted}"
+
+
+def scan(
+    file: h5py.File,
+    about: dict[str, Any],
+    record: LineRecord,
+    dt: float,
+    faults: dict[str, str],
+    complete: tuple[list[int], str] | None = None,
+) -> Records:
+    """Read all records once, by blocks, and find the valid ones.
+
+    Parameters
+    ----------
+    about : valid root attributes
+    record : which of the line's channels are there
+    dt : time between two records [s]
+    faults : from ``table_faults``
+    complete : what ``committed_rows`` found earlier, None to find it now
+    """
+    n_complete, fault = committed_rows(file) if complete is None else complete
+    told = [f"{path} {clause}" for path, clause in faults.items()] + ([fault] if fault else [])
+    damaged = dict.fromkeys(faults, 0)
+    rows = [0, 0, 0]
+    for number, tables in enumerate(growing_tables(record)):
+        usable = {p: c for p, c in tables.items() if p not in faults and is_there(file, p)}
+        # All of the energies are used, or none.
+        if CLOCKS[number] not in usable or (number == 1 and faults.keys() & tables.keys()):
+            continue
+        lengths = {path: file[path].shape[0] for path in usable}
+        short = min(lengths, key=lambda path: lengths[path])
+        n = min(n_complete[number], lengths[short])
+        if n < n_complete[number]:
+            told.append(f"{short} ends after {n} of {n_complete[number]} records")
+        parted = {}
+        for path, channel in usable.items():
+            may_be_nan = channel.may_be_nan or (number == 2 and record.window is not None)
+            valid = valid_rows(file[path], n, largest(channel.unit), may_be_nan)
+            if path == CLOCKS[number]:
+                valid = min(valid, _in_order(file[path], valid, dt if number == 0 else None))
+            if valid < n and (channel.essential or path == CLOCKS[number]):
+                told.append(f"{path} is damaged from record {valid} on")
+                n = valid
+            elif valid < n:
+                parted[path] = valid
+        parted = {path: valid for path, valid in parted.items() if valid < n}
+        words = "{} is damaged from record {} on, and left out from there"
+        told += [words.format(path, valid) for path, valid in parted.items()]
+        damaged |= parted
+        rows[number] = n
+    told += _missing_end(about, rows[0])
+    last = float(file["time"][rows[0] - 1]) if rows[0] else float("nan")
+    return Records(rows, damaged, told, last)
+
+
+def valid_rows(table: h5py.Dataset, n_rows: int, most: float, may_be_nan: bool) -> int:
+    """Rows before the first that cannot be read, or holds NaN, infinity or more than ``most``."""
+    n_columns = int(np.prod(table.shape[1:]))
+    chunk, start = table.chunks[0] if table.chunks else 1, 0
+    try:
+        for part in row_blocks(n_rows, min(n_columns, _COLUMNS), chunk):
+            start = part.start
+            bad = _invalid(table, part, n_columns, most, may_be_nan)
+            if bad.any():
+                return start + int(bad.argmax())
+        return n_rows
+    except HDF5_ERRORS:
+        pass  # somewhere in this block
+    for first in range(start, n_rows, chunk):
+        part = slice(first, min(first + chunk, n_rows))
+        try:
+            bad = _invalid(table, part, n_columns, most, may_be_nan)
+        except HDF5_ERRORS:
+            return first
+        if bad.any():
+            return first + int(bad.argmax())
+    return n_rows
+
+
+def _invalid(
+    table: h5py.Dataset, part: slice, n_columns: int, most: float, may_be_nan: bool
+) -> np.ndarray:
+    """Which rows hold something that cannot be, (rows,) bool."""
+    bad = np.zeros(part.stop - part.start, dtype=bool)
+    for first in range(0, n_columns, _COLUMNS):
+        columns = (slice(first, first + _COLUMNS),) if table.ndim == 2 else ()
+        values = np.asarray(table[(part, *columns)]).reshape(bad.size, -1)
+        with np.errstate(invalid="ignore"):
+            valid = np.abs(values) <= most
+        bad |= ~(valid | np.isnan(values) if may_be_nan else valid).all(axis=1)
+    return bad
+
+
+def _in_order(table: h5py.Dataset, n: int, dt: float | None) -> int:
+    """Times before the first that is not after the one before, or not a number of steps of
+    ``dt`` [s] after the first."""
+    first, before = float(table[0]) if n else 0.0, -np.inf
+    for part in row_blocks(n, 1):
+        time = np.asarray(table[part])
+        wrong = np.diff(time, prepend=before) <= 0.0
+        if dt is not None:
+            wrong |= np.abs(time - first - dt * np.arange(part.start, part.stop)) > _OFF * dt
+        if wrong.any():
+            return part.start + int(wrong.argmax())
+        before = time[-1]
+    return n
+
+
+def _missing_end(about: dict[str, Any], n: int) -> list[str]:
+    """That the file says it holds more steps than it does."""
+    wanted = about.get("n_steps")
+    if wanted is None or about["outcome"] == RUNNING or n == wanted + 1:
+        return []
+    if not n and not wanted:  # it broke before the first step
+        return []
+    return [f"{n} of {wanted + 1} records are valid"]

@@ -9,16 +9,17 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 
 from catenary.base.errors import InputError
 from catenary.meshgen.wires import Role
-from catenary.postproc.channels.line_record import LineRecord, from_table
+from catenary.postproc.channels.line_record import LineRecord
 from catenary.postproc.files.hdf5 import block_reading
-from catenary.postproc.files.result_file import DONE, FORMAT, LINE_TIME, RUNNING, complete_rows
+from catenary.postproc.files.run_schema import ALL_COLUMNS, DONE, LINE_TIME, PLACES, RUNNING
 from catenary.postproc.read.line_of_run import LineOfRun
 from catenary.postproc.read.records import Records
-from catenary.postproc.read.sound_file import SoundFile
+from catenary.postproc.read.validated_file import ValidatedFile
 from catenary.solver.time_loop.views import channels
 
 logger = logging.getLogger("catenary.results")
@@ -35,7 +36,7 @@ class Results(LineOfRun):
     Parameters
     ----------
     path : the result file or the folder that holds it as ``run.h5``
-    records : what ``evaluate.guard`` found in it, None to check it here
+    records : what ``guard.examined`` found in it, None to check it here
     image : the bytes of the file, if a run of this process wrote it; it need not be there any more
 
     Raises
@@ -52,7 +53,7 @@ class Results(LineOfRun):
         self.path = path / RESULT_FILE if path.is_dir() else path
         if image is None and not self.path.is_file():
             raise InputError(f"{self.path} does not exist: name a result file or its folder")
-        super().__init__(SoundFile(self.path, records, image))
+        super().__init__(ValidatedFile(self.path, records, image))
 
     def __enter__(self) -> Results:
         return self
@@ -73,7 +74,7 @@ class Results(LineOfRun):
 
     @property
     def damage(self) -> list[str]:
-        """A sentence that names the file's damage and what is used of it, none if it is sound."""
+        """A sentence that names the file's damage and what is used of it, none if it is valid."""
         return self._file.damage
 
     @property
@@ -121,23 +122,20 @@ class Results(LineOfRun):
 
     # ---- channels ---------------------------------------------------------------------------
 
-    @cached_property
+    @property
     def _length(self) -> int:
-        return complete_rows(self._file)[0]
+        return self._file.records.rows[0]
 
     @cached_property
     def _line_length(self) -> int:
         """Rows of the line's channels, none of which is later than the last step."""
-        if LINE_TIME not in self._file:
-            return self._length
-        n = complete_rows(self._file)[2]
+        n = self._file.records.rows[2]
         return min(n, (self._length - 1) // self.line_record.every + 1) if self._length else 0
 
-    @cached_property
+    @property
     def line_record(self) -> LineRecord:
-        """Which part of the line's channels is recorded; all in files of earlier versions."""
-        told = self.attributes.get("line_record")
-        return LineRecord() if told is None else from_table(told)
+        """Which part of the line's channels is recorded."""
+        return self._file.record
 
     @property
     def time(self) -> np.ndarray:
@@ -155,8 +153,8 @@ class Results(LineOfRun):
     @property
     def line_time(self) -> np.ndarray:
         """Times of the rows of the line's channels, shape (m,) [s], read anew at each call."""
-        clock = self._file[LINE_TIME if LINE_TIME in self._file else "time"]
-        return np.asarray(clock[: self._line_length])
+        n = self._line_length
+        return np.asarray(self._file[LINE_TIME][:n]) if n else np.zeros(0)
 
     def n_rows(self, name: str) -> int:
         """Rows of a channel; those of the line may be fewer than the steps."""
@@ -171,44 +169,41 @@ class Results(LineOfRun):
         return self.rows(name, slice(0, self.n_rows(name)))
 
     def rows(self, name: str, part: slice) -> np.ndarray:
-        """Some rows of a channel, shape (rows, columns), NaN where the line is not recorded."""
+        """Some rows of a channel, shape (rows, columns), NaN where it is damaged and where the
+        line is not recorded."""
+        n = len(range(*part.indices(self.n_rows(name))))
+        whole = np.full((n, self._n_places(name)), np.nan)
         table = self._table(name)
-        if table is None or name not in channels.line_channels():
-            return self._unrecorded(name, part) if table is None else np.asarray(table[part])
-        columns = self.recorded_columns(name)
-        if columns.size == self._n_places(name):
-            return np.asarray(table[part])
-        whole = self._unrecorded(name, part)
-        whole[:, columns] = table[part]
+        if table is not None:
+            valid = self._valid(name, part)
+            columns = self.recorded_columns(name)
+            all_there = columns.size == whole.shape[1]
+            whole[: valid.stop - valid.start, slice(None) if all_there else columns] = table[valid]
         return whole
 
     def column(self, name: str, index: int, part: slice | None = None) -> np.ndarray:
         """One column of a channel, all of its rows or ``part`` of them, from ``start`` to ``stop``;
-        NaN where the line is not recorded."""
-        table = self._table(name)
+        NaN as in ``rows``."""
         part = slice(0, self.n_rows(name)) if part is None else part
-        if name in channels.line_channels():
-            place = np.flatnonzero(self.recorded_columns(name) == index)
-            if table is None or not place.size:
-                return np.full(part.stop - part.start, np.nan)
-            index = int(place[0])
-        assert table is not None
-        return block_reading.column(table, part, index)
+        values = np.full(part.stop - part.start, np.nan)
+        table, place = self._table(name), np.flatnonzero(self.recorded_columns(name) == index)
+        if table is not None and place.size:
+            valid = self._valid(name, part)
+            n = valid.stop - valid.start
+            values[:n] = block_reading.column(table, valid, int(place[0]))
+        return values
 
     def blocks(self, name: str) -> Iterator[tuple[slice, np.ndarray]]:
         """All rows of a channel in order, by blocks: which rows, and their values as ``rows``."""
         table = self._table(name)
         step = table.chunks[0] if table is not None and table.chunks else 1
-        if table is None or name in channels.line_channels():
-            n_columns = self._n_places(name)
-        else:
-            n_columns = table.shape[1]
-        for part in block_reading.row_blocks(self.n_rows(name), n_columns, step):
+        for part in block_reading.row_blocks(self.n_rows(name), self._n_places(name), step):
             yield part, self.rows(name, part)
 
     def recorded_columns(self, name: str) -> np.ndarray:
-        """Which arms or droppers have a column in the table of a line's channel, (n,) int."""
-        if name not in self.line_record.names:
+        """Which columns of a channel its table has, (n,) int; all but of arms and droppers beyond
+        the recorded stretch."""
+        if name in channels.line_channels() and name not in self.line_record.names:
             return np.zeros(0, dtype=np.int64)
         path = f"line_columns/{name}"
         if path in self._file:
@@ -220,43 +215,42 @@ class Results(LineOfRun):
 
         Over every step, whatever is recorded of the line; NaN if there are no steps.
         """
-        if name not in channels.line_channels():
-            return block_reading.extremes(self._file[f"channels/{name}"], self._length)
-        kept = self._file.extremes(self._length) or {}
+        of_line = name in channels.line_channels()
+        kept = (self._file.extremes(self._length) or {}) if of_line else {}
         if name in kept:
             return kept[name]
         table = self._table(name)
-        if table is None or not self.line_record.whole:
+        if table is None or (of_line and not self.line_record.whole):
             return np.full((2, self._n_places(name)), np.nan)
-        return block_reading.extremes(table, self._line_length)
+        valid = self._valid(name, slice(0, self.n_rows(name)))
+        return block_reading.extremes(table, valid.stop)
 
     def has(self, name: str) -> bool:
-        """Whether a channel was recorded."""
+        """Whether a channel was recorded, and can be read."""
         return self._table(name) is not None
 
-    def _table(self, name: str) -> Any:
-        """The table of a channel, None if the channel was not recorded."""
-        if name in channels.line_channels() and f"line_channels/{name}" in self._file:
-            return self._file[f"line_channels/{name}"]
-        return self._file[f"channels/{name}"] if f"channels/{name}" in self._file else None
+    def _path(self, name: str) -> str:
+        return f"{'line_channels' if name in channels.line_channels() else 'channels'}/{name}"
+
+    def _table(self, name: str) -> h5py.Dataset | None:
+        """The table of a channel, None if there is none that is valid."""
+        path = self._path(name)
+        return self._file[path] if path in self._file else None
+
+    def _valid(self, name: str, part: slice) -> slice:
+        """The rows of a part that can be read."""
+        start, stop, _ = part.indices(self.n_rows(name))
+        n = self._file.records.damaged.get(self._path(name), stop)
+        return slice(start, max(start, min(stop, n)))
 
     def _n_places(self, name: str) -> int:
         """Columns that a channel has if all are recorded."""
-        of = {
-            channels.ARM: "line/arm_x",
-            channels.DROPPER: "line/dropper_x",
-            channels.WIRE_END: "line/end_x",
-        }
         channel = channels.CHANNELS[name]
         if not channel.of_line:
             n_wires = len(self.wires_of(Role.CONTACT))
             return channel.n_columns(channels.Train(tuple(self.n_strips()), False, n_wires))
-        path = of[channel.per]
+        path = PLACES[ALL_COLUMNS[channel.per]]
         return int(self._file[path].shape[0]) if path in self._file else 0
-
-    def _unrecorded(self, name: str, part: slice) -> np.ndarray:
-        n = len(range(*part.indices(self.n_rows(name))))
-        return np.full((n, self._n_places(name)), np.nan)
 
     @property
     def n_pantographs(self) -> int:
@@ -264,8 +258,8 @@ class Results(LineOfRun):
         return int(self._file["channels/contact_force"].shape[1])
 
     def n_strips(self) -> list[int]:
-        """Number of strips of each pantograph, by their order; one each in files without."""
-        told: list[int] = self.attributes.get("n_strips", [])
+        """Number of strips of each pantograph, by their order."""
+        told: list[int] = self.attributes["n_strips"]
         return told or [1] * self.n_pantographs
 
     @property
@@ -277,16 +271,6 @@ class Results(LineOfRun):
         """Columns of ``strip_force`` of each pantograph."""
         ends = np.cumsum([0, *self.n_strips()]).tolist()
         return [range(*pair) for pair in itertools.pairwise(ends)]
-
-    def strip_forces(self) -> list[np.ndarray]:
-        """Shares of the strips in the contact force of each pantograph, (n, its strips) each [N].
-
-        Empty if no pantograph has more than one. Reads all of them into memory.
-        """
-        if not self.several_strips:
-            return []
-        whole = self.channel("strip_force")
-        return [whole[:, columns.start : columns.stop] for columns in self.strip_columns()]
 
     def wire_columns(self) -> list[dict[str, int]]:
         """Column of ``contact_wire_force`` by the name of a contact wire, of each pantograph."""
@@ -317,15 +301,9 @@ class Results(LineOfRun):
         """Whether a pantograph has joints in the time loop."""
         return self.has("constraint_violation")
 
-    def constraint_violations(self) -> np.ndarray | None:
-        """Largest open joint of each pantograph at each record, (n, n_pantographs) [m].
-
-        NaN where a pantograph has no joints in the time loop, None if none has.
-        """
-        return self.channel("constraint_violation") if self.has_violations else None
-
     def largest_violations(self) -> list[float | None]:
-        """The same over the whole run (n_pantographs,) [m], None without joints in the loop."""
+        """Largest open joint of each pantograph over the whole run, (n_pantographs,) [m]; None
+        without joints in the time loop."""
         if not self.has_violations or not self._length:
             return [None] * self.n_pantographs
         found = self.extremes("constraint_violation")[1]
@@ -356,31 +334,23 @@ class Results(LineOfRun):
 
     def energies(self) -> dict[str, np.ndarray]:
         """Energies by name, each (m,), empty if the run did not record them."""
-        if "energy" not in self._file:
+        if not self._file.has_energies:
             return {}
-        n = complete_rows(self._file)[1]
-        return {
-            name: np.asarray(self._file[f"energy/{name}"][:n])
-            for name in channels.ENERGIES
-            if f"energy/{name}" in self._file
-        }
+        n = self._file.records.rows[1]
+        there = (name for name in channels.ENERGIES if f"energy/{name}" in self._file)
+        return {name: np.asarray(self._file[f"energy/{name}"][:n]) for name in there}
 
     # ---- to continue from ------------------------------------------------------------------
 
     @property
     def checkpoint(self) -> dict[str, Any]:
-        """The latest sound state to continue from.
+        """The latest valid state to continue from.
 
         Raises
         ------
         InputError
-            If the file holds none, or is of an earlier version.
+            If the file holds none.
         """
-        if self.attributes["format"] != FORMAT:
-            raise InputError(
-                f"{self.path} was written by an earlier version of Catenary, which this one reads "
-                "but cannot continue; start the run anew"
-            )
         state, told = self._file.state()
         for sentence in told:
             logger.warning("%s", sentence)

@@ -13,11 +13,10 @@ from pathlib import Path
 import h5py
 from h5py import h5f
 
-from catenary.postproc.files.hdf5.checked import text_of
+from catenary.postproc.files.hdf5.checked import HDF5_ERRORS, text_of
 from catenary.postproc.files.hdf5.self_contained import open_own
-from catenary.postproc.files.result_file import RUNNING
-from catenary.postproc.read.attributes import HDF5_ERRORS
-from catenary.postproc.read.records import complete_of
+from catenary.postproc.files.result_file import committed_rows
+from catenary.postproc.files.run_schema import RUNNING
 
 # How often a file is opened that was written meanwhile, and the pause before [s]: an append takes
 # some milliseconds.
@@ -35,8 +34,8 @@ def opened(path: Path) -> tuple[h5py.File, Complete | None]:
     Returns
     -------
     file : with all indices read if its run goes on or was killed
-    complete : what ``complete_of`` found before that, so that no later record counts; None if the
-        run has ended
+    complete : what ``committed_rows`` found before that, so that no later record counts; None if
+        the run has ended
 
     Raises
     ------
@@ -51,7 +50,7 @@ def opened(path: Path) -> tuple[h5py.File, Complete | None]:
             outcome = text_of(file.attrs.get("outcome"))
             if not isinstance(outcome, str) or outcome != RUNNING:
                 return file, None
-            complete = complete_of(file)
+            complete = committed_rows(file)
             if not complete[1]:
                 _read_indices(file)
                 return file, complete

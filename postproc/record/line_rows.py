@@ -8,38 +8,84 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from catenary.postproc.channels.line_record import LineRecord
+from catenary.postproc.files.result_file import LineRows
 from catenary.postproc.record.column_gather import ColumnGather
-from catenary.postproc.record.extremes import Extremes
-from catenary.postproc.record.kept_rows import KeptRows
+from catenary.solver.kernels import native
 from catenary.solver.time_loop.views import channels
 from catenary.solver.time_loop.views.observers import Stage
 
 
-class LineRows(NamedTuple):
-    """What a flush appends of the line's channels, on rank 0.
+class _KeptRows:
+    """Rows of columns along the line, all of them or those near the train, until the next flush.
+
+    Parameters
+    ----------
+    n_rows : most rows
+    n_columns : of a row
+    x : (n_columns,) where the columns are [m], if those near the train are enough; None for all
 
     Attributes
     ----------
-    chosen : (n,) int, which of the buffered rows are recorded
-    values : name -> the first of the columns that are kept, and these (n, columns)
-    extremes : name -> (2, all columns), smallest and largest since the start of the run
+    is_whole : whether all columns are kept
     """
 
-    chosen: np.ndarray
-    values: dict[str, tuple[int, np.ndarray]]
-    extremes: dict[str, np.ndarray]
+    def __init__(self, n_rows: int, n_columns: int, x: np.ndarray | None) -> None:
+        # Columns between two places stand side by side only in the order of the track.
+        self.is_whole = x is None or bool((np.diff(x) < 0.0).any())
+        self._x, self._n_columns, self._n_rows = x, n_columns, 0
+        self._rows = np.empty((n_rows if self.is_whole else 0, n_columns))
+        self._parts: list[tuple[int, np.ndarray]] = []
+
+    def columns_within(self, edges: tuple[np.ndarray, np.ndarray] | None) -> slice:
+        """Columns that rows are to have, of which ``edges`` are from and to of a window [m]."""
+        if self.is_whole or edges is None or self._x is None:
+            return slice(0, self._n_columns)
+        begin = int(np.searchsorted(self._x, edges[0].min()))
+        end = int(np.searchsorted(self._x, edges[1].max(), side="right"))
+        return slice(begin, max(begin, end))
+
+    def put(self, rows: np.ndarray, columns: slice) -> None:
+        """Keep ``rows`` (n, ...) of these columns, behind those that were kept before."""
+        if self.is_whole:
+            self._rows[self._n_rows : self._n_rows + len(rows)] = rows
+        else:
+            self._parts.append((columns.start, rows.copy()))
+        self._n_rows += len(rows)
+
+    def take_out(self) -> tuple[int, np.ndarray]:
+        """The first of the columns that were kept, and all rows of these, (n, columns), NaN where
+        they were not. Valid until the next ``put``."""
+        n_rows, self._n_rows = self._n_rows, 0
+        if self.is_whole:
+            return 0, self._rows[:n_rows]
+        begin = min((first for first, _ in self._parts), default=0)
+        end = max((first + part.shape[1] for first, part in self._parts), default=begin)
+        result, at = np.full((n_rows, end - begin), np.nan), 0
+        for first, part in self._parts:
+            result[at : at + len(part), first - begin : first - begin + part.shape[1]] = part
+            at += len(part)
+        self._parts.clear()
+        return begin, result
 
 
 class _Part(NamedTuple):
-    """A channel on this rank: which of its columns are recorded, what keeps and what gathers them.
+    """A channel on this rank.
 
-    ``gather`` and ``kept`` are None if the channel is not recorded.
+    Attributes
+    ----------
+    owned : (n,) numbers of the rank's columns
+    columns : which of these are recorded
+    gather, kept : of the recorded ones; None if the channel is not recorded
+    extremes : (2, n) smallest and largest value of every step
+    gather_extremes : of all columns
     """
 
+    owned: np.ndarray
     columns: np.ndarray
     gather: ColumnGather | None
-    kept: KeptRows | None
-    extremes: Extremes
+    kept: _KeptRows | None
+    extremes: np.ndarray
+    gather_extremes: ColumnGather
 
 
 class LineGather:
@@ -67,19 +113,21 @@ class LineGather:
             place = np.full(x.size, -1)
             place[recorded] = np.arange(recorded.size)
             mine = np.flatnonzero(place[owned] >= 0)
-            extremes = Extremes(comm, owned, x.size)
+            extremes = np.repeat([[np.inf], [-np.inf]], owned.size, axis=1)
+            all_columns = ColumnGather(comm, owned, x.size, 2)
             gather = kept = None
             if name in record.names:
                 gather = ColumnGather(comm, place[owned[mine]], recorded.size, rows)
                 # Ranks send all their columns: what they keep of a row is then the same in each.
                 in_parts = record.window is not None and comm.size == 1
-                kept = KeptRows(rows, mine.size, x[owned[mine]] if in_parts else None)
-            self._parts[name] = _Part(mine, gather, kept, extremes)
+                kept = _KeptRows(rows, mine.size, x[owned[mine]] if in_parts else None)
+            self._parts[name] = _Part(owned, mine, gather, kept, extremes, all_columns)
 
     def restore(self, extremes: Mapping[str, np.ndarray]) -> None:
         """Continue from extremes by name, (2, all columns) each, on all ranks. Not collective."""
         for name, whole in extremes.items():
-            self._parts[name].extremes.restore(whole)
+            part = self._parts[name]
+            part.extremes[:] = whole[:, part.owned]
 
     def take(
         self, first_step: int, rows: np.ndarray, parts: Mapping[str, slice], *, all_move: bool
@@ -100,7 +148,8 @@ class LineGather:
         edges = self._record.within(position[start::every])
         for name, part in self._parts.items():
             moved = slice(None) if all_move else self._moving.columns(name)
-            part.extremes.take(rows, parts[name], moved)
+            begin, end, _ = moved.indices(part.owned.size)
+            native.take_extremes(rows, parts[name].start, begin, end, part.extremes)
             if part.kept is not None and start < n_steps:
                 shown = rows[start::every, parts[name]]
                 own = part.kept.columns_within(edges)
@@ -114,9 +163,9 @@ class LineGather:
         values = {}
         for name, part in self._parts.items():
             if part.gather is not None and part.kept is not None:
-                first, kept = part.kept.whole()
+                first, kept = part.kept.take_out()
                 values[name] = first, part.gather(kept) if part.kept.is_whole else kept
-        extremes = {name: part.extremes.whole() for name, part in self._parts.items()}
+        extremes = {name: part.gather_extremes(part.extremes) for name, part in self._parts.items()}
         chosen = np.concatenate([np.zeros(0, dtype=np.int64), *self._chosen])
         self._chosen.clear()
         self._n_taken = 0

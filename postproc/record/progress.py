@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, TextIO
 
-from catenary.postproc.files.result_file import DONE
+from catenary.postproc.files.run_schema import DONE
 from catenary.solver.time_loop.views.observers import Observer, Stage, StepView
 
 logger = logging.getLogger("catenary.progress")

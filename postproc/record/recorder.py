@@ -18,9 +18,10 @@ from catenary.base.parallel import on_root
 from catenary.postproc.channels.header import Header
 from catenary.postproc.channels.line_record import LineRecord
 from catenary.postproc.files.disk import Elsewhere, NoRoom, broken_write
-from catenary.postproc.files.result_file import DONE, INTERRUPTED, LineBlock, ResultFile
+from catenary.postproc.files.result_file import LineRows, ResultFile
+from catenary.postproc.files.run_schema import DONE, INTERRUPTED
 from catenary.postproc.record.column_gather import next_flush
-from catenary.postproc.record.line_rows import LineGather, LineRows
+from catenary.postproc.record.line_rows import LineGather
 from catenary.solver.time_loop.views import channels
 from catenary.solver.time_loop.views.observers import NEVER, Observer, Stage, StepView
 
@@ -175,7 +176,7 @@ class Recorder(Observer):
         self._take_waiting()
         line = self._line()
         state = view.state() if view is not None else None
-        self._guarded(lambda: self._append(self._blocks(), self._block(line), state))
+        self._guarded(lambda: self._append(self._blocks(), line, state))
         self._rows = self._n_taken = 0
         self._energies.clear()
         self._flushed_once = True
@@ -254,7 +255,7 @@ class Recorder(Observer):
         self._header = None  # that of a long line is large
 
     def _append(
-        self, blocks: Mapping[str, np.ndarray], line: LineBlock, state: Mapping[str, Any] | None
+        self, blocks: Mapping[str, np.ndarray], line: LineRows, state: Mapping[str, Any] | None
     ) -> None:
         # In this order nothing is lost of a file that was moved.
         self._open_file.append(blocks, line, state)
@@ -269,11 +270,6 @@ class Recorder(Observer):
         if found is None:
             raise OSError("the extremes up to the state to continue from are missing")
         self._extremes = found
-
-    def _block(self, line: LineRows) -> LineBlock:
-        """The rows of the line's channels with their times and positions of the train."""
-        position = self._columns("contact_position")[line.chosen]
-        return LineBlock(self._time[line.chosen], position, line.values, line.extremes)
 
     def _blocks(self) -> dict[str, np.ndarray]:
         """What a flush appends of each step."""

@@ -139,7 +139,7 @@ def _pantograph(
     }
 
 
-def _supports(statistics: RunStatistics, wires: list[str | None]) -> dict[str, Any]:
+def _supports(statistics: RunStatistics, wires: list[str]) -> dict[str, Any]:
     supports = statistics.supports
     rows = zip(supports.x, supports.uplift, supports.evaluated, wires, strict=True)
     return {

@@ -21,7 +21,7 @@ OF_EACH_KIND = ("ambrosio2012", "en50318_2002", "ac_simple_3d", "overlap", "re33
 ALL_CASES = [
     pytest.param(case, marks=() if case in OF_EACH_KIND else pytest.mark.study) for case in CASES
 ]
-FILES = {"run.h5", "fields.xdmf", "fields.h5", "fields.vtkhdf", "summary.json", "report.html"}
+FILES = {"run.h5", "fields.xdmf", "fields.h5", "summary.json", "report.html"}
 
 # What other programs rely on in summary.json: keys and the kind of their values.
 NUMBER = (int, float)

@@ -249,7 +249,7 @@ def test_a_run_does_not_go_on_behind_times_that_are_lost(
     done = catenary("restart", str(out), cwd=tmp_path)
     assert done.code == 2
     (sentence,) = done.stderr.splitlines()
-    assert f"run.h5 cannot be continued: {clock} is damaged from record " in sentence
+    assert f"run.h5 cannot be continued: {clock} is damaged" in sentence
     assert (out / "run.h5").read_bytes() == before
 
 

@@ -556,13 +556,6 @@ FAULTS = (
         "test_single_processes_of_several_tasks_are_told",
     ),
     Fault(
-        "fields.vtkhdf in VTK 9.7, asked for a time; in VTK 9.3",
-        "the first step for ever; refused",
-        "a single grid with the cell array part, which all show by time",
-        "unit/postproc/test_postproc_fields.py",
-        "test_vtkhdf_shows_at_a_time_what_xdmf_shows",
-    ),
-    Fault(
         "run.h5 in xarray",
         "phony_dim_0 to phony_dim_37, no units",
         "time, places and units",

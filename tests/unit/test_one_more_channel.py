@@ -19,7 +19,7 @@ from program import SHORT_SCENE
 
 from catenary.cases.run.runner import run_case
 from catenary.cases.scene.load import load_scene
-from catenary.postproc.files.result_file import FORMAT
+from catenary.postproc.files.run_schema import FORMAT
 from catenary.postproc.read.results import Results
 from catenary.postproc.report import csv_tables
 from catenary.solver.time_loop import march as time_loop
@@ -114,7 +114,7 @@ def test_a_channel_of_pantographs_is_recorded_read_exported_drawn_and_checked(
         assert (table.attrs["unit"], table.attrs["meaning"]) == (b"m", b"place of the strip")
         table[7] = np.nan
     with Results(tmp_path) as results:
-        assert "channels/strip_place is damaged in 1 of" in results.damage[0]
+        assert "channels/strip_place is damaged from record 7 on" in results.damage[0]
     assert (tmp_path / "channel_strip_place.png").stat().st_size > 5000
     assert "Place of the strip." in (tmp_path / "report.html").read_text()
 

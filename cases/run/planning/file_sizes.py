@@ -61,7 +61,7 @@ class FileSizes:
     Attributes
     ----------
     result : ``run.h5``
-    film : ``fields.h5``, ``fields.xdmf`` and ``fields.vtkhdf``
+    film : ``fields.h5`` and ``fields.xdmf``
     report : ``report.html``, its pictures and tables
     """
 
@@ -109,7 +109,7 @@ def estimate_files(
 
 
 def _film_bytes(problem: Problem, recording: Recording, n_snapshots: int) -> float:
-    """Size of ``fields.h5``, ``.xdmf`` and ``.vtkhdf``, were all parts of the line in them [B]."""
+    """Size of ``fields.h5`` and ``.xdmf``, were all parts of the line in them [B]."""
     fields, line = recording.fields, problem.line
     share = shown_share(fields, problem, recording.n_steps)
     extent = Extent(recording.arm_x, recording.dropper_x, recording.n_nodes, recording.n_cells)
@@ -118,7 +118,7 @@ def _film_bytes(problem: Problem, recording: Recording, n_snapshots: int) -> flo
     n_points += 2 * line.support_positions.size
     text = n_blocks * (_XDMF_BLOCK + _XDMF_FIELD * len(fields.kinds))
     values = share * snapshot_bytes(fields, extent)
-    return _FIELD_TABLES + 40.0 * n_points + n_snapshots * (values + text + 40 * n_blocks + 200)
+    return _FIELD_TABLES + 40.0 * n_points + n_snapshots * (values + text + 32 * n_blocks)
 
 
 def _tables(problem: Problem, recording: Recording) -> dict[str, tuple[Channel, int]]:

@@ -17,8 +17,8 @@ from catenary.cases.studies.sweep.jobs import AS_USUAL, Ended, RunOptions, inter
 from catenary.cases.studies.sweep.run_jobs import run_jobs
 from catenary.postproc.evaluate import filters
 from catenary.postproc.evaluate.statistics import covers
-from catenary.postproc.read.file_schema import is_number
 from catenary.postproc.read.results import Results
+from catenary.postproc.read.validation import is_number
 
 RUNS = "runs"
 # Distance at which histories are compared [m]: 20 Hz are waves of 0.25 m at 18 km/h.

@@ -14,7 +14,7 @@ from typing import Any
 
 from catenary.cases.studies.sweep.jobs import PANTOGRAPH_COLUMNS
 from catenary.postproc.files.disk import plain
-from catenary.postproc.read.file_schema import is_number
+from catenary.postproc.read.validation import is_number
 
 logger = logging.getLogger("catenary.sweep")
 

@@ -28,7 +28,7 @@ from catenary.cases.studies.sweep.jobs import AS_USUAL, Ended, Job, RunOptions
 from catenary.postproc.evaluate.wording import fixed
 from catenary.postproc.files.disk import plain, write_all
 from catenary.postproc.files.own_files import VARIANT_FILE as RECORD
-from catenary.postproc.files.result_file import DONE, INTERRUPTED
+from catenary.postproc.files.run_schema import DONE, INTERRUPTED
 from catenary.postproc.read.results import Results
 
 # What is taken from an open result file beside the summary: plain values by name.

@@ -17,29 +17,17 @@ from typing import Any
 import h5py
 import numpy as np
 
-from catenary.postproc.files.hdf5.array_writes import put_array, put_attribute, put_text
+from catenary.postproc.files.hdf5.array_writes import put_array, set_attribute
 
 # The oldest format of HDF5 whose object headers, links and attributes carry checksums. The next
 # one marks a file as open for writing: after a kill nobody could open it.
 FORMAT_BOUNDS = ("v108", "v108")
+# What HDF5 and h5py raise at a damaged file.
+HDF5_ERRORS = (OSError, RuntimeError, ValueError, KeyError, TypeError, AttributeError)
 # Attribute with the checksums of the other attributes, by name, as JSON.
 ATTRIBUTE_SUMS = "attribute_crc32"
 # Attribute of a group with one checksum of all its arrays.
 ARRAYS_SUM = "crc32"
-
-
-def set_attribute(place: h5py.HLObject, name: str, value: Any) -> None:
-    """Store an attribute, text with a fixed length in UTF-8.
-
-    Parameters
-    ----------
-    place : file, group or dataset
-    value : text or a number
-    """
-    if isinstance(value, str):
-        put_text(place, name, value)
-    else:
-        put_attribute(place, name, np.asarray(value))
 
 
 def text_of(value: Any) -> Any:
@@ -88,7 +76,7 @@ def broken_seals(place: h5py.HLObject, values: Mapping[str, Any]) -> list[str]:
 
 def seal_arrays(group: h5py.Group, arrays: Mapping[str, Any]) -> None:
     """Store one checksum of the arrays of a group, ``arrays`` by name."""
-    put_attribute(group, ARRAYS_SUM, np.asarray(sum_of_arrays(arrays)))
+    set_attribute(group, ARRAYS_SUM, sum_of_arrays(arrays))
 
 
 def put_sealed_arrays(group: h5py.Group, arrays: Mapping[str, Any]) -> None:
@@ -99,7 +87,7 @@ def put_sealed_arrays(group: h5py.Group, arrays: Mapping[str, Any]) -> None:
         put_array(group, name, array)
         total = _added(total, name, array)
         del array  # before there is the next one
-    put_attribute(group, ARRAYS_SUM, np.asarray(total))
+    set_attribute(group, ARRAYS_SUM, total)
 
 
 def sum_of_arrays(arrays: Mapping[str, Any]) -> int:

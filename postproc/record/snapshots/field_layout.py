@@ -7,7 +7,7 @@ more room than it shows.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -103,27 +103,45 @@ class FieldRecord:
 
 
 @dataclass(frozen=True)
-class Slots:
+class BlockTables:
+    """The tables of a block in the file, beside its fields.
+
+    Attributes
+    ----------
+    points : (n_points, 3) at rest [m]
+    nodes : (n_points,) node of the line that each moves with, ``FIXED`` for one that stays
+    cells : (k, 2) of all snapshots, or of the largest one if they are the same
+    first, count : (n_snapshots,) points that each snapshot shows
+    cell_first, cell_count : (n_snapshots,) which of the cells a snapshot has
+    """
+
+    points: np.ndarray
+    nodes: np.ndarray
+    cells: np.ndarray
+    first: np.ndarray
+    count: np.ndarray
+    cell_first: np.ndarray
+    cell_count: np.ndarray
+
+    def tables(self) -> dict[str, np.ndarray]:
+        """All of them by name."""
+        return {own.name: getattr(self, own.name) for own in fields(BlockTables)}
+
+
+@dataclass(frozen=True)
+class Slots(BlockTables):
     """The places of a block's values in its tables.
 
     Attributes
     ----------
     block : the block
     kinds : its fields
-    first, count : (n_snapshots,) points that each snapshot shows
-    start : (n_snapshots + 1,) of its first point among those of all snapshots
-    cells : (k, 2) int32 of all snapshots, or of the largest one if they are the same
-    cell_first, cell_count : (n_snapshots,) which of them a snapshot has
+    start : (n_snapshots + 1,) of a snapshot's first point among those of all snapshots
     """
 
     block: Block
     kinds: tuple[FieldKind, ...]
-    first: np.ndarray
-    count: np.ndarray
     start: np.ndarray
-    cells: np.ndarray
-    cell_first: np.ndarray
-    cell_count: np.ndarray
 
     @property
     def name(self) -> str:
@@ -144,9 +162,9 @@ class Slots:
 
     def bytes(self) -> int:
         """What its tables take [B]."""
-        fields = sum(kind.item_bytes * self.rows(kind) for kind in self.kinds)
-        at_rest = (24 + 8) * len(self.block.points) + self.cells.nbytes
-        return fields + at_rest + 5 * 8 * self.first.size + (6 + len(self.kinds)) * _TABLES
+        of_fields = sum(kind.item_bytes * self.rows(kind) for kind in self.kinds)
+        tables = sum(table.nbytes for table in self.tables().values())
+        return of_fields + tables + (7 + len(self.kinds)) * _TABLES
 
 
 def layout_of(record: FieldRecord, blocks: list[Block], times: np.ndarray) -> list[Slots]:
@@ -171,4 +189,15 @@ def _slots(record: FieldRecord, block: Block, times: np.ndarray) -> Slots:
             cell_count = count // 2 if block.pairs else count - 1
     start = np.concatenate([[0], np.cumsum(count)])
     kinds = tuple(kind for kind in record.kinds if kind.belongs_to(block))
-    return Slots(block, kinds, first, count, start, cells, cell_first, cell_count)
+    return Slots(
+        points=block.points.astype("<f8"),
+        nodes=block.nodes.astype("<i8"),
+        cells=cells.astype("<i4"),
+        first=first.astype("<i8"),
+        count=count.astype("<i8"),
+        cell_first=cell_first.astype("<i8"),
+        cell_count=cell_count.astype("<i8"),
+        block=block,
+        kinds=kinds,
+        start=start,
+    )

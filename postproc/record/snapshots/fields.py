@@ -18,7 +18,7 @@ from catenary.postproc.record.column_gather import ColumnGather, next_flush
 from catenary.postproc.record.snapshots.blocks import Block, RecordedLine, blocks_of
 from catenary.postproc.record.snapshots.field_layout import FieldRecord
 from catenary.postproc.record.snapshots.field_values import FieldValues, Gathered
-from catenary.postproc.record.snapshots.fields_file import FieldsFile, LineSize
+from catenary.postproc.record.snapshots.fields_file import FieldsFile
 from catenary.solver.time_loop.views.observers import Observer, Stage, StepView
 
 _MAX_BUFFER = 32 * 1024 * 1024
@@ -96,14 +96,10 @@ class FieldRecorder(Observer):
         if not self._record.is_whole:
             self._blocks = self._record.chosen(blocks_of(self._line, stage.node_points))
         self._n_nodes = n_nodes
-        gathers = [ColumnGather(self._comm, stage.owned_nodes, n_nodes, self._capacity)]
-        if self._blocks:
-            # What nobody shows of their rooms is neither touched nor copied.
-            gathers = [gathers[0].twin() for _ in motions]
-        # All of a line's share what is received; each is put aside before the next one.
+        gather = ColumnGather(self._comm, stage.owned_nodes, n_nodes, self._capacity)
         self._motions = {
-            motion: (gather, np.zeros((self._capacity, gather.n_owned)))
-            for motion, gather in zip(motions, gathers * len(motions), strict=False)
+            motion: (gather.twin(), np.zeros((self._capacity, gather.n_owned)))
+            for motion in motions
         }
         if self._wants_droppers:
             owned, n = stage.owned_droppers, int(stage.dropper_x.size)
@@ -173,11 +169,7 @@ class FieldRecorder(Observer):
         for motion, (gather, kept) in self._motions.items():
             if self._own is not None:
                 kept = np.ascontiguousarray(kept[:rows, : self._own.size])
-            whole = gather(kept[:rows], self._among)
-            # What several of them are gathered into is the same for all of a whole line.
-            shared = len(self._motions) > 1 and self._own is None
-            is_room = not np.may_share_memory(whole, kept)
-            motions[motion] = whole.copy() if shared and is_room else whole
+            motions[motion] = gather(kept[:rows], self._among)
         force = self._droppers(self._force[:rows]) if self._wants_droppers else np.zeros((rows, 0))
         places = np.array(self._pantographs)
         known = Gathered(motions, force, self._tension, places)
@@ -209,8 +201,8 @@ class FieldRecorder(Observer):
         points, every = stage.node_points, (self._every, stage.dt)
         values = FieldValues(self._line, points)
         blocks = blocks_of(self._line, points)
-        known = LineSize(len(points), stage.n_places)
-        file = FieldsFile(self._xdmf, self._record, blocks, values, known, every)
+        sizes = len(points), stage.n_places
+        file = FieldsFile(self._xdmf, self._record, blocks, values, *sizes, every)
         # Numbers of the snapshots to come.
         first = -(-self._first_step // self._every)
         numbers = np.arange(first, max(first, stage.n_steps // self._every) + 1)

@@ -12,15 +12,14 @@ import json
 import logging
 import os
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING
 
 import h5py
 import numpy as np
 from h5py import h5d, h5p, h5s, h5t
 
 from catenary.postproc.files.disk import MARGIN, check_in_place, opened, reserve, write_at
-from catenary.postproc.files.hdf5.array_writes import put_array
-from catenary.postproc.files.hdf5.checked import set_attribute, text_of
+from catenary.postproc.files.hdf5.array_writes import put_array, set_attribute
 from catenary.postproc.files.own_files import new_part
 from catenary.postproc.record.snapshots.blocks import Block
 from catenary.postproc.record.snapshots.field_layout import (
@@ -34,26 +33,14 @@ from catenary.postproc.record.snapshots.field_layout import (
 )
 from catenary.postproc.record.snapshots.field_values import FieldValues, Gathered
 from catenary.postproc.record.snapshots.growing_xdmf import GrowingXdmf, grids_of
-from catenary.postproc.record.snapshots.vtkhdf import SUFFIX, write_vtkhdf
+
+if TYPE_CHECKING:
+    from catenary.postproc.record.snapshots.fields_schema import FieldTables
 
 logger = logging.getLogger("catenary.fields")
 
 # Rows of a table that are copied at once.
 _ROWS_OF_COPY = 1 << 16
-# Tables of a block beside its fields.
-AT_REST = ("points", "nodes", "cells", "first", "count", "cell_first", "cell_count")
-
-
-class LineSize(NamedTuple):
-    """Nodes of a whole line, and how many numbers say where each pantograph's masses are."""
-
-    n_nodes: int
-    n_places: tuple[int, ...]
-
-    @property
-    def n_numbers(self) -> int:
-        """Numbers of all pantographs, with the heights of their bases."""
-        return len(self.n_places) + sum(self.n_places)
 
 
 class FieldsFile:
@@ -64,7 +51,8 @@ class FieldsFile:
     xdmf : the XDMF file; the numbers go into the file of the same name ending in ``.h5``
     record, blocks : which part of the line at rest is recorded
     values : makes the values
-    size : of line and train
+    n_nodes : of the whole line
+    n_places : how many numbers say where each pantograph's masses are
     every : steps between two snapshots, and the time of a step [s]
     """
 
@@ -74,12 +62,15 @@ class FieldsFile:
         record: FieldRecord,
         blocks: list[Block],
         values: FieldValues,
-        size: LineSize,
+        n_nodes: int,
+        n_places: tuple[int, ...],
         every: tuple[int, float],
     ) -> None:
         self._xdmf, self.path = xdmf, xdmf.with_suffix(".h5")
         self._record, self._blocks, self._values = record, blocks, values
-        self._size, (self._steps, self._dt) = size, every
+        self._n_nodes, self._n_places, (self._steps, self._dt) = n_nodes, n_places, every
+        # Numbers of all pantographs, with the heights of their bases.
+        self._n_numbers = len(n_places) + sum(n_places)
         self._every = self._steps * self._dt
         self._written: list[float] = []
         self._planned: list[float] = []
@@ -144,14 +135,14 @@ class FieldsFile:
             if not survives(self.path):
                 raise ValueError("HDF5 does not read it")
             with opened(self.path, "r+") as file:
-                kept, times = read_fields(file).times, file["times"]
+                known, times = read_fields(file), file["times"]
                 # The step from which the run goes on is shown again, that before it is not.
-                kept = kept[kept < start_time - 0.5 * self._dt]
+                kept = known.times[known.times < start_time - 0.5 * self._dt]
                 begin = round(float(kept[0]) / self._every) if kept.size else int(numbers[0])
                 planned = np.arange(begin, numbers[-1] + 1)
                 self._plan(planned[: times.size])
                 self._find_places(file)
-                self._check(file, kept)
+                self._refuse_other(known, kept)
                 times[kept.size :] = np.full(times.size - kept.size, np.nan)
                 self._written = kept.tolist()
             if planned.size > len(self._planned):
@@ -203,7 +194,7 @@ class FieldsFile:
                 at = places[kind.name] + kind.item_bytes * slots.row_at(kind, first)
                 write_at(self._handle, at, values)
         pantographs = np.ascontiguousarray(known.pantographs, dtype="<f8")
-        write_at(self._handle, self._places_at + 8 * first * self._size.n_numbers, pantographs)
+        write_at(self._handle, self._places_at + 8 * first * self._n_numbers, pantographs)
         write_at(self._handle, self._times_at + 8 * first, np.array(times, dtype="<f8"))
         self._written += times
         if self._published:
@@ -218,12 +209,6 @@ class FieldsFile:
         self._handle = -1
         if self._text is not None:
             self._text.close()
-        if self._published and len(self._written) > 1:
-            try:
-                write_vtkhdf(self.path)
-            except (OSError, KeyError, RuntimeError, ValueError) as error:
-                words = "%s is not written (%s); `catenary paraview` writes it"
-                logger.warning(words, self.path.with_suffix(SUFFIX), error)
         if not self._published:
             with contextlib.suppress(OSError):
                 self._made_as.unlink(missing_ok=True)
@@ -236,12 +221,12 @@ class FieldsFile:
 
     def _n_bytes(self) -> int:
         """What the file takes at most [B]."""
-        of_time = 8 * len(self._planned) * (1 + self._size.n_numbers)
+        of_time = 8 * len(self._planned) * (1 + self._n_numbers)
         return MARGIN + of_time + sum(slots.bytes() for slots in self._layout)
 
     def _write_tables(self, file: h5py.File) -> None:
         set_attribute(file, "format", FORMAT)
-        set_attribute(file, "n_nodes", self._size.n_nodes)
+        set_attribute(file, "n_nodes", self._n_nodes)
         set_attribute(file, RESTS_BEYOND, int(self._record.rests_beyond))
         set_attribute(file, "parts", json.dumps([slots.name for slots in self._layout]))
         put_array(file, "times", np.full(len(self._planned), np.nan))
@@ -249,11 +234,11 @@ class FieldsFile:
         how = h5p.create(h5p.DATASET_CREATE)
         how.set_alloc_time(h5d.ALLOC_TIME_EARLY)
         how.set_fill_time(h5d.FILL_TIME_NEVER)
-        _create(file, PLACES, (len(self._planned), self._size.n_numbers), "<f8", how)
-        put_array(file, SIZES, np.array(self._size.n_places, dtype="<i8"))
+        _create(file, PLACES, (len(self._planned), self._n_numbers), "<f8", how)
+        put_array(file, SIZES, np.array(self._n_places, dtype="<i8"))
         for slots in self._layout:
             group = file.create_group(slots.name)
-            for name, table in _at_rest(slots).items():
+            for name, table in slots.tables().items():
                 put_array(group, name, table)
             for kind in slots.kinds:
                 shape = (slots.rows(kind), kind.components)[: 1 + (kind.components > 1)]
@@ -271,36 +256,29 @@ class FieldsFile:
             group = file[slots.name]
             self._places.append({name: _place_of(group, name) for name in names})
 
-    def _check(self, file: h5py.File, times: np.ndarray) -> None:
+    def _refuse_other(self, known: FieldTables, times: np.ndarray) -> None:
         """Raise ValueError if a file that is to be continued is not of this run and these places.
 
         Parameters
         ----------
+        known : what it holds
         times : of the snapshots that are kept [s]
         """
-        if text_of(file.attrs.get("format")) != FORMAT or file["times"].shape != (
-            len(self._planned),
-        ):
-            raise ValueError("format")
         apart = np.diff(times) - self._every
-        if not (np.abs(apart) <= 0.01 * self._every).all() or not np.isfinite(times).all():
+        if not (np.abs(apart) <= 0.01 * self._every).all():
             raise ValueError("times")
-        if file[PLACES].shape != (len(self._planned), self._size.n_numbers):
-            raise ValueError(PLACES)
+        if known.n_places.tolist() != list(self._n_places):
+            raise ValueError(SIZES)
         spans = [
             (self._times_at, 8 * len(self._planned)),
-            (self._places_at, 8 * len(self._planned) * self._size.n_numbers),
+            (self._places_at, 8 * len(self._planned) * self._n_numbers),
         ]
         for slots, places in zip(self._layout, self._places, strict=True):
-            group = file[slots.name]
-            for name, table in _at_rest(slots).items():
-                if not np.array_equal(group[name][...], table):
+            for name, table in slots.tables().items():
+                if not np.array_equal(known.blocks[slots.name].tables()[name], table):
                     raise ValueError(name)
             for kind in slots.kinds:
-                size = kind.item_bytes * slots.rows(kind)
-                if group[kind.name].nbytes != size:
-                    raise ValueError(kind.name)
-                spans.append((places[kind.name], size))
+                spans.append((places[kind.name], kind.item_bytes * slots.rows(kind)))
         # Snapshots are written where they stand: none may reach into another, or beyond the file.
         spans.sort()
         starts, sizes = np.array(spans, dtype=np.int64).T
@@ -330,16 +308,3 @@ def _create(
 def _place_of(group: h5py.Group, name: str) -> int:
     """Where in the file a table begins [B], 0 if it has no numbers; KeyError without one."""
     return h5d.open(group.id, name.encode()).get_offset() or 0
-
-
-def _at_rest(slots: Slots) -> dict[str, np.ndarray]:
-    """The tables of a block beside its fields, by ``AT_REST``."""
-    return {
-        "points": slots.block.points.astype("<f8"),
-        "nodes": slots.block.nodes.astype("<i8"),
-        "cells": slots.cells.astype("<i4"),
-        "first": slots.first.astype("<i8"),
-        "count": slots.count.astype("<i8"),
-        "cell_first": slots.cell_first.astype("<i8"),
-        "cell_count": slots.cell_count.astype("<i8"),
-    }

@@ -1,32 +1,24 @@
 """The attributes and tables of ``fields.h5``, declared once, and read against the declaration.
 
-As ``file_schema`` and ``sound_file`` do for ``run.h5``. Fields themselves are checked for kind and
-length here, and for their values snapshot by snapshot. Not collective.
+As ``run_schema`` and ``validated_file`` do for ``run.h5``. Fields themselves are checked for kind
+and length here, and for their values snapshot by snapshot. Not collective.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Annotated, Literal, NamedTuple
 
 import h5py
 import numpy as np
 from h5py import h5d
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
-from catenary.postproc.files.hdf5.checked import text_of
-from catenary.postproc.read.attributes import HDF5_ERRORS, decoded
-from catenary.postproc.read.constants import values_fault
-from catenary.postproc.read.file_schema import (
-    LARGEST,
-    REQUIRED,
-    Attribute,
-    Constant,
-    is_text,
-    is_whole,
-)
+from catenary.postproc.files.hdf5.checked import HDF5_ERRORS
+from catenary.postproc.files.run_schema import JSON, Positive, Table, Text, largest
+from catenary.postproc.read.validation import read_attributes, values_fault
 from catenary.postproc.record.snapshots.blocks import FIXED, OTHER_PARTS
 from catenary.postproc.record.snapshots.field_kinds import KINDS, FieldKind
-from catenary.postproc.record.snapshots.field_layout import FORMAT, PLACES, RESTS_BEYOND, SIZES
+from catenary.postproc.record.snapshots.field_layout import FORMAT, PLACES, SIZES, BlockTables
 
 # More snapshots or pantographs' numbers than any run has; nothing larger is read.
 _MOST_SNAPSHOTS, _MOST_PARTS, _MOST_PLACES = 10**7, 10**4, 10**6
@@ -34,52 +26,42 @@ _MOST_SNAPSHOTS, _MOST_PARTS, _MOST_PLACES = 10**7, 10**4, 10**6
 _TIMES = 1 << 16
 
 
-def _parts(value: Any) -> bool:
-    return (
-        isinstance(value, list)
-        and 0 < len(value) <= _MOST_PARTS
-        and all(is_text(name) and name not in ("", ".") and "/" not in name for name in value)
-        and len(set(value)) == len(value)
-    )
+def _each_once(names: list[str]) -> list[str]:
+    if len(set(names)) < len(names) or any(name in ("", ".") or "/" in name for name in names):
+        raise ValueError("names")
+    return names
 
 
-ATTRIBUTES: dict[str, Attribute] = {
-    "format": Attribute(f'"{FORMAT}"', lambda value: value == FORMAT),
-    "n_nodes": Attribute("a whole number from 1", lambda value: is_whole(value, 1)),
-    "parts": Attribute("a list of names, each of them once", _parts, is_json=True),
-    RESTS_BEYOND: Attribute("0 or 1", lambda value: is_whole(value, 0) and value <= 1, fallback=0),
+class FieldsAttributes(BaseModel):
+    """The root attributes, as `RunAttributes` of a result file."""
+
+    model_config = ConfigDict(strict=True)
+
+    format: Literal["catenary-fields-2"] = Field(description=f'"{FORMAT}"')
+    n_nodes: Positive
+    parts: Annotated[
+        list[Text], JSON, AfterValidator(_each_once), Field(min_length=1, max_length=_MOST_PARTS)
+    ] = Field(description="a list of names, each of them once")
+    rests_beyond: Literal[0, 1] = Field(default=0, description="0 or 1")
+
+
+def _numbers(dimensions: tuple[str, ...], most: float = 1e12) -> Table:
+    return Table(dimensions, low=0, high=most, whole=True)
+
+
+BLOCK: dict[str, Table] = {
+    "points": Table(("point", "xyz"), "m"),
+    "nodes": _numbers(("point",)),
+    "cells": _numbers(("cell", "upper_lower"), 1e9),
+    "first": _numbers(("snapshot",)),
+    "count": _numbers(("snapshot",)),
+    "cell_first": _numbers(("snapshot",)),
+    "cell_count": _numbers(("snapshot",)),
 }
-# Letters: T snapshots that are planned, B points of a block, C its cells.
-_SNAPSHOTS = Constant("T", 0, 1e12, whole=True)
-BLOCK: dict[str, Constant] = {
-    "points": Constant("B3"),
-    "nodes": Constant("B", 0, 1e12, whole=True),
-    "cells": Constant("C2", 0, 1e9, whole=True),
-    "first": _SNAPSHOTS,
-    "count": _SNAPSHOTS,
-    "cell_first": _SNAPSHOTS,
-    "cell_count": _SNAPSHOTS,
-}
-
-
-@dataclass(frozen=True)
-class BlockTables:
-    """The tables of a block beside its fields, sound; see `field_layout.Slots`.
-
-    points (B, 3) [m], nodes (B,), cells (C, 2), the others (T,).
-    """
-
-    points: np.ndarray
-    nodes: np.ndarray
-    cells: np.ndarray
-    first: np.ndarray
-    count: np.ndarray
-    cell_first: np.ndarray
-    cell_count: np.ndarray
 
 
 class FieldTables(NamedTuple):
-    """A ``fields.h5`` that is sound.
+    """A ``fields.h5`` that is valid.
 
     Attributes
     ----------
@@ -109,33 +91,18 @@ def read_fields(file: h5py.File) -> FieldTables:
     FieldsFault
         If anything is missing, of another kind, or does not fit the rest.
     """
-    about = _attributes(file)
+    about, *faults = read_attributes(file, FieldsAttributes)
+    for fault in sum(faults, []):
+        raise FieldsFault(fault)
     clock = _table(file, "times", np.dtype("<f8"), (None,))
     n_planned = clock.shape[0]
     if n_planned > _MOST_SNAPSHOTS:
         raise FieldsFault(f"times has {n_planned} rows, and no run has so many snapshots")
-    sizes = _read(file, SIZES, Constant("P", 0, _MOST_PLACES, whole=True), {})
+    sizes = _read(file, SIZES, _numbers(("pantograph",), _MOST_PLACES), {})
     _table(file, PLACES, np.dtype("<f8"), (n_planned, sizes.size + int(sizes.sum())))
     n_nodes = int(about["n_nodes"])
     blocks = {name: _block(file, name, n_planned, n_nodes) for name in about["parts"]}
-    return FieldTables(n_nodes, bool(about[RESTS_BEYOND]), _times(clock), sizes, blocks)
-
-
-def _attributes(file: h5py.File) -> dict[str, Any]:
-    """The root attributes, sound."""
-    found = {}
-    for name, declared in ATTRIBUTES.items():
-        if declared.fallback is not REQUIRED and name not in file.attrs:
-            found[name] = declared.fallback
-            continue
-        try:
-            value = decoded(text_of(file.attrs[name]), declared.is_json)
-        except HDF5_ERRORS as error:
-            raise FieldsFault(f'its attribute "{name}" is missing or cannot be read') from error
-        if not declared.sound(value):
-            raise FieldsFault(f'its attribute "{name}" is not {declared.must_be}')
-        found[name] = value
-    return found
+    return FieldTables(n_nodes, bool(about["rests_beyond"]), _times(clock), sizes, blocks)
 
 
 def _table(
@@ -167,9 +134,9 @@ def _table(
     return table
 
 
-def _read(file: h5py.File, path: str, declared: Constant, sizes: dict[str, int]) -> np.ndarray:
-    """The values of a table as it is declared; letters without a size get theirs."""
-    table = _table(file, path, None, (None,) * len(declared.shape))
+def _read(file: h5py.File, path: str, declared: Table, sizes: dict[str, int]) -> np.ndarray:
+    """The values of a table as it is declared; ``sizes`` of dimensions are added."""
+    table = _table(file, path, None, (None,) * len(declared.dimensions))
     try:
         values = np.asarray(table[...])
     except (*HDF5_ERRORS, MemoryError) as error:
@@ -192,14 +159,14 @@ def _times(clock: h5py.Dataset) -> np.ndarray:
     times = np.concatenate(parts)
     if not (np.diff(times) > 0.0).all():
         raise FieldsFault("times does not ascend")
-    if times.size and not 0.0 <= times[0] <= times[-1] <= LARGEST["s"]:
+    if times.size and not 0.0 <= times[0] <= times[-1] <= largest("s"):
         raise FieldsFault(f"times reaches from {times[0]:g} to {times[-1]:g} s, which cannot be")
     return times
 
 
 def _block(file: h5py.File, name: str, n_planned: int, n_nodes: int) -> BlockTables:
     """The tables of a block, which fit each other, the line and the block's fields."""
-    sizes = {"T": n_planned}
+    sizes = {"snapshot": n_planned}
     is_wire = name not in OTHER_PARTS
     lowest = 0 if is_wire else FIXED
     declared = {**BLOCK, "nodes": BLOCK["nodes"]._replace(low=lowest, high=n_nodes - 1)}
@@ -207,7 +174,7 @@ def _block(file: h5py.File, name: str, n_planned: int, n_nodes: int) -> BlockTab
         **{own: _read(file, f"{name}/{own}", how, sizes) for own, how in declared.items()}
     )
     # Of a wire two points at least are shown; of all else two belong together.
-    least, step, most = (2, 1, sizes["B"]) if is_wire else (0, 2, sizes["B"])
+    least, step, most = (2, 1, sizes["point"]) if is_wire else (0, 2, sizes["point"])
     wrong = (found.count < least) | (found.first + found.count > most)
     wrong |= (found.first % step != 0) | (found.count % step != 0)
     if wrong.any() or most % step:

@@ -15,7 +15,7 @@ from scipy import signal
 from catenary.postproc.evaluate import filters
 from catenary.postproc.files.hdf5 import block_reading
 from catenary.postproc.files.kept_extremes import store_extremes
-from catenary.postproc.files.result_file import COMPLETE
+from catenary.postproc.files.run_schema import COMPLETE
 from catenary.postproc.read.results import Results
 from catenary.postproc.report import csv_tables
 from catenary.postproc.report.pictures import envelope
@@ -80,34 +80,6 @@ def test_a_thinned_curve_keeps_every_peak() -> None:
         assert np.nanmax(shown) >= np.nanmax(y[inner])
         assert np.nanmin(shown) <= np.nanmin(y[inner])
     assert envelope.thinned(y[:100]) == slice(None)
-
-
-def test_files_of_the_earlier_layout_are_read(
-    run_folder: Path, tmp_path: Path, make_march: Any, record_run: Any
-) -> None:
-    path = record_run(tmp_path / "run.h5", make_march(n_steps=200))
-    with Results(path) as results:
-        known = {name: results.channel(name) for name in ("arm_uplift", "dropper_force")}
-        extremes = {name: results.extremes(name) for name in known}
-    with h5py.File(path, "r+") as file:
-        for name in known:
-            file.move(f"line_channels/{name}", f"channels/{name}")
-        for name in ("line_channels", "line_columns", "extremes"):
-            del file[name]
-        for name in ("line_record", "attribute_crc32"):
-            del file.attrs[name]
-        rows = file[COMPLETE][:2]
-        del file[COMPLETE]
-        file[COMPLETE] = rows
-        for name, value in (("dt_s", "time_step"), ("speed_m_per_s", "speed")):
-            file.attrs[name] = file[f"facts/{value}"][()]
-        file.attrs["wave_speed_m_per_s"] = file["facts/wave_speed"][()]
-        del file["facts"]
-        file.attrs["format"] = "catenary-run-1"
-    with Results(path) as results:
-        for name, values in known.items():
-            np.testing.assert_array_equal(results.channel(name), values)
-            np.testing.assert_array_equal(results.extremes(name), extremes[name])
 
 
 REPORT = """

@@ -5,12 +5,10 @@ from __future__ import annotations
 import csv
 import io
 import json
-import shutil
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
 import pytest
 from contact_wires import overlap, problem_on, twins
@@ -27,7 +25,6 @@ from catenary.postproc.channels.header import (
     wire_roles,
 )
 from catenary.postproc.evaluate.error_indicators import indicate
-from catenary.postproc.files.hdf5.checked import seal_attributes
 from catenary.postproc.film.film_data import film_data
 from catenary.postproc.read.line_of_run import LineOfRun
 from catenary.postproc.read.results import Results
@@ -207,15 +204,3 @@ def test_films_show_the_wire_that_is_touched(tmp_path: Path, usual: dict[str, An
     ]
     np.testing.assert_allclose(data.rest_height(x), np.min(each, axis=0), atol=1e-12)
     assert data.touched(16.0) == FIRST and data.touched(32.0) == SECOND
-
-
-def test_files_without_roles_are_of_simple_catenaries(run_folder: Path, tmp_path: Path) -> None:
-    path = Path(shutil.copy(run_folder / "run.h5", tmp_path))
-    with h5py.File(path, "r+") as file:
-        del file.attrs["wires"], file["static/elasticity_of_wires"]
-        seal_attributes(file)
-    with Results(path) as results:
-        assert results.damage == []
-        assert results.roles == {FIRST: Role.CONTACT, "messenger_wire": Role.MESSENGER}
-        lift = results.static("elasticity")
-        np.testing.assert_array_equal(results.static("elasticity_of_wires"), lift[:, None])

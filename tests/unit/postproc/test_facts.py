@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-import json
 import math
 import shutil
 from collections.abc import Iterator
@@ -27,7 +26,6 @@ from catenary.postproc.evaluate.error_indicators import as_table, indicate
 from catenary.postproc.evaluate.statistics import evaluate
 from catenary.postproc.files.hdf5.checked import seal_arrays
 from catenary.postproc.read.results import Results
-from catenary.postproc.report.report import write_report
 from catenary.solver.problem.contact_laws import HertzLaw, KinematicLaw
 from catenary.solver.problem.problem import Damping, Placement, Problem
 from catenary.solver.time_loop.views.channels import PANTOGRAPH, RUN
@@ -159,40 +157,11 @@ def test_a_strip_on_a_suspension_is_what_a_contact_meets_first(
     assert np.isnan(found["actuator_force"]).all()
 
 
-def as_earlier(path: Path) -> None:
-    """Make a file what format 2 was: three facts among its attributes."""
+def test_a_file_of_an_earlier_format_is_refused(run_folder: Path, tmp_path: Path) -> None:
+    path = Path(shutil.copy(run_folder / "run.h5", tmp_path))
     with h5py.File(path, "r+") as file:
-        for name, fact in (("dt_s", "time_step"), ("speed_m_per_s", "speed")):
-            file.attrs[name] = file[f"facts/{fact}"][()]
-        file.attrs["wave_speed_m_per_s"] = file["facts/wave_speed"][()]
-        words = [{"kind": "k", "description": "d", "static_force_N": f} for f in (150.0, 140.0)]
-        file.attrs["pantographs"] = json.dumps(words)
-        del file["facts"], file.attrs["attribute_crc32"]
         file.attrs["format"] = "catenary-run-2"
-
-
-def test_files_of_the_earlier_format_have_a_report_that_says_what_it_lacks(
-    run_folder: Path, tmp_path: Path
-) -> None:
-    path = Path(shutil.copy(run_folder / "run.h5", tmp_path))
-    as_earlier(path)
-    write_report(tmp_path, tmp_path)
-    told = json.loads((tmp_path / "summary.json").read_text())
-    assert told["speed_km_h"] == pytest.approx(300.0)
-    assert [p["static_force_N"] for p in told["pantographs"]] == [150.0, 140.0]
-    (sentence,) = told["indicators"]["warnings"]
-    assert "run the case again" in sentence and told["indicators"]["mesh"]["resolved_hz"] is None
-    assert sentence in (tmp_path / "report.html").read_text()
-
-
-def test_an_earlier_file_with_an_impossible_step_is_refused(
-    run_folder: Path, tmp_path: Path
-) -> None:
-    path = Path(shutil.copy(run_folder / "run.h5", tmp_path))
-    as_earlier(path)
-    with h5py.File(path, "r+") as file:
-        file.attrs["dt_s"] = 0.0
-    with pytest.raises(InputError, match=r'attribute "dt_s" holds 0 in place of 1e-12 to 1000 s'):
+    with pytest.raises(InputError, match="no result file of this version .* 'catenary-run-2'"):
         Results(path)
 
 

@@ -16,8 +16,9 @@ from PIL import Image
 from catenary.base.errors import InputError
 from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.shape import BODY, HEAD, shape_of
-from catenary.postproc.files.hdf5.checked import seal_attributes, set_attribute
-from catenary.postproc.film import animate, pantograph_shape, scale, train, video
+from catenary.postproc.files.hdf5.array_writes import set_attribute
+from catenary.postproc.files.hdf5.checked import seal_attributes
+from catenary.postproc.film import animate, beside_line, pantograph_shape, projection, video
 from catenary.postproc.film.animate import SIZE, Wish
 from catenary.postproc.film.film_data import FilmData, film_data
 from catenary.postproc.film.line_view import LineView
@@ -29,7 +30,6 @@ from catenary.postproc.read.guard import survives
 from catenary.postproc.read.results import Results
 from catenary.postproc.record.snapshots.field_layout import Course, FieldRecord
 from catenary.postproc.record.snapshots.fields import FieldRecorder
-from catenary.postproc.record.snapshots.vtkhdf import write_vtkhdf
 
 # HDF5's files are examined, and films written, by processes of their own.
 pytestmark = pytest.mark.process
@@ -49,16 +49,16 @@ def folder(tmp_path: Path, make_march: Any, record_run: Any) -> Path:
     ("value", "expected"), [(1.0, 1.0), (1.99, 1.5), (7.9, 6.0), (62.0, 60.0), (0.45, 0.4)]
 )
 def test_factors_are_round_and_never_larger(value: float, expected: float) -> None:
-    assert scale.round_down(value) == pytest.approx(expected)
+    assert projection.round_down(value) == pytest.approx(expected)
 
 
 def test_a_drawing_lifts_by_the_factor_of_motions() -> None:
-    drawn = scale.Scale(8.0, 60.0).drawn(np.array([5.0, 5.0]), np.array([0.0, 0.05]))
+    drawn = projection.Scale(8.0, 60.0).drawn(np.array([5.0, 5.0]), np.array([0.0, 0.05]))
     np.testing.assert_allclose(drawn, [40.0, 43.0])
 
 
 def test_the_largest_uplift_stays_between_the_wires() -> None:
-    found = scale.scale_for(110.0, 6.0, 2.5, 1.2, 0.1)
+    found = projection.scale_for(110.0, 6.0, 2.5, 1.2, 0.1)
     assert 0.2 * 1.2 * found.size < found.motion * 0.1 < 0.5 * 1.2 * found.size
 
 
@@ -88,13 +88,13 @@ def test_snapshots_are_those_of_the_fields(folder: Path, make_march: Any) -> Non
 
 
 def test_what_does_not_move_is_not_drawn_larger() -> None:
-    found = scale.scale_for(110.0, 6.0, 2.5, 1.2, 0.0)
+    found = projection.scale_for(110.0, 6.0, 2.5, 1.2, 0.0)
     assert found.motion == found.size
 
 
 def test_each_view_shows_its_two_directions() -> None:
     rest, moved = np.array([[7.0, 0.2, 5.0]]), np.array([[0.5, -0.01, 0.02]])
-    drawing = scale.Scale(10.0, 50.0)
+    drawing = projection.Scale(10.0, 50.0)
     seen = {view: Projection(view, drawing).seen(rest, moved, 3.0)[0] for view in View}
     np.testing.assert_allclose(seen[View.SIDE], [7.5, 3.0, 51.0])
     # To the left is up from above, and left from behind the train.
@@ -156,7 +156,6 @@ def test_a_run_may_go_on_while_its_snapshots_are_read(folder: Path) -> None:
     with (folder / "fields.h5").open("rb") as writer:
         fcntl.flock(writer, fcntl.LOCK_EX | fcntl.LOCK_NB)
         assert survives(folder / "fields.h5")
-        write_vtkhdf(folder / "fields.h5")
         with Snapshots(folder, 10) as snapshots:
             assert snapshots.times.size == 21
         fcntl.flock(writer, fcntl.LOCK_UN)
@@ -182,7 +181,7 @@ def test_what_cannot_be_shown_is_refused(folder: Path) -> None:
         snapshots.uplift(0)
     with h5py.File(folder / "fields.h5", "r+") as file:
         n = file["contact_wire/count"][0]
-        file["contact_wire/uplift"][3 * n + 5] = np.nan
+        file["contact_wire/displacement"][3 * n + 5] = np.nan
     with Snapshots(folder, n_nodes) as snapshots, pytest.raises(InputError, match=r"t = 0\.15 s"):
         snapshots.uplift(3)
     with h5py.File(folder / "fields.h5", "r+") as file:
@@ -232,12 +231,12 @@ def test_a_picture_wider_than_the_snapshots_is_refused(
 
 def test_coaches_carry_all_pantographs() -> None:
     for position in (np.array([100.0]), np.array([100.0, 0.0]), np.array([400.0, 200.0, 31.0])):
-        spans = train.coaches(position)
+        spans = beside_line.coaches(position)
         for x in position:
-            on = (spans[:, 0] - train.GAP < x) & (x < spans[:, 1])
+            on = (spans[:, 0] - beside_line.GAP < x) & (x < spans[:, 1])
             assert on.any()
-        np.testing.assert_allclose(spans[:, 1] - spans[:, 0], train.COACH)
-        assert train.boxes(position, 3.6).shape == (8 * len(spans), 3)
+        np.testing.assert_allclose(spans[:, 1] - spans[:, 0], beside_line.COACH)
+        assert beside_line.boxes(position, 3.6).shape == (8 * len(spans), 3)
 
 
 def test_snapshots_are_chosen_by_time() -> None:
@@ -340,8 +339,8 @@ def _drawn_droppers(folder: Path, look: View) -> tuple[FilmData, int, np.ndarray
             schematic = MovingPantographs(data, snapshots, None)
             plotter = pyvista.Plotter(off_screen=True)
             view = LineView(
-                plotter, data, Projection(look, scale.Scale(1.0, 1.0)),
-                scale.Colours(2, "uplift", 0.01), schematic, snapshots,
+                plotter, data, Projection(look, projection.Scale(1.0, 1.0)),
+                projection.Colours(2, "uplift", 0.01), schematic, snapshots,
             )  # fmt: skip
             row = data.row_at(float(snapshots.times[3]))
             view.update(row, snapshots.displacement(3), None, schematic.poses(3))

@@ -2,25 +2,23 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 from typing import Any
 
 import h5py
 import numpy as np
-import pytest
 import pyvista
-from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
-from vtkmodules.vtkIOHDF import vtkHDFReader
 from watched_fields import BLOCKS, blocks_at, times_in, watch
 
 from catenary.meshgen.mesh import CONTACT_WIRE, DROPPERS, MESSENGER_WIRE
-from catenary.postproc.record.snapshots import fields_file
 from catenary.postproc.record.snapshots.blocks import ARMS, MASTS, RecordedLine, blocks_of
 from catenary.postproc.record.snapshots.field_kinds import FIELDS
-from catenary.postproc.record.snapshots.field_layout import Course, FieldRecord
+from catenary.postproc.record.snapshots.field_layout import BlockTables, Course, FieldRecord
 from catenary.postproc.record.snapshots.field_values import curvature
 from catenary.postproc.record.snapshots.fields import FieldRecorder
-from catenary.postproc.record.snapshots.vtkhdf import NO_DROPPER
+
+AT_REST = {own.name for own in dataclasses.fields(BlockTables)}
 
 
 def test_xdmf_has_the_times_of_the_steps_to_the_last_digit(tmp_path: Path, make_march: Any) -> None:
@@ -137,8 +135,8 @@ def test_fields_that_are_not_chosen_cost_nothing(tmp_path: Path, make_march: Any
         march.drive(watch(march, path, record=FieldRecord(chosen)))
         sizes[chosen] = (tmp_path / "fields.h5").stat().st_size, set(asked)
         with h5py.File(tmp_path / "fields.h5") as file:
-            assert set(file["masts"]) == set(fields_file.AT_REST)
-            assert set(file["steady_arms"]) - set(fields_file.AT_REST) == {
+            assert set(file["masts"]) == AT_REST
+            assert set(file["steady_arms"]) - AT_REST == {
                 name for name in chosen if name in ("uplift", "displacement", "velocity")
             }
     assert sizes["uplift",][1] == sizes["uplift", "displacement"][1] == {("w", False)}
@@ -219,65 +217,3 @@ def test_pieces_of_a_wire_stay_apart_in_a_window(tmp_path: Path, make_march: Any
         expected = [k for k in range(grid.n_points - 1) if k + 1 not in inside]
         np.testing.assert_array_equal(cells[:, 0], expected)
         np.testing.assert_array_equal(cells[:, 1] - cells[:, 0], 1)
-
-
-@pytest.mark.parametrize("window", [None, (30.0, 20.0)])
-def test_vtkhdf_shows_at_a_time_what_xdmf_shows(
-    window: tuple[float, float] | None, tmp_path: Path, make_march: Any
-) -> None:
-    """A pipeline asks for a time; VTK 9.7 obeys for a single grid, and not for a collection."""
-    march, path = make_march(n_steps=500), tmp_path / "fields.xdmf"
-    place = march.position(0.0)
-    course = Course(float(place.min()), float(place.max()), march.speed)
-    march.drive(watch(march, path, record=FieldRecord(FIELDS, window=window, course=course)))
-    hdf = tmp_path / "fields.vtkhdf"
-    assert hdf.stat().st_size < 200e3, "numbers are not stored twice"
-    reader = vtkHDFReader()
-    reader.SetFileName(str(hdf))
-    reader.UpdateInformation()
-    steps = vtkStreamingDemandDrivenPipeline.TIME_STEPS()
-    times = reader.GetOutputInformation(0).Get(steps)
-    assert times == pytest.approx([0.05 * number for number in range(11)], rel=1e-12)
-    for number in (10, 4, 0, 7):
-        reader.UpdateTimeStep(times[number])
-        whole = pyvista.wrap(reader.GetOutputDataObject(0))
-        expected = blocks_at(path, 0.05 * number)
-        assert tuple(expected) == BLOCKS
-        part = whole.cell_data["part"]
-        cells = whole.cell_connectivity.reshape(-1, 2)
-        first = 0
-        for i, wanted in enumerate(expected.values()):
-            points = slice(first, first + wanted.n_points)
-            np.testing.assert_array_equal(whole.points[points], wanted.points)
-            np.testing.assert_array_equal(
-                cells[part == i], first + wanted.cell_connectivity.reshape(-1, 2)
-            )
-            for field in whole.point_data:
-                found = whole.point_data[field][points]
-                if field in wanted.point_data:
-                    np.testing.assert_array_equal(found, wanted.point_data[field])
-                else:  # masts do not move, and what hangs between wires has no tension
-                    beside = np.nan if field in ("tension", "bending_moment") else 0.0
-                    np.testing.assert_array_equal(found, beside)
-            for field in set(whole.cell_data.keys()) - {"part"}:
-                found = whole.cell_data[field][part == i]
-                beside = NO_DROPPER if field == "dropper_state" else np.nan
-                np.testing.assert_array_equal(found, wanted.cell_data.get(field, beside))
-            first += wanted.n_points
-        assert first == whole.n_points and part.size == whole.n_cells
-        assert set(whole.point_data) | set(whole.cell_data) == {*FIELDS, "dropper_state", "part"}
-
-
-def test_vtkhdf_without_the_numbers_is_refused(
-    tmp_path: Path, make_march: Any, caplog: pytest.LogCaptureFixture
-) -> None:
-    """In place of a line that stands still."""
-    march, path = make_march(n_steps=100), tmp_path / "fields.xdmf"
-    march.drive(watch(march, path))
-    (tmp_path / "fields.h5").unlink()
-    reader = vtkHDFReader()
-    reader.SetFileName(str(tmp_path / "fields.vtkhdf"))
-    reader.Update()
-    whole = reader.GetOutputDataObject(0)
-    assert whole is None or whole.GetNumberOfPoints() == 0
-    assert "Cannot open Values" in caplog.text

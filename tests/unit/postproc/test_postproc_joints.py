@@ -37,8 +37,7 @@ def test_each_step_has_the_largest_open_joint(
 ) -> None:
     record_run(tmp_path / "run.h5", with_joints)
     with Results(tmp_path) as results:
-        found = results.constraint_violations()
-        assert found is not None
+        found = results.channel("constraint_violation")
         np.testing.assert_array_equal(found[:, 0], 1e-12 * np.arange(601))
         assert np.isnan(found[:, 1]).all()
         assert results.largest_violations() == [6e-10, None]
@@ -66,5 +65,5 @@ def test_runs_without_joints_have_no_such_channel(run_folder: Path) -> None:
     with h5py.File(run_folder / "run.h5") as file:
         assert "constraint_violation" not in file["channels"]
     with Results(run_folder) as results:
-        assert results.constraint_violations() is None
+        assert not results.has_violations
         assert results.largest_violations() == [None, None]

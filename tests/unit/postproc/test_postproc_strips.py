@@ -37,7 +37,8 @@ def test_each_strip_has_a_column(tmp_path: Path, with_strips: Any, record_run: A
     record_run(tmp_path / "run.h5", with_strips)
     with Results(tmp_path) as results:
         assert results.n_strips() == [1, 2]
-        one, two = results.strip_forces()
+        assert results.strip_columns() == [range(0, 1), range(1, 3)]
+        one, two = np.split(results.channel("strip_force"), [1], axis=1)
         force = results.channel("contact_force")
         np.testing.assert_array_equal(one, force[:, :1])
         np.testing.assert_allclose(two, force[:, 1:] * [0.6, 0.4], rtol=1e-15)
@@ -64,4 +65,4 @@ def test_runs_of_single_strips_have_no_such_channel(run_folder: Path) -> None:
         assert "strip_force" not in file["channels"]
     with Results(run_folder) as results:
         assert results.n_strips() == [1, 1]
-        assert results.strip_forces() == []
+        assert not results.several_strips and not results.has("strip_force")

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from catenary.postproc.files.hdf5.checked import FORMAT_BOUNDS
-from catenary.postproc.files.result_file import COMPLETE, RUNNING
+from catenary.postproc.files.run_schema import COMPLETE, RUNNING
 from catenary.postproc.read.running_file import opened
 
 ROWS = 200
@@ -29,7 +29,7 @@ def written(path: Path) -> Path:
     with h5py.File(path, "w", libver=FORMAT_BOUNDS) as file:
         file.attrs["outcome"] = RUNNING
         file.create_dataset("time", data=np.arange(float(ROWS)), maxshape=(None,), chunks=(8,))
-        file[COMPLETE] = [ROWS, 0]
+        file[COMPLETE] = [ROWS, 0, 0]
     return path
 
 

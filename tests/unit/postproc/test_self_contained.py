@@ -21,7 +21,6 @@ from catenary.postproc.files.result_file import fault_to_continue
 from catenary.postproc.film.snapshots import Snapshots
 from catenary.postproc.read.results import Results
 from catenary.postproc.record.snapshots.fields import FieldRecorder
-from catenary.postproc.record.snapshots.vtkhdf import write_vtkhdf
 
 pytestmark = pytest.mark.process
 PRECIOUS = b"precious" * 4000
@@ -102,8 +101,7 @@ OPENED_BY: dict[str, dict[str, Callable[[Path], Any]]] = {
         "changes": lambda path: open_own(path, "r+"),
     },
     "fields.h5": {
-        "films": lambda path: Snapshots(path.parent, 10),
-        "VTKHDF": write_vtkhdf,
+        "films": lambda path: Snapshots(path.parent, 10).__exit__(None, None, None),
         "restart": lambda path: disk.opened(path, "r+").__enter__(),
     },
 }

@@ -1,4 +1,9 @@
-"""A folder for Matplotlib's own cache where the user has no home that can be written."""
+"""What Matplotlib finds when it is imported: a folder for its cache, and no settings of the user's.
+
+Pictures have the program's own style. Matplotlib reads a ``matplotlibrc`` at import: that in the
+working directory, else that of ``MATPLOTLIBRC``, else that of the user. One that is no text ends
+the import.
+"""
 
 from __future__ import annotations
 
@@ -11,10 +16,23 @@ from collections.abc import Iterator
 from pathlib import Path
 
 VARIABLE = "MPLCONFIGDIR"
+_SETTINGS, _FILE = "MATPLOTLIBRC", Path("matplotlibrc")
 
 
-def settle() -> None:
-    """Set Matplotlib's variable, before it is imported, unless its default will do."""
+def leave_out_settings() -> None:
+    """See to it, before Matplotlib is imported, that it reads no ``matplotlibrc`` of a user's.
+
+    Where the working directory has one it is imported here, from a folder that has none.
+    """
+    os.environ[_SETTINGS] = os.devnull
+    if os.path.lexists(_FILE):
+        with contextlib.chdir(Path(__file__).parent):
+            import matplotlib  # noqa: F401
+
+
+def choose_folder() -> None:
+    """Set the folder of its cache, before it is imported, where the user has no home that can be
+    written."""
     if VARIABLE in os.environ or _may_be_made(_default()):
         return
     for base in _bases():

@@ -1,0 +1,112 @@
+"""Rows of growing tables: appended, written as far as a window reaches, cut where a run goes on.
+
+Not collective.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import h5py
+import numpy as np
+from h5py import h5s
+
+_NO_FILTER = 0xFFFFFFFF
+
+
+def append_rows(dataset: h5py.Dataset, start: int, rows: np.ndarray) -> None:
+    """Let a growing dataset end with ``rows`` (n, ...) behind its first ``start``."""
+    grow((dataset,), start + rows.shape[0])
+    if not rows.size:
+        return
+    block = np.ascontiguousarray(rows, dtype=np.float64)
+    there = dataset.id.get_space()
+    there.select_hyperslab((start,) + (0,) * (block.ndim - 1), block.shape)
+    dataset.id.write(h5s.create_simple(block.shape), there, block)
+
+
+def grow(datasets: Iterable[h5py.Dataset], rows: int) -> None:
+    """Let growing datasets have so many rows, which read as NaN until they are written."""
+    for dataset in datasets:
+        dataset.id.set_extent((rows, *dataset.id.shape[1:]))
+
+
+def write_window(
+    dataset: h5py.Dataset,
+    start: int,
+    values: tuple[int, np.ndarray],
+    x: np.ndarray,
+    edges: tuple[np.ndarray, np.ndarray],
+) -> None:
+    """Write rows from ``start`` on, NaN outside of a window. Not collective.
+
+    Chunks without a value in the window are not touched: they take no room in the file.
+
+    Parameters
+    ----------
+    values : the first of the columns that are given, and these (rows, columns); they reach over
+        the window of each row
+    x : (columns,) where the columns are [m]
+    edges : from and to of the window at each row, (rows,) each [m]
+    """
+    rows, columns = dataset.chunks
+    low, high = edges
+    given, numbers = values
+    end = start + numbers.shape[0]
+    for first in range(start - start % rows, end, rows):
+        part = slice(max(first, start), min(first + rows, end))
+        own = slice(part.start - start, part.stop - start)
+        near = np.flatnonzero((x >= low[own].min()) & (x <= high[own].max()))
+        for block in np.unique(near // columns):
+            across = slice(block * columns, min((block + 1) * columns, x.size))
+            at = x[across]
+            inside = (at >= low[own, None]) & (at <= high[own, None])
+            if inside.any():
+                kept = slice(max(across.start, given), min(across.stop, given + numbers.shape[1]))
+                shown = np.full(inside.shape, np.nan)
+                there = slice(kept.start - across.start, kept.stop - across.start)
+                shown[:, there] = numbers[own, kept.start - given : kept.stop - given]
+                dataset[part, across] = np.where(inside, shown, np.nan)
+
+
+class DamagedClock(Exception):
+    """A table of times cannot be read; the message is a clause."""
+
+
+def rows_before(clock: h5py.Dataset, n: int, time: float) -> int:
+    """How many of the first ``n`` ascending times of a table are before ``time``; `DamagedClock` if
+    they cannot be read."""
+    try:
+        return int(np.searchsorted(clock[:n], time))
+    except OSError as error:
+        raise DamagedClock(f"{clock.name[1:]} is damaged") from error
+
+
+def shorten(file: h5py.File, path: str, rows: int) -> int:
+    """Cut a growing table to ``rows``; returns how many of them were found lost at its end.
+
+    HDF5 reads the last chunk that stays in part, and refuses to cut it or to append to it if its
+    checksum is wrong. Such a chunk is replaced by one of NaN. The table must not be open elsewhere.
+    """
+    lost = _mend_end(file[path], rows)
+    # Opened anew: an open table remembers the chunk that it has read last, filters included.
+    table = file[path]
+    table.resize(min(rows, table.shape[0]), axis=0)
+    return lost
+
+
+def _mend_end(table: h5py.Dataset, rows: int) -> int:
+    """Replace damaged chunks of the last ``rows`` that stay; returns how many rows are lost."""
+    lost = 0
+    rows = min(rows, table.shape[0])
+    begin = rows - rows % table.chunks[0]
+    width = table.chunks[1] if table.ndim > 1 else 1
+    for first in range(0, table.shape[1] if table.ndim > 1 else 1, width):
+        part = (slice(begin, rows), slice(first, first + width))[: table.ndim]
+        try:
+            table[part]
+        except OSError:
+            empty = np.full(table.chunks, np.nan, dtype=table.dtype)
+            table.id.write_direct_chunk((begin, first)[: table.ndim], empty.tobytes(), _NO_FILTER)
+            lost = rows - begin
+    return lost

@@ -1,0 +1,335 @@
+"""All that ``run.h5`` holds, declared once: attributes, tables, their dimensions, units and bounds.
+
+``result_file`` and ``dimensions`` write by these declarations, ``read.validated_file`` reads
+against them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from typing import Annotated, Any, NamedTuple, NotRequired
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from typing_extensions import TypedDict
+
+from catenary.meshgen.wires import Role
+from catenary.postproc.channels.facts import FACTS
+from catenary.postproc.channels.facts import WIRE as CONTACT_WIRE
+from catenary.postproc.channels.line_record import LineRecord, from_table
+from catenary.postproc.standards.en50367 import EDITIONS, SYSTEMS
+from catenary.solver.time_loop.views import channels
+from catenary.solver.time_loop.views.channels import Channel
+from catenary.solver.waves.excitation import excitation_of_facts
+
+FORMAT = "catenary-run-3"
+RUNNING, DONE, INTERRUPTED = "running", "done", "interrupted"
+# Committed row counts of the steps, the energies and the line's channels. They are written after
+# the rows: a table may be longer after a kill.
+COMPLETE = "complete_rows"
+LINE_TIME = "line_channels/time"
+# The times of the three kinds of rows.
+CLOCKS = ("time", "energy/time", LINE_TIME)
+# Beyond these sizes a recorded value is damage, by unit; the march itself ends a run whose contact
+# force passes 1e9 N.
+_LARGEST = {"s": 1e9, "m": 1e9, "N": 1e12, "J": 1e21, "-": 1e12}
+
+
+def largest(unit: str) -> float:
+    """Largest size of a valid value in a unit."""
+    return _LARGEST.get(unit, _LARGEST["-"])
+
+
+# ---- root attributes ---------------------------------------------------------------------------
+
+# Marks an attribute that is stored as JSON text.
+JSON = object()
+# The default of one that is not there where it does not apply.
+MISSING: Any = None
+
+
+def read_by(read: Callable[[Any], object]) -> AfterValidator:
+    """Validates a value by a function that fails at an invalid one."""
+
+    def check(value: Any) -> Any:
+        try:
+            read(value)
+        except (KeyError, TypeError, IndexError) as error:
+            raise ValueError(str(error)) from error
+        return value
+
+    return AfterValidator(check)
+
+
+def _read_line_record(table: Any) -> None:
+    record = from_table(table)
+    ends = [*(record.window or ()), *(record.stretch or ())]
+    known = set(channels.line_channels())
+    if not (1 <= record.every <= 10**9 and all(map(math.isfinite, ends))):
+        raise ValueError("cadence or places")
+    if not set(record.names) <= known:
+        raise ValueError("channels")
+
+
+def _read_watched(table: dict[str, Any]) -> None:
+    if any((name == "remarks") != isinstance(value, list) for name, value in table.items()):
+        raise ValueError("only remarks are a list")
+
+
+Number = Annotated[float, Field(allow_inf_nan=False)]
+
+
+class _Sentence(TypedDict):
+    says: str
+    at_m: NotRequired[Number]
+
+
+class _Incident(_Sentence):
+    time_s: Number
+
+
+class _Pantograph(TypedDict):
+    kind: str
+    description: str
+
+
+class _Arrivals(TypedDict, total=False):
+    pantographs: list[_Sentence]
+    warnings: list[str]
+    ends: list[str]
+
+
+Text = Annotated[str, Field(pattern=r"^[^\x00-\x1f]*$", description="text")]
+Count = Annotated[int, Field(ge=0, le=10**12, description="a whole number from 0")]
+Positive = Annotated[int, Field(ge=1, le=10**12, description="a whole number from 1")]
+_NotNegative = Annotated[float, Field(ge=0, le=1e12, description="a number of zero or more")]
+_Numbers = Annotated[dict[str, Number], JSON, Field(description="a table of numbers")]
+_Effects = Annotated[
+    list[Annotated[list[str], Field(min_length=3, max_length=3)]],
+    JSON,
+    Field(description="a list of names with titles and reasons"),
+]
+
+
+class RunAttributes(BaseModel):
+    """The root attributes; ``description`` is how an error names a valid value.
+
+    Those without a default are needed for a report; others take it where they are damaged.
+    """
+
+    model_config = ConfigDict(strict=True)
+
+    case: Text
+    title: Text = ""
+    n_dofs: Positive
+    system: Annotated[
+        str, read_by(SYSTEMS.__getitem__), Field(description=f"one of {', '.join(SYSTEMS)}")
+    ]
+    edition: Annotated[
+        str, read_by(EDITIONS.__getitem__), Field(description=f"one of {', '.join(EDITIONS)}")
+    ]
+    n_steps_planned: Positive
+    n_steps_begun_for: Positive = MISSING
+    n_ranks: Positive = 1
+    created: Text = "unknown"
+    outcome: str = Field(default=RUNNING, min_length=1, description="text")
+    n_steps: Count = MISSING
+    simulated_s: _NotNegative = MISSING
+    marched_s: _NotNegative = MISSING
+    march_wall_s: _NotNegative = MISSING
+    march_cpu_s: _NotNegative = MISSING
+    records_wall_s: _NotNegative = MISSING
+    config: Annotated[dict[str, Any], JSON, Field(description="a scene as JSON")]
+    versions: Annotated[dict[str, Any], JSON] = Field(default={}, description="a table")
+    effects_on: _Effects
+    effects_off: _Effects
+    pantographs: Annotated[list[_Pantograph], JSON] = Field(
+        default=[], description="a list of tables of facts"
+    )
+    defects: Annotated[list[_Sentence], JSON] = Field(default=[], description="a list of sentences")
+    incidents: Annotated[list[_Incident], JSON] = Field(
+        default=[], description="a list of times with sentences"
+    )
+    arrivals: Annotated[_Arrivals, JSON] = Field(
+        default=_Arrivals(), description="facts of waves from the ends, with sentences"
+    )
+    excitation: Annotated[
+        dict[str, Any], JSON, read_by(lambda facts: facts and excitation_of_facts(facts))
+    ] = Field(default={}, description="what sets the line into motion")
+    wires: Annotated[
+        dict[str, str],
+        JSON,
+        read_by(lambda roles: [Role(role) for role in roles.values()]),
+        Field(min_length=1, description="a table of roles"),
+    ]
+    petsc_options: Annotated[list[Any], JSON] = Field(default=[], description="a list")
+    n_strips: Annotated[list[Annotated[int, Field(ge=1, le=1000)]], JSON] = Field(
+        default=[], description="a list of whole numbers"
+    )
+    line_record: Annotated[dict[str, Any], JSON, read_by(_read_line_record)] = Field(
+        default=MISSING, description="what is recorded of the line"
+    )
+    detour: Text = ""
+    window: Text = ""
+    phase_wall_s: _Numbers = {}
+    inner_iterations: _Numbers = {}
+    watched: Annotated[dict[str, Number | list[str]], JSON, read_by(_read_watched)] = Field(
+        default={}, description="numbers of the march's watch, with sentences"
+    )
+
+
+# ---- tables ------------------------------------------------------------------------------------
+
+ARM, DROPPER, WIRE_END = "steady_arm", "dropper", "wire_end"
+# Sizes of dimensions that are the same in all files.
+SIZES = {"upper_lower": 2, "xyz": 3, "from_to": 2, "radial_lift_along": 3, "smallest_largest": 2}
+# The dimension of a channel's columns, by what a column stands for. Channels of the line have all
+# of their columns in the extremes, and the recorded ones in ``line_channels``.
+COLUMNS = {
+    channels.PANTOGRAPH: "pantograph",
+    channels.STRIP: "strip",
+    channels.WIRE: "contact_wire_of_pantograph",
+    channels.CONTACT: "contact",
+    channels.ARM: f"recorded_{ARM}",
+    channels.DROPPER: f"recorded_{DROPPER}",
+    channels.WIRE_END: f"recorded_{WIRE_END}",
+}
+ALL_COLUMNS = {channels.ARM: ARM, channels.DROPPER: DROPPER, channels.WIRE_END: WIRE_END}
+# Where the places along the track of a dimension are.
+PLACES = {ARM: "line/arm_x", DROPPER: "line/dropper_x", WIRE_END: "line/end_x"}
+
+
+class Table(NamedTuple):
+    """A table that is written once.
+
+    Attributes
+    ----------
+    dimensions : names; one has the same size in all tables of a file
+    unit, meaning : SI unit, "-" if none, and words
+    coordinates : name of the table beside it that says where its rows are
+    low, high : bounds of the values, inclusive
+    whole : whether the numbers are stored as integers
+    ascending : whether they ascend strictly
+    may_be_nan : whether NaN is a value
+    optional : whether a file may be without it
+    """
+
+    dimensions: tuple[str, ...]
+    unit: str = "-"
+    meaning: str = ""
+    coordinates: str = ""
+    low: float = -1e9
+    high: float = 1e9
+    whole: bool = False
+    ascending: bool = False
+    may_be_nan: bool = False
+    optional: bool = False
+
+
+def _numbers(dimensions: tuple[str, ...], meaning: str, optional: bool = False) -> Table:
+    """A table of numbers that count something from 0."""
+    return Table(dimensions, "-", meaning, low=0, high=1e12, whole=True, optional=optional)
+
+
+def _force(dimensions: tuple[str, ...], meaning: str, optional: bool = False) -> Table:
+    return Table(dimensions, "N", meaning, low=-1e12, high=1e12, optional=optional)
+
+
+_PLACE = "position along the track"
+CONSTANTS: dict[str, Table] = {
+    "line/arm_x": Table((ARM,), "m", f"{_PLACE} of steady arms"),
+    "line/arm_wire": _numbers((ARM,), "number of the wire that each steady arm holds"),
+    "line/dropper_x": Table((DROPPER,), "m", f"{_PLACE} of droppers"),
+    "line/dropper_span": _numbers((DROPPER,), "span of each dropper, from 0"),
+    "line/droppers": _numbers((DROPPER, "upper_lower"), "nodes of each dropper"),
+    "line/end_x": Table((WIRE_END,), "m", f"{_PLACE} of ends of wires", optional=True),
+    "line/end_wire": _numbers((WIRE_END,), "number of the wire", optional=True),
+    "line/end_outwards": Table(
+        (WIRE_END,), "-", "1 where the wire ends, -1 where it begins",
+        low=-1, high=1, whole=True, optional=True,
+    ),
+    "line/node_points": Table(("node", "xyz"), "m", "places of the nodes at rest"),
+    "line/support_x": Table(("support",), "m", f"{_PLACE} of supports", ascending=True),
+    "line/running_range": Table(("from_to",), "m", "where trains run"),
+    "line/evaluation_range": Table(("from_to",), "m", "stretch of the statistics", ascending=True),
+    "static/dropper_length": Table((DROPPER,), "m", "length of droppers as cut"),
+    "static/dropper_force": _force((DROPPER,), "tension of droppers at rest"),
+    "static/contact_x": Table(("contact_node",), "m", f"{_PLACE} of the contact wires' nodes"),
+    "static/contact_height": Table(
+        ("contact_node",), "m", "height of the contact wires at rest", "contact_x"
+    ),
+    "static/contact_y": Table(
+        ("contact_node",), "m", "lateral place of the contact wires at rest", "contact_x",
+        optional=True,
+    ),
+    "static/elasticity_x": Table(("elasticity_place",), "m", f"{_PLACE} of the unit force"),
+    "static/elasticity": Table(
+        ("elasticity_place",), "m/N", "lift of a head under a unit force", "elasticity_x"
+    ),
+    "static/elasticity_of_wires": Table(
+        ("elasticity_place", "contact_wire"), "m/N",
+        "lift of each contact wire under a unit force on it alone", "elasticity_x", may_be_nan=True,
+    ),
+    "static/arm_stagger": Table(
+        (ARM,), "m", "lateral place of the wire at steady arms", optional=True
+    ),
+    "static/arm_force": _force(
+        (ARM, "radial_lift_along"), "force of steady arms at rest", optional=True
+    ),
+    "static/arm_tension": _force((ARM,), "tension of steady arms at rest", optional=True),
+}  # fmt: skip
+COUNTS = Table(
+    ("clock",), "-", "rows that are whole: of channels, energies, and channels of the line"
+)
+
+
+def constant_tables(wires: Iterable[str], breaks: Iterable[str]) -> dict[str, Table]:
+    """All tables of a file that are written once, but the facts.
+
+    Parameters
+    ----------
+    wires : names of the wires
+    breaks : names of those of several pieces
+    """
+    tables = dict(CONSTANTS)
+    for name in wires:
+        meaning = f"wires of {name}: numbers of nodes"
+        tables[f"line/wires/{name}"] = _numbers((f"wires_{name}",), meaning)
+    for name in breaks:
+        meaning = f"breaks of {name}: numbers of nodes"
+        tables[f"line/breaks/{name}"] = _numbers((f"breaks_{name}",), meaning)
+    for name in channels.line_channels():
+        columns, meaning = (
+            COLUMNS[channels.CHANNELS[name].per],
+            f"which columns of {name} are recorded, from 0",
+        )
+        tables[f"line_columns/{name}"] = _numbers((columns,), meaning, optional=True)
+    return tables
+
+
+def fact_tables() -> dict[str, Table]:
+    """Tables of the facts, from ``FACTS``."""
+    per = {channels.PANTOGRAPH: ("pantograph",), CONTACT_WIRE: ("contact_wire",)}
+    return {
+        f"facts/{name}": Table(
+            per.get(fact.per, ()), fact.unit, fact.meaning,
+            low=fact.low, high=fact.high, may_be_nan=fact.may_be_nan,
+        )
+        for name, fact in FACTS.items()
+    }  # fmt: skip
+
+
+def growing_tables(
+    record: LineRecord, train: channels.Train | None = None
+) -> tuple[dict[str, Channel], dict[str, Channel], dict[str, Channel]]:
+    """Tables that grow by rows: of the steps, the energies and the line's channels, clocks first.
+
+    Parameters
+    ----------
+    record : which of the line's channels are recorded
+    train : whose channels are recorded, None for all that there are
+    """
+    of_train = {f"channels/{c.name}": c for c in channels.train_channels(train)}
+    of_line = {f"line_channels/{name}": channels.CHANNELS[name] for name in record.names}
+    energies = {f"energy/{c.name}": c for c in channels.ENERGIES.values()}
+    return {"time": channels.TIME, **of_train}, energies, {LINE_TIME: channels.TIME, **of_line}

@@ -1,0 +1,347 @@
+"""A result file opened for reading, checked against ``run_schema`` before anything is given out."""
+
+from __future__ import annotations
+
+import contextlib
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from catenary.base.errors import InputError
+from catenary.meshgen.wires import Role
+from catenary.postproc.channels.facts import NONE
+from catenary.postproc.channels.line_record import LineRecord, from_table
+from catenary.postproc.files.hdf5.checked import HDF5_ERRORS, sum_is_kept, text_of
+from catenary.postproc.files.kept_extremes import extremes_at
+from catenary.postproc.files.run_schema import (
+    ALL_COLUMNS,
+    FORMAT,
+    RUNNING,
+    RunAttributes,
+    constant_tables,
+    fact_tables,
+    growing_tables,
+)
+from catenary.postproc.read.records import Records, scan, table_faults
+from catenary.postproc.read.running_file import opened, opened_image
+from catenary.postproc.read.validation import (
+    is_there,
+    listed,
+    names_in,
+    read_attributes,
+    table_values,
+)
+from catenary.solver.time_loop.views import channels
+
+# Facts without which there is no report; others may have been declared after a file was written.
+_ESSENTIAL_FACTS = ("time_step", "speed", "wave_speed")
+
+
+class ValidatedFile:
+    """A result file whose attributes, constants and tables have been checked. Not collective.
+
+    Parameters
+    ----------
+    path : the result file
+    records : what ``scan`` found in it, None to scan it when records are first read
+    image : its bytes, if a run of this process wrote it; the file need not be there any more
+
+    Attributes
+    ----------
+    attrs : valid root attributes, lists and tables decoded, numbers as Python's
+    facts : name -> value of the facts, NaN for those declared after the file was written
+    record : which of the line's channels are recorded
+    sizes : of dimensions by name
+
+    Raises
+    ------
+    InputError
+        If it is no result file, or damaged so that no report can be made of it.
+    """
+
+    def __init__(
+        self, path: Path, records: Records | None = None, image: bytes | None = None
+    ) -> None:
+        self.path = path
+        try:
+            self._file, self._complete = (
+                opened(path) if image is None else (opened_image(image), None)
+            )
+        except HDF5_ERRORS as error:
+            reason = " ".join(str(error).split())
+            raise InputError(
+                f"{path} cannot be read as HDF5 ({reason}): it is damaged or no result file; "
+                "nothing in it can be used"
+            ) from error
+        try:
+            self._check()
+        except BaseException:
+            self.close()
+            raise
+        if records is not None:
+            self.records = records
+
+    def _check(self) -> None:
+        self._refuse_other_format()
+        self.sizes: dict[str, int] = {}
+        self.facts: dict[str, np.ndarray] = {}
+        self.attrs, fatal, self._partial = read_attributes(self._file, RunAttributes)
+        known = self.attrs.get("line_record")
+        self.record = LineRecord() if known is None else from_table(known)
+        fatal += [*self._read_facts(), *self._constant_faults()]
+        most = self.attrs.get("n_steps_planned", 10**12) + 1
+        self._faults = table_faults(self._file, self.record, self.sizes, most)
+        steps = growing_tables(self.record)[0]
+        essential = {"time", *(path for path, own in steps.items() if own.essential)}
+        unusable = [f"{p} {clause}" for p, clause in self._faults.items() if p in essential]
+        fatal += [] if fatal else unusable or self._misfits()
+        if fatal:
+            usable = "no part of it can be reported" if unusable else self._usable()
+            raise InputError(f"{self.path} is damaged: {listed(fatal)}; {usable}")
+
+    def _refuse_other_format(self) -> None:
+        try:
+            found = text_of(self._file.attrs.get("format"))
+        except HDF5_ERRORS as error:
+            raise InputError(
+                f"{self.path} is damaged: the head of the file cannot be read; nothing in it can "
+                "be used"
+            ) from error
+        if not isinstance(found, str) or found != FORMAT:
+            raise InputError(
+                f'{self.path} is no result file of this version of Catenary: its attribute "format"'
+                f" is {found!r}, not {FORMAT!r}"
+            )
+
+    def _read_facts(self) -> list[str]:
+        """Read the facts; returns their faults."""
+        try:
+            group = self._file["facts"]
+            intact = sum_is_kept(group, {name: np.asarray(group[name][()]) for name in group})
+        except HDF5_ERRORS:
+            return ["its facts are missing or cannot be read"]
+        if intact is False:
+            return ["its facts differ from their checksum"]
+        faults = []
+        for path, declared in fact_tables().items():
+            name = path.removeprefix("facts/")
+            if name not in group and intact and name not in _ESSENTIAL_FACTS:
+                shape = tuple(self.sizes.get(own, 1) for own in declared.dimensions)
+                self.facts[name] = np.full(shape, NONE)
+                continue
+            values, fault = table_values(self._file, path, declared, self.sizes)
+            if values is None:
+                faults.append(fault)
+            else:
+                self.facts[name] = values
+        return faults
+
+    def _constant_faults(self) -> list[str]:
+        """What is wrong with tables that are written once."""
+        file, faults = self._file, []
+        wires, breaks = names_in(file, "line/wires"), names_in(file, "line/breaks")
+        largest: dict[str, int] = {}
+        for path, declared in constant_tables(wires, breaks).items():
+            if declared.optional and not is_there(file, path):
+                continue
+            values, fault = table_values(file, path, declared, self.sizes)
+            if values is None:
+                faults.append(fault)
+            elif declared.whole and values.size:
+                largest[path] = int(values.max())
+        if not wires:
+            faults.append("line/wires has no wire")
+        return faults or self._references(largest, wires)
+
+    def _references(self, largest: dict[str, int], wires: list[str]) -> list[str]:
+        """What does not fit together: numbers of nodes, wires, spans and columns that are not
+        there, of which ``largest`` is the largest of each table."""
+        sizes = self.sizes
+        limits = {
+            "line/droppers": sizes["node"],
+            "line/dropper_span": sizes["support"] - 1,
+            "line/arm_wire": len(wires),
+            "line/end_wire": len(wires),
+        }
+        for name in wires:
+            limits[f"line/wires/{name}"] = sizes["node"]
+            limits[f"line/breaks/{name}"] = sizes[f"wires_{name}"]
+        for name in channels.line_channels():
+            of_all = ALL_COLUMNS[channels.CHANNELS[name].per]
+            limits[f"line_columns/{name}"] = sizes.get(of_all, 0)
+        faults = [
+            f"{path} names number {largest[path]} of {limit}"
+            for path, limit in limits.items()
+            if largest.get(path, -1) >= limit
+        ]
+        if faults:
+            return faults
+        x = self._file["static/contact_x"][...]
+        start, end = self._file["line/evaluation_range"][...]
+        beyond = start >= x.max() or end <= x.min()
+        return ["line/evaluation_range lies beyond the contact wires"] if beyond else []
+
+    def _misfits(self) -> list[str]:
+        """What does not fit the numbers of pantographs, strips and wires."""
+        sizes, n = self.sizes, self.sizes["pantograph"]
+        if n < 1:
+            return ["channels/contact_force has no columns"]
+        nodes, roles = self._file["line/wires"], self.attrs["wires"]
+        faults = [
+            f'its attribute "{name}" has {len(self.attrs[name])} entries for {n}'
+            for name in ("n_strips", "pantographs")
+            if self.attrs[name] and len(self.attrs[name]) != n
+        ]
+        faults += [
+            f"line/wires has no {name}, whose role is {role}"
+            for name, role in roles.items()
+            if name not in nodes
+        ]
+        contact = [name for name, role in roles.items() if role == Role.CONTACT.value]
+        if not contact:
+            faults.append("no wire has the role of a contact wire")
+        if faults:
+            return faults
+        n_nodes = [nodes[name].size for name in contact]
+        strips = sum(self.attrs["n_strips"] or [1] * n)
+        expected = {
+            "contact_node": sum(n_nodes),
+            "contact_wire": len(contact),
+            "strip": strips,
+            "contact": strips * len(contact),
+            "contact_wire_of_pantograph": n * len(contact),
+        }
+        faults = [
+            f"its tables have {sizes[name]} of {name} in place of {size}"
+            for name, size in expected.items()
+            if sizes.get(name, size) != size
+        ]
+        if strips > n and "strip" not in sizes:
+            faults.append("channels/strip_force is missing")
+        if faults:
+            return faults
+        x = np.split(self._file["static/contact_x"][...], np.cumsum(n_nodes)[:-1])
+        ascend = all(own.size > 1 and (np.diff(own) > 0.0).all() for own in x)
+        return [] if ascend else ["static/contact_x does not ascend"]
+
+    def _usable(self) -> str:
+        """What can still be used of a file of which no report can be made."""
+        dt = float(self.facts.get("time_step", np.nan))
+        if not dt > 0.0:
+            return "no part of it can be reported"
+        about = {"n_steps": None, "outcome": RUNNING, **self.attrs}
+        last = scan(self._file, about, self.record, dt, self._faults, self._complete).last
+        return f"{_up_to(last)} and can be read with h5py"
+
+    @cached_property
+    def records(self) -> Records:
+        """Which records are valid."""
+        dt = float(self.facts["time_step"])
+        return scan(self._file, self.attrs, self.record, dt, self._faults, self._complete)
+
+    @property
+    def damage(self) -> list[str]:
+        """A sentence that names the file's damage and what is used of it, none if it is valid."""
+        damage = [*self._partial, *self.records.told]
+        if not damage:
+            return []
+        return [f"{self.path.name} is damaged: {listed(damage)}; {_up_to(self.records.last)}."]
+
+    def __contains__(self, path: str) -> bool:
+        return path not in self._faults and is_there(self._file, path)
+
+    def __getitem__(self, path: str) -> Any:
+        try:
+            return self._file[path]
+        except HDF5_ERRORS as error:
+            raise InputError(f"{self.path} is damaged: {path} cannot be read") from error
+
+    @property
+    def has_energies(self) -> bool:
+        """Whether the energies were recorded and are valid."""
+        return "energy" in self and not any(path.startswith("energy/") for path in self._faults)
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
+
+    # ---- kept twice ----------------------------------------------------------------------------
+
+    def extremes(self, n_rows: int) -> dict[str, np.ndarray] | None:
+        """Extremes of the line's channels over the first ``n_rows`` steps by channel,
+        (2, columns); None if they are not kept, or damaged."""
+        try:
+            return extremes_at(self._file, n_rows)
+        except HDF5_ERRORS:
+            return None
+
+    def state(self) -> tuple[dict[str, Any], list[str]]:
+        """The latest valid state to continue from, and messages about later ones.
+
+        Raises
+        ------
+        InputError
+            If there is none.
+        """
+        told: list[str] = []
+        for slot in self._slots():
+            try:
+                state = _state_in(self._file, slot, self.records.rows[0])
+            except ValueError as error:
+                told.append(f"the state in checkpoint/{slot} is damaged, {error}")
+                continue
+            if told:
+                told = [f"{self.path}: {listed(told)}; the one of step {state['step']} is taken"]
+            return state, told
+        if not told:
+            raise InputError(f"{self.path} holds no state to continue from")
+        raise InputError(
+            f"{self.path} holds no valid state to continue from: {listed(told)}; "
+            f"{_up_to(self.records.last)} and can be reported; to go on, start the run anew"
+        )
+
+    def read_states(self) -> None:
+        """Read all states and extremes once, valid or not."""
+        for slot in self._slots():
+            with contextlib.suppress(ValueError):
+                _state_in(self._file, slot, self.records.rows[0])
+        self.extremes(self.records.rows[0])
+
+    def _slots(self) -> list[str]:
+        """Names of the states, the latest first; empty if there are none."""
+        try:
+            latest = text_of(self._file["checkpoint"].attrs["latest"])
+        except HDF5_ERRORS:
+            latest = ""
+        return sorted(names_in(self._file, "checkpoint"), key=lambda name: (name != latest, name))
+
+
+def _state_in(file: h5py.File, slot: str, n_rows: int) -> dict[str, Any]:
+    """The state in a slot, which ``n_rows`` valid steps precede; ValueError with a clause that
+    says what is wrong with it."""
+    try:
+        group = file[f"checkpoint/{slot}"]
+        state = {name: text_of(dataset[()]) for name, dataset in group.items()}
+        intact = sum_is_kept(group, state) is not False
+    except HDF5_ERRORS as error:
+        raise ValueError("it cannot be read") from error
+    if not intact:
+        raise ValueError("it differs from its checksum")
+    for name, values in state.items():
+        if isinstance(values, (float, np.ndarray)) and not np.isfinite(values).all():
+            raise ValueError(f"{name} holds NaN or infinity")
+    step = state.get("step")
+    if not isinstance(step, int) or isinstance(step, bool) or step < 0:
+        raise ValueError("it has no step")
+    if step > n_rows:
+        raise ValueError(f"it is of step {step}, and the records before it end after {n_rows}")
+    return state
+
+
+def _up_to(last: float) -> str:
+    if last != last:
+        return "none of its records can be read"
+    return f"its records up to t = {last:.3f} s are valid"
