@@ -40,7 +40,7 @@ SANITIZED = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
 # Python's own flags let integers wrap around, which would pass for wanted.
 SANITIZED_FLAGS = [
     *("-O1", "-g", "-fno-omit-frame-pointer", "-fstrict-overflow", "-U_FORTIFY_SOURCE"),
-    "-D_GLIBCXX_ASSERTIONS",
+    *("-D_GLIBCXX_ASSERTIONS", "-DCATENARY_CHECKS"),
     *SANITIZED,
 ]
 

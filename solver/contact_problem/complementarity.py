@@ -16,7 +16,7 @@ master is not zero: `model.switching_links`.
 With the law linear, or replaced by its tangent, this is a linear complementarity problem. Its
 matrix is a P-matrix, so that it has one solution, unless the convective part of a contact damper
 outweighs the compliances, or there are riders (docs/theory.md). An active-set iteration (semismooth
-Newton) finds it, mostly in one or two rounds; a set that cycles is handed to `pivoting`, and a step
+Newton) finds it, mostly in one or two rounds; a set that cycles is handed to pivoting, and a step
 without solution ends the run with a sentence. A law that is not linear is linearised again at what
 was found: Newton's method, which for a convex spring comes from one side and cannot overshoot.
 """
@@ -32,13 +32,16 @@ from catenary.solver.contact.line_response import Affine, Coupled, LineResponse,
 from catenary.solver.contact.train.head_states import Heads
 from catenary.solver.contact_problem.dense_systems import Room, Signs, System, room_for
 from catenary.solver.contact_problem.law_tangents import LawInSteps, Tangents
-from catenary.solver.contact_problem.pivoting import pivot
 from catenary.solver.kernels import native
 
 # Mostly one or two rounds are needed; a set that cycles shows within a few.
 _MAX_ROUNDS = 30
 # What there is to say of a step that holds something that is no number.
 NOT_FINITE = "it has no finite solution; try a smaller numerics.dt_s"
+_NO_SOLUTION = (
+    "contacts and slack droppers of this step have no common solution; take a smaller "
+    "numerics.dt_s or less contact damping"
+)
 # Links that the arrays have room for at first.
 _FIRST_ROOM = 32
 
@@ -173,7 +176,7 @@ class InnerProblem:
         self.pivoted = False
         self._room = -1
         self._bound_to: tuple[Affine | None, LineResponse | None]
-        self._make_room(_FIRST_ROOM)
+        self.make_room(_FIRST_ROOM)
 
     def solve(self, line: LineResponse, heads: Heads) -> InnerSolution:
         """Forces of the step.
@@ -189,22 +192,29 @@ class InnerProblem:
         return self._with_law(line, heads)
 
     def slack_under(self, line: LineResponse, force: np.ndarray) -> np.ndarray:
-        """Compensations (m,) [N] under given contact forces (n,) [N]."""
+        """Compensations (m,) [N] under given contact forces (n,) [N].
+
+        Raises
+        ------
+        NotConverged
+            If there are none.
+        """
         n, m = self.law.n, line.count
         coupled = self.coupled
         if not m or not native.any_switched(line.rows, m, coupled, force):
             return np.zeros(m)
         if m > self._room:
-            self._make_room(m)
+            self.make_room(m)
         _, behind, matrix, right, _, room = self.unknowns
         none, links = np.zeros(n), slice(n, n + m)
         native.couple(line.rows, m, coupled, none, none, self.unknowns)
         own = right[links] - matrix[links, :n] @ force
         system = System(matrix[links, links].copy(), own, np.zeros(m))
         signs = Signs(np.zeros(m, dtype=bool), behind[links])
-        if native.settle(system, signs, _MAX_ROUNDS, room) <= 0:
-            self.pivoted = True
-            pivot(system.matrix, own, *signs, system.solution)
+        rounds, pivoted = native.find_solution(system, signs, _MAX_ROUNDS, room)
+        self.pivoted |= pivoted
+        if rounds <= 0:
+            raise NotConverged(_NO_SOLUTION)
         return system.solution
 
     def covers(self, line: LineResponse, force: np.ndarray, slack: np.ndarray) -> bool:
@@ -235,37 +245,21 @@ class InnerProblem:
         """Forces and compensations for the law's tangents."""
         gap, n, m = self.gap, self.law.n, line.count
         if m > self._room:
-            self._make_room(m)
+            self.make_room(m)
         gap.line = line
         if self._bound_to[0] is not heads.affine or self._bound_to[1] is not line:
             # Mostly they are those of the step before.
             self._bound_to = heads.affine, line
             self._solve = native.solve.bound(self.problem(heads.affine, line))
-        rounds, size, finite, complete = self._solve()
-        solution = self.unknowns.solution
-        force = solution[:n]
+        rounds, size, finite, complete, pivoted = self._solve()
+        self.pivoted |= pivoted
         if rounds <= 0:
-            self.pivoted = True
-            rounds = self._pivot(size) - rounds
-            links = line.rows, m, self.coupled
-            if size == n and m and native.any_switched(*links, force):
-                # Contacts alone needed pivoting, too.
-                tangents, size = self.law.tangents, n + m
-                worth = tangents.by_depth, tangents.by_rate
-                native.couple(*links, *worth, self.unknowns)
-                rounds += self._pivot(size)
-            gap.under(force, solution[n:size])
-            complete = self.covers(line, force, solution[n:size])
-        elif not finite:
+            raise NotConverged(_NO_SOLUTION)
+        if not finite:
             raise RunBroken(NOT_FINITE)
-        slack = solution[n:size]
-        return InnerSolution(force, slack, *gap.found, rounds, self.pivoted, complete)
-
-    def _pivot(self, size: int) -> int:
-        """Rounds that pivoting needs for the first ``size`` unknowns, whose solution it finds."""
-        always, behind, matrix, right, solution, _ = self.unknowns
-        whole = matrix[:size, :size].copy(), right[:size].copy()
-        return pivot(*whole, always[:size], behind[:size], solution[:size])
+        solution = self.unknowns.solution
+        found = solution[:n], solution[n:size], *gap.found
+        return InnerSolution(*found, rounds, self.pivoted, complete)
 
     def problem(self, heads: Affine, line: LineResponse) -> SmallProblem:
         """What kernels solve; ``unknowns`` are others when more links need room."""
@@ -281,7 +275,8 @@ class InnerProblem:
             max_rounds=_MAX_ROUNDS,
         )
 
-    def _make_room(self, n_links: int) -> None:
+    def make_room(self, n_links: int) -> None:
+        """Make room for at least so many links with a row; ``unknowns`` are then others."""
         n = self.law.n
         self._room = max(n_links, 2 * self._room)
         size = n + self._room

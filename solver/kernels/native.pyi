@@ -152,8 +152,9 @@ write_outputs: Kernel
 subtract: Kernel
 any_switched: Kernel
 couple: Kernel
-solve_on: Kernel
-settle: Kernel
+find_solution: Kernel
+pivot: Kernel
+find_zero: Kernel
 under: Kernel
 leaves_out: Kernel
 solve: Kernel

@@ -132,6 +132,13 @@ class OneSolve:
         """This rank's share of the inner problem, another one when it needs more room."""
         return self._exchange.share
 
+    def make_room(self, n_links: int) -> None:
+        """Make room for rows of so many links a rank. Collective."""
+        early = self.share.early_height, self.share.early_rate
+        self._exchange.enlarge(n_links)
+        self.share.early_height[:], self.share.early_rate[:] = early
+        self._respond = self.interaction.responder(self.share)
+
     @property
     def traffic(self) -> tuple[int, int]:
         """Messages and bytes that this rank sent to agree on forces."""
@@ -163,10 +170,7 @@ class OneSolve:
             if reply.verdict == Verdict.BROKEN:
                 raise self._broken()
             if reply.verdict == Verdict.ENLARGE:
-                early = share.early_height.copy(), share.early_rate.copy()
-                exchange.enlarge(2 * reply.room)
-                self._respond = interaction.responder(exchange.share)
-                exchange.share.early_height[:], exchange.share.early_rate[:] = early
+                self.make_room(2 * reply.room)
             elif reply.verdict == Verdict.REPEAT:
                 for bound in self._bounds:
                     bound *= 2.0

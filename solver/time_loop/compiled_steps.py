@@ -1,7 +1,7 @@
 """Many steps of the scheme ``one_solve`` in one call, on one rank, as far as kernels can take them.
 
-A step whose forces these do not find, because an active set cycles, a link finds no room, or
-something is no number, is finished by the scheme itself, from where the loop has left it.
+A step whose forces these do not find, because there are none, a link finds no room, or something
+is no number, is finished by the scheme itself, from where the loop has left it.
 """
 
 from __future__ import annotations
@@ -275,12 +275,13 @@ class CompiledSteps:
         try:
             taken = self.steps().take(self._done, end)
         finally:
-            steps, rounds, slack, repeated = self._counts[0].tolist()
+            steps, rounds, slack, repeated, pivoted = self._counts[0].tolist()
             counters.steps += steps
             counters.solves += steps
             counters.rounds += rounds
             counters.slack_dropper_steps += slack
             counters.repeated_steps += repeated
+            counters.pivoted_steps += pivoted
             self._done += steps
             self._event.end()
         return taken.begun, taken.is_full

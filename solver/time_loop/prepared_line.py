@@ -15,8 +15,13 @@ from catenary.mbs.head.head_arrays import N_DRIVE, drive_width
 from catenary.mbs.head.newmark_head import SteppedHead
 from catenary.mbs.interface import Pantograph
 from catenary.mbs.lowering import LoweredPantograph
+from catenary.solver.contact_problem.coupling import Implicit
 from catenary.solver.kernels import native
+from catenary.solver.schemes.one_solve import OneSolve
 from catenary.solver.time_loop.compiled_steps import CompiledSteps
+
+# Links of a long line that may switch in one step: mostly it is some ten. These take 7 MB.
+_MOST_LINKS = 512
 
 
 class Ahead(NamedTuple):
@@ -42,17 +47,12 @@ def write_line(path: Path, blocks: CompiledSteps, dt: float, steps: tuple[int, i
     Raises
     ------
     InputError
-        If loads are made while they are stepped, links have bends, or only a part of the line is
-        there.
+        If loads are made while they are stepped, or only a part of the line is there.
     RunBroken
         If the file cannot be written.
     """
     scheme = blocks.scheme
     line, pantographs = scheme.interaction.line, scheme.pantographs
-    if (scheme.interaction.links.table.bent >= 0).any():
-        raise InputError(
-            "droppers with a curve may pass several of its points in a step, which Python finds out"
-        )
     if line.loads is not None and line.loads.are_sampled:
         raise InputError(
             "gusts are made under way, and a prepared line has none; take them away (wind.gusts=)"
@@ -62,6 +62,7 @@ def write_line(path: Path, blocks: CompiledSteps, dt: float, steps: tuple[int, i
             "a window of this line has matrices of what moves only: a prepared line has all of "
             'them; take window.mode = "off"'
         )
+    make_room(scheme)
     first, last = steps
     models = [stepped_by_kernels(model) for model in pantographs.models]
     drives = np.zeros((last - first, len(models), drive_width(pantographs.most_contacts)))
@@ -80,6 +81,14 @@ def write_line(path: Path, blocks: CompiledSteps, dt: float, steps: tuple[int, i
         blocks.steps().write(str(path), ahead)
     except RuntimeError as error:
         raise RunBroken(f"{path}: {error}") from error
+
+
+def make_room(scheme: OneSolve) -> None:
+    """Make room for all links that may have a row in a step to come: steps can make no more."""
+    assert isinstance(scheme.coupling, Implicit)
+    n_links = min(scheme.coupling.inner.coupled.released.size, _MOST_LINKS)
+    scheme.make_room(n_links)
+    scheme.coupling.inner.make_room(n_links)
 
 
 def stepped_by_kernels(model: Pantograph) -> SteppedHead:

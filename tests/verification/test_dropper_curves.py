@@ -22,7 +22,6 @@ from catenary.meshgen.hardware import DropperKind
 from catenary.meshgen.mesh import CONTACT_WIRE, LineMesh
 from catenary.meshgen.topologies.line_data import LineData
 from catenary.solver.contact_problem.dense_systems import Signs, System, room_for
-from catenary.solver.contact_problem.pivoting import pivot
 from catenary.solver.kernels import native
 from catenary.solver.model.elements.beam import shape_values
 from catenary.solver.model.matrices import whole_matrix
@@ -423,11 +422,11 @@ def test_links_with_any_rising_tables_of_slopes_find_their_pieces() -> None:
         reserve = side * np.abs(change) * place - change * (own @ np.linalg.solve(whole, load))
         coupling = -change[:, None] * (own @ np.linalg.solve(whole, own.T))
         matrix, found = np.eye(place.size) - coupling, np.zeros(place.size)
-        none = np.zeros(place.size, dtype=bool), np.zeros(place.size, dtype=np.int64)
-        system = System(matrix.copy(), -reserve, found)
-        if native.settle(system, Signs(*none), 30, room_for(place.size)) <= 0:
-            cycled += 1
-            pivot(matrix, -reserve, *none, found)
+        signs = Signs(np.zeros(place.size, dtype=bool), np.zeros(place.size, dtype=np.int64))
+        system = System(matrix, -reserve, found)
+        rounds, pivoted = native.find_solution(system, signs, 30, room_for(place.size))
+        assert rounds > 0
+        cycled += pivoted
         moved = np.linalg.solve(whole, load - own.T @ found)
         pulled = along.T @ [
             looked_up(*table, e) for table, e in zip(tables, along @ moved, strict=True)

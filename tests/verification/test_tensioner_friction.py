@@ -8,9 +8,10 @@ from measuring import check, march, registered
 from small_lines import BARE, mesh_of, numerics, problem_of, train
 
 from catenary.meshgen.mesh import CONTACT_WIRE
-from catenary.solver.contact_problem.pivoting import pivot
+from catenary.solver.contact_problem.dense_systems import Signs, System, room_for
 from catenary.solver.effects.effect import Effect
 from catenary.solver.effects.shipped.axial_effects import CREEP
+from catenary.solver.kernels import native
 from catenary.solver.model.builder import ModelBuilder
 from catenary.solver.model.loads import ShapeLoad
 from catenary.solver.problem.along_track import AlongTrack, Tensioner
@@ -103,7 +104,8 @@ def test_wheels_that_slip_either_way_are_found_by_pivoting() -> None:
         wheels, links = 1 + seed % 6, seed % 9
         matrix, right = random_wheels(seed, wheels, links)
         none, found = np.zeros(right.size, dtype=bool), np.zeros(right.size)
-        pivot(matrix, right, none, none.astype(int), found)
+        signs = Signs(none, none.astype(np.int64))
+        assert native.pivot(System(matrix, right, found), signs, room_for(right.size)) > 0
         left = matrix @ found - right
         rounding = 1e-9 * (1.0 + np.abs(right).max())
         assert min(found.min(), left.min()) > -rounding

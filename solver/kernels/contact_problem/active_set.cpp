@@ -91,10 +91,17 @@ int64_t settle(const System& system, const Signs& signs, int64_t max_rounds, con
     const auto& [matrix, right, solution] = system;
     const auto& [always, behind] = signs;
     const int64_t n = size(right);
-    const auto acts = room.acts.first(n);
+    const auto acts = room.acts.first(n), before = room.before.first(n);
     for (int64_t i = 0; i < n; ++i)
         acts[i] = behind[i] ? acts[i - behind[i]] : always[i] || right[i] > 0.0;
+    int64_t kept_at = 1;
     for (int64_t rounds = 1; rounds <= max_rounds; ++rounds) {
+        // Each set has one that follows it: sets come back for ever once one does. One is kept for
+        // twice as many rounds as the one before it (R. P. Brent, BIT 20 (1980) 176-184).
+        if (rounds == kept_at) {
+            std::ranges::copy(acts, before.begin());
+            kept_at *= 2;
+        }
         solve_on(system, acts, room);
         bool changed = false;
         for (int64_t i = 0; i < n; ++i) {
@@ -109,6 +116,7 @@ int64_t settle(const System& system, const Signs& signs, int64_t max_rounds, con
             acts[i] = now;
         }
         if (!changed) return rounds;
+        if (std::ranges::equal(acts, before)) return -rounds;
     }
     return -max_rounds;
 }

@@ -1,7 +1,6 @@
 #pragma once
 // Small dense systems, of which some rows and columns act.
-#include "base/arrays.hpp"
-#include "base/record.hpp"
+#include "contact_problem/room.hpp"
 
 namespace catenary {
 
@@ -20,15 +19,6 @@ struct Signs {
     CATENARY_RECORD(always, behind)
 };
 
-/// Room to solve for up to k unknowns: `factors` (k, k), the others (k,).
-struct Room {
-    Array2<double> factors;
-    std::span<int64_t> acting, order;
-    std::span<double> left, change;
-    std::span<bool> acts;
-    CATENARY_RECORD(factors, acting, order, left, change, acts)
-};
-
 /// Solve the rows and columns that act by elimination with pivoting; the others are zero.
 ///
 /// Rows may differ by orders of magnitude, as those of contacts with a law of impact and of
@@ -38,7 +28,7 @@ void solve_on(const System& system, std::span<const bool> acts, const Room& room
 
 /// Active-set iteration for x = max(0, x - (matrix x - right)), freely for `always`, and freely
 /// with another before it for those `behind` one. Returns the rounds needed, which are not positive
-/// if the set did not settle.
+/// if the set did not settle, or came back to one that it has had.
 int64_t settle(const System& system, const Signs& signs, int64_t max_rounds, const Room& room);
 
 }  // namespace catenary

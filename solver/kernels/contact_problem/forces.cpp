@@ -29,14 +29,17 @@ Solved solve_by_tangents(const SmallProblem& problem, const MarchedHertzLaw& law
     if (!subtract(problem.heads, problem.share.line, problem.share.present, gap)) return solved;
     linearise(law, gap.place, gap.rate);
     int64_t rounds = 0;
+    bool pivoted = false;
     for (int64_t number = 0; number < kMostTangents; ++number) {
         solved = solve(problem);
         if (solved.rounds <= 0 || !solved.finite) return solved;
         rounds += solved.rounds;
+        pivoted = pivoted || solved.pivoted;
         linearise(law, depth, rate);
         const auto compensation = part(problem.unknowns.solution, size(depth), solved.size);
         if (agrees(gap, problem.share.rows, force, compensation, law, number)) {
             solved.rounds = rounds;
+            solved.pivoted = pivoted;
             return solved;
         }
     }
@@ -84,6 +87,7 @@ int64_t find_forces(double time, const SmallProblem& problem, const StepLaw& law
     if (!report(time, solution.first(n), law.reported)) return kLeft;
     if (law.marched) remember(*law.marched, problem.found.depth, problem.found.rate);
     counts.rounds += solved.rounds;
+    counts.pivoted += solved.pivoted;
     for (int64_t k = 0; k < solved.size - n; ++k) {
         switched[k] = problem.share.rows.number(k);
         counts.slack += solution[n + k] != 0.0 && problem.coupled.slackens[switched[k]];

@@ -12,6 +12,7 @@ struct Counts {
     int64_t rounds;    ///< of the active-set iteration
     int64_t slack;     ///< links that slacken, step by step
     int64_t repeated;  ///< steps for which bounds were too small
+    int64_t pivoted;   ///< steps in which an active set cycled
 };
 
 /// In place of a number of compensations: forces are left to others; bounds were too small.

@@ -133,19 +133,21 @@ Solved solve(const SmallProblem& problem) {
     }
     press(gap, tangents, unknowns);
     const auto force = unknowns.solution.first(n);
-    auto settled = [&](int64_t of) {
-        return settle(unknowns.system(of), unknowns.signs(of), max_rounds, unknowns.room);
+    auto find_first = [&](int64_t of) {
+        return find_solution(unknowns.system(of), unknowns.signs(of), max_rounds, unknowns.room);
     };
-    int64_t rounds = settled(n), used = n;
-    if (rounds > 0 && any_switched(rows, count, coupled, force)) {
+    Found forces = find_first(n);
+    int64_t used = n;
+    if (forces.rounds > 0 && any_switched(rows, count, coupled, force)) {
         couple(rows, count, coupled, tangents.by_depth, tangents.by_rate, unknowns);
         used = n + count;
-        rounds = settled(used);
+        const Found all = find_first(used);
+        forces = {all.rounds, all.pivoted || forces.pivoted};
     }
     const auto compensation = part(unknowns.solution, n, used);
     finite = under(gap, rows, force, compensation, found) && finite;
     const bool complete = !leaves_out(force, compensation, rows, share.bounds, coupled);
-    return {rounds, used, finite, complete};
+    return {forces.rounds, used, finite, complete, forces.pivoted};
 }
 
 }  // namespace catenary

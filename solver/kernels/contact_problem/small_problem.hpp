@@ -2,7 +2,7 @@
 // The small dense problem of a step: contact forces and switching links. The equations are those of
 // solver/contact_problem/complementarity.py.
 #include "contact/response.hpp"
-#include "contact_problem/active_set.hpp"
+#include "contact_problem/pivoting.hpp"
 #include "contact_problem/laws.hpp"
 
 namespace catenary {
@@ -23,7 +23,8 @@ struct Coupled {
 
 /// Room for a problem with up to k unknowns: contact forces, then compensations.
 struct Unknowns {
-    std::span<bool> always;  ///< see `Signs`
+    static constexpr bool kScratch = true;  ///< no step reads what the one before has left
+    std::span<bool> always;                 ///< see `Signs`
     std::span<int64_t> behind;
     Array2<double> matrix;  ///< (k, k)
     std::span<double> right, solution;
@@ -55,12 +56,12 @@ struct SmallProblem {
 };
 
 struct Solved {
-    int64_t rounds;  ///< not positive if the set did not settle; the problem then stands in matrix
-                     ///< and right-hand side
+    int64_t rounds;  ///< not positive if there is no solution
     int64_t size;    ///< unknowns used: n if no contact force takes a link beyond its reserve, else
                      ///< n + the number of rows
     bool finite;     ///< whether depths and rates are
     bool complete;   ///< whether all links that have switched had a row, see `leaves_out`
+    bool pivoted;    ///< whether an active set cycled
 };
 
 /// Find contact forces and compensations for a law's tangents.

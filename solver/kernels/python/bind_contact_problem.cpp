@@ -1,14 +1,42 @@
 // What Python calls of the small problem of a step.
 #include "contact_problem/forces.hpp"
+#include "contact_problem/simplicial_path.hpp"
 #include "python/from_python.hpp"
 
 namespace catenary::python {
 
 namespace {
 
-std::tuple<int64_t, int64_t, bool, bool> solve_problem(const SmallProblem& problem) {
+std::tuple<int64_t, int64_t, bool, bool, bool> solve_problem(const SmallProblem& problem) {
     const Solved solved = solve(problem);
-    return {solved.rounds, solved.size, solved.finite, solved.complete};
+    return {solved.rounds, solved.size, solved.finite, solved.complete, solved.pivoted};
+}
+
+std::tuple<int64_t, bool> find_signed(const System& system, const Signs& signs, int64_t max_rounds,
+                                      const Room& room) {
+    const Found found = find_solution(system, signs, max_rounds, room);
+    return {found.rounds, found.pivoted};
+}
+
+/// A map that Python evaluates.
+class CalledMap : public Map {
+  public:
+    explicit CalledMap(const py::function& of) : of_(of) {}
+    void at(std::span<const double> z, std::span<double> value) override {
+        const py::array_t<double> at(static_cast<py::ssize_t>(z.size()), z.data());
+        const auto found = of_(at).cast<py::array_t<double>>();
+        if (found.size() != at.size()) throw py::value_error("the map has the wrong size");
+        std::ranges::copy(std::span(found.data(), z.size()), value.begin());
+    }
+
+  private:
+    const py::function& of_;
+};
+
+bool find_zero_of(const py::function& of, std::span<double> z, double width, double small,
+                  const Room& room) {
+    CalledMap map(of);
+    return find_zero(map, z, width, small, room.pivoting.path, room);
 }
 
 }  // namespace
@@ -18,12 +46,13 @@ void offer_contact_problem(py::module_& module) {
     offer(module, "subtract", subtract, "Fill in the gap without forces.");
     offer(module, "any_switched", any_switched, "Whether contact forces alone switch a link.");
     offer(module, "couple", couple, "Put rows and columns of links beside those of contacts.");
-    offer(module, "solve_on", solve_on, "Solve the rows and columns that act.");
-    offer(module, "settle", settle, "Active-set iteration; rounds needed, else none above zero.");
     offer(module, "under", under, "Fill in depths and rates under forces and compensations.");
     offer(module, "leaves_out", leaves_out, "Whether a link without a row may have switched.");
     offer(module, "solve", solve_problem,
-          "Contact forces and compensations: rounds, unknowns used, finite, complete.");
+          "Contact forces and compensations: rounds, unknowns used, finite, complete, pivoted.");
+    offer(module, "find_solution", find_signed, "Active set, then pivoting: rounds, pivoted.");
+    offer(module, "pivot", pivot, "Least-index pivoting; rounds needed, else none above zero.");
+    offer(module, "find_zero", find_zero_of, "Find a zero of a map; whether there is one.");
     module.attr("MOST_TANGENTS") = kMostTangents;
     offer(module, "linearise", linearise, "Linearise Hertz's law with hysteresis.");
     offer(module, "remember", remember, "Remember how fast those come who do not touch.");

@@ -78,7 +78,7 @@ auto output(std::span<double> TrainOutputs::* which) {
 }  // namespace
 
 void offer_steps(py::module_& module) {
-    PYBIND11_NUMPY_DTYPE(Counts, steps, rounds, slack, repeated);
+    PYBIND11_NUMPY_DTYPE(Counts, steps, rounds, slack, repeated, pivoted);
     module.attr("COUNTS") = py::dtype::of<Counts>();
     py::class_<Taken>(module, "Taken")
         .def_readonly("begun", &Taken::begun)

@@ -29,7 +29,7 @@ concept RecordType = requires(T record) {
 
 /// Lets a visitor have all that a value holds: `bytes(T&)` for plain values, `array(T*&, n)` for
 /// arrays of n numbers, and `count(size_t&)` for lengths, upon which a reader resizes. Pointers to
-/// objects are left out.
+/// objects are left out. One with `scratch(bool)` is told where records are `kScratch`.
 template <class Visitor, class T>
 void visit(Visitor& visitor, T& value);
 
@@ -84,7 +84,10 @@ void visit_value(Visitor& visitor, T& value) {
 }
 template <class Visitor, RecordType T>
 void visit_value(Visitor& visitor, T& value) {
+    constexpr bool is_scratch = requires { T::kScratch; };
+    if constexpr (is_scratch && requires { visitor.scratch(true); }) visitor.scratch(true);
     std::apply([&](auto&... member) { (visit(visitor, member), ...); }, value.members());
+    if constexpr (is_scratch && requires { visitor.scratch(true); }) visitor.scratch(false);
 }
 
 template <class Visitor, class T>
@@ -95,7 +98,7 @@ void visit(Visitor& visitor, T& value) {
 /// A part of memory that arrays share.
 struct MemoryBlock {
     uintptr_t begin, end;
-    bool changes;  ///< whether any array in it is written
+    bool changes;  ///< whether any array in it is written, and read in a later step
 };
 
 /// Finds the blocks of all arrays.
@@ -104,17 +107,19 @@ class BlockFinder {
     template <class T>
     void bytes(T&) {}
     void count(size_t&) {}
+    void scratch(bool is) { is_scratch_ = is; }
     template <class T>
     void array(T*& data, size_t n) {
         if (n == 0) return;
         const auto begin = reinterpret_cast<uintptr_t>(data);
-        found_.push_back({begin, begin + n * sizeof(T), !std::is_const_v<T>});
+        found_.push_back({begin, begin + n * sizeof(T), !std::is_const_v<T> && !is_scratch_});
     }
     /// All of them, in the order of memory.
     std::vector<MemoryBlock> blocks();
 
   private:
     std::vector<MemoryBlock> found_;
+    bool is_scratch_ = false;
 };
 
 /// Writes what a record holds as bytes, with arrays as parts of blocks.

@@ -25,12 +25,13 @@ from catenary.cases.studies.hard import runs
 from catenary.solver.kernels.native import Simulation
 
 # Lumped masses on droppers that slacken; three planes; a mechanism; two pantographs and several
-# contact wires; strips that bend and roll, laws, a controller, a vehicle; all that a run may be.
-FEW = ("ac_simple", "ac_simple_3d", "ambrosio2012", "overlap", "rich_train", "n_window")
+# contact wires; strips that bend and roll, laws, a controller, a vehicle; all that a run may be;
+# droppers with a curve.
+FEW = ("ac_simple", "ac_simple_3d", "ambrosio2012", "overlap", "rich_train", "n_window",
+       "dropper_curve")  # fmt: skip
 REFUSED = {
     "w_wind": "gusts are made under way, .*wind.gusts=",
     "d_incidents": "incidents change the line",
-    "dropper_curve": "droppers with a curve may pass several of its points in a step",
     "n_fixed": "numerics.scheme is not one_solve",
     "n_newmark": "numerics.adaptive_tolerance_N lets steps be halved",
     "f_planes": "the model joins stations further apart",
@@ -103,7 +104,7 @@ def test_what_needs_more_than_the_loop_is_refused(name: str, tmp_path: Path) -> 
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize("name", ["ac_simple", "overlap", "rich_train"])
+@pytest.mark.parametrize("name", ["ac_simple", "dropper_curve", "overlap", "rich_train"])
 def test_c_program_takes_these_steps_and_allocates_nothing(name: str, tmp_path: Path) -> None:
     program = compiled(Path(__file__).with_name("counted_steps.c"), tmp_path / "steps")
     scene = acting_scene(name)

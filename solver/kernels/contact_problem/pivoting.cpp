@@ -1,0 +1,285 @@
+#include "contact_problem/pivoting.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "contact_problem/simplicial_path.hpp"
+
+namespace catenary {
+
+namespace {
+
+/// Shares go from 0 to 1; paths on a grid of some of that take the fewest steps.
+constexpr double kFirstGrid = 0.25;
+/// What may be missing in a row, of the largest right-hand side; and, as that makes the problem
+/// jump from shares to shares, what shares and tensions may disagree by.
+constexpr double kRounding = 1e-12, kAgreement = 10.0 * kRounding;
+/// Rows of bends along one direction differ by this at most, of their largest number.
+constexpr double kAlike = 1e-9;
+/// Problems that one step may solve on its way to shares.
+constexpr int64_t kMostLooks = 100'000;
+
+double largest(std::span<const double> numbers) {
+    double found = 0.0;
+    for (double number : numbers) found = std::max(found, std::abs(number));
+    return found;
+}
+
+/// A row of a matrix less the unit matrix.
+struct Beside {
+    const Array2<double>& matrix;
+    int64_t row;
+    double operator[](int64_t column) const {
+        return matrix(row, column) - (row == column ? 1.0 : 0.0);
+    }
+};
+
+/// Find how rows of bends along one direction go with each other: i `needs` j if it acts only while
+/// j does, and `excludes` it if it does not while j does.
+///
+/// But for a unit matrix they are multiples of one row u, c u, and act where u x is below right / c
+/// of a positive c, and above it of a negative one.
+void find_bends(const System& system, const Room& room) {
+    const auto& [matrix, right, solution] = system;
+    const int64_t n = size(right);
+    const auto& needs = room.pivoting.needs;
+    const auto& excludes = room.pivoting.excludes;
+    const auto scale = room.left.first(n);
+    const auto peak = room.acting.first(n);
+    for (int64_t i = 0; i < n; ++i) {
+        const Beside own{matrix, i};
+        peak[i] = 0;
+        for (int64_t k = 1; k < n; ++k)
+            if (std::abs(own[k]) > std::abs(own[peak[i]])) peak[i] = k;
+        scale[i] = std::abs(own[peak[i]]);
+    }
+    auto along = [&](int64_t i, int64_t j) {
+        const Beside one{matrix, i}, other{matrix, j};
+        if (i == j || scale[i] == 0.0 || scale[j] == 0.0) return 0.0;
+        const double sign = std::copysign(1.0, one[peak[i]] * other[peak[i]]);
+        auto differ = [&](int64_t k) {
+            return !(std::abs(one[k] / scale[i] - sign * other[k] / scale[j]) <= kAlike);
+        };
+        if (differ(peak[i])) return 0.0;
+        for (int64_t k = 0; k < n; ++k)
+            if (differ(k)) return 0.0;
+        return sign;
+    };
+    for (int64_t i = 0; i < n; ++i)
+        for (int64_t j = 0; j < n; ++j) {
+            const double sign = along(i, j);
+            // Where along u of row i both begin to act, i below its place.
+            const double place = right[i] / scale[i], other = sign * right[j] / scale[j];
+            needs(i, j) = sign > 0.0 && other > place;
+            excludes(i, j) = sign < 0.0 && other >= place;
+        }
+}
+
+/// How pivoting ended: whether a set was right, the rounds to get there, and how many rows were
+/// turned before it went round in a circle of sets.
+struct Pivoted {
+    bool found;
+    int64_t rounds, n_turned, since;
+};
+
+/// Since when turned rows have come back to the set that there is, each an even number of times;
+/// `n_turned` if they have not.
+int64_t circle_since(std::span<const int64_t> turned, std::span<bool> odd) {
+    const int64_t n_turned = size(turned);
+    std::ranges::fill(odd, false);
+    int64_t n_odd = 0;
+    for (int64_t s = n_turned; s-- > 0;) {
+        bool& own = odd[turned[s]];
+        own = !own;
+        n_odd += own ? 1 : -1;
+        if (n_odd == 0) return s;
+    }
+    return n_turned;
+}
+
+/// Go from set to set, from `room.acts` on, until one is right.
+Pivoted pivot_from(const System& system, const Signs& signs, const Room& room) {
+    const auto& [matrix, right, solution] = system;
+    const auto& [always, behind] = signs;
+    const auto& needs = room.pivoting.needs;
+    const auto& excludes = room.pivoting.excludes;
+    const auto& turned = room.pivoting.turned;
+    const int64_t n = size(right), most = 20 * n + 100;
+    const auto acts = room.acts.first(n);
+    const double little = kRounding * (1.0 + largest(right));
+    // Of bends along one direction the next one turns, whichever are wrong.
+    auto held = [&](int64_t i) {
+        for (int64_t j = 0; j < n; ++j)
+            if (needs(j, i) && acts[j]) return true;
+        return always[i];
+    };
+    auto barred = [&](int64_t i) {
+        for (int64_t j = 0; j < n; ++j)
+            if (acts[j] ? excludes(i, j) : needs(i, j)) return true;
+        return false;
+    };
+    auto is_wrong = [&](int64_t i) {
+        if (behind[i] != 0) return false;
+        if (acts[i]) return solution[i] < -little && !held(i);
+        double residual = -right[i];
+        for (int64_t j = 0; j < n; ++j) residual += matrix(i, j) * solution[j];
+        return residual < -little && !barred(i);
+    };
+    int64_t n_turned = 0;
+    for (int64_t rounds = 1; rounds < most; ++rounds) {
+        // Each set has one that follows it, so sets that come again do so for ever.
+        const int64_t since = circle_since(turned.first(n_turned), room.pivoting.marks[0].first(n));
+        if (since < n_turned) return {false, rounds, n_turned, since};
+        solve_on(system, acts, room);
+        int64_t first = 0;
+        while (first < n && !is_wrong(first)) ++first;
+        if (first == n) return {true, rounds, n_turned, n_turned};
+        turned[n_turned++] = first;
+        acts[first] = !acts[first];
+        for (int64_t i = 0; i < n; ++i) acts[i] = acts[i - behind[i]];
+    }
+    return {false, most, n_turned, 0};
+}
+
+/// Finds what share of each master's riders is released: all below no tension, none above it.
+///
+/// With shares given, what is left is a problem with a P-matrix whose solution goes continuously
+/// with them; so there are shares that agree with it. They are sought for the masters that went
+/// round in a circle; others keep all or nothing, as the set has it, unless their tension then
+/// disagrees.
+class Shares : public Map {
+  public:
+    Shares(const System& system, const Signs& signs, const Room& room, const Pivoted& circle)
+        : system_(system),
+          signs_(signs),
+          room_(room),
+          n_(size(system.right)),
+          size_(1.0 + largest(system.right)) {
+        std::ranges::fill(is_sought_, false);
+        for (int64_t t = circle.since; t < circle.n_turned; ++t)
+            is_sought_[room_.pivoting.turned[t]] = true;
+        int64_t n_sought = 0;
+        for (int64_t i = 0; i < n_; ++i) {
+            if (signs_.behind[i] == 1) masters_[n_masters_++] = i - 1;
+            shares_[i] = room_.acts[i] ? 1.0 : 0.0;
+            // Near what was right for the shares before.
+            room_.acts[i] = signs_.always[i] || system_.solution[i] > 0.0;
+            none_[i] = 0;
+        }
+        for (int64_t master : masters()) n_sought += is_sought_[master];
+        if (n_sought == 0)
+            for (int64_t master : masters()) is_sought_[master] = true;
+    }
+
+    /// Find them; whether there are such. The solution is that for them.
+    bool find() {
+        while (true) {
+            int64_t n = 0;
+            for (int64_t master : masters())
+                if (is_sought_[master]) place_[n++] = shares_[master];
+            const auto place = place_.first(n);
+            put_excess();
+            n = 0;
+            for (int64_t master : masters())
+                if (is_sought_[master]) place_[n++] -= excess_[master];
+            const bool found =
+                find_zero(*this, place, kFirstGrid, kAgreement, room_.pivoting.path, room_);
+            take(place);
+            put_excess();
+            bool more = false;
+            for (int64_t master : masters()) {
+                const double left = shares_[master] > 0.0 ? excess_[master] : -excess_[master];
+                if (is_sought_[master] || (found && left <= kAgreement)) continue;
+                is_sought_[master] = more = true;
+            }
+            if (!more) return found;
+            for (int64_t master : masters())
+                if (std::isnan(shares_[master])) shares_[master] = 0.0;
+        }
+    }
+    int64_t rounds() const { return rounds_; }
+
+    /// Zero where shares, a place cut to 0 to 1, agree with tensions, as far as it lies outside:
+    /// the normal map of a variational inequality.
+    void at(std::span<const double> place, std::span<double> value) override {
+        take(place);
+        put_excess();
+        int64_t n = 0;
+        for (int64_t master : masters())
+            if (is_sought_[master]) {
+                value[n] = excess_[master] + place[n] - shares_[master];
+                ++n;
+            }
+    }
+
+  private:
+    std::span<const int64_t> masters() const { return masters_.first(n_masters_); }
+    void take(std::span<const double> place) {
+        int64_t n = 0;
+        for (int64_t master : masters())
+            if (is_sought_[master]) shares_[master] = std::clamp(place[n++], 0.0, 1.0);
+    }
+    /// Fill in the tension of masters where it is above zero, less their compensation where it is
+    /// not; no number where there is none.
+    void put_excess() {
+        const auto& [matrix, right, solution] = system_;
+        const Array2<double>& partly = room_.pivoting.partly;
+        for (int64_t i = 0; i < n_; ++i) {
+            const int64_t behind = signs_.behind[i];
+            const double part = behind > 0 ? shares_[i - behind] : 1.0;
+            for (int64_t j = 0; j < n_; ++j) partly(i, j) = matrix(i, j) * part;
+            partly(i, i) += 1.0 - part;
+            right_[i] = right[i] * part;
+            free_[i] = signs_.always[i] || (behind > 0 && part > 0.0);
+            if (behind > 0 || free_[i]) room_.acts[i] = free_[i];
+        }
+        const Pivoted pivoted = pivot_from({partly, right_, solution}, {free_, none_}, room_);
+        rounds_ += pivoted.rounds;
+        const bool is_known = pivoted.found && ++looks_ < kMostLooks;
+        for (int64_t master : masters()) {
+            double left = -right[master] - solution[master];
+            for (int64_t j = 0; j < n_; ++j) left += matrix(master, j) * solution[j];
+            excess_[master] = is_known ? left / size_ : std::numeric_limits<double>::quiet_NaN();
+        }
+    }
+
+    const System& system_;
+    const Signs& signs_;
+    const Room& room_;
+    int64_t n_, n_masters_ = 0, rounds_ = 0, looks_ = 0;
+    double size_;  ///< of right-hand sides
+    std::span<double> shares_ = room_.pivoting.numbers[0].first(n_),
+                      right_ = room_.pivoting.numbers[1].first(n_),
+                      excess_ = room_.pivoting.numbers[2].first(n_),
+                      place_ = room_.pivoting.numbers[3].first(n_);
+    std::span<int64_t> masters_ = room_.pivoting.counts[0].first(n_),
+                       none_ = room_.pivoting.counts[1].first(n_);
+    std::span<bool> is_sought_ = room_.pivoting.marks[1].first(n_),
+                    free_ = room_.pivoting.marks[2].first(n_);
+};
+
+}  // namespace
+
+int64_t pivot(const System& system, const Signs& signs, const Room& room) {
+    std::ranges::copy(signs.always, room.acts.begin());
+    find_bends(system, room);
+    const Pivoted pivoted = pivot_from(system, signs, room);
+    if (pivoted.found) return pivoted.rounds;
+    if (std::ranges::all_of(signs.behind, [](int64_t behind) { return behind == 0; }))
+        return -pivoted.rounds;
+    Shares shares(system, signs, room, pivoted);
+    const bool found = shares.find();
+    const int64_t rounds = pivoted.rounds + shares.rounds();
+    return found ? rounds : -rounds;
+}
+
+Found find_solution(const System& system, const Signs& signs, int64_t max_rounds,
+                    const Room& room) {
+    const int64_t rounds = settle(system, signs, max_rounds, room);
+    if (rounds > 0) return {rounds, false};
+    const int64_t more = pivot(system, signs, room);
+    return {more > 0 ? more - rounds : more, true};
+}
+
+}  // namespace catenary

@@ -1,0 +1,33 @@
+#pragma once
+// What finds a step's forces where the active set cycles: pivoting, and riders that carry in part.
+//
+// Contacts and links alone are a linear complementarity problem with a P-matrix, which pivoting
+// solves. Bends of one link, and a wheel that slips one way or the other, have a row each, of which
+// some act only where others do, and some only where others do not. Sets are taken that belong to a
+// place along the link: with others the matrix is none. So a link goes from piece to piece of its
+// law, one at a time, and with a law that rises all over it does not come back to one: with all
+// rows before its own solved for, what it lacks has one sign to either side of where it stays.
+//
+// Nor is the matrix one with riders: what a dropper does across it is whole while it is taut and
+// nothing while it is slack, whatever its tension, so that it jumps where that passes zero. If the
+// jump tightens the dropper that slackens, it is neither taut nor slack. The step then ends with
+// its tension at zero and riders that carry in part (docs/theory.md, section 16).
+#include "contact_problem/active_set.hpp"
+
+namespace catenary {
+
+/// How forces were found.
+struct Found {
+    int64_t rounds;  ///< that were needed; not positive if there is no solution
+    bool pivoted;    ///< whether the active set cycled
+};
+
+/// Solve for signs by the active set, and by `pivot` where that does not settle.
+Found find_solution(const System& system, const Signs& signs, int64_t max_rounds, const Room& room);
+
+/// Murty's least-index pivoting: slower, but it cannot cycle for a P-matrix. Riders go with their
+/// masters, in part if there is no other solution. Returns the rounds needed, which are not
+/// positive if there is no solution.
+int64_t pivot(const System& system, const Signs& signs, const Room& room);
+
+}  // namespace catenary
