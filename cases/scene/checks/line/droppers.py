@@ -48,7 +48,7 @@ def droppers_inside(
         )
         return
     for span in spans:
-        positions = positions_in(scene, table, kind, span)
+        positions = positions_in(scene.origin, table, kind, span)
         outside = [x for x in positions if not SHORTEST_GAP <= x <= span - SHORTEST_GAP]
         close = [pair for pair in zip(positions, positions[1:], strict=False)
                  if pair[1] - pair[0] < SHORTEST_GAP]  # fmt: skip

@@ -91,7 +91,7 @@ def _of_free_line(scene: Scene) -> Size | None:
     """The size of a line whose wires are listed, counted without making it."""
     try:
         n_droppers, nodes = free_counts(scene)
-        listed = free_wires(scene, span_lengths(scene.line)) or ()
+        listed = free_wires(scene.line, span_lengths(scene.line)) or ()
     except InputError:
         return None
     wires = [Wire.of(own.conductor, own.name, own.role, ()) for own in listed]

@@ -12,7 +12,7 @@ from catenary.cases.scene.convert.line.parts import (
     staggered,
     steady_arm,
 )
-from catenary.cases.scene.scene import Scene
+from catenary.cases.scene.input.origin import Origin
 from catenary.cases.scene.tables.line.free import (
     FreeArmsTable,
     FreeClampsTable,
@@ -20,6 +20,7 @@ from catenary.cases.scene.tables.line.free import (
     FreeSupportsTable,
     FreeWireTable,
 )
+from catenary.cases.scene.tables.line.line import LineTable
 from catenary.cases.scene.tables.units import length_from_mm
 from catenary.meshgen.hardware import Clamps, SteadyArms, Supports
 from catenary.meshgen.topologies.free_data import Course, FreeDroppers, FreeLink, FreeWire
@@ -30,13 +31,12 @@ TENSIONER, FIXED = "tensioner", "fixed"
 _INSIDE = 1e-6  # [m]
 
 
-def free_wires(scene: Scene, spans: tuple[float, ...]) -> tuple[FreeWire, ...] | None:
+def free_wires(line: LineTable, spans: tuple[float, ...]) -> tuple[FreeWire, ...] | None:
     """The wires of a free line, None of another one."""
-    tables = scene.line.wires
-    if tables is None:
+    if line.wires is None:
         return None
     masts = np.concatenate([[0.0], np.cumsum(spans)])
-    return tuple(_wire(scene, table, masts) for table in tables)
+    return tuple(_wire(line, table, masts) for table in line.wires)
 
 
 def stretches_of(table: FreeWireTable, masts: np.ndarray) -> tuple[tuple[float, float], ...]:
@@ -53,11 +53,11 @@ def _masts_of(table: FreeWireTable, masts: np.ndarray) -> np.ndarray:
     return masts[1:-1] if table.supports is None else masts[table.supports]
 
 
-def _wire(scene: Scene, table: FreeWireTable, masts: np.ndarray) -> FreeWire:
+def _wire(line: LineTable, table: FreeWireTable, masts: np.ndarray) -> FreeWire:
     stretches = stretches_of(table, masts)
     role = Role(table.role)
-    heights, lateral = _courses(scene, table, role, masts)
-    names = {wire.name for wire in scene.line.wires or []}
+    heights, lateral = _courses(line, table, role, masts)
+    names = {wire.name for wire in line.wires or []}
     ends = (table.start, table.end)
     clamped = [end if end is not None and end in names else "" for end in ends]
     tensioned = [_tensioned(table, side, masts, stretches) for side in (0, -1)]
@@ -89,7 +89,7 @@ def _tensioned(
 
 
 def _courses(
-    scene: Scene, table: FreeWireTable, role: Role, masts: np.ndarray
+    line: LineTable, table: FreeWireTable, role: Role, masts: np.ndarray
 ) -> tuple[Course | None, Course | None]:
     """Heights and lateral places of a wire along the line; None where the wires that it is clamped
     to say them."""
@@ -102,27 +102,27 @@ def _courses(
         x = tuple(along.tolist())
         sideways = sideways + table.sideways_m
         return Course(x, tuple(height.tolist())), Course(x, tuple(sideways.tolist()))
-    at, n = tuple(masts.tolist()), scene.line.n_spans
+    at, n = tuple(masts.tolist()), line.n_spans
     heights = table.height_m
     if heights is None and role is Role.CONTACT:
-        heights = [scene.line.contact_height_m]
+        heights = [line.contact_height_m]
     level = None
     if heights is not None:
         level = Course(at, tuple(heights) if len(heights) > 1 else (heights[0],) * (n + 1))
     given = table.stagger_m
     if given is None and role is Role.CONTACT:
-        given = scene.line.stagger_m
-    names = {wire.name for wire in scene.line.wires or []}
+        given = line.stagger_m
+    names = {wire.name for wire in line.wires or []}
     if given is None and names & {table.start, table.end}:
         return level, None
     if given is None:
-        given = scene.line.messenger_stagger_m or [0.0]
+        given = line.messenger_stagger_m or [0.0]
     places = tuple(y + table.sideways_m for y in staggered(given, n))
     return level, Course(at, places)
 
 
 def free_links(
-    scene: Scene, spans: tuple[float, ...], wires: tuple[FreeWire, ...] | None
+    line: LineTable, origin: Origin, spans: tuple[float, ...], wires: tuple[FreeWire, ...] | None
 ) -> tuple[FreeLink, ...] | None:
     """The links of a free line, None of another one.
 
@@ -131,16 +131,15 @@ def free_links(
     InputError
         If droppers are not declared for one of the span lengths.
     """
-    tables = scene.line.links
-    if tables is None or wires is None:
+    if line.links is None or wires is None:
         return None
     masts = np.concatenate([[0.0], np.cumsum(spans)])
     by_name = {wire.name: wire for wire in wires}
     links: list[FreeLink] = []
-    for i, table in enumerate(tables):
+    for i, table in enumerate(line.links):
         match table:
             case FreeDroppersTable():
-                links.append(_droppers(scene, f"line.links.{i}", table, spans))
+                links.append(_droppers(line, origin, f"line.links.{i}", table, spans))
             case FreeClampsTable():
                 links.append(
                     Clamps(
@@ -174,7 +173,7 @@ def _places(
 
 
 def _droppers(
-    scene: Scene, key: str, table: FreeDroppersTable, spans: tuple[float, ...]
+    line: LineTable, origin: Origin, key: str, table: FreeDroppersTable, spans: tuple[float, ...]
 ) -> FreeDroppers:
     kind = dropper_kind(table, table.contact_clamp_kg)
     if table.at_m is not None:
@@ -182,12 +181,11 @@ def _droppers(
         at = tuple(table.at_m)
         return FreeDroppers(table.name, kind, table.upper, table.lower, at, at, sag)
     starts = np.concatenate([[0.0], np.cumsum(spans)])
-    line = scene.line
     places: list[float] = []
     sags: list[float] = []
     first, last = line.transition.n_spans_start, line.n_spans - line.transition.n_spans_end
     for span in table.spans or range(1, line.n_spans + 1):
-        within = positions_in(scene, key, table, spans[span - 1])
+        within = positions_in(origin, key, table, spans[span - 1])
         places += [float(starts[span - 1] + x) for x in within]
         running = first <= span - 1 < last
         sags += pre_sag_of(table, spans[span - 1], within) if running else (0.0,) * len(within)

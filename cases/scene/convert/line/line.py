@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TypeVar
 
@@ -19,10 +19,12 @@ from catenary.cases.scene.convert.line.parts import (
     staggered,
     steady_arm,
 )
+from catenary.cases.scene.input.origin import Origin
 from catenary.cases.scene.scene import Scene
+from catenary.cases.scene.tables.line.fittings import FittingTable
 from catenary.cases.scene.tables.line.line import LineTable
 from catenary.cases.scene.tables.line.track.curve import CurveTable
-from catenary.cases.scene.tables.line.wires import BridleTable, StitchWireTable
+from catenary.cases.scene.tables.line.wires import AuxiliaryWireTable, BridleTable, StitchWireTable
 from catenary.meshgen.curve import Curve
 from catenary.meshgen.hardware import Fittings
 from catenary.meshgen.line import Line
@@ -46,13 +48,13 @@ def line_of(scene: Scene) -> Line:
     InputError
         If the droppers are not declared for one of the span lengths, or do not fit into one.
     """
-    return replace(make_line(line_data_of(scene)), fittings=_fittings(scene.line))
+    return replace(make_line(line_data_of(scene)), fittings=fittings_of(scene.line.fittings))
 
 
-def _fittings(table: LineTable) -> tuple[Fittings, ...]:
+def fittings_of(tables: Sequence[FittingTable]) -> tuple[Fittings, ...]:
     """Fittings by kind and wire; what has a length is two masses."""
     found: dict[tuple[str, str], list[tuple[float, float]]] = {}
-    for one in table.fittings:
+    for one in tables:
         ends = (one.at_m, one.at_m + one.length_m) if one.length_m else (one.at_m,)
         group = found.setdefault((one.kind, one.wire), [])
         group += [(x, one.mass_kg / len(ends)) for x in ends]
@@ -63,22 +65,32 @@ def _fittings(table: LineTable) -> tuple[Fittings, ...]:
 
 
 def line_data_of(scene: Scene) -> LineData:
-    """What a scene says of its line.
+    """The line of a scene as topologies take it.
 
     Raises
     ------
     InputError
         If the droppers are not declared for one of the span lengths.
     """
-    table = scene.line
+    return line_data(scene.line, scene.origin)
+
+
+def line_data(table: LineTable, origin: Origin) -> LineData:
+    """The line of a table as topologies take it; ``origin`` says where its keys were written.
+
+    Raises
+    ------
+    InputError
+        If the droppers are not declared for one of the span lengths.
+    """
     spans = span_lengths(table)
     hung = table.dropper
-    wires = free_wires(scene, spans)
-    links = free_links(scene, spans, wires)
+    wires = free_wires(table, spans)
+    links = free_links(table, origin, spans, wires)
     contact_height, contact_wire, stagger = _contact_of(table, wires)
     # Spans of one length are alike.
     lengths = dict.fromkeys(spans)
-    of_length = {span: positions_in(scene, "line.dropper", hung, span) for span in lengths}
+    of_length = {span: positions_in(origin, "line.dropper", hung, span) for span in lengths}
     positions = [of_length[span] for span in spans]
     first, last = table.transition.n_spans_start, table.n_spans - table.transition.n_spans_end
     sag_of = {
@@ -108,7 +120,7 @@ def line_data_of(scene: Scene) -> LineData:
         n_transition=(table.transition.n_spans_start, table.transition.n_spans_end),
         transition_rise=table.transition.rise_m,
         topology=table.topology,
-        auxiliary_wire=_auxiliary(scene, spans),
+        auxiliary_wire=_optional(lambda own: _auxiliary(own, origin, spans), table.auxiliary_wire),
         stitch_wire=_optional(_stitch, table.stitch_wire),
         twin=_optional(lambda own: Twin(own.spacing_m, own.droppers == "alternating"), table.twin),
         bridle=_optional(_bridle, table.bridle),
@@ -147,16 +159,15 @@ def _optional(make: Callable[[_Table], _Part], table: _Table | None) -> _Part | 
     return None if table is None else make(table)
 
 
-def _auxiliary(scene: Scene, spans: tuple[float, ...]) -> AuxiliaryWire | None:
-    table = scene.line.auxiliary_wire
-    if table is None:
-        return None
+def _auxiliary(
+    table: AuxiliaryWireTable, origin: Origin, spans: tuple[float, ...]
+) -> AuxiliaryWire:
     key = "line.auxiliary_wire.dropper"
     return AuxiliaryWire(
         conductor(table),
         table.height_m,
         dropper_kind(table.dropper, table.dropper.auxiliary_clamp_kg),
-        tuple(positions_in(scene, key, table.dropper, span) for span in spans),
+        tuple(positions_in(origin, key, table.dropper, span) for span in spans),
     )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from catenary.base.errors import InputError
-from catenary.cases.scene.scene import Scene
+from catenary.cases.scene.input.origin import Origin
 from catenary.cases.scene.tables.line.droppers import DropperTable, HangingTable
 from catenary.cases.scene.tables.line.free import FreeArmsTable, FreeDroppersTable
 from catenary.cases.scene.tables.line.hardware import SteadyArmTable
@@ -61,7 +61,7 @@ def dropper_kind(table: HangingTable, lower_clamp: float) -> DropperKind:
 
 
 def positions_in(
-    scene: Scene, key: str, kind: HangingTable | None, span: float
+    origin: Origin, key: str, kind: HangingTable | None, span: float
 ) -> tuple[float, ...]:
     """Distances of the droppers of a table from the left support of a span [m].
 
@@ -81,7 +81,7 @@ def positions_in(
         listed = ", ".join(f"{pattern.span_m:g}" for pattern in kind.patterns)
         key = f"{key}.patterns"
         raise InputError(
-            f"{key} {scene.origin.of(key)} has no entry for spans of {span:g} m; it has {listed} m"
+            f"{key} {origin.of(key)} has no entry for spans of {span:g} m; it has {listed} m"
         )
     assert kind.count is not None and kind.spacing_m is not None
     margin = 0.5 * (span - (kind.count - 1) * kind.spacing_m)
