@@ -12,8 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from catenary.base.errors import InputError
-from catenary.cases.scene.input.faults import Fault
-from catenary.cases.scene.input.origin import Origin, shown
+from catenary.cases.scene.input.faults import Fault, Origin, shown
 from catenary.cases.scene.input.plain_text import decode, read_whole
 
 _LONGEST_NAME = 1000
