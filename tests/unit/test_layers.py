@@ -48,7 +48,8 @@ ROOMS = {
     ),
     "cases": (
         "scene.input", "scene.keys", "scene.line", "scene.train", "scene.run", "scene.scene",
-        "scene.problem", "scene.cost_model", "scene.checks", "scene.load", "terminal", "process",
+        "scene.problem", "scene.cost_model", "scene.checks", "scene.load", "scene.starter",
+        "terminal", "process",
         "result_folder", "run",
         "studies.told_remarks", "studies.sweep", "studies.pantograph", "studies.accuracy",
         "studies.hard",

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from catenary.cases.scene.input.faults import Fault
 from catenary.cases.scene.keys.error_sentences import refusal
-from catenary.cases.scene.line.droppers import HangingTable, positions_in
+from catenary.cases.scene.line.droppers import HangingTable, hung_in
+from catenary.cases.scene.line.line_data import numbered
 from catenary.meshgen.geometry import find_cuts
 from catenary.meshgen.topologies.all_topologies import make_line
 from catenary.meshgen.topologies.line_data import SHORTEST_GAP, LineData
 from catenary.meshgen.topologies.twin import TWIN
+from catenary.postproc.evaluate.wording import counted
 from catenary.solver.problem.problem import Problem
 
 if TYPE_CHECKING:
@@ -26,29 +28,41 @@ _SOME = 6
 
 def check_droppers_inside_spans(scene: Scene, line: LineData) -> Iterator[Fault]:
     """Of each group the first span whose droppers are outside or too close together."""
-    table = scene.line
+    table, spans = scene.line, numbered(line.span_lengths)
     if table.dropper is not None:
-        yield from droppers_inside(scene, "line.dropper", table.dropper, line.span_lengths)
+        yield from droppers_inside(scene, "line.dropper", table.dropper, spans)
     if line.auxiliary_wire is not None and table.auxiliary_wire is not None:
         key, hung = "line.auxiliary_wire.dropper", table.auxiliary_wire.dropper
-        yield from droppers_inside(scene, key, hung, line.span_lengths)
+        yield from droppers_inside(scene, key, hung, spans)
 
 
 def droppers_inside(
-    scene: Scene, table: str, kind: HangingTable, spans: Sequence[float]
+    scene: Scene, table: str, kind: HangingTable, spans: Mapping[int, float]
 ) -> Iterator[Fault]:
-    """The first of some spans in which droppers of a table are outside or too close together."""
-    if kind.positions_m is not None and len(set(spans)) > 1:
+    """The first of some spans in which droppers of a table are outside or too close together.
+
+    ``spans`` are lengths [m] by numbers, from 1. Numbers of spans beyond the line are faults too.
+    """
+    numbers = {n: i for i, pattern in enumerate(kind.patterns or ()) for n in pattern.spans or ()}
+    beyond = max(numbers, default=0)
+    if beyond > scene.line.n_spans:
+        key, why = (
+            f"{table}.patterns.{numbers[beyond]}.spans",
+            f"the line has {counted(scene.line.n_spans, 'span')}",
+        )
+        yield refusal(scene.origin, key, beyond, why)
+        return
+    if kind.positions_m is not None and len(set(spans.values())) > 1:
         key = f"{table}.positions_m"
-        lengths = ", ".join(f"{span:g}" for span in sorted(set(spans))[:_SOME])
+        lengths = ", ".join(f"{span:g}" for span in sorted(set(spans.values()))[:_SOME])
         yield Fault(
             key,
             f"{key} {scene.origin.of(key)} holds for one span length, but the spans are "
             f"{lengths} m long; give {table}.patterns or count and spacing_m",
         )
         return
-    for span in spans:
-        positions = positions_in(scene.origin, table, kind, span)
+    for number, (positions, _) in hung_in(scene.origin, table, kind, spans).items():
+        span = spans[number]
         outside = [x for x in positions if not SHORTEST_GAP <= x <= span - SHORTEST_GAP]
         close = [pair for pair in zip(positions, positions[1:], strict=False)
                  if pair[1] - pair[0] < SHORTEST_GAP]  # fmt: skip
@@ -68,12 +82,13 @@ def droppers_inside(
             return
         which = "positions_m" if kind.positions_m is not None else "patterns"
         key = f"{table}.{which}"
+        of = f" of span {number}" if number in numbers else ""
         if outside:
-            what = f"a dropper at {outside[0]:g} m; it must lie inside the span, between 0 and "
+            what = f"a dropper{of} at {outside[0]:g} m; it must lie inside the span, between 0 and "
             what += f"{span:g} m"
         else:
             left, right = close[0]
-            what = f"droppers at {left:.10g} and {right:.10g} m; they must be at least "
+            what = f"droppers{of} at {left:.10g} and {right:.10g} m; they must be at least "
             what += f"{SHORTEST_GAP:g} m apart"
         yield Fault(key, f"{key} {scene.origin.of(key)} puts {what}")
         return

@@ -19,7 +19,13 @@ from catenary.cases.scene.line.free import (
     FreeSupportsTable,
     FreeWireTable,
 )
-from catenary.cases.scene.line.line_data import FIXED, TENSIONER, span_lengths, stretches_of
+from catenary.cases.scene.line.line_data import (
+    FIXED,
+    TENSIONER,
+    numbered,
+    span_lengths,
+    stretches_of,
+)
 from catenary.cases.scene.problem import line_data_of
 from catenary.meshgen.division import divisions_of
 from catenary.meshgen.geometry import SAME_CUT, Cuts
@@ -279,9 +285,9 @@ def check_free_droppers(scene: Scene, line: LineData) -> Iterator[Fault]:
     """Of each link the first span whose droppers are outside or too close together."""
     for i, table in enumerate(scene.line.links or []):
         if isinstance(table, FreeDroppersTable) and table.at_m is None:
-            spans = [line.span_lengths[span - 1] for span in table.spans or ()]
-            key = f"line.links.{i}"
-            yield from droppers_inside(scene, key, table, spans or line.span_lengths)
+            spans = numbered(line.span_lengths)
+            own = spans if table.spans is None else {n: spans[n] for n in table.spans}
+            yield from droppers_inside(scene, f"line.links.{i}", table, own)
 
 
 def check_free_places(scene: Scene, line: LineData) -> Iterator[Fault]:

@@ -13,7 +13,8 @@ from catenary.cases.scene.checks.free import free_counts
 from catenary.cases.scene.checks.twins import RELATIVE_MOTION
 from catenary.cases.scene.cost_model import estimate_memory, estimate_start
 from catenary.cases.scene.input.faults import Fault, SceneError
-from catenary.cases.scene.line.line import TransitionTable
+from catenary.cases.scene.line.free import FreeDroppersTable
+from catenary.cases.scene.line.line import LineTable, TransitionTable
 from catenary.cases.scene.line.line_data import free_wires, overlaps_of, span_lengths
 from catenary.cases.scene.problem import line_of
 from catenary.meshgen.division import divisions_of
@@ -105,11 +106,19 @@ def _size(scene: Scene, n_droppers: int, nodes: dict[str, int], wires: Sequence[
     groups = effects.unknown_groups(chosen, wires)
     unknowns = sum(nodes[wire] * len(own) for group in groups for wire, own in group.items())
     n_spans, irregular = scene.line.n_spans, scene.irregularities
-    kinds = len(set(span_lengths(scene.line)))
+    kinds = max(len(set(span_lengths(scene.line))), kinds_by_number(scene.line))
     if irregular.contact_wire_height is not None or irregular.dropper_lengths is not None:
         kinds = n_spans
     by_pieces = scene.window.mode == "bounded" and scene.window.tolerance is None
     return Size(n_spans, n_droppers, sum(nodes.values()), unknowns, kinds, by_pieces)
+
+
+def kinds_by_number(table: LineTable) -> int:
+    """How many kinds of spans a line has by the numbers of its spans, 0 if lengths tell them."""
+    hung = [table.dropper, table.auxiliary_wire and table.auxiliary_wire.dropper]
+    hung += [link for link in table.links or () if isinstance(link, FreeDroppersTable)]
+    patterns = [pattern for own in hung if own for pattern in own.patterns or ()]
+    return len(patterns) if any(pattern.spans for pattern in patterns) else 0
 
 
 def _sample(scene: Scene, lengths: tuple[float, ...]) -> tuple[Line, np.ndarray]:
@@ -122,6 +131,8 @@ def _sample(scene: Scene, lengths: tuple[float, ...]) -> tuple[Line, np.ndarray]
         If there is no such line.
     """
     table, n = scene.line, len(lengths)
+    if kinds_by_number(table):
+        return line_of(scene), np.ones(n, dtype=int)
     overlaps = overlaps_of(table)
     inner = Counter(lengths[1:-1])
     kinds: Counter[tuple[float, ...]] = Counter()

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar, Literal
+from collections.abc import Mapping
+from itertools import pairwise
+from typing import Annotated, ClassVar, Literal, NamedTuple
 
 from pydantic import AfterValidator, Field, model_validator
 
@@ -39,9 +41,16 @@ Curve = Annotated[list[PAIR], Field(min_length=2, max_length=20), AfterValidator
 
 
 class DropperPattern(Table):
-    """Where the droppers of all spans of one length hang."""
+    """Where the droppers of all spans of one length hang, or of spans by their numbers."""
 
-    span_m: Span = Field(description="length of the spans that have this pattern")
+    span_m: Span | None = Field(None, description="length of the spans that have this pattern")
+    spans: list[Annotated[int, Field(ge=1, le=20_000)]] | None = Field(
+        None,
+        min_length=1,
+        max_length=20_000,
+        description="in place of their length, numbers of the spans that have this pattern, from "
+        "1; they go before a pattern of their length",
+    )
     positions_m: list[DropperPosition] = Field(
         min_length=1, max_length=200, description="distances from the span's left support"
     )
@@ -51,6 +60,8 @@ class DropperPattern(Table):
 
     @model_validator(mode="after")
     def _consistent(self) -> DropperPattern:
+        exactly_one(self, "span_m", "spans")
+        ascending(self.spans or [], "spans")
         ascending(self.positions_m, "positions_m")
         _one_pre_sag_each(self.pre_sag_mm, len(self.positions_m))
         return self
@@ -91,7 +102,16 @@ class HangingTable(Table):
     )
     spacing_m: float | None = Field(None, gt=0, le=500, description="distance between droppers")
     patterns: list[DropperPattern] | None = Field(
-        None, min_length=1, max_length=200, description="one entry per span length"
+        None,
+        min_length=1,
+        max_length=20_000,
+        description="one entry per span length, or for spans by their numbers",
+    )
+    patterns_file: str | None = Field(
+        None,
+        min_length=1,
+        description="places and pre-sag of the droppers of all spans as a CSV file, taken in when "
+        "it is read",
     )
 
     @model_validator(mode="after")
@@ -101,7 +121,12 @@ class HangingTable(Table):
         if (self.count is None) != (self.spacing_m is None):
             raise ValueError("needs count and spacing_m together, but only one is given")
         if self.patterns is not None:
-            ascending([p.span_m for p in self.patterns], "patterns by span_m")
+            lengths = [p.span_m for p in self.patterns if p.span_m is not None]
+            ascending(lengths, "patterns by span_m")
+            numbers = sorted(number for p in self.patterns for number in p.spans or ())
+            twice = [one for one, next in pairwise(numbers) if one == next]
+            if twice:
+                raise ValueError(f"must have one pattern for span {twice[0]}, not several")
         if self.positions_m is not None:
             ascending(self.positions_m, "positions_m")
         return self
@@ -185,41 +210,85 @@ def dropper_kind(table: HangingTable, lower_clamp: float) -> DropperKind:
     )
 
 
-def positions_in(
-    origin: Origin, key: str, kind: HangingTable | None, span: float
-) -> tuple[float, ...]:
-    """Distances of the droppers of a table from the left support of a span [m].
+class Hung(NamedTuple):
+    """Droppers of a span: distances from its left support [m] and the pre-sag of each [m]."""
+
+    positions: tuple[float, ...]
+    pre_sag: tuple[float, ...]
+
+
+def hung_in(
+    origin: Origin, key: str, kind: HangingTable, spans: Mapping[int, float]
+) -> dict[int, Hung]:
+    """The droppers of a table in spans, by the number of the span from 1.
+
+    ``spans`` are lengths [m] by these numbers.
 
     Raises
     ------
     InputError
-        If the table ``key`` has no pattern for spans of that length.
+        If the table ``key`` has no pattern for one of the spans.
     """
-    if kind is None:
-        return ()
+    by_number = {n: pattern for pattern in kind.patterns or () for n in pattern.spans or ()}
+    by_length: dict[float, Hung] = {}  # spans of one length are alike
+    found: dict[int, Hung] = {}
+    for number, span in spans.items():
+        pattern = by_number.get(number)
+        if pattern is not None:
+            found[number] = _hung(kind, pattern, tuple(pattern.positions_m))
+            continue
+        if span not in by_length:
+            pattern = next((p for p in kind.patterns or () if _is_of(p, span)), None)
+            places = _positions(kind, pattern, span)
+            if places is None:
+                raise InputError(_no_entry(origin, f"{key}.patterns", kind, number, span))
+            by_length[span] = _hung(kind, pattern, places)
+        found[number] = by_length[span]
+    return found
+
+
+def _is_of(pattern: DropperPattern, span: float) -> bool:
+    return pattern.span_m is not None and abs(pattern.span_m - span) < _SAME_SPAN
+
+
+def _no_entry(origin: Origin, key: str, kind: HangingTable, number: int, span: float) -> str:
+    lengths = [f"{p.span_m:g}" for p in kind.patterns or () if p.span_m is not None]
+    if lengths:
+        what, has = f"spans of {span:g} m", f"{', '.join(lengths)} m"
+    else:
+        numbers = sorted(n for p in kind.patterns or () for n in p.spans or ())
+        spans = f"{len(numbers)} span{'s' * (len(numbers) > 1)}"
+        what, has = f"span {number}", f"{spans}, from {numbers[0]} to {numbers[-1]}"
+    return f"{key} {origin.of(key)} has no entry for {what}; it has {has}"
+
+
+def _positions(
+    kind: HangingTable, pattern: DropperPattern | None, span: float
+) -> tuple[float, ...] | None:
+    """Distances from the left support [m], None where no pattern gives them."""
     if kind.positions_m is not None:
         return tuple(kind.positions_m)
     if kind.patterns is not None:
-        for pattern in kind.patterns:
-            if abs(pattern.span_m - span) < _SAME_SPAN:
-                return tuple(pattern.positions_m)
-        listed = ", ".join(f"{pattern.span_m:g}" for pattern in kind.patterns)
-        key = f"{key}.patterns"
-        raise InputError(
-            f"{key} {origin.of(key)} has no entry for spans of {span:g} m; it has {listed} m"
-        )
+        return None if pattern is None else tuple(pattern.positions_m)
     assert kind.count is not None and kind.spacing_m is not None
     margin = 0.5 * (span - (kind.count - 1) * kind.spacing_m)
     return tuple(margin + i * kind.spacing_m for i in range(kind.count))
 
 
-def pre_sag_of(kind: DropperTable, span: float, positions: tuple[float, ...]) -> tuple[float, ...]:
-    """Pre-sag that each dropper of a span gives [m]."""
-    if kind.pre_sag_mm is not None:
-        return tuple(length_from_mm(value) for value in kind.pre_sag_mm)
-    for pattern in kind.patterns or []:
-        if pattern.pre_sag_mm is not None and abs(pattern.span_m - span) < _SAME_SPAN:
-            return tuple(length_from_mm(value) for value in pattern.pre_sag_mm)
+def _hung(kind: HangingTable, pattern: DropperPattern | None, positions: tuple[float, ...]) -> Hung:
+    """Droppers at positions of a span [m] with the pre-sag that they give."""
+    return Hung(positions, _pre_sag(kind, pattern, positions))
+
+
+def _pre_sag(
+    kind: HangingTable, pattern: DropperPattern | None, positions: tuple[float, ...]
+) -> tuple[float, ...]:
+    given = None if pattern is None else pattern.pre_sag_mm
+    if not isinstance(kind, DropperTable):
+        return (0.0,) * len(positions)
+    given = kind.pre_sag_mm or given
+    if given is not None:
+        return tuple(length_from_mm(value) for value in given)
     if not kind.pre_sag_mid_mm or len(positions) < FEWEST_SAGGING:
         return (0.0,) * len(positions)
     # Plain numbers: a long line may have as many lengths as spans.

@@ -60,6 +60,12 @@ class LineTable(Table):
     span_m: Annotated[list[Span], OneOrMore, Field(min_length=1, max_length=20_000)] = Field(
         description="span length, or a list of span lengths that is repeated"
     )
+    spans_file: str | None = Field(
+        None,
+        min_length=1,
+        description="lengths of all spans as a CSV file, in place of span_m, taken in when it is "
+        "read; n_spans may be left out then, and a smaller one takes the first spans of the file",
+    )
     contact_height_m: float = Field(
         5.08, gt=0, le=20, description="height of the contact wire at the supports above the rail"
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TypeVar
 
 import numpy as np
@@ -11,9 +11,9 @@ from catenary.cases.scene.input.faults import Origin
 from catenary.cases.scene.keys.units import length_from_mm
 from catenary.cases.scene.line.droppers import (
     DropperTable,
+    Hung,
     dropper_kind,
-    positions_in,
-    pre_sag_of,
+    hung_in,
 )
 from catenary.cases.scene.line.free import (
     FreeArmsTable,
@@ -27,13 +27,13 @@ from catenary.cases.scene.line.hardware import (
     steady_arm,
 )
 from catenary.cases.scene.line.line import LineTable
-from catenary.cases.scene.line.track import _curve
+from catenary.cases.scene.line.track import curve_of
 from catenary.cases.scene.line.wires import (
     AuxiliaryWireTable,
     WireTable,
-    _bridle,
-    _stitch,
+    bridle_of,
     conductor,
+    stitch_wire_of,
 )
 from catenary.meshgen.hardware import Clamps, SteadyArms, Supports
 from catenary.meshgen.topologies.free_data import Course, FreeDroppers, FreeLink, FreeWire
@@ -60,28 +60,23 @@ def line_data(table: LineTable, origin: Origin) -> LineData:
     wires = free_wires(table, spans)
     links = free_links(table, origin, spans, wires)
     contact_height, contact_wire, stagger = _contact_of(table, wires)
-    # Spans of one length are alike.
-    lengths = dict.fromkeys(spans)
-    of_length = {span: positions_in(origin, "line.dropper", hung, span) for span in lengths}
-    positions = [of_length[span] for span in spans]
+    droppers = [Hung((), ())] * table.n_spans
+    if hung is not None:
+        droppers = list(hung_in(origin, "line.dropper", hung, numbered(spans)).values())
     first, last = table.transition.n_spans_start, table.n_spans - table.transition.n_spans_end
-    sag_of = {
-        span: () if hung is None else pre_sag_of(hung, span, of_length[span])
-        for span in dict.fromkeys(spans[first:last])
-    }
     pre_sag = [
-        sag_of[spans[i]] if first <= i < last else (0.0,) * len(positions[i])
-        for i in range(table.n_spans)
+        own.pre_sag if first <= i < last else (0.0,) * len(own.positions)
+        for i, own in enumerate(droppers)
     ]
     return LineData(
         span_lengths=spans,
-        dropper_positions=tuple(positions),
+        dropper_positions=tuple(own.positions for own in droppers),
         pre_sag=tuple(pre_sag),
         stagger=stagger,
         messenger_stagger=_optional(
             lambda own: staggered(own, table.n_spans), table.messenger_stagger_m
         ),
-        curve=_optional(_curve, table.curve),
+        curve=_optional(curve_of, table.curve),
         contact_height=contact_height,
         encumbrance=table.encumbrance_m or 0.0,
         contact_wire=contact_wire,
@@ -93,9 +88,9 @@ def line_data(table: LineTable, origin: Origin) -> LineData:
         transition_rise=table.transition.rise_m,
         topology=table.topology,
         auxiliary_wire=_optional(lambda own: _auxiliary(own, origin, spans), table.auxiliary_wire),
-        stitch_wire=_optional(_stitch, table.stitch_wire),
+        stitch_wire=_optional(stitch_wire_of, table.stitch_wire),
         twin=_optional(lambda own: Twin(own.spacing_m, own.droppers == "alternating"), table.twin),
-        bridle=_optional(_bridle, table.bridle),
+        bridle=_optional(bridle_of, table.bridle),
         overlaps=overlaps_of(table),
         wires=wires,
         links=links,
@@ -139,8 +134,15 @@ def _auxiliary(
         conductor(table),
         table.height_m,
         dropper_kind(table.dropper, table.dropper.auxiliary_clamp_kg),
-        tuple(positions_in(origin, key, table.dropper, span) for span in spans),
+        tuple(
+            own.positions for own in hung_in(origin, key, table.dropper, numbered(spans)).values()
+        ),
     )
+
+
+def numbered(spans: Sequence[float]) -> dict[int, float]:
+    """Lengths of spans [m] by their numbers, from 1."""
+    return dict(enumerate(spans, start=1))
 
 
 def span_lengths(table: LineTable) -> tuple[float, ...]:
@@ -312,11 +314,11 @@ def _droppers(
     places: list[float] = []
     sags: list[float] = []
     first, last = line.transition.n_spans_start, line.n_spans - line.transition.n_spans_end
-    for span in table.spans or range(1, line.n_spans + 1):
-        within = positions_in(origin, key, table, spans[span - 1])
-        places += [float(starts[span - 1] + x) for x in within]
+    own = {span: spans[span - 1] for span in table.spans or range(1, line.n_spans + 1)}
+    for span, hung in hung_in(origin, key, table, own).items():
+        places += [float(starts[span - 1] + x) for x in hung.positions]
         running = first <= span - 1 < last
-        sags += pre_sag_of(table, spans[span - 1], within) if running else (0.0,) * len(within)
+        sags += hung.pre_sag if running else (0.0,) * len(hung.positions)
     at = tuple(places)
     return FreeDroppers(table.name, kind, table.upper, table.lower, at, at, tuple(sags))
 

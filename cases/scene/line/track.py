@@ -78,7 +78,8 @@ class TunnelTable(Table):
         return self
 
 
-def _curve(table: CurveTable) -> Curve:
+def curve_of(table: CurveTable) -> Curve:
+    """The curve of the track."""
     to_left = 1.0 if table.side == "left" else -1.0
     first = -np.inf if table.from_m is None else table.from_m
     last = np.inf if table.to_m is None else table.to_m

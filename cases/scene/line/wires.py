@@ -148,11 +148,13 @@ def conductor(table: WireTable) -> Conductor:
     )
 
 
-def _stitch(table: StitchWireTable) -> StitchWire:
+def stitch_wire_of(table: StitchWireTable) -> StitchWire:
+    """The stitch wires of a line."""
     return StitchWire(
         conductor(table), table.length_m, table.clamp_kg, table.clamp_stiffness_N_per_m
     )
 
 
-def _bridle(table: BridleTable) -> Bridle:
+def bridle_of(table: BridleTable) -> Bridle:
+    """The bridles of a line."""
     return Bridle(conductor(table), table.length_m, table.clamp_kg, table.clamp_stiffness_N_per_m)
