@@ -46,8 +46,8 @@ def new(
         Path | None,
         typer.Option(
             "--droppers",
-            help="CSV file with the columns span, position_m and pre_sag_mm, a line for each "
-            "dropper; is copied.",
+            help="CSV file with the columns span, position_m and pre_sag_mm or length_m, a line "
+            "for each dropper; is copied, with the pre-sag that lengths give.",
         ),
     ] = None,
 ) -> None:
@@ -58,8 +58,19 @@ def new(
         for kind, beginning in BEGINNINGS.items():
             console.say(f"  {kind:15} {beginning.meaning}")
         topology = typer.prompt("Which kind of line", default="simple")
+
+    def complete(inner: Path) -> None:
+        """Find the pre-sag of planned lengths."""
+        if droppers is None:
+            return
+        from catenary.cases.run.at_rest.planned_lengths import take_in_lengths
+
+        left = take_in_lengths(inner)
+        if left is not None:
+            console.say(f"the pre-sag found gives the lengths of the droppers within {left:.2g} mm")
+
     try:
-        path = write_case(folder, topology or "simple", spans, droppers)
+        path = write_case(folder, topology or "simple", spans, droppers, complete)
     except OSError as error:
         raise InputError(f"{folder} cannot be made ({(error.strerror or '?').lower()})") from error
     console.say(

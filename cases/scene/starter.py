@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -33,6 +33,8 @@ class Beginning:
     changes: tuple[tuple[str, str], ...] = ()
 
 
+# Tables of a planner beside a case.
+SPANS_FILE, DROPPERS_FILE = "spans.csv", "droppers.csv"
 _OF_TWO_MESSENGERS = (
     ('topology = "twin"', 'topology = "twin_messenger"'),
     ("# two of 120 mm2 as one", "# each, 120 mm2"),
@@ -58,7 +60,11 @@ _SHORT_RUN_IN, _SHORT_JUDGED, _AFTER = 4, 2, 4
 
 
 def write_case(
-    folder: Path, kind: str, spans: Path | None = None, droppers: Path | None = None
+    folder: Path,
+    kind: str,
+    spans: Path | None = None,
+    droppers: Path | None = None,
+    complete: Callable[[Path], None] | None = None,
 ) -> Path:
     """Make a folder with a new case, and return its file. Not collective.
 
@@ -67,6 +73,7 @@ def write_case(
     folder : the new folder, whose name is that of the case
     kind : a name of ``BEGINNINGS``, or of a shipped case
     spans, droppers : CSV files of a planner, which are copied beside the case
+    complete : is called with the folder in the making, and may write these tables anew
 
     Raises
     ------
@@ -80,7 +87,7 @@ def write_case(
         raise InputError(f"{folder} is there already: choose another name, or remove it")
     if droppers is not None and spans is None:
         raise InputError("--droppers needs --spans too: droppers hang in the spans of that file")
-    copied = {"spans.csv": spans, "droppers.csv": droppers}
+    copied = {SPANS_FILE: spans, DROPPERS_FILE: droppers}
     files = {name: read_whole(path, f"{path}") for name, path in copied.items() if path is not None}
     lengths = [] if spans is None else span_table(spans)
     text = starting_text(kind, folder.resolve().name, lengths, droppers is not None)
@@ -92,6 +99,8 @@ def write_case(
             (inner / name).write_bytes(content)
         (inner / CASE_FILE).write_text(text, encoding="utf-8")
         try:
+            if complete is not None:
+                complete(inner)
             load_scene(inner)
         except InputError as error:
             # The files are named by where they come from: the folder was never there.
@@ -164,13 +173,13 @@ def _with_usual_values(body: str) -> str:
 
 def _with_files(body: str, spans: Sequence[float], droppers: bool) -> str:
     """The text with the planner's tables in place of its own spans and droppers."""
-    body = _replaced(body, r"n_spans = .*\nspan_m = .*\n", 'spans_file = "spans.csv"\n', 1)
+    body = _replaced(body, r"n_spans = .*\nspan_m = .*\n", f'spans_file = "{SPANS_FILE}"\n', 1)
     if droppers:
         own = r"(?:positions_m|pre_sag_mm|pre_sag_mid_mm) = .*\n"
         start = body.index("[line.dropper]")
         end = body.index("\n[", start) + 1
         table = re.sub(own, "", body[start:end]).rstrip()
-        body = f'{body[:start]}{table}\npatterns_file = "droppers.csv"\n\n{body[end:]}'
+        body = f'{body[:start]}{table}\npatterns_file = "{DROPPERS_FILE}"\n\n{body[end:]}'
         # Droppers of an auxiliary wire hang evenly: five of them, ten metres apart.
         even = r"\1count = 5\nspacing_m = 10.0\n"
         body = re.sub(r"(\[line\.auxiliary_wire\.dropper\].*\n.*\n)positions_m = .*\n", even, body)

@@ -124,12 +124,23 @@ def _spans(path: Path, where: str, raw: dict[str, Any]) -> list[float]:
     return lengths[:wanted] if isinstance(wanted, int) and wanted > 0 else lengths
 
 
-def _patterns(path: Path, where: str, raw: dict[str, Any]) -> list[dict[str, Any]]:
-    """Droppers of all spans, those of like spans together; spans beyond the line are left out."""
-    rows = _rows(path, where, {"span": True, "position_m": True, "pre_sag_mm": False})
+# Columns of a table of droppers, and whether they must be there.
+DROPPER_COLUMNS = {"span": True, "position_m": True, "pre_sag_mm": False}
+
+
+def dropper_table(
+    path: Path, where: str, columns: dict[str, bool]
+) -> dict[int, list[dict[str, float]]]:
+    """Droppers of each span by its number, each by names of columns; ``where`` begins sentences.
+
+    Raises
+    ------
+    InputError
+        If it is no table with these columns, in the order of spans and positions.
+    """
     hung: dict[int, list[dict[str, float]]] = {}
     before, last = 0.0, 0.0
-    for number, row in rows:
+    for number, row in _rows(path, where, columns):
         span, position = row["span"], row["position_m"]
         if span < 1 or span != int(span) or span < before:
             raise InputError(
@@ -143,10 +154,17 @@ def _patterns(path: Path, where: str, raw: dict[str, Any]) -> list[dict[str, Any
             )
         before, last = span, position
         hung.setdefault(int(span), []).append(row)
+    return hung
+
+
+def _patterns(path: Path, where: str, raw: dict[str, Any]) -> list[dict[str, Any]]:
+    """Droppers of all spans, those of like spans together; spans beyond the line are left out."""
+    hung = dropper_table(path, where, DROPPER_COLUMNS)
     n = raw["line"].get("n_spans")
     most = n if isinstance(n, int) else max(hung)
     like: dict[tuple[tuple[float, ...], ...], list[int]] = {}
-    names = ("position_m", "pre_sag_mm") if "pre_sag_mm" in rows[0][1] else ("position_m",)
+    first = next(iter(hung.values()))[0]
+    names = [name for name in ("position_m", "pre_sag_mm") if name in first]
     for span, own in hung.items():
         if span <= most:
             columns = tuple(tuple(row[name] for row in own) for name in names)
@@ -195,10 +213,10 @@ def _rows(path: Path, where: str, columns: dict[str, bool]) -> list[tuple[int, d
 def _check_names(where: str, named: list[str], columns: dict[str, bool]) -> None:
     takes = f"it takes {', '.join(columns)}"
     for name in named:
-        if name == "length_m":
+        if name == "length_m" and name not in columns:
             raise InputError(
                 f"{where}; droppers are cut for the pre-sag, so that it takes no length_m: give "
-                "pre_sag_mm, and compare lengths with those of `catenary static`"
+                "pre_sag_mm, which `catenary new --droppers` finds from lengths"
             )
         if name not in columns:
             near = difflib.get_close_matches(name, columns, n=1)
