@@ -32,7 +32,7 @@ def new(
         typer.Option(
             "--topology",
             help="Kind of line: simple, stitched, compound, twin, twin_messenger, single, tramway, "
-            "conductor_rail, or a shipped case to begin with.",
+            "conductor_rail, or a case to begin with.",
             autocompletion=completion.beginnings,
         ),
     ] = None,

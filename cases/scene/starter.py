@@ -1,17 +1,18 @@
-"""The text of a new case: that of a shipped one, made a beginning for somebody else's line."""
+"""A new case: the text of another one, made a beginning for somebody else's line."""
 
 from __future__ import annotations
 
+import itertools
 import re
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from catenary.base.errors import InputError
-from catenary.cases.scene.input.case_files import CASE_FILE, shipped
+from catenary.cases.scene.input.case_files import CASE_FILE, find_case
 from catenary.cases.scene.input.csv_files import span_table
-from catenary.cases.scene.input.plain_text import plain, read_whole
+from catenary.cases.scene.input.plain_text import decode, plain, read_whole
 from catenary.cases.scene.input.toml_input import read_toml
 from catenary.cases.scene.keys.usual_values import TYPICAL
 from catenary.cases.scene.load import load_scene
@@ -71,7 +72,7 @@ def write_case(
     Parameters
     ----------
     folder : the new folder, whose name is that of the case
-    kind : a name of ``BEGINNINGS``, or of a shipped case
+    kind : a name of ``BEGINNINGS``, or a case: name of a shipped one, file or folder
     spans, droppers : CSV files of a planner, which are copied beside the case
     complete : is called with the folder in the making, and may write these tables anew
 
@@ -114,10 +115,10 @@ def starting_text(kind: str, name: str, spans: Sequence[float] = (), droppers: b
 
     Parameters
     ----------
-    kind : a name of ``BEGINNINGS``, or of a shipped case
+    kind : a name of ``BEGINNINGS``, or a case: name of a shipped one, file or folder
     name : name of the new case, for its title
     spans : lengths of all spans [m], which stand in ``spans.csv`` beside the case; those of the
-        shipped case if empty
+        case that it begins as if empty
     droppers : whether droppers stand in ``droppers.csv`` beside the case
 
     Raises
@@ -125,35 +126,40 @@ def starting_text(kind: str, name: str, spans: Sequence[float] = (), droppers: b
     InputError
         If there is no such kind, or if the spans are too few to run in, to judge and to run out.
     """
-    begun = BEGINNINGS.get(kind) or (Beginning(kind, "") if kind in shipped() else None)
-    if begun is None:
+    begun = BEGINNINGS.get(kind, Beginning(kind, ""))
+    try:
+        path = find_case(begun.case)
+    except InputError as error:
         raise InputError(
             f"there is no kind of line named {kind}: name one of {', '.join(BEGINNINGS)}, or a "
-            f"shipped case ({', '.join(shipped())})"
-        )
-    path = shipped()[begun.case]
-    text, source = path.read_text(encoding="utf-8"), read_toml(path)["case"].get("source", "")
+            f"case ({error})"
+        ) from error
+    of_case = read_toml(path).get("case", {})
+    source = str(of_case.get("source", "") if isinstance(of_case, dict) else "")
+    text = decode(read_whole(path, str(path)), str(path))
     for old, new in begun.changes:
         assert text.count(old) == 1, f"{path} has {old!r} {text.count(old)} times"
         text = text.replace(old, new)
+    body = re.sub(r"^# usual: .*\n", "", text[text.find("[line]") :], flags=re.MULTILINE)
+    if not body.startswith("[line]"):
+        raise InputError(f"{path} has no table [line] to begin with")
+    if spans:
+        body = _with_files(body, spans, droppers)
     head = (
-        f"# {plain(name)}: a new case, begun from the shipped case {begun.case}. Change what is\n"
-        "# otherwise on your line. `catenary list --keys WORD` explains keys.\n"
+        f"# {plain(name)}: a new case, begun from {path.parent.name}. Change what is otherwise\n"
+        "# on your line. `catenary list --keys WORD` explains keys.\n"
         '# Behind "usual" stands what other lines have, in the unit of the key.\n\n'
     )
     case = (
         f'[case]\ntitle = "{_quoted(name)}"\n'
-        f'description = "Begun from the shipped case {begun.case}."\n'
-        f'source = "to be replaced; values of {begun.case}: {_quoted(source)}"\n\n'
+        f'description = "Begun from {_quoted(path.parent.name)}."\n'
+        f'source = "to be replaced; values of {_quoted(path.parent.name)}: {_quoted(source)}"\n\n'
     )
-    body = text[text.index("[line]") :]
-    if spans:
-        body = _with_files(body, spans, droppers)
     return head + case + _with_usual_values(body)
 
 
 def _quoted(text: str) -> str:
-    return text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", " ")
+    return plain(text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", " "))
 
 
 def _with_usual_values(body: str) -> str:
@@ -173,37 +179,41 @@ def _with_usual_values(body: str) -> str:
 
 def _with_files(body: str, spans: Sequence[float], droppers: bool) -> str:
     """The text with the planner's tables in place of its own spans and droppers."""
-    body = _replaced(body, r"n_spans = .*\nspan_m = .*\n", f'spans_file = "{SPANS_FILE}"\n', 1)
-    if droppers:
-        own = r"(?:positions_m|pre_sag_mm|pre_sag_mid_mm) = .*\n"
-        start = body.index("[line.dropper]")
-        end = body.index("\n[", start) + 1
-        table = re.sub(own, "", body[start:end]).rstrip()
-        body = f'{body[:start]}{table}\npatterns_file = "{DROPPERS_FILE}"\n\n{body[end:]}'
-        # Droppers of an auxiliary wire hang evenly: five of them, ten metres apart.
-        even = r"\1count = 5\nspacing_m = 10.0\n"
-        body = re.sub(r"(\[line\.auxiliary_wire\.dropper\].*\n.*\n)positions_m = .*\n", even, body)
-    n, places = len(spans), [0.0]
-    for span in spans:
-        places.append(places[-1] + span)
-    if n < _START + _SHORT_RUN_IN + _SHORT_JUDGED + _AFTER:
-        least = _START + _SHORT_RUN_IN + _SHORT_JUDGED + _AFTER
+    least = _START + _SHORT_RUN_IN + _SHORT_JUDGED + _AFTER
+    n, places = len(spans), [0.0, *itertools.accumulate(spans)]
+    if n < least:
         raise InputError(f"a new case needs {least} spans to run in, judge and run out, not {n}")
+    body = _edited(body, "line", {"n_spans": None, "span_m": None, "spans_file": f'"{SPANS_FILE}"'})
+    if droppers:
+        own = dict.fromkeys(("positions_m", "pre_sag_mm", "pre_sag_mid_mm", "count", "spacing_m"))
+        body = _edited(body, "line.dropper", {**own, "patterns_file": f'"{DROPPERS_FILE}"'})
+        if "\n[line.auxiliary_wire.dropper]" in body:  # hangs evenly, as spans differ
+            even = {"positions_m": None, "count": "5", "spacing_m": "10.0"}
+            body = _edited(body, "line.auxiliary_wire.dropper", even)
     first = min(_START + _RUN_IN, n // 3 + 1)
     last = min(first + _JUDGED, n - _AFTER)
+    body = _edited(body, "train", {"start_m": f"{places[_START]:.10g}"})
+    judged = {"from_m": f"{places[first]:.10g}", "to_m": f"{places[last]:.10g}"}
+    body = _edited(body, "evaluation", judged)
     short = _START + _SHORT_RUN_IN
-    body = _replaced(body, r"start_m = .*\n", f"start_m = {places[_START]:.10g}\n", 1)
-    body = _replaced(body, r"from_m = .*\n", f"from_m = {places[first]:.10g}\n", 1)
-    body = _replaced(body, r"to_m = .*\n", f"to_m = {places[last]:.10g}\n", 1)
     test = (
-        f'[test]\n"line.n_spans" = {short + _SHORT_JUDGED + _AFTER}\n'
+        f'[test]\n"line.n_spans" = {least}\n'
         f'"evaluation.from_m" = {places[short]:.10g}\n'
         f'"evaluation.to_m" = {places[short + _SHORT_JUDGED]:.10g}\n'
     )
-    return body[: body.index("[test]")] + test
+    return body.partition("[test]")[0].rstrip() + "\n\n" + test
 
 
-def _replaced(text: str, pattern: str, new: str, often: int) -> str:
-    found, n = re.subn(f"^{pattern}", new, text, count=often, flags=re.MULTILINE)
-    assert n == often, f"{n} times {pattern}"
-    return found
+def _edited(body: str, table: str, values: Mapping[str, str | None]) -> str:
+    """The text with other values of keys of a table, as TOML; None takes a key away."""
+    heading = re.search(rf"^\[{re.escape(table)}\].*\n", body, re.MULTILINE)
+    if heading is None:
+        raise InputError(f"the case to begin with has no table [{table}]")
+    end = re.compile(r"^\[", re.MULTILINE).search(body, heading.end())
+    stop = len(body) if end is None else end.start()
+    own = body[heading.end() : stop]
+    for key, value in values.items():
+        new = "" if value is None else f"{key} = {value}\n"
+        given = re.compile(rf"^{key} = (?:\[[^\]]*\])?.*\n", re.MULTILINE)
+        own = given.sub(new, own) if given.search(own) else new + own
+    return body[: heading.end()] + own + body[stop:]

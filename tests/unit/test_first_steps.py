@@ -92,6 +92,21 @@ def test_tables_of_a_planner_make_a_case(tmp_path: Path, kind: str, n: int) -> N
     ]
 
 
+def test_a_case_of_ones_own_may_be_a_beginning(tmp_path: Path) -> None:
+    spans, droppers = tables(tmp_path, 20)
+    wires = write_case(tmp_path / "wires", "windy_viaduct")
+    wires.write_text(wires.read_text().replace("tension_N = 22000.0", "tension_N = 21000.0"))
+    path = write_case(tmp_path / "line", str(wires.parent), spans, droppers)
+    text = path.read_text()
+    assert text.count("# usual: 10000 to 20000, high speed 20000") == 1  # not once more
+    scene = load_scene(path)
+    assert scene.line.contact_wire is not None and scene.line.contact_wire.tension_N == 21000.0
+    # The places of the evaluated stretch are changed, and none of another table.
+    assert scene.wind == load_scene("windy_viaduct").wind
+    again = write_case(tmp_path / "next", str(tmp_path / "line"), spans, droppers)
+    assert load_scene(again).line == scene.line
+
+
 def test_a_line_without_droppers_takes_spans_alone(tmp_path: Path) -> None:
     spans, _ = tables(tmp_path, 20)
     assert load_scene(write_case(tmp_path / "a", "tramway", spans)).line.n_spans == 20
