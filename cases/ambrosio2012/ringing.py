@@ -14,7 +14,7 @@ from scipy.sparse import linalg as sparse_linalg
 
 from catenary.cases.ambrosio2012.statements import DAMPINGS, SINGLE, Run, Runs
 from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.convert.problem import problem_of
+from catenary.cases.scene.problem import problem_of
 from catenary.cases.scene.scene import Scene
 from catenary.postproc.report.study_report import StudyTable
 from catenary.solver.model.matrices import stiffness_matrix, whole_matrix

@@ -211,7 +211,7 @@ class AtRest:
         """
         import pandas as pd
 
-        from catenary.cases.scene.convert.problem import problem_of
+        from catenary.cases.scene.problem import problem_of
         from catenary.meshgen.wires import Role
 
         names = [wire.name for wire in problem_of(self._scene).line.wires_of(Role.CONTACT)]

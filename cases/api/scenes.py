@@ -7,13 +7,13 @@ from pathlib import Path
 from typing import Any
 
 from catenary.base.errors import InputError
-from catenary.cases.scene.convert.course import resolved
-from catenary.cases.scene.input.origin import shown
+from catenary.cases.scene.input.faults import shown
 from catenary.cases.scene.input.plain_text import DEEPEST
 from catenary.cases.scene.input.toml_input import REMOVED
 from catenary.cases.scene.keys.error_sentences import unknown_key
 from catenary.cases.scene.keys.keys import is_known, known_keys
 from catenary.cases.scene.load import Draft, read_draft
+from catenary.cases.scene.problem import resolved
 from catenary.cases.scene.scene import Scene as CheckedScene
 
 

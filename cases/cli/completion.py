@@ -14,6 +14,13 @@ def cases(incomplete: str) -> list[tuple[str, str]]:
     return [(one.name, one.title) for one in entries() if one.name.startswith(incomplete)]
 
 
+def beginnings(incomplete: str) -> list[tuple[str, str]]:
+    """Kinds of line that a new case may begin with."""
+    from catenary.cases.scene.starter import BEGINNINGS
+
+    return [(name, one.meaning) for name, one in BEGINNINGS.items() if name.startswith(incomplete)]
+
+
 def assignments(incomplete: str) -> list[tuple[str, str]]:
     """``key=`` for all keys that fit, or ``key=word`` once the key is whole.
 

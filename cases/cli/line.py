@@ -132,7 +132,7 @@ def static(
     scene = load(case, assignments, extras)
     from catenary.cases.run.at_rest.static_table import rest_text, static_table
     from catenary.cases.run.describe.defects import defect_facts
-    from catenary.cases.scene.convert.problem import problem_of
+    from catenary.cases.scene.problem import problem_of
 
     table, problem = static_table(scene), problem_of(scene)
     if out is not None:

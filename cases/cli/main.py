@@ -29,7 +29,7 @@ def all_verbs() -> typer.Typer:
     from catenary.cases.cli.studies import sweep, accuracy, hard  # noqa: F401
     from catenary.cases.cli import pantograph  # noqa: F401
     from catenary.cases.cli.studies import stability, waves, scaling  # noqa: F401
-    from catenary.cases.cli import lists  # noqa: F401
+    from catenary.cases.cli import lists, first_steps  # noqa: F401
 
     # isort: on
     return application.app

@@ -158,9 +158,9 @@ def paraview(
 
 def _shapes(folder: Path, records: Records | None) -> list[Shape] | None:
     """How the pantographs of a run are drawn, None if its scene is not one of this version."""
-    from catenary.cases.scene.convert.problem import problem_of
-    from catenary.cases.scene.input.origin import Origin
+    from catenary.cases.scene.input.faults import Origin
     from catenary.cases.scene.load import scene_from
+    from catenary.cases.scene.problem import problem_of
     from catenary.mbs.shape import shape_of
     from catenary.postproc.read.results import Results
 

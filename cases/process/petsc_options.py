@@ -10,7 +10,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import Any
 
 from catenary.base.errors import InputError
-from catenary.cases.scene.input.origin import shown
+from catenary.cases.scene.input.faults import shown
 from catenary.cases.scene.keys.keys import nearest
 
 # Options that PETSc looks up when the process ends, after `idle_options` was called.
@@ -117,7 +117,7 @@ def idle_options(of_scene: Collection[str]) -> list[str]:
         is made of them
     """
     from catenary.base.petsc import PETSc
-    from catenary.cases.scene.tables.run.petsc import PetscTable
+    from catenary.cases.scene.run.petsc import PetscTable
 
     library = ctypes.CDLL(PETSc.__file__)
     known = [*PetscTable.model_fields, *_OTHER_OPTIONS]

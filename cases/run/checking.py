@@ -8,7 +8,7 @@ from catenary.cases.run.at_rest.installed import registration_of
 from catenary.cases.run.describe.arrivals import arrival_facts
 from catenary.cases.run.describe.pantographs import kind_lines
 from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.convert.problem import problem_of
+from catenary.cases.scene.problem import problem_of
 from catenary.cases.scene.scene import Scene
 from catenary.postproc.evaluate.wording import counted
 from catenary.solver.statics.line_at_rest import stable_form

@@ -7,7 +7,7 @@ import math
 from typing import Any
 
 from catenary.base.errors import InputError
-from catenary.cases.scene.input.origin import Origin
+from catenary.cases.scene.input.faults import Origin
 from catenary.cases.scene.load import scene_from
 from catenary.cases.scene.scene import Scene
 

@@ -11,7 +11,7 @@ from catenary.cases.run.describe.defects import defect_facts
 from catenary.cases.run.describe.incidents import incident_facts
 from catenary.cases.run.describe.pantographs import header_words
 from catenary.cases.run.planning.plan import effect_rows
-from catenary.cases.scene.convert.course import resolved
+from catenary.cases.scene.problem import resolved
 from catenary.cases.scene.scene import Scene
 from catenary.postproc.channels.facts import facts_of
 from catenary.postproc.channels.header import Header, line_datasets, static_datasets, wire_roles

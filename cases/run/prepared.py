@@ -8,7 +8,7 @@ from mpi4py import MPI
 
 import catenary.solver.kernels
 from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.convert.problem import problem_of
+from catenary.cases.scene.problem import problem_of
 from catenary.cases.scene.scene import Scene
 from catenary.solver.statics.line_at_rest import line_at_rest
 from catenary.solver.statics.stability_of_rest import refuse_lost_wire

@@ -37,7 +37,7 @@ from catenary.cases.run.planning.needs import (
 )
 from catenary.cases.run.recording import FIELD_EVERY, extent_of, recording_of
 from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.convert.problem import problem_of
+from catenary.cases.scene.problem import problem_of
 from catenary.cases.scene.scene import Scene
 from catenary.meshgen.mesh import LineMesh
 from catenary.postproc.channels.header import Header

@@ -7,8 +7,8 @@ from pathlib import Path
 
 from catenary.base.errors import InputError
 from catenary.cases.result_folder.output_files import new_file
-from catenary.cases.scene.checks.line.mesh_size import MANY_NODES, size_of
-from catenary.cases.scene.convert.line.line import line_of
+from catenary.cases.scene.checks.mesh_size import MANY_NODES, size_of
+from catenary.cases.scene.problem import line_of
 from catenary.cases.scene.scene import Scene
 from catenary.meshgen.build import make_mesh, use_mesh
 from catenary.meshgen.mesh import LineMesh
@@ -70,8 +70,8 @@ def draw_scene(scene: Scene, path: Path, force: bool) -> tuple[float, float]:
     new_file(path, DRAWN, force)
     # Matplotlib takes long to import.
     from catenary.cases.run.describe.defects import defect_facts
-    from catenary.cases.scene.convert.line.overlaps import overlaps_of
-    from catenary.cases.scene.convert.problem import problem_of
+    from catenary.cases.scene.line.line_data import overlaps_of
+    from catenary.cases.scene.problem import problem_of
     from catenary.postproc.report.pictures.line_drawing import Mark, draw_line
     from catenary.solver.statics.form_finding.equilibrium import find_form
 

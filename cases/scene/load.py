@@ -13,11 +13,9 @@ from pydantic import ValidationError
 from catenary.base.errors import InputError
 from catenary.cases.scene.checks.scene import check
 from catenary.cases.scene.input.case_files import find_case
-from catenary.cases.scene.input.faults import SceneError
-from catenary.cases.scene.input.origin import Origin
-from catenary.cases.scene.input.pair_files import absolute_names, take_in_files
+from catenary.cases.scene.input.csv_files import absolute_names, take_in_files
+from catenary.cases.scene.input.faults import Origin, SceneError, text_faults
 from catenary.cases.scene.input.plain_text import refuse_deep
-from catenary.cases.scene.input.text_faults import text_faults
 from catenary.cases.scene.input.toml_input import Assigned, assign, parse_assignment, read_toml
 from catenary.cases.scene.keys.error_sentences import schema_faults, unknown_key
 from catenary.cases.scene.keys.keys import is_known, known_keys, with_kinds

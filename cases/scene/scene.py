@@ -11,25 +11,20 @@ from typing import Any
 
 from pydantic import Field, PrivateAttr
 
-from catenary.cases.scene.input.origin import Origin
-from catenary.cases.scene.tables.line.imperfections.defects import Defect
-from catenary.cases.scene.tables.line.imperfections.irregularities import IrregularitiesTable
-from catenary.cases.scene.tables.line.line import LineTable
-from catenary.cases.scene.tables.line.mesh import MeshTable
-from catenary.cases.scene.tables.run.case import CaseTable
-from catenary.cases.scene.tables.run.contact import ContactTable
-from catenary.cases.scene.tables.run.evaluation import EvaluationTable
-from catenary.cases.scene.tables.run.incidents import Incident
-from catenary.cases.scene.tables.run.numerics import NumericsTable
-from catenary.cases.scene.tables.run.output import OutputTable
-from catenary.cases.scene.tables.run.petsc import PetscTable
-from catenary.cases.scene.tables.run.wind import WindTable
-from catenary.cases.scene.tables.run.window import WindowTable
-from catenary.cases.scene.tables.table import Table
-from catenary.cases.scene.tables.train.mechanism import Name
-from catenary.cases.scene.tables.train.pantograph import PantographTable
-from catenary.cases.scene.tables.train.train import TrainTable
-from catenary.cases.scene.tables.train.vehicle import VehicleTable
+from catenary.cases.scene.input.faults import Origin
+from catenary.cases.scene.keys.table import Table
+from catenary.cases.scene.line.imperfections import Defect, IrregularitiesTable
+from catenary.cases.scene.line.line import LineTable
+from catenary.cases.scene.run.case import CaseTable, EvaluationTable
+from catenary.cases.scene.run.contact import ContactTable
+from catenary.cases.scene.run.incidents import Incident
+from catenary.cases.scene.run.numerics import MeshTable, NumericsTable, WindowTable
+from catenary.cases.scene.run.output import OutputTable
+from catenary.cases.scene.run.petsc import PetscTable
+from catenary.cases.scene.run.wind import WindTable
+from catenary.cases.scene.train.mechanism import Name
+from catenary.cases.scene.train.pantograph import PantographTable
+from catenary.cases.scene.train.train import TrainTable, VehicleTable
 from catenary.solver.effects import all_effects as effect_registry
 from catenary.solver.effects.effect import Limit
 

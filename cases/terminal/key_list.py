@@ -15,9 +15,8 @@ from pydantic_core import PydanticUndefined
 
 from catenary.base.errors import InputError
 from catenary.cases.scene.keys.keys import ANY, kind_of, tables_in
-from catenary.cases.scene.keys.typical_values import TYPICAL
-from catenary.cases.scene.keys.usual_ranges import usual_range
-from catenary.cases.scene.tables.units import unit_of
+from catenary.cases.scene.keys.units import unit_of
+from catenary.cases.scene.keys.usual_values import TYPICAL, usual_range
 from catenary.postproc.standards.en50367 import EDITIONS, SYSTEMS
 from catenary.solver.effects import all_effects as effects
 

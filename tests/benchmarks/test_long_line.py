@@ -17,8 +17,8 @@ import pytest
 from measuring import check
 from program import catenary_started
 
-from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.load import load_scene
+from catenary.cases.scene.problem import problem_of
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402

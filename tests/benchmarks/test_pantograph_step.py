@@ -15,8 +15,8 @@ import pytest
 from mpi4py import MPI
 
 from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.load import load_scene
+from catenary.cases.scene.problem import problem_of
 from catenary.mbs.build import Operation, PantographData, make_pantograph
 from catenary.mbs.head.strips import Strips, Suspension, Turning
 from catenary.mbs.head.wire_crossing import LateralPath

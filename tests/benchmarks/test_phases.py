@@ -12,8 +12,8 @@ from petsc4py import PETSc
 
 from catenary.base.petsc_events import NAMES
 from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.load import load_scene
+from catenary.cases.scene.problem import problem_of
 from catenary.solver.statics.elasticity import elasticity, middle_span
 from catenary.solver.statics.form_finding.equilibrium import find_form
 from catenary.solver.time_loop.march import March

@@ -17,8 +17,8 @@ from mpi4py import MPI
 from repeating_line import layout, line
 
 from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.load import load_scene
+from catenary.cases.scene.problem import problem_of
 from catenary.solver.integrators.line_state import PredictedLineState, Steps
 from catenary.solver.integrators.make_line import NewmarkLine
 from catenary.solver.integrators.two_pass_step import StationPasses

@@ -20,8 +20,8 @@ from mpi4py import MPI
 
 from catenary.cases.run.runner import run_case
 from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.load import load_scene
+from catenary.cases.scene.problem import problem_of
 from catenary.postproc.read.results import Results
 from catenary.solver.integrators.make_line import NewmarkLine
 from catenary.solver.model.model import Model

@@ -17,8 +17,8 @@ from small_lines import bare_wires
 from catenary.base.errors import InputError
 from catenary.base.parallel import on_root
 from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.load import load_scene
+from catenary.cases.scene.problem import problem_of
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE, LineMesh
 from catenary.meshgen.topologies.all_topologies import make_line
 from catenary.solver.model.partition import distribute

@@ -11,9 +11,9 @@ from typing import Any
 import pytest
 from program import assert_sound, catenary
 
-from catenary.cases.scene.convert.line.line import line_of
 from catenary.cases.scene.input.case_files import shipped
 from catenary.cases.scene.load import load_scene
+from catenary.cases.scene.problem import line_of
 
 CASES = shipped()
 # One of each kind of line is run with every test, all of them in whole studies.

@@ -14,8 +14,8 @@ from fuzzing import RandomScene, topology_scene
 from windowed import COMM, apart, largest, march, nudged
 
 from catenary.base.errors import InputError
-from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.load import load_scene
+from catenary.cases.scene.problem import problem_of
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.hard import runs as hard_runs
 from catenary.cases.studies.hard.runs import Watched

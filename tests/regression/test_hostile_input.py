@@ -19,12 +19,11 @@ from catenary.base.errors import InputError
 from catenary.cases.cli.main import app
 from catenary.cases.run import scene_mesh
 from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.checks.line.mesh_size import size_of
-from catenary.cases.scene.convert.course import resolved
-from catenary.cases.scene.convert.problem import problem_of
+from catenary.cases.scene.checks.mesh_size import size_of
 from catenary.cases.scene.input.case_files import shipped
-from catenary.cases.scene.input.origin import Origin
+from catenary.cases.scene.input.faults import Origin
 from catenary.cases.scene.load import load_scene, scene_from
+from catenary.cases.scene.problem import problem_of, resolved
 from catenary.cases.studies.sweep.variants import read_named
 from catenary.meshgen.mesh import CONTACT_WIRE
 from catenary.meshgen.topologies.twin import second

@@ -13,8 +13,8 @@ from program import MPIRUN, assert_same_histories, assert_sound, catenary, short
 
 from catenary.base.errors import InputError
 from catenary.cases.run.extending import extended_scene
-from catenary.cases.scene.convert.course import resolved
 from catenary.cases.scene.load import load_scene
+from catenary.cases.scene.problem import resolved
 from catenary.postproc.read.results import Results
 
 # Where the run ends at first, and where the long one and what goes on do [m].

@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from catenary.cases.scene.convert.course import resolved
-from catenary.cases.scene.convert.line.line import line_of
+from catenary.cases.scene.problem import line_of, resolved
 from catenary.cases.scene.scene import Scene
 from catenary.meshgen.hardware import DropperKind, Droppers, SteadyArm
 from catenary.meshgen.line import Line

@@ -10,8 +10,8 @@ from typer.testing import CliRunner
 
 from catenary.base.errors import InputError
 from catenary.cases.cli.main import app
-from catenary.cases.scene.convert.course import resolved
 from catenary.cases.scene.load import load_scene
+from catenary.cases.scene.problem import resolved
 from catenary.cases.studies.accuracy import models
 from catenary.cases.studies.accuracy.axes import AXES, parse_axes
 from catenary.cases.studies.accuracy.axis import DISCRETISATION

@@ -12,10 +12,10 @@ from measuring import check
 from typer.testing import CliRunner
 
 from catenary.cases.cli.main import app
-from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.input.case_files import shipped
 from catenary.cases.scene.input.toml_input import read_toml
 from catenary.cases.scene.load import load_scene
+from catenary.cases.scene.problem import problem_of
 from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.response.linearisation import of_chain
 

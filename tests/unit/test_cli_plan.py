@@ -14,14 +14,14 @@ from catenary.cases.run.planning.needs import (
 )
 from catenary.cases.run.planning.plan import make_plan, plan_text
 from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.checks.line.mesh_size import Size, size_of
-from catenary.cases.scene.convert.problem import problem_of
+from catenary.cases.scene.checks.mesh_size import Size, size_of
 from catenary.cases.scene.cost_model import (
     estimate_march,
     estimate_memory,
     estimate_start,
 )
 from catenary.cases.scene.load import load_scene
+from catenary.cases.scene.problem import problem_of
 from catenary.solver.window.choice import moving_share
 
 

@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 
 from catenary.base.errors import InputError
 from catenary.cases.cli.main import app
-from catenary.cases.scene.keys.typical_values import TYPICAL
+from catenary.cases.scene.keys.usual_values import TYPICAL
 from catenary.cases.scene.load import load_scene
 from catenary.cases.terminal.key_list import key_details, key_table, keys_of_a_scene
 

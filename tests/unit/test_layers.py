@@ -46,8 +46,9 @@ ROOMS = {
         "report",
     ),
     "cases": (
-        "scene.input", "scene.tables", "scene.keys", "scene.scene", "scene.convert",
-        "scene.cost_model", "scene.checks", "scene.load", "terminal", "process",
+        "scene.input", "scene.keys", "scene.line", "scene.train", "scene.run", "scene.scene",
+        "scene.problem", "scene.cost_model", "scene.checks", "scene.load", "scene.starter",
+        "terminal", "process",
         "result_folder", "run",
         "studies.told_remarks", "studies.sweep", "studies.pantograph", "studies.accuracy",
         "studies.hard",

@@ -17,8 +17,8 @@ from catenary.base.errors import InputError
 from catenary.cases.cli.main import app
 from catenary.cases.run.runner import run_case
 from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.load import load_scene
+from catenary.cases.scene.problem import problem_of
 from catenary.cases.studies.choice import advice, output
 from catenary.cases.studies.choice.study import (
     Costs,

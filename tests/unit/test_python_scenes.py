@@ -14,9 +14,9 @@ import pytest
 
 import catenary
 from catenary.cases.run.checking import check_line
-from catenary.cases.scene.convert.course import resolved
 from catenary.cases.scene.input.case_files import find_case
 from catenary.cases.scene.load import load_scene
+from catenary.cases.scene.problem import resolved
 from catenary.scenes import checked
 
 CASE = "en50318_2002"

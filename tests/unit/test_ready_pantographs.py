@@ -11,9 +11,9 @@ from typer.testing import CliRunner
 
 from catenary.base.errors import InputError
 from catenary.cases.cli.main import app
-from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.load import load_scene, scene_from
-from catenary.cases.scene.tables.train.pantograph import Ready
+from catenary.cases.scene.problem import problem_of
+from catenary.cases.scene.train.pantograph import Ready
 from catenary.mbs.library import READY
 from catenary.mbs.lumped_data import LumpedData
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from catenary.base.errors import InputError
-from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.load import load_scene
+from catenary.cases.scene.problem import problem_of
 from catenary.solver.problem.along_track import AlongTrack, Tensioner
 
 ON = "effects.axial_motion=true"

@@ -10,11 +10,10 @@ import numpy as np
 import pytest
 
 from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.checks.line.droppers import estimated_dropper_lengths
-from catenary.cases.scene.convert.line.line import line_data_of
-from catenary.cases.scene.convert.problem import problem_of
+from catenary.cases.scene.checks.droppers import estimated_dropper_lengths
 from catenary.cases.scene.input.case_files import shipped
 from catenary.cases.scene.load import load_scene
+from catenary.cases.scene.problem import line_data_of, problem_of
 from catenary.solver.statics.form_finding.equilibrium import find_form
 
 

@@ -5,10 +5,9 @@ from __future__ import annotations
 import pytest
 
 from catenary.base.errors import InputError
-from catenary.cases.scene.convert.course import resolved
-from catenary.cases.scene.convert.problem import problem_of
-from catenary.cases.scene.input.origin import Origin
+from catenary.cases.scene.input.faults import Origin
 from catenary.cases.scene.load import load_scene, scene_from
+from catenary.cases.scene.problem import problem_of, resolved
 from catenary.solver.problem.contact_laws import HYSTERESIS, HertzLaw, KinematicLaw, LinearLaw
 
 CASE = "en50318_2002"

@@ -9,11 +9,9 @@ import pytest
 from catenary.cases.run.describe.defects import defect_facts
 from catenary.cases.run.planning.plan import make_plan, plan_text
 from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.convert.course import resolved
-from catenary.cases.scene.convert.line.line import line_data_of
-from catenary.cases.scene.convert.problem import problem_of
-from catenary.cases.scene.input.origin import Origin
+from catenary.cases.scene.input.faults import Origin
 from catenary.cases.scene.load import load_scene, scene_from
+from catenary.cases.scene.problem import line_data_of, problem_of, resolved
 from catenary.cases.scene.scene import Scene
 from catenary.meshgen.hardware import Fittings
 from catenary.meshgen.topologies.all_topologies import make_line

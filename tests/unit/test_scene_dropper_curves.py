@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 
 from catenary.base.errors import InputError
-from catenary.cases.scene.convert.course import resolved
-from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.input.case_files import find_case
-from catenary.cases.scene.input.origin import Origin
+from catenary.cases.scene.input.faults import Origin
 from catenary.cases.scene.load import load_scene, scene_from
+from catenary.cases.scene.problem import problem_of, resolved
 from catenary.cases.scene.scene import Scene
 
 NO_STIFFNESS = "line.dropper.stiffness_N_per_m="

@@ -10,11 +10,10 @@ import pytest
 
 from catenary.base.errors import InputError
 from catenary.cases.run.planning.plan import effect_rows
-from catenary.cases.scene.convert.course import resolved
-from catenary.cases.scene.convert.problem import problem_of
-from catenary.cases.scene.input.origin import Origin
+from catenary.cases.scene.input.faults import Origin
 from catenary.cases.scene.keys.keys import known_keys
 from catenary.cases.scene.load import load_scene, scene_from
+from catenary.cases.scene.problem import problem_of, resolved
 from catenary.cases.scene.scene import Scene
 from catenary.solver.effects import all_effects as effects
 from catenary.solver.effects.effect import Effect, register, unregister

@@ -9,8 +9,8 @@ import pytest
 from catenary.base.errors import InputError
 from catenary.cases.run.describe.arrivals import arrival_facts
 from catenary.cases.run.planning.plan import make_plan, plan_text
-from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.load import load_scene
+from catenary.cases.scene.problem import problem_of
 from catenary.solver.problem.ends import AbsorbingLayer, Fixed, Periodic
 
 END = "line.ends.end"

@@ -13,13 +13,10 @@ from free_tables import as_free
 from measuring import march
 
 from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.convert.course import resolved
-from catenary.cases.scene.convert.line.line import line_of
-from catenary.cases.scene.convert.problem import problem_of
-from catenary.cases.scene.input.faults import SceneError
-from catenary.cases.scene.input.origin import Origin
+from catenary.cases.scene.input.faults import Origin, SceneError
 from catenary.cases.scene.input.toml_input import read_toml
 from catenary.cases.scene.load import load_scene, scene_from
+from catenary.cases.scene.problem import line_of, problem_of, resolved
 from catenary.cases.scene.scene import Scene
 from catenary.meshgen.topologies.all_topologies import make_line
 from catenary.meshgen.wires import End, Role
@@ -295,6 +292,6 @@ def test_tension_that_is_lost_is_lost_by_what_is_clamped() -> None:
 
 
 def make_line_of_example() -> Any:
-    from catenary.cases.scene.convert.line.line import line_data_of
+    from catenary.cases.scene.problem import line_data_of
 
     return make_line(line_data_of(scene_of(example())))

@@ -10,10 +10,9 @@ import pytest
 
 from catenary.base.errors import InputError
 from catenary.cases.scene.checks.scene import MIN_SEPARATION
-from catenary.cases.scene.convert.course import end_of, resolved
-from catenary.cases.scene.convert.problem import problem_of
-from catenary.cases.scene.input.origin import Origin
+from catenary.cases.scene.input.faults import Origin
 from catenary.cases.scene.load import load_scene, scene_from
+from catenary.cases.scene.problem import end_of, problem_of, resolved
 from catenary.cases.scene.scene import Scene
 from catenary.mbs.head.flexure import Flexure
 from catenary.mbs.head.strips import Strips, Suspension, Turning

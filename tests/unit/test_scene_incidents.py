@@ -7,10 +7,9 @@ import pytest
 from catenary.base.errors import InputError
 from catenary.cases.run.describe.incidents import incident_facts
 from catenary.cases.run.planning.plan import make_plan, plan_text
-from catenary.cases.scene.convert.course import resolved
-from catenary.cases.scene.convert.problem import problem_of
-from catenary.cases.scene.input.origin import Origin
+from catenary.cases.scene.input.faults import Origin
 from catenary.cases.scene.load import load_scene, scene_from
+from catenary.cases.scene.problem import problem_of, resolved
 from catenary.cases.scene.scene import Scene
 from catenary.mbs.lowering import Lowering
 from catenary.solver.problem.incidents import DropperBreak, TensionLoss

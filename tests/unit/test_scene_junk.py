@@ -11,10 +11,10 @@ from typer.testing import CliRunner
 
 from catenary.base.errors import InputError
 from catenary.cases.cli.main import app
-from catenary.cases.scene.convert.course import resolved
-from catenary.cases.scene.input.origin import Origin
+from catenary.cases.scene.input.faults import Origin
 from catenary.cases.scene.keys.keys import known_keys
 from catenary.cases.scene.load import load_scene, scene_from
+from catenary.cases.scene.problem import resolved
 from catenary.cases.scene.scene import Scene
 
 KEYS = [key.replace("*", "0") for key in known_keys(Scene)]

@@ -8,10 +8,9 @@ from free_tables import as_free
 
 from catenary.base.errors import InputError
 from catenary.cases.run.planning.plan import effect_rows
-from catenary.cases.scene.convert.line.line import line_data_of
-from catenary.cases.scene.convert.problem import problem_of
-from catenary.cases.scene.input.origin import Origin
+from catenary.cases.scene.input.faults import Origin
 from catenary.cases.scene.load import load_scene, scene_from
+from catenary.cases.scene.problem import line_data_of, problem_of
 from catenary.solver.effects.all_effects import active
 
 ON = "effects.lateral_motion=true"

@@ -6,10 +6,9 @@ import pytest
 
 from catenary.base.errors import InputError
 from catenary.cases.run.describe.pantographs import kind_lines
-from catenary.cases.scene.convert.course import resolved
-from catenary.cases.scene.convert.problem import problem_of
-from catenary.cases.scene.input.origin import Origin
+from catenary.cases.scene.input.faults import Origin
 from catenary.cases.scene.load import load_scene, scene_from
+from catenary.cases.scene.problem import problem_of, resolved
 from catenary.cases.scene.scene import Scene
 from catenary.mbs.control import Regulation
 from catenary.mbs.head.laws import Law

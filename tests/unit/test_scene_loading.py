@@ -9,14 +9,12 @@ import numpy as np
 import pytest
 
 from catenary.base.errors import InputError
-from catenary.cases.scene.convert.course import end_of, resolved
-from catenary.cases.scene.convert.line.line import line_data_of
-from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.input.case_files import find_case, shipped
-from catenary.cases.scene.input.origin import Origin
+from catenary.cases.scene.input.faults import Origin
+from catenary.cases.scene.keys.units import unit_of
 from catenary.cases.scene.load import load_scene, scene_from
+from catenary.cases.scene.problem import end_of, line_data_of, problem_of, resolved
 from catenary.cases.scene.scene import Scene
-from catenary.cases.scene.tables.units import unit_of
 
 # Keys that other programs rely on.
 CONTRACT = [

@@ -7,11 +7,10 @@ import pytest
 
 from catenary.base.errors import InputError, RunBroken
 from catenary.cases.run.planning.plan import make_plan, plan_text
-from catenary.cases.scene.convert.course import resolved
-from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.cost_model import estimate_march
-from catenary.cases.scene.input.origin import Origin
+from catenary.cases.scene.input.faults import Origin
 from catenary.cases.scene.load import load_scene, scene_from
+from catenary.cases.scene.problem import problem_of, resolved
 from catenary.cases.scene.scene import Scene
 from catenary.mbs.build import has_joints
 from catenary.mbs.lumped_data import LumpedData

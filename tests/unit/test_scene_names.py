@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from catenary.cases.scene.convert.line.line import line_of
-from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.input.faults import SceneError
 from catenary.cases.scene.load import load_scene
+from catenary.cases.scene.problem import line_of, problem_of
 from catenary.meshgen.wires import Role
 from catenary.solver.problem.incidents import TensionLoss
 

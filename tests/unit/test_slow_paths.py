@@ -12,7 +12,6 @@ from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of, trai
 from catenary.cases.run.planning.needs import needs_with_mesh
 from catenary.cases.run.planning.plan import make_plan, plan_text
 from catenary.cases.run.scene_mesh import mesh_of as mesh_of_scene
-from catenary.cases.scene.convert.problem import problem_of as problem_of_scene
 from catenary.cases.scene.cost_model import (
     SEVERAL_MAKE_UPS,
     STATION_COST,
@@ -22,6 +21,7 @@ from catenary.cases.scene.cost_model import (
     estimate_march,
 )
 from catenary.cases.scene.load import load_scene
+from catenary.cases.scene.problem import problem_of as problem_of_scene
 from catenary.solver.effects.build_model import numbering_of
 from catenary.solver.integrators import slow_path
 from catenary.solver.integrators.slow_path import PARTS, slow_path_of

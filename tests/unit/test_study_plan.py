@@ -18,9 +18,9 @@ from catenary.cases.ambrosio2012.conclusion import changes_of
 from catenary.cases.ambrosio2012.study import variants
 from catenary.cases.ambrosio2012.variations import read_table, searched
 from catenary.cases.cli.main import app
-from catenary.cases.scene.convert.course import resolved
 from catenary.cases.scene.input.case_files import shipped
 from catenary.cases.scene.load import load_scene
+from catenary.cases.scene.problem import resolved
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.case_study import StudyVariant, make_plan
 from catenary.postproc.report.study_report import (

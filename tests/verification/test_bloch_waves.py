@@ -9,8 +9,8 @@ import pytest
 
 from catenary.base.errors import InputError
 from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.load import load_scene
+from catenary.cases.scene.problem import problem_of
 from catenary.cases.studies.waves.theory import WaveTheory, wave_theory
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest
 from catenary.solver.waves.bloch import Period, bloch_waves, period_of

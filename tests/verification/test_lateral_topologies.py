@@ -10,8 +10,8 @@ import pytest
 from measuring import check, line_alone, matrix_of, release, solve_free, start_march, step
 
 from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.load import load_scene
+from catenary.cases.scene.problem import problem_of
 from catenary.meshgen.mesh import LineMesh
 from catenary.solver.model.model import Model
 from catenary.solver.problem.problem import Damping, Problem

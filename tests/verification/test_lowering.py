@@ -21,9 +21,9 @@ from small_lines import (
     train,
 )
 
-from catenary.cases.scene.convert.train.pantograph import pantograph_of
 from catenary.cases.scene.input.toml_input import read_toml
-from catenary.cases.scene.tables.train.pantograph import MultibodyTable
+from catenary.cases.scene.problem import pantograph_of
+from catenary.cases.scene.train.pantograph import MultibodyTable
 from catenary.mbs.build import PantographData
 from catenary.mbs.lowering import Lowering
 from catenary.mbs.lumped_data import LumpedData

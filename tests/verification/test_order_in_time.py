@@ -37,8 +37,8 @@ from small_lines import (
 )
 
 from catenary.cases.run.scene_mesh import mesh_of as mesh_of_scene
-from catenary.cases.scene.convert.problem import problem_of as problem_of_scene
 from catenary.cases.scene.load import load_scene
+from catenary.cases.scene.problem import problem_of as problem_of_scene
 from catenary.meshgen.mesh import CONTACT_WIRE
 from catenary.postproc.evaluate import filters
 from catenary.solver.model.model import Model

@@ -15,9 +15,9 @@ from plain_line import History, PlainLine
 from small_lines import WHOLE, ac_simple_line, en50318_line, mesh_of, problem_of, train
 
 from catenary.cases.run.scene_mesh import mesh_of as mesh_of_scene
-from catenary.cases.scene.convert.problem import problem_of as problem_of_scene
 from catenary.cases.scene.input.case_files import shipped
 from catenary.cases.scene.load import load_scene
+from catenary.cases.scene.problem import problem_of as problem_of_scene
 from catenary.meshgen.mesh import CONTACT_WIRE
 from catenary.meshgen.topologies.line_data import LineData
 from catenary.postproc.evaluate.statistics import contact_statistics

@@ -10,10 +10,9 @@ from measuring import check
 
 from catenary.base.errors import InputError
 from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.convert.line.line import line_of
-from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.input.case_files import shipped
 from catenary.cases.scene.load import load_scene
+from catenary.cases.scene.problem import line_of, problem_of
 from catenary.meshgen.slowest_wave import slowest_wave, supported_wave
 from catenary.meshgen.wires import Role
 from catenary.solver.statics.elasticity import elasticity, middle_span

@@ -9,8 +9,8 @@ import pytest
 from measuring import check
 
 from catenary.base.errors import InputError
-from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.load import load_scene
+from catenary.cases.scene.problem import problem_of
 from catenary.mbs.mechanism.pantograph_data import MultibodyData, reduced, stand
 from catenary.mbs.rigid.forces import PointForce
 from catenary.mbs.rigid.reversed_system import turned_round

@@ -17,8 +17,8 @@ from windowed import apart
 from windowed import march as march_in_window
 
 from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.load import load_scene
+from catenary.cases.scene.problem import problem_of
 from catenary.cases.studies.hard import runs as hard_runs
 from catenary.solver.problem.window import EXACT, WindowChoice
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest

@@ -16,8 +16,8 @@ from measuring import COMM
 
 from catenary.cases.run.describe.arrivals import arrival_facts, wave_line
 from catenary.cases.run.describe.wave_arrivals import Course, from_far_end
-from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.load import load_scene
+from catenary.cases.scene.problem import problem_of
 from catenary.cases.studies.sweep.jobs import make_jobs
 from catenary.cases.studies.sweep.run_jobs import run_jobs
 from catenary.cases.studies.sweep.variants import parse_vary, product

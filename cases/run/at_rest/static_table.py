@@ -8,7 +8,7 @@ import numpy as np
 
 from catenary.cases.run.at_rest.installed import installed
 from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.convert.problem import problem_of
+from catenary.cases.scene.problem import problem_of
 from catenary.cases.scene.scene import Scene
 from catenary.cases.terminal.terminal_text import static_text
 from catenary.postproc.channels.header import line_datasets, static_datasets

@@ -10,7 +10,7 @@ import numpy as np
 from catenary.base.errors import InputError
 from catenary.cases.run.describe.temperatures import temperature_text
 from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.convert.problem import problem_of
+from catenary.cases.scene.problem import problem_of
 from catenary.cases.scene.scene import Scene
 from catenary.solver.statics.tension_along import over_temperatures
 

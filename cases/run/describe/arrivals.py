@@ -17,7 +17,7 @@ from catenary.cases.run.describe.wave_arrivals import (
     reflection_felt,
     run_in_for,
 )
-from catenary.cases.scene.convert.problem import problem_of
+from catenary.cases.scene.problem import problem_of
 from catenary.cases.scene.scene import Scene
 from catenary.meshgen.line import Line
 from catenary.meshgen.slowest_wave import bends, slowest_wave_of, wave_of_two_spans

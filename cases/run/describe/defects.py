@@ -4,18 +4,20 @@ from __future__ import annotations
 
 from typing import Any
 
-from catenary.cases.scene.convert.line.defects import place_of, stretch_of
-from catenary.cases.scene.scene import Scene
-from catenary.cases.scene.tables.line.imperfections.defects import (
+from catenary.cases.scene.line.imperfections import (
     Defect,
     HardSpotTable,
+    HeightTable,
     KinkTable,
+    LengthsTable,
     LooseClampTable,
     MissingDropperTable,
     WornWireTable,
     WrongTensionTable,
+    place_of,
+    stretch_of,
 )
-from catenary.cases.scene.tables.line.imperfections.irregularities import HeightTable, LengthsTable
+from catenary.cases.scene.scene import Scene
 from catenary.meshgen.line import Line
 from catenary.meshgen.wires import Role
 from catenary.postproc.evaluate.wording import counted

@@ -4,9 +4,14 @@ from __future__ import annotations
 
 from typing import Any
 
-from catenary.cases.scene.convert.incidents import at_step, dropper_place
+from catenary.cases.scene.run.incidents import (
+    DropperBreakTable,
+    Incident,
+    TensionLossTable,
+    at_step,
+    dropper_place,
+)
 from catenary.cases.scene.scene import Scene
-from catenary.cases.scene.tables.run.incidents import DropperBreakTable, Incident, TensionLossTable
 from catenary.meshgen.line import Line
 from catenary.solver.problem.problem import Problem
 

@@ -20,7 +20,7 @@ from catenary.cases.run.recording import (
     snapshot_bytes,
     train_of,
 )
-from catenary.cases.scene.convert.course import resolved
+from catenary.cases.scene.problem import resolved
 from catenary.postproc.channels.line_record import GZIP
 from catenary.postproc.files.hdf5.chunk_shapes import Chunk, chunks_of
 from catenary.solver.problem.problem import Problem

@@ -19,9 +19,9 @@ from catenary.cases.run.recording import (
     extent_of,
     recording_of,
 )
-from catenary.cases.scene.checks.line.mesh_size import size_of
-from catenary.cases.scene.convert.problem import problem_of
+from catenary.cases.scene.checks.mesh_size import size_of
 from catenary.cases.scene.cost_model import estimate_march, estimate_memory
+from catenary.cases.scene.problem import problem_of
 from catenary.cases.scene.scene import Scene
 from catenary.mbs.lumped_data import LumpedData
 from catenary.meshgen.mesh import LineMesh

@@ -14,8 +14,8 @@ from catenary.cases.run.describe.pantographs import kind_lines
 from catenary.cases.run.planning.file_sizes import FileSizes
 from catenary.cases.run.planning.needs import Needs, needs_with_mesh, simulated_time
 from catenary.cases.run.recording import extent_of
-from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.cost_model import estimate_march
+from catenary.cases.scene.problem import problem_of
 from catenary.cases.scene.scene import Scene
 from catenary.meshgen.slowest_wave import slowest_wave
 from catenary.postproc.evaluate.wording import counted

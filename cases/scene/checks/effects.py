@@ -7,15 +7,15 @@ import functools
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from catenary.cases.scene.convert.line.parts import hanging_table
-from catenary.cases.scene.input.faults import Fault
-from catenary.cases.scene.input.origin import shown
+from catenary.cases.scene.input.faults import Fault, shown
 from catenary.cases.scene.keys.error_sentences import refusal
+from catenary.cases.scene.line.line_data import hanging_table
 from catenary.solver.effects import all_effects as effects
 from catenary.solver.effects.effect import Limit
 
 if TYPE_CHECKING:
     from catenary.cases.scene.scene import Scene
+
 
 # Effects that are off by default and need a value in the scene: the key that holds it.
 _DATA_OF = {
@@ -48,7 +48,7 @@ def check_chosen_act(scene: Scene) -> Iterator[Fault]:
     One that lifts a limit is a permission, of which a scene need not make use. In a calm, such as
     one of the variants of a sweep, those of the wind may stay on.
     """
-    from catenary.cases.scene.convert.problem import problem_of
+    from catenary.cases.scene.problem import problem_of
 
     if scene.origin.recorded:
         return
@@ -73,7 +73,7 @@ def _calmed(scene: Scene) -> set[str]:
 
 def check_requirements_of_defaults(scene: Scene) -> Iterator[Fault]:
     """Of effects that are on by default, unless the scene holds nothing for them to act on."""
-    from catenary.cases.scene.convert.problem import problem_of
+    from catenary.cases.scene.problem import problem_of
 
     problem = functools.cache(lambda: problem_of(scene))
     for name, effect in effects.registry().items():

@@ -11,9 +11,18 @@ import difflib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from catenary.base.errors import InputError
+from catenary.cases.scene.checks.air import (
+    check_crosswind,
+    check_tunnels,
+    check_uplift,
+    check_wind,
+    has_front,
+)
+from catenary.cases.scene.checks.defects import check_defects
+from catenary.cases.scene.checks.droppers import check_dropper_lengths, check_droppers_inside_spans
 from catenary.cases.scene.checks.effects import (
     check_chosen_act,
     check_effect_data,
@@ -21,48 +30,34 @@ from catenary.cases.scene.checks.effects import (
     check_requirements_of_chosen,
     check_requirements_of_defaults,
 )
-from catenary.cases.scene.checks.line.along import check_along
-from catenary.cases.scene.checks.line.defects import check_defects
-from catenary.cases.scene.checks.line.droppers import (
-    check_dropper_lengths,
-    check_droppers_inside_spans,
+from catenary.cases.scene.checks.ends import check_ends
+from catenary.cases.scene.checks.free import check_free_droppers
+from catenary.cases.scene.checks.idle import check_idle
+from catenary.cases.scene.checks.incidents import check_incidents
+from catenary.cases.scene.checks.mesh_size import size_faults
+from catenary.cases.scene.checks.motion import check_along, check_lateral
+from catenary.cases.scene.checks.numerics import (
+    check_contact,
+    check_iterations,
+    check_scheme,
+    check_window,
 )
-from catenary.cases.scene.checks.line.ends import check_ends
-from catenary.cases.scene.checks.line.free_places import check_free_droppers
-from catenary.cases.scene.checks.line.idle import check_idle
-from catenary.cases.scene.checks.line.lateral import check_lateral
-from catenary.cases.scene.checks.line.mesh_size import size_faults
-from catenary.cases.scene.checks.line.topology import check_names, check_parts, check_topology
-from catenary.cases.scene.checks.line.twins import check_twins
-from catenary.cases.scene.checks.run.contact import check_contact
-from catenary.cases.scene.checks.run.incidents import check_incidents
-from catenary.cases.scene.checks.run.iterations import check_iterations
-from catenary.cases.scene.checks.run.output import check_output, check_recorded_parts
-from catenary.cases.scene.checks.run.scheme import check_scheme
-from catenary.cases.scene.checks.run.usual import usual_faults
-from catenary.cases.scene.checks.run.wind import check_wind
-from catenary.cases.scene.checks.run.window import check_window
-from catenary.cases.scene.checks.train.aerodynamics import (
-    check_crosswind,
-    check_tunnels,
-    check_uplift,
-    has_front,
-)
-from catenary.cases.scene.checks.train.laws import check_laws
-from catenary.cases.scene.checks.train.pantograph import check_mechanisms, check_pantographs
-from catenary.cases.scene.checks.train.vehicle import check_vehicle
-from catenary.cases.scene.convert.course import end_of, strips_ahead
-from catenary.cases.scene.convert.line.line import line_data_of
-from catenary.cases.scene.input.faults import Fault, SceneError, UnfitScene
+from catenary.cases.scene.checks.pantographs import check_laws, check_mechanisms, check_pantographs
+from catenary.cases.scene.checks.topology import check_names, check_parts, check_topology
+from catenary.cases.scene.checks.twins import check_twins
+from catenary.cases.scene.checks.vehicle import check_vehicle
+from catenary.cases.scene.input.faults import Fault, Origin, SceneError, UnfitScene
 from catenary.cases.scene.keys.error_sentences import refusal, unknown_key
 from catenary.cases.scene.keys.keys import is_known, known_keys
+from catenary.cases.scene.keys.units import unit_of
+from catenary.cases.scene.keys.usual_values import USUAL, unit_guess
+from catenary.cases.scene.problem import end_of, line_data_of, strips_ahead
+from catenary.cases.scene.scene import Scene
 from catenary.meshgen.slowest_wave import bends, slowest_wave
 from catenary.meshgen.topologies.all_topologies import make_line
 from catenary.meshgen.topologies.line_data import LineData
+from catenary.postproc.record.snapshots.blocks import OTHER_PARTS
 from catenary.solver.effects.effect import Limit
-
-if TYPE_CHECKING:
-    from catenary.cases.scene.scene import Scene
 
 # Two heads cannot stand closer on a roof; their contacts would also share one finite element.
 MIN_SEPARATION = 1.0
@@ -311,6 +306,61 @@ def _mesh_file(scene: Scene) -> Iterator[Fault]:
         found = False
     if not found:
         yield _refusal(scene, "mesh.file", str(path), "there is no such file")
+
+
+def check_output(scene: Scene) -> Iterator[Fault]:
+    """Spans that the line does not have."""
+    output, n = scene.output, scene.line.n_spans
+    for key in ("line_channels_spans", "field_spans"):
+        spans = getattr(output, key)
+        if spans is not None and spans[1] > n:
+            why = f"the line has the spans 1 to {n}"
+            yield refusal(scene.origin, f"output.{key}", spans, why)
+
+
+def check_recorded_parts(scene: Scene, line: LineData) -> Iterator[Fault]:
+    """Parts that the line does not have."""
+    if scene.output.field_parts is None:
+        return
+    parts = [*(wire.name for wire in make_line(line).wires), *OTHER_PARTS]
+    for part in scene.output.field_parts:
+        if part not in parts:
+            why = f"this line has {', '.join(parts)}"
+            yield refusal(scene.origin, "output.field_parts", part, why)
+
+
+_MEANT = ", or case.accept_unusual = true if it is meant"
+
+
+def usual_faults(scene: Scene) -> Iterator[Fault]:
+    """A fault for every number that was probably written in another unit.
+
+    None in a scene that says with ``case.accept_unusual`` that its numbers are meant.
+    """
+    if scene.case.accept_unusual:
+        return
+    plain = scene.model_dump(exclude_none=True)
+    for pattern in USUAL:
+        yield from _faults(plain, pattern.split("."), "", scene.origin)
+
+
+def _faults(value: Any, parts: list[str], key: str, origin: Origin) -> Iterator[Fault]:
+    if parts and isinstance(value, list):
+        for i, entry in enumerate(value):
+            yield from _faults(entry, parts, f"{key}.{i}", origin)
+        return
+    if parts:
+        inner = value if isinstance(value, dict) else {}
+        for name in inner if parts[0] == "*" else [parts[0]] if parts[0] in inner else []:
+            below = f"{key}.{name}" if key else name
+            yield from _faults(inner[name], parts[1:], below, origin)
+        return
+    for number in value if isinstance(value, list) else [value]:
+        guess = unit_guess(key, number)
+        if guess:
+            unit = unit_of(key)
+            yield Fault(key, f"{key} is {number:.12g} {unit} {origin.of(key)}; {guess}{_MEANT}")
+            return
 
 
 # Checks that need no other one.

@@ -1,10 +1,70 @@
-"""What is wrong with a scene: all of it, each with its key and one sentence."""
+"""Faults of a scene: where its keys were written, sentences about them, errors that hold them."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
 
 from catenary.base.errors import Fault, InputError
+from catenary.cases.scene.input.plain_text import escaped, plain, steers
+
+_SHOWN, _SOME, _DEEP = 60, 8, 3
+COMMAND_LINE = "on the command line (--set)"
+
+
+@dataclass(frozen=True)
+class Origin:
+    """Where a scene's keys were written: its file, pairs of a key that was assigned and the place
+    of that, and pairs of a key and the file that its value was read from. Of a scene that a result
+    recorded every key is written, also what its author left to the defaults."""
+
+    file: str
+    overridden: tuple[tuple[str, str], ...] = ()
+    taken_in: tuple[tuple[str, str], ...] = ()
+    recorded: bool = False
+
+    def of(self, key: str) -> str:
+        """Place of a key, with its preposition, for use in a sentence."""
+        for above, file in self.taken_in:
+            if key == above or key.startswith(above + "."):
+                return f"in {file}"
+        for given, where in reversed(self.overridden):
+            if key == given or key.startswith(given + ".") or given.startswith(key + "."):
+                return where
+        return f"in {self.file}"
+
+    def is_overridden(self, key: str) -> bool:
+        """Whether just this key was assigned."""
+        return any(key == given for given, _ in self.overridden)
+
+
+def shown(value: Any) -> str:
+    """A value as a person would write it, shortened."""
+    return plain(_as_toml(value), _SHOWN)
+
+
+def _as_toml(value: Any, depth: int = 0) -> str:
+    """A value as TOML has it; of what is long or deep, the beginning."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        return f'"{value}"'
+    if isinstance(value, list | tuple | dict) and depth == _DEEP:
+        return "..."
+    if isinstance(value, list | tuple):
+        some = ", ".join(_as_toml(one, depth + 1) for one in value[:_SOME])
+        return f"[{some}{', ...' if len(value) > _SOME else ''}]"
+    if isinstance(value, dict):
+        pairs = [f"{key} = {_as_toml(one, depth + 1)}" for key, one in list(value.items())[:_SOME]]
+        return f"{{{', '.join(pairs)}{', ...' if len(value) > _SOME else ''}}}"
+    if value is None:
+        return "nothing"
+    try:
+        return str(value)
+    except ValueError:
+        return "a number of thousands of digits"
+
 
 # More sentences than these nobody reads; the rest is counted.
 MOST_TOLD = 50
@@ -40,3 +100,44 @@ class SceneError(InputError):
 
 class UnfitScene(SceneError):
     """A scene whose values are allowed one by one, and do not fit together or are implausible."""
+
+
+# Where a text may have several lines and tabs.
+_PROSE = ("description", "source", "reason")
+
+
+def text_faults(raw: Any, origin: Origin) -> list[Fault]:
+    """A fault for each key and each text with a control character, ``MOST_TOLD`` at most."""
+    found: list[Fault] = []
+    for fault in _texts(raw, "", origin):
+        found.append(fault)
+        if len(found) == MOST_TOLD:
+            break
+    return found
+
+
+def _texts(value: Any, key: str, origin: Origin) -> Iterator[Fault]:
+    if isinstance(value, str):
+        prose = key.rsplit(".", 1)[-1] in _PROSE
+        for letter in value:
+            if steers(letter) and not (prose and letter in "\n\t\r"):
+                yield Fault(
+                    key,
+                    f'{plain(key)} is "{plain(value, _SHOWN)}" {origin.of(key)}; it must not hold '
+                    f"the control character {escaped(letter)}",
+                )
+                return
+    elif isinstance(value, dict):
+        for name, inner in value.items():
+            below = f"{key}.{name}" if key else str(name)
+            if any(steers(letter) for letter in str(name)):
+                yield Fault(
+                    below,
+                    f"{plain(below, 200)} {origin.of(key)} is a key with a control character",
+                )
+            else:
+                yield from _texts(inner, below, origin)
+    elif isinstance(value, list):
+        for number, inner in enumerate(value):
+            if isinstance(inner, str | dict | list):
+                yield from _texts(inner, f"{key}.{number}", origin)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from catenary.base.errors import InputError
-from catenary.cases.scene.input.origin import COMMAND_LINE, shown
+from catenary.cases.scene.input.faults import COMMAND_LINE, shown
 from catenary.cases.scene.input.plain_text import DEEPEST, decode, plain, read_whole
 
 # A key part and its dot; more of them in a row make a table that is nested too deeply, which would

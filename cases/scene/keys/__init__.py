@@ -1,1 +1,1 @@
-"""Keys of a scene: which there are, their usual values, and sentences about wrong ones."""
+"""Keys of a scene: tables, units, usual values, and sentences about wrong ones."""

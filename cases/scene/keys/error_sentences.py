@@ -8,13 +8,11 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
-from catenary.cases.scene.input.faults import MOST_TOLD, Fault
-from catenary.cases.scene.input.origin import Origin, shown
+from catenary.cases.scene.input.faults import MOST_TOLD, Fault, Origin, shown
 from catenary.cases.scene.input.plain_text import plain
 from catenary.cases.scene.keys.keys import is_known, known_keys, nearest, without_kinds
-from catenary.cases.scene.keys.usual_ranges import unit_guess, usual_range
-from catenary.cases.scene.tables.run.petsc import ELSEWHERE
-from catenary.cases.scene.tables.units import unit_of
+from catenary.cases.scene.keys.units import unit_of
+from catenary.cases.scene.keys.usual_values import unit_guess, usual_range
 
 _LONGEST_KEY = 200  # of one in a sentence
 _LONGEST_TAG = 60
@@ -176,3 +174,10 @@ def _location(loc: Sequence[int | str], raw: Any) -> list[str]:
         else:
             raw = None
     return parts
+
+
+# The end of the sentence on any other option.
+ELSEWHERE = (
+    "is no PETSc option that a scene may give: solver options with bounded values only; all others "
+    "stand on the command line after --"
+)

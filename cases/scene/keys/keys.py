@@ -11,8 +11,8 @@ from typing import Annotated, Any
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from catenary.cases.scene.tables.table import Table
-from catenary.cases.scene.tables.units import SUFFIXES
+from catenary.cases.scene.keys.table import Table
+from catenary.cases.scene.keys.units import SUFFIXES
 from catenary.solver.effects import all_effects as effects
 
 # Stands for an index into a list of tables or for a name that the scene chooses.

@@ -11,7 +11,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from catenary.base.errors import InputError
-from catenary.cases.scene.input.origin import shown
+from catenary.cases.scene.input.faults import shown
 from catenary.cases.studies.accuracy import models
 from catenary.cases.studies.accuracy.axis import DISCRETISATION, MODEL, Axis, Level, Reference
 

@@ -7,9 +7,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 from catenary.base.errors import InputError
-from catenary.cases.scene.convert.course import resolved
 from catenary.cases.scene.input.case_files import find_case
 from catenary.cases.scene.load import load_scene
+from catenary.cases.scene.problem import resolved
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.accuracy.axis import MODEL, Axis, Level, Reference
 from catenary.cases.studies.sweep.jobs import Job

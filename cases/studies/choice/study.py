@@ -16,10 +16,9 @@ from mpi4py import MPI
 from catenary.base.errors import InputError, RunBroken
 from catenary.cases.process.interrupts import Phase
 from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.convert.course import end_of
-from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.input.toml_input import Assigned
 from catenary.cases.scene.load import load_scene
+from catenary.cases.scene.problem import end_of, problem_of
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.choice.switches import Choice, Switch, choice_of
 from catenary.cases.studies.choice.turns import RepeatedMarch, beside, in_turns

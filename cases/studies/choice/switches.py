@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from catenary.cases.scene.checks.line.twins import RELATIVE_MOTION, needs_relative_motion
-from catenary.cases.scene.convert.problem import problem_of
+from catenary.cases.scene.checks.twins import RELATIVE_MOTION, needs_relative_motion
+from catenary.cases.scene.problem import problem_of
 from catenary.solver.effects import all_effects as effects
 from catenary.solver.effects.effect import Effect
 

@@ -17,9 +17,9 @@ from pydantic import Field, ValidationError, model_validator
 
 from catenary.base.errors import InputError
 from catenary.cases.scene.input.toml_input import read_toml
+from catenary.cases.scene.keys.table import Table
 from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.scene import Scene
-from catenary.cases.scene.tables.table import Table
 
 TABLE = Path(__file__).resolve().with_name("hard.toml")
 # The correction's own tolerances, far below what is compared: where wires move along the track,

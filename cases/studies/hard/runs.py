@@ -18,7 +18,7 @@ from scipy.sparse.linalg import spsolve
 from catenary.base.errors import RunBroken
 from catenary.base.parallel import on_root
 from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.convert.problem import problem_of
+from catenary.cases.scene.problem import problem_of
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.hard.balance import LineBalance
 from catenary.postproc.record.run_watch import RunWatch, watch_cadence, watched

@@ -9,7 +9,7 @@ import numpy as np
 
 from catenary.base.errors import InputError
 from catenary.cases.run.describe.pantographs import description_of
-from catenary.cases.scene.convert.train.pantograph import pantograph_of, static_force
+from catenary.cases.scene.problem import pantograph_of, static_force
 from catenary.cases.scene.scene import Scene
 from catenary.mbs.build import PantographData
 from catenary.mbs.mechanism.pantograph_data import MultibodyData, stand

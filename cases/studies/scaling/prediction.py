@@ -17,8 +17,8 @@ from typing import NamedTuple
 from catenary.base.errors import InputError
 from catenary.cases.run.planning.needs import needs_with_mesh
 from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.cost_model import STEP_OVERHEAD
+from catenary.cases.scene.problem import problem_of
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.scaling.messages import Sizes, Wire
 from catenary.solver.effects.build_model import numbering_of

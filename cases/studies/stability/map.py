@@ -14,8 +14,8 @@ import numpy as np
 
 from catenary.base.errors import InputError
 from catenary.cases.scene.load import load_scene
+from catenary.cases.scene.run.numerics import MAX_DT
 from catenary.cases.scene.scene import Scene
-from catenary.cases.scene.tables.run.numerics import MAX_DT
 from catenary.cases.studies.hard.runs import at_rest
 from catenary.cases.studies.stability import from_matrices as theory
 from catenary.cases.studies.stability.by_marching import (

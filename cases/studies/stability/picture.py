@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from catenary.cases.scene.tables.run.numerics import MAX_DT
+from catenary.cases.scene.run.numerics import MAX_DT
 from catenary.cases.studies.stability.map import Limit, StabilityMap, meets
 from catenary.postproc.report.pictures import figures
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from catenary.cases.scene.keys.keys import ANY
-from catenary.cases.scene.tables.units import SUFFIXES, unit_of
+from catenary.cases.scene.keys.units import SUFFIXES, unit_of
 from catenary.cases.terminal.key_list import Key, keys_of_a_scene
 
 STATISTICS_IN_WORDS = {

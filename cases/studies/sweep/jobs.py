@@ -7,8 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from catenary.base.errors import InputError
-from catenary.cases.scene.input.faults import UnfitScene
-from catenary.cases.scene.input.origin import shown
+from catenary.cases.scene.input.faults import UnfitScene, shown
 from catenary.cases.scene.input.toml_input import Assigned
 from catenary.cases.scene.keys.keys import nearest
 from catenary.cases.scene.load import Draft, load_scene

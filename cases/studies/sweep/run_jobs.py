@@ -22,7 +22,7 @@ from catenary.cases.result_folder.output_folder import (
 )
 from catenary.cases.run.planning.needs import Kept, total_size
 from catenary.cases.run.runner import RESULT, run_case
-from catenary.cases.scene.convert.course import resolved
+from catenary.cases.scene.problem import resolved
 from catenary.cases.studies.sweep.done_before import read_record, read_summary, record_text
 from catenary.cases.studies.sweep.jobs import AS_USUAL, Ended, Job, RunOptions
 from catenary.postproc.evaluate.wording import fixed

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from catenary.base.errors import InputError
-from catenary.cases.scene.input.origin import shown
+from catenary.cases.scene.input.faults import shown
 from catenary.cases.scene.input.plain_text import steers
 from catenary.cases.scene.input.toml_input import parse_assignment, read_toml
 from catenary.cases.scene.keys.error_sentences import unknown_key

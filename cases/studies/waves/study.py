@@ -15,9 +15,9 @@ from catenary.cases.result_folder.output_folder import refuse_earlier
 from catenary.cases.run.excited_run import ExcitedRun
 from catenary.cases.run.runner import run_case
 from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.convert.problem import problem_of
-from catenary.cases.scene.input.origin import Origin
+from catenary.cases.scene.input.faults import Origin
 from catenary.cases.scene.load import scene_from
+from catenary.cases.scene.problem import problem_of
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.sweep.output import as_csv
 from catenary.cases.studies.waves import ends, obstacles, pictures

@@ -18,7 +18,7 @@ from mpi4py import MPI
 
 from catenary.base.errors import InputError, RunBroken
 from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.convert.problem import problem_of
+from catenary.cases.scene.problem import problem_of
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.sweep.output import as_csv
 from catenary.cases.studies.told_remarks import remark_lines

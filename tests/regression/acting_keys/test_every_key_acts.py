@@ -21,6 +21,8 @@ from catenary.cases.studies.hard import runs
 ELSEWHERE = re.compile(
     "|".join(
         (
+            # Patterns by numbers of spans: test_planners_tables.
+            r".*\.patterns\.\*\.spans$",
             # Words, files, what is written of a run: test_cases, test_own_mesh, test_petsc_options.
             r"case\b|test\b|petsc\b|output\b|evaluation\b|mesh\.file|.*_file$|.*\.name$",
             # What each effect adds: test_effects_counting.

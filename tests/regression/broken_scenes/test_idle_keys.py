@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 from refusals import SOUND, assert_refused
 
-from catenary.cases.scene.convert.course import resolved
-from catenary.cases.scene.input.origin import Origin
+from catenary.cases.scene.input.faults import Origin
 from catenary.cases.scene.load import load_scene, scene_from
+from catenary.cases.scene.problem import resolved
 from catenary.cases.studies.accuracy.axes import AXES
 
 FREE = Path(__file__).parents[3] / "docs/examples/two_messengers.toml"

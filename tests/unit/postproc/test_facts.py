@@ -16,8 +16,8 @@ import pytest
 
 from catenary.base.errors import InputError
 from catenary.cases.scene.keys.keys import known_keys
+from catenary.cases.scene.keys.units import unit_of
 from catenary.cases.scene.scene import Scene
-from catenary.cases.scene.tables.units import unit_of
 from catenary.mbs.head.strips import Strips, Suspension
 from catenary.mbs.lumped_data import LumpedData
 from catenary.meshgen.mesh import CONTACT_WIRE

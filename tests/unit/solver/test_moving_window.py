@@ -12,8 +12,8 @@ from small_lines import ac_simple_line, mesh_of, numerics, problem_of, train
 
 from catenary.base.errors import InputError
 from catenary.cases.run.scene_mesh import mesh_of as scene_mesh
-from catenary.cases.scene.convert.problem import problem_of as scene_problem
 from catenary.cases.scene.load import load_scene
+from catenary.cases.scene.problem import problem_of as scene_problem
 from catenary.meshgen.mesh import LineMesh
 from catenary.solver.kernels import native
 from catenary.solver.linear.factors import meeting_station, station_factors

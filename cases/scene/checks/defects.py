@@ -1,0 +1,190 @@
+"""Whether irregularities, defects, fittings and incidents can be those of a line."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from catenary.cases.scene.input.faults import Fault
+from catenary.cases.scene.keys.error_sentences import refusal
+from catenary.cases.scene.line.imperfections import (
+    DropperDefectTable,
+    HardSpotTable,
+    KinkTable,
+    WornWireTable,
+    WrongTensionTable,
+    stretch_of,
+)
+from catenary.cases.scene.problem import line_of
+from catenary.cases.scene.run.incidents import DropperBreakTable
+from catenary.meshgen.line import Line
+from catenary.meshgen.slowest_wave import slowest_wave_of
+from catenary.meshgen.topologies.line_data import LineData
+from catenary.meshgen.wires import Role, Wire
+from catenary.postproc.evaluate.wording import counted
+from catenary.solver.effects.effect import Limit
+
+if TYPE_CHECKING:
+    from catenary.cases.scene.scene import Scene
+
+
+# More waves than these along a line take more memory than its motion.
+MOST_WAVES = 400_000
+_TINY = 1e-6  # [m]
+
+
+def check_defects(scene: Scene, data: LineData) -> Iterator[Fault]:
+    """Those that cannot be; names of wires must be known."""
+    line = line_of(scene)
+    yield from _irregularities(scene, line)
+    yield from _fittings(scene, line)
+    seen: dict[tuple[object, ...], str] = {}
+    for i, table in enumerate(scene.defects):
+        key = f"defects.{i}"
+        if isinstance(table, DropperDefectTable):
+            which = table.span, table.dropper
+            found = list(_dropper(scene, line, key, *which))
+            yield from found or _twice(scene, seen, (f"{key}.dropper", table.dropper), which)
+            continue
+        assert isinstance(table, WornWireTable | WrongTensionTable | HardSpotTable | KinkTable)
+        wire = line.wire(table.wire)
+        if isinstance(table, WornWireTable):
+            for name in ("from_m", "to_m"):
+                yield from _place(scene, wire, f"{key}.{name}", getattr(table, name))
+            yield from _worn_twice(scene, i, table)
+        elif isinstance(table, WrongTensionTable):
+            what = "tension", table.wire
+            yield from _twice(scene, seen, (f"{key}.wire", table.wire), what)
+            yield from _tension(scene, line, wire, f"{key}.factor", table.factor)
+        else:
+            yield from _place(scene, wire, f"{key}.at_m", table.at_m)
+            if isinstance(table, KinkTable) and wire.role is not Role.CONTACT:
+                why = "strips run on contact wires only"
+                yield refusal(scene.origin, f"{key}.wire", table.wire, why)
+            elif isinstance(table, KinkTable) and not wire.bending_stiffness:
+                why = f"{wire.name} has no bending stiffness, and so keeps no bend under tension"
+                yield refusal(scene.origin, f"{key}.angle_deg", table.angle_deg, why)
+    yield from _broken_later(scene, seen)
+
+
+def _irregularities(scene: Scene, line: Line) -> Iterator[Fault]:
+    for name in ("contact_wire_height", "running_surface"):
+        table = getattr(scene.irregularities, name)
+        if table is None:
+            continue
+        key, length = f"irregularities.{name}", line.support_positions[-1]
+        for i, (x, _) in enumerate(table.by_place or []):
+            if not -_TINY <= x <= length + _TINY:
+                why = f"the line runs from 0 to {length:g} m"
+                yield refusal(scene.origin, f"{key}.by_place.{i}.0", x, why)
+        if table.standard_deviation_mm is None:
+            continue
+        start, end = stretch_of(table, line)
+        for part, value in (("from_m", table.from_m), ("to_m", table.to_m)):
+            if value is not None and value > length + _TINY:
+                why = f"the line ends at {length:g} m"
+                yield refusal(scene.origin, f"{key}.{part}", value, why)
+        if end <= start and table.to_m is not None:
+            why = f"it must be greater than the {start:g} m where they begin"
+            yield refusal(scene.origin, f"{key}.to_m", table.to_m, why)
+        elif end - start < table.shortest_m:
+            why = f"no wave of shortest_m = {table.shortest_m:g} m fits from {start:g} to {end:g} m"
+            part = "shortest_m" if table.from_m is None else "from_m"
+            yield refusal(scene.origin, f"{key}.{part}", getattr(table, part), why)
+        if (end - start) / table.shortest_m > MOST_WAVES:
+            why = f"it must be at least {(end - start) / MOST_WAVES:.3g} m on {end - start:g} m"
+            yield refusal(scene.origin, f"{key}.shortest_m", table.shortest_m, why)
+    lengths = scene.irregularities.dropper_lengths
+    for i, (span, dropper, _) in enumerate((lengths and lengths.by_dropper) or []):
+        entry = f"irregularities.dropper_lengths.by_dropper.{i}"
+        yield from _dropper(scene, line, entry, int(span), int(dropper), (".0", ".1"))
+
+
+def _fittings(scene: Scene, line: Line) -> Iterator[Fault]:
+    for i, table in enumerate(scene.line.fittings):
+        key, wire = f"line.fittings.{i}", line.wire(table.wire)
+        yield from _place(scene, wire, f"{key}.at_m", table.at_m)
+        end = table.at_m + table.length_m
+        if _is_at(wire, table.at_m) and not _is_at(wire, end):
+            why = f"it would end at {end:g} m, where {wire.name} is not"
+            yield refusal(scene.origin, f"{key}.length_m", table.length_m, why)
+
+
+def _place(scene: Scene, wire: Wire, key: str, x: float) -> Iterator[Fault]:
+    if not _is_at(wire, x):
+        pieces = [f"{piece.x[0]:g} to {piece.x[-1]:g} m" for piece in wire.pieces]
+        more = " and so on" if len(pieces) > 3 else ""
+        why = f"{wire.name} runs from {', '.join(pieces[:3])}{more}"
+        yield refusal(scene.origin, key, x, why)
+
+
+def _is_at(wire: Wire, x: float) -> bool:
+    return any(piece.x[0] - _TINY <= x <= piece.x[-1] + _TINY for piece in wire.pieces)
+
+
+def _dropper(
+    scene: Scene,
+    line: Line,
+    key: str,
+    span: int,
+    dropper: int,
+    parts: tuple[str, str] = (".span", ".dropper"),
+) -> Iterator[Fault]:
+    if span > line.n_spans:
+        why = f"the line has {counted(line.n_spans, 'span')}"
+        yield refusal(scene.origin, key + parts[0], span, why)
+        return
+    n = len(line.droppers_of_span(span - 1))
+    if dropper > n:
+        why = f"span {span} has {counted(n, 'dropper')}"
+        yield refusal(scene.origin, key + parts[1], dropper, why)
+
+
+def _twice(
+    scene: Scene,
+    seen: dict[tuple[object, ...], str],
+    key: tuple[str, object],
+    what: tuple[object, ...],
+) -> Iterator[Fault]:
+    entry = key[0].rsplit(".", 1)[0]
+    if what in seen:
+        why = f"{seen[what]} has this already; take one of them away"
+        yield refusal(scene.origin, *key, why)
+    seen.setdefault(what, entry)
+
+
+def _worn_twice(scene: Scene, i: int, table: WornWireTable) -> Iterator[Fault]:
+    for j, other in enumerate(scene.defects[:i]):
+        if not isinstance(other, WornWireTable) or other.wire != table.wire:
+            continue
+        if other.from_m < table.to_m and table.from_m < other.to_m:
+            why = f"defects.{j} has a stretch of {table.wire} that reaches into this one"
+            yield refusal(scene.origin, f"defects.{i}.from_m", table.from_m, why)
+
+
+def _tension(scene: Scene, line: Line, wire: Wire, key: str, factor: float) -> Iterator[Fault]:
+    most = wire.most_taken
+    if factor * wire.tension <= most:
+        why = (
+            f"wires that are clamped to {wire.name} take {most:g} N of its {wire.tension:g} N: it "
+            f"must be greater than {most / wire.tension:.3g}"
+        )
+        yield refusal(scene.origin, key, factor, why)
+    if wire.role is not Role.CONTACT or not scene.holds(Limit.WAVE_SPEED):
+        return
+    wave = 3.6 * slowest_wave_of(line, wire, factor)
+    if scene.switches()["wrong_tension"] and scene.train.speed_km_h >= wave:
+        why = (
+            f"the wave speed of {wire.name} would be {wave:.1f} km/h, not above train.speed_km_h = "
+            f"{scene.train.speed_km_h:g}, which needs effects.supercritical_speed = true"
+        )
+        yield refusal(scene.origin, key, factor, why)
+
+
+def _broken_later(scene: Scene, seen: dict[tuple[object, ...], str]) -> Iterator[Fault]:
+    for i, incident in enumerate(scene.incidents):
+        if isinstance(incident, DropperBreakTable):
+            entry = seen.get((incident.span, incident.dropper))
+            if entry is not None:
+                why = f"{entry} lets this one carry nothing from the start"
+                yield refusal(scene.origin, f"incidents.{i}.dropper", incident.dropper, why)

@@ -1,0 +1,462 @@
+"""Whether the wires and links of a free line make a line, each where the other is."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from catenary.base.errors import InputError
+from catenary.cases.scene.checks.droppers import droppers_inside
+from catenary.cases.scene.input.faults import Fault
+from catenary.cases.scene.keys.error_sentences import refusal
+from catenary.cases.scene.line.free import (
+    FreeArmsTable,
+    FreeClampsTable,
+    FreeDroppersTable,
+    FreeSupportsTable,
+    FreeWireTable,
+)
+from catenary.cases.scene.line.line_data import (
+    FIXED,
+    TENSIONER,
+    numbered,
+    span_lengths,
+    stretches_of,
+)
+from catenary.cases.scene.problem import line_data_of
+from catenary.meshgen.division import divisions_of
+from catenary.meshgen.geometry import SAME_CUT, Cuts
+from catenary.meshgen.hardware import Clamps
+from catenary.meshgen.mesh import ANCHORS
+from catenary.meshgen.topologies.all_topologies import make_line
+from catenary.meshgen.topologies.free import carriers, hung, in_order
+from catenary.meshgen.topologies.free_data import FreeDroppers, FreeLink, FreeWire
+from catenary.meshgen.topologies.line_data import SHORTEST_GAP, LineData
+
+if TYPE_CHECKING:
+    from catenary.cases.scene.scene import Scene
+
+
+# Names that mean something else in files and among ends.
+TAKEN = (ANCHORS, "droppers", "clamps", "steady_arms", "masts", "pantographs", TENSIONER, FIXED)
+# Tables of other topologies that have defaults, and would be read by none here.
+_ELSEWHERE = {"support": "a link of type supports", "steady_arm": "a link of type steady_arms"}
+# As many as spans of 20 droppers each on the longest line.
+MOST_DROPPERS = 400_000
+_TINY = 1e-6  # [m]
+
+
+def check_free_tables(scene: Scene) -> Iterator[Fault]:
+    """Names, numbers of spans and supports, and ends that cannot be."""
+    for key, instead in _ELSEWHERE.items():
+        if getattr(scene.line, key) != type(getattr(scene.line, key))():
+            why = f"is no part of the topology free; leave it out, and write {instead}"
+            yield Fault(f"line.{key}", f"line.{key} {scene.origin.of(f'line.{key}')} {why}")
+    if scene.line.overlap is not None:
+        key = "line.overlap"
+        yield Fault(
+            key,
+            f"{key} {scene.origin.of(key)} is no part of the topology free; leave it out, and give "
+            "the wires of both sections stretches_m in line.wires",
+        )
+    yield from _names(scene)
+    wires = {wire.name: wire for wire in scene.line.wires or []}
+    if not any(wire.role == "contact" for wire in wires.values()):
+        key = "line.wires"
+        yield Fault(
+            key, f"{key} {scene.origin.of(key)} has no wire of the role contact to run under"
+        )
+    for i, wire in enumerate(scene.line.wires or []):
+        yield from _wire(scene, f"line.wires.{i}", wire, wires)
+    for i, link in enumerate(scene.line.links or []):
+        key = f"line.links.{i}"
+        joined = ("upper", "lower", "wire", "holds")
+        for end in joined:
+            name = getattr(link, end, None)
+            if name is not None:
+                yield from _known(scene, f"{key}.{end}", name, wires)
+        if isinstance(link, FreeDroppersTable | FreeClampsTable) and link.upper == link.lower:
+            why = "a link joins two wires, and lower is this one too"
+            yield refusal(scene.origin, f"{key}.upper", link.upper, why)
+        yield from _numbers(scene, key, link)
+    yield from _circles(scene)
+    yield from _lifted(scene)
+    yield from _slack(scene)
+    yield from _many(scene)
+
+
+def _names(scene: Scene) -> Iterator[Fault]:
+    seen: dict[str, str] = {}
+    entries = [(f"line.wires.{i}", wire.name) for i, wire in enumerate(scene.line.wires or [])]
+    links = [(f"line.links.{i}", link.name) for i, link in enumerate(scene.line.links or [])]
+    for key, name in [*entries, *links]:
+        if name in TAKEN and key.startswith("line.wires"):
+            why = "this name means something else; take another one"
+            yield refusal(scene.origin, f"{key}.name", name, why)
+        if name in seen:
+            why = f"{seen[name]} has this name too; each wire and each link needs one of its own"
+            yield refusal(scene.origin, f"{key}.name", name, why)
+        seen.setdefault(name, key)
+    for _, name in entries:
+        if f"{name}_clamps" in seen:
+            why = f"the clamps at the ends of {name} have this name"
+            yield refusal(scene.origin, f"{seen[f'{name}_clamps']}.name", f"{name}_clamps", why)
+
+
+def _known(scene: Scene, key: str, name: str, wires: Iterable[str]) -> Iterator[Fault]:
+    if name not in wires:
+        near = difflib.get_close_matches(name, list(wires), n=1)
+        meant = f"did you mean {near[0]}? " if near else ""
+        why = f"{meant}line.wires has {', '.join(wires)}"
+        yield refusal(scene.origin, key, name, why)
+
+
+def _wire(
+    scene: Scene, key: str, table: FreeWireTable, wires: dict[str, FreeWireTable]
+) -> Iterator[Fault]:
+    masts = np.concatenate([[0.0], np.cumsum(span_lengths(scene.line))])
+    n, length = scene.line.n_spans, float(masts[-1])
+    for name in ("height_m", "stagger_m"):
+        given = getattr(table, name)
+        if given is not None and len(given) not in (1, n + 1):
+            yield Fault(
+                f"{key}.{name}",
+                f"{key}.{name} {scene.origin.of(f'{key}.{name}')} must be one number or one for "
+                f"each support ({n + 1}), but lists {len(given)}",
+            )
+    beyond = [number for number in table.supports or [] if number > n]
+    if beyond:
+        why = f"the line has the supports 0 to {n}"
+        yield refusal(scene.origin, f"{key}.supports", beyond[0], why)
+        return
+    which = "stretches_m" if table.stretches_m is not None else "from_supports_m"
+    stretches = stretches_of(table, masts)
+    if not stretches:
+        why = "the line has no inner support"
+        yield refusal(scene.origin, f"{key}.{which}", table.from_supports_m, why)
+        return
+    if stretches[0][0] < -_TINY or stretches[-1][1] > length + _TINY:
+        outside = stretches[0] if stretches[0][0] < -_TINY else stretches[-1]
+        why = f"a piece would run from {outside[0]:g} to {outside[1]:g} m, and the line from 0 to"
+        yield refusal(scene.origin, f"{key}.{which}", given_of(table, which), f"{why} {length:g} m")
+        return
+    for one, other in zip(stretches, stretches[1:], strict=False):
+        if other[0] < one[1] + _TINY:
+            why = f"pieces would overlap from {other[0]:g} to {one[1]:g} m"
+            yield refusal(scene.origin, f"{key}.{which}", given_of(table, which), why)
+            return
+    for side in ("start", "end"):
+        yield from _end(scene, f"{key}.{side}", table, getattr(table, side), wires)
+    needs = table.role != "contact" and not {table.start, table.end} & wires.keys()
+    half = table.role != "contact" and not {table.start, table.end} <= wires.keys()
+    if (needs or half) and table.height_m is None and table.course_m is None:
+        yield Fault(
+            f"{key}.height_m",
+            f"{key}.height_m ({table.name}) is missing {scene.origin.of(key)}: nothing else says "
+            "how high its ends are held; give height_m or course_m",
+        )
+
+
+def given_of(table: FreeWireTable, key: str) -> object:
+    """What a table says under a key."""
+    return getattr(table, key)
+
+
+def _end(
+    scene: Scene, key: str, table: FreeWireTable, given: str | None, wires: dict[str, FreeWireTable]
+) -> Iterator[Fault]:
+    if given is None or given in (TENSIONER, FIXED):
+        return
+    if given == table.name:
+        yield refusal(scene.origin, key, given, "a wire cannot be clamped to itself")
+    elif given not in wires:
+        near = difflib.get_close_matches(given, [*wires, TENSIONER, FIXED], n=1)
+        meant = f"did you mean {near[0]}? " if near else ""
+        why = f"{meant}it must be {TENSIONER}, {FIXED} or a wire of {', '.join(wires)}"
+        yield refusal(scene.origin, key, given, why)
+    elif {table.start, table.end} <= wires.keys() and table.start != table.end:
+        if key.endswith("end"):
+            why = (
+                f"it starts on {table.start}: both ends must be clamped to one wire, or one be "
+                f"{TENSIONER} or {FIXED}, for it to be known whose tension the wire takes"
+            )
+            yield refusal(scene.origin, key, given, why)
+
+
+def _numbers(
+    scene: Scene,
+    key: str,
+    link: FreeDroppersTable | FreeClampsTable | FreeSupportsTable | FreeArmsTable,
+) -> Iterator[Fault]:
+    """Numbers of spans and supports that the line does not have."""
+    n = scene.line.n_spans
+    for name, first, what in (("spans", 1, "spans"), ("supports", 0, "supports")):
+        beyond = [number for number in getattr(link, name, None) or [] if number > n]
+        if beyond:
+            yield refusal(
+                scene.origin, f"{key}.{name}", beyond[0], f"the line has the {what} {first} to {n}"
+            )
+
+
+def _circles(scene: Scene) -> Iterator[Fault]:
+    """Wires that are clamped to each other, or hang from each other, in a circle."""
+    wires = scene.line.wires or []
+    names = {wire.name for wire in wires}
+    ends = {wire.name: [e for e in (wire.start, wire.end) if e in names] for wire in wires}
+    hanging: dict[str, list[str]] = {wire.name: [] for wire in wires}
+    for link in scene.line.links or []:
+        if isinstance(link, FreeDroppersTable | FreeClampsTable) and link.upper in names:
+            hanging[link.upper].append(link.lower)
+    for key, what, after in (
+        ("line.wires", "clamped to", ends),
+        ("line.links", "hanging from", hanging),
+    ):
+        if any(name in others for name, others in after.items()):
+            continue  # reported as a link to itself
+        try:
+            in_order(after.items())
+        except InputError as circle:
+            yield Fault(key, f"{key} {scene.origin.of(key)} has wires {what} each other: {circle}")
+
+
+def _lifted(scene: Scene) -> Iterator[Fault]:
+    """Supports that are to hold a wire which nothing but droppers joins to their own."""
+    wires, links = scene.line.wires or [], scene.line.links or []
+    joined = [(wire.name, end) for wire in wires for end in (wire.start, wire.end) if end]
+    joined += [(link.upper, link.lower) for link in links if isinstance(link, FreeClampsTable)]
+    for i, link in enumerate(links):
+        if not isinstance(link, FreeSupportsTable) or link.holds is None:
+            continue
+        moved, before = {link.wire}, 0
+        while len(moved) > before:
+            before = len(moved)
+            moved |= {name for pair in joined if moved & set(pair) for name in pair}
+            moved -= {TENSIONER, FIXED}
+        if link.holds not in moved:
+            why = (
+                f"no clamp joins it to {link.wire}, which the supports carry, and droppers are cut "
+                f"for its height: it must be one of {', '.join(sorted(moved))}"
+            )
+            yield refusal(scene.origin, f"line.links.{i}.holds", link.holds, why)
+
+
+def _slack(scene: Scene) -> Iterator[Fault]:
+    """Droppers that would do different things when slack, of which there is one for the line."""
+    links = [
+        (i, link)
+        for i, link in enumerate(scene.line.links or [])
+        if isinstance(link, FreeDroppersTable)
+    ]
+    for i, link in links[1:]:
+        for name in ("residual_stiffness_ratio", "slack_damping"):
+            first = getattr(links[0][1], name)
+            if getattr(link, name) != first:
+                why = f"it must be the {first} of line.links.{links[0][0]}, as for all droppers"
+                yield refusal(scene.origin, f"line.links.{i}.{name}", getattr(link, name), why)
+
+
+def _many(scene: Scene) -> Iterator[Fault]:
+    """More droppers than any line of so many spans has."""
+    n = 0
+    for i, link in enumerate(scene.line.links or []):
+        if isinstance(link, FreeDroppersTable):
+            spans = len(link.spans) if link.spans is not None else scene.line.n_spans
+            patterns = [len(pattern.positions_m) for pattern in link.patterns or []]
+            each = max([len(link.positions_m or []), link.count or 0, *patterns])
+            n += len(link.at_m) if link.at_m is not None else spans * each
+            if n > MOST_DROPPERS:
+                key = f"line.links.{i}"
+                yield Fault(
+                    key,
+                    f"{key} ({link.name}) {scene.origin.of(key)} and the links before it have {n} "
+                    f"droppers, but at most {MOST_DROPPERS} are allowed",
+                )
+                return
+
+
+# A wire may hang on nothing over so many times the longest span.
+MOST_SPANS = 1.5
+
+
+def check_free_droppers(scene: Scene, line: LineData) -> Iterator[Fault]:
+    """Of each link the first span whose droppers are outside or too close together."""
+    for i, table in enumerate(scene.line.links or []):
+        if isinstance(table, FreeDroppersTable) and table.at_m is None:
+            spans = numbered(line.span_lengths)
+            own = spans if table.spans is None else {n: spans[n] for n in table.spans}
+            yield from droppers_inside(scene, f"line.links.{i}", table, own)
+
+
+def check_free_places(scene: Scene, line: LineData) -> Iterator[Fault]:
+    """Links where a wire is not, places too close, wires that hang on nothing or cross."""
+    assert line.wires is not None and line.links is not None
+    wires = {wire.name: wire for wire in line.wires}
+    found = [
+        fault
+        for i, link in enumerate(line.links)
+        for fault in _on_wires(scene, f"line.links.{i}", link, wires)
+    ]
+    for i, wire in enumerate(line.wires):
+        found += _clamped_on(scene, f"line.wires.{i}", wire, wires)
+        found += _heights(scene, f"line.wires.{i}", wire, line)
+    found += [] if found else _close(scene, line)
+    found += [] if found else _twice(scene, line)
+    for i, wire in enumerate([] if found else line.wires):
+        found += _carried(scene, f"line.wires.{i}", wire, line)
+        found += _left(scene, f"line.wires.{i}", wire, line)
+    yield from found or _crossing(scene, line)
+
+
+def places_of(line: LineData) -> np.ndarray:
+    """All places at which wires are cut, ascending, each once [m]."""
+    assert line.wires is not None and line.links is not None
+    parts = [line.support_positions]
+    parts += [np.array(wire.stretches).ravel() for wire in line.wires]
+    parts += [np.array(_places(link)) for link in line.links]
+    x = np.concatenate(parts)
+    x = x[np.argsort(x, kind="stable")]
+    return x[np.diff(x, prepend=-np.inf) > SAME_CUT]
+
+
+def free_counts(scene: Scene) -> tuple[int, dict[str, int]]:
+    """Numbers of droppers, and of nodes of each wire, of a free line.
+
+    Raises
+    ------
+    InputError
+        If droppers are not declared for one of the span lengths.
+    """
+    line = line_data_of(scene)
+    assert line.wires is not None and line.links is not None
+    x = places_of(line)
+    cuts = Cuts(x, np.isin(x, line.support_positions), ())
+    gaps = divisions_of(cuts, scene.mesh.elements_per_gap, scene.mesh.support_refinement)
+    before = np.concatenate([[0], np.cumsum(gaps)])
+    nodes = {}
+    for wire in line.wires:
+        ends = cuts.of(np.array(wire.stretches))
+        nodes[wire.name] = int((np.diff(before[ends], axis=1) + 1).sum())
+    droppers = sum(len(link.lower_x) for link in line.links if isinstance(link, FreeDroppers))
+    return droppers, nodes
+
+
+def _places(link: FreeLink) -> tuple[float, ...]:
+    return link.lower_x if isinstance(link, FreeDroppers) else link.x
+
+
+def _on_wires(
+    scene: Scene, key: str, link: FreeLink, wires: dict[str, FreeWire]
+) -> Iterator[Fault]:
+    pair = isinstance(link, FreeDroppers | Clamps)
+    for end in ("upper", "lower") if pair else ("wire",):
+        wire = wires[getattr(link, end)]
+        out = next((x for x in _places(link) if not wire.passes(x)), None)
+        if out is not None:
+            runs = ", ".join(f"{start:g} to {stop:g}" for start, stop in wire.stretches[:3])
+            more = " and so on" if len(wire.stretches) > 3 else ""
+            why = f"{wire.name} does not pass {out:g} m, only {runs} m{more}"
+            yield refusal(scene.origin, f"{key}.{end}", wire.name, why)
+
+
+def _clamped_on(
+    scene: Scene, key: str, wire: FreeWire, wires: dict[str, FreeWire]
+) -> Iterator[Fault]:
+    for end, name in enumerate(wire.clamped_to):
+        out = [] if not name else [s[end] for s in wire.stretches if not wires[name].passes(s[end])]
+        if out:
+            why = f"{name} does not pass {out[0]:g} m, where this wire would be clamped to it"
+            yield refusal(scene.origin, f"{key}.{('start', 'end')[end]}", name, why)
+
+
+def _heights(scene: Scene, key: str, wire: FreeWire, line: LineData) -> Iterator[Fault]:
+    if wire.heights is None and wire.name in hung(line):
+        yield Fault(
+            f"{key}.height_m",
+            f"{key}.height_m ({wire.name}) is missing {scene.origin.of(key)}: droppers hang this "
+            "wire or supports hold it, at a height that nothing says",
+        )
+
+
+def _close(scene: Scene, line: LineData) -> Iterator[Fault]:
+    """Cuts that are too close to each other to be meant."""
+    x = places_of(line)
+    close = np.flatnonzero(np.diff(x) < SHORTEST_GAP)
+    if close.size:
+        one, other = x[close[0]], x[close[0] + 1]
+        yield Fault(
+            "line.links",
+            f"line.links and line.wires {scene.origin.of('line.links')} name the places "
+            f"{one:.10g} and {other:.10g} m; places must be one, or {SHORTEST_GAP:g} m apart",
+        )
+
+
+def _twice(scene: Scene, line: LineData) -> Iterator[Fault]:
+    """Two links that would hold the same place of a wire at its height."""
+    assert line.links is not None
+    seen: dict[tuple[str, int], int] = {}
+    for i, link in enumerate(line.links):
+        if not isinstance(link, FreeDroppers):
+            continue
+        for x in link.lower_x:
+            j = seen.setdefault((link.lower, round(x / SHORTEST_GAP)), i)
+            if j != i:
+                why = f"line.links.{j} has a dropper of {link.lower} at {x:g} m already"
+                yield refusal(scene.origin, f"line.links.{i}.lower", link.lower, why)
+                return
+
+
+def _carried(scene: Scene, key: str, wire: FreeWire, line: LineData) -> Iterator[Fault]:
+    """Wires that nothing carries over much more than the longest span."""
+    at, longest = carriers(line, wire), max(line.span_lengths)
+    for start, end in wire.stretches:
+        own = at[(at > start - _TINY) & (at < end + _TINY)]
+        gap = np.diff(own)
+        far = np.flatnonzero(gap > MOST_SPANS * longest)
+        if far.size:
+            a, b = own[far[0]], own[far[0] + 1]
+            why = (
+                f"it hangs on nothing from {a:g} to {b:g} m, and the longest span is {longest:g} "
+                "m: give it droppers, clamps or supports there"
+            )
+            yield refusal(scene.origin, f"{key}.name", wire.name, why)
+            return
+
+
+def _left(scene: Scene, key: str, wire: FreeWire, line: LineData) -> Iterator[Fault]:
+    """Wires whose tension is taken by those that are clamped to them."""
+    assert line.wires is not None
+    takers = [other for other in line.wires if wire.name in other.bearers]
+    starts = sorted({s[0] for other in takers for s in other.stretches})
+    for x in starts:
+        own = [one for one in takers if any(s[0] <= x < s[1] for s in one.stretches)]
+        taken = sum(one.conductor.tension for one in own)
+        if taken >= wire.conductor.tension:
+            why = (
+                f"it must be more than the {taken:g} N that {' and '.join(o.name for o in own)} "
+                f"take of it at {x:g} m"
+            )
+            yield refusal(scene.origin, f"{key}.tension_N", wire.conductor.tension, why)
+            return
+
+
+def _crossing(scene: Scene, line: LineData) -> Iterator[Fault]:
+    """Droppers whose upper wire is expected to hang below the lower one."""
+    assert line.links is not None
+    made = make_line(line)
+    for i, link in enumerate(line.links):
+        if not isinstance(link, FreeDroppers):
+            continue
+        x = np.array(link.lower_x)
+        upper, lower = (made.wire(name).points(x)[:, 2] for name in (link.upper, link.lower))
+        worst = int(np.argmin(upper - lower))
+        if not upper[worst] > lower[worst]:
+            why = (
+                f"at {x[worst]:g} m it is expected {lower[worst] - upper[worst]:.3f} m below "
+                f"{link.lower}, which hangs from it: raise its height_m or its tension_N, or let "
+                "the other wire hang lower"
+            )
+            yield refusal(scene.origin, f"line.links.{i}.upper", link.upper, why)
+            return

@@ -1,1 +1,0 @@
-"""What a line must hold beyond the range of each key."""

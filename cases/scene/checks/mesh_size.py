@@ -1,0 +1,179 @@
+"""How large a scene's mesh will be, counted from its tables before anything is made of them."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from catenary.base.errors import InputError
+from catenary.cases.scene.checks.free import free_counts
+from catenary.cases.scene.checks.twins import RELATIVE_MOTION
+from catenary.cases.scene.cost_model import estimate_memory, estimate_start
+from catenary.cases.scene.input.faults import Fault, SceneError
+from catenary.cases.scene.line.free import FreeDroppersTable
+from catenary.cases.scene.line.line import LineTable, TransitionTable
+from catenary.cases.scene.line.line_data import free_wires, overlaps_of, span_lengths
+from catenary.cases.scene.problem import line_of
+from catenary.meshgen.division import divisions_of
+from catenary.meshgen.geometry import find_cuts
+from catenary.meshgen.line import Line
+from catenary.meshgen.wires import Wire
+from catenary.solver.effects import all_effects as effects
+
+if TYPE_CHECKING:
+    from catenary.cases.scene.scene import Scene
+
+
+# 20 000 spans of ten gaps with ten elements each; their run takes some 7 GB.
+MOST_NODES = 4_000_000
+# From here on a mesh takes longer than one waits without a word.
+MANY_NODES = 50_000
+
+
+class Size(NamedTuple):
+    """Number of spans, droppers, nodes of all wires, and unknowns of a line, how many kinds of
+    spans there are, and whether matrices are made of what a window of spans needs alone."""
+
+    spans: int
+    droppers: int
+    nodes: int
+    unknowns: int
+    kinds: int
+    by_pieces: bool = False
+
+    def sentence(self) -> str:
+        """What it is and what it takes, in one sentence."""
+        memory = estimate_memory(self.unknowns, by_pieces=self.by_pieces)
+        start = estimate_start(self.nodes, 0.0 if self.by_pieces else self.kinds / self.spans)
+        return (
+            f"{self.spans} spans and {self.droppers} droppers make {self.nodes} nodes and "
+            f"{self.unknowns} unknowns: its start takes about {start:.0f} s and a "
+            f"run about {memory / 1e9:.1f} GB of memory on one rank"
+        )
+
+
+def size_of(scene: Scene) -> Size | None:
+    """The size of the mesh that a scene's line will have; None if it brings its own, or if its line
+    cannot be made, which other checks report.
+
+    Counted on a line that has each length of span once: a line of thousands of spans is not made.
+    """
+    if scene.mesh.file is not None:
+        return None
+    if scene.line.wires is not None:
+        return _of_free_line(scene)
+    lengths = span_lengths(scene.line)
+    try:
+        sample, times = _sample(scene, lengths)
+        cuts = find_cuts(sample)
+    except (InputError, SceneError):
+        return None
+    gaps = divisions_of(cuts, scene.mesh.elements_per_gap, scene.mesh.support_refinement)
+    masts = sample.support_positions
+    span_of_gap = np.searchsorted(masts, 0.5 * (cuts.x[1:] + cuts.x[:-1])) - 1
+    weighted = gaps * times[span_of_gap]
+    nodes = dict.fromkeys((wire.name for wire in sample.wires), 0)
+    for piece in cuts.pieces:
+        last = piece.first + len(piece.points) - 1
+        # As often as the section that begins there; of less than a span, as the support it goes by.
+        whole = piece.points[-1, 0] - piece.points[0, 0] >= min(lengths)
+        often = times[span_of_gap[piece.first if whole else last - 1]]
+        nodes[piece.wire] += int(weighted[piece.first : last].sum() + often)
+    hanging = np.searchsorted(masts, sample.dropper_x) - 1
+    together = () if scene.switches()[RELATIVE_MOTION] else {one for one, _ in sample.twins}
+    own = [wire for wire in sample.wires if wire.name not in together]
+    return _size(scene, int(times[hanging].sum()), nodes, own)
+
+
+def _of_free_line(scene: Scene) -> Size | None:
+    """The size of a line whose wires are listed, counted without making it."""
+    try:
+        n_droppers, nodes = free_counts(scene)
+        listed = free_wires(scene.line, span_lengths(scene.line)) or ()
+    except InputError:
+        return None
+    wires = [Wire.of(own.conductor, own.name, own.role, ()) for own in listed]
+    return _size(scene, n_droppers, nodes, wires)
+
+
+def _size(scene: Scene, n_droppers: int, nodes: dict[str, int], wires: Sequence[Wire]) -> Size:
+    """The size of a line with nodes of wires by name, of which ``wires`` have unknowns."""
+    switches = scene.switches()
+    chosen = (effect for name, effect in effects.registry().items() if switches[name])
+    groups = effects.unknown_groups(chosen, wires)
+    unknowns = sum(nodes[wire] * len(own) for group in groups for wire, own in group.items())
+    n_spans, irregular = scene.line.n_spans, scene.irregularities
+    kinds = max(len(set(span_lengths(scene.line))), kinds_by_number(scene.line))
+    if irregular.contact_wire_height is not None or irregular.dropper_lengths is not None:
+        kinds = n_spans
+    by_pieces = scene.window.mode == "bounded" and scene.window.tolerance is None
+    return Size(n_spans, n_droppers, sum(nodes.values()), unknowns, kinds, by_pieces)
+
+
+def kinds_by_number(table: LineTable) -> int:
+    """How many kinds of spans a line has by the numbers of its spans, 0 if lengths tell them."""
+    hung = [table.dropper, table.auxiliary_wire and table.auxiliary_wire.dropper]
+    hung += [link for link in table.links or () if isinstance(link, FreeDroppersTable)]
+    patterns = [pattern for own in hung if own for pattern in own.patterns or ()]
+    return len(patterns) if any(pattern.spans for pattern in patterns) else 0
+
+
+def _sample(scene: Scene, lengths: tuple[float, ...]) -> tuple[Line, np.ndarray]:
+    """A line of the first span, of one span of each length, of those of each kind of overlap, and
+    of the last span; how often each of these is in the line of the scene.
+
+    Raises
+    ------
+    InputError
+        If there is no such line.
+    """
+    table, n = scene.line, len(lengths)
+    if kinds_by_number(table):
+        return line_of(scene), np.ones(n, dtype=int)
+    overlaps = overlaps_of(table)
+    inner = Counter(lengths[1:-1])
+    kinds: Counter[tuple[float, ...]] = Counter()
+    if overlaps is not None:
+        both = [range(first, first + overlaps.n_spans) for first in overlaps.first]
+        if any(ahead.stop >= n for ahead in both):
+            raise InputError("the overlap is beyond the line")
+        kinds = Counter(tuple(lengths[i] for i in spans) for spans in both)
+        inner -= Counter(length for kind, often in kinds.items() for length in kind * often)
+    kept: list[float] = []
+    numbers: list[int] = []
+    first_spans: list[int] = []
+    for kind, often in kinds.items():
+        first_spans.append(2 + len(inner) + len(kept))
+        # A span of no weight parts it from the next overlap.
+        kept += [*kind, kind[-1]]
+        numbers += [*(often for _ in kind), 0]
+    spans = [lengths[0], *inner, *kept, lengths[-1]][: n + len(kinds)]
+    changes: dict[str, Any] = {
+        "n_spans": len(spans),
+        "span_m": spans,
+        "transition": TransitionTable(),
+        "stagger_m": [0.0],
+        "messenger_stagger_m": None,
+    }
+    if table.overlap is not None:
+        alike = {"first_span": first_spans, "repeat_every_spans": None}
+        changes["overlap"] = table.overlap.model_copy(update=alike)
+    sample = scene.model_copy(update={"line": table.model_copy(update=changes)})
+    return line_of(sample), np.array([1, *inner.values(), *numbers, 1])
+
+
+def size_faults(scene: Scene) -> Iterator[Fault]:
+    """A fault if the mesh has more than ``MOST_NODES``."""
+    size = size_of(scene)
+    if size is not None and size.nodes > MOST_NODES:
+        key = "line.n_spans"
+        yield Fault(
+            key,
+            f"{key} is {size.spans} {scene.origin.of(key)}; {size.sentence()}; at most "
+            f"{MOST_NODES} nodes are allowed: take fewer spans, or a smaller mesh.elements_per_gap "
+            f"({scene.mesh.elements_per_gap}) or mesh.support_refinement "
+            f"({scene.mesh.support_refinement})",
+        )

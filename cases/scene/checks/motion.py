@@ -1,0 +1,271 @@
+"""Whether a scene has what motion along and across the track needs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from catenary.cases.scene.input.faults import Fault
+from catenary.cases.scene.keys.error_sentences import refusal
+from catenary.cases.scene.keys.table import TAKE_AWAY
+from catenary.cases.scene.line.free import FreeWireTable
+from catenary.cases.scene.line.line import LineTable
+from catenary.cases.scene.line.line_data import TENSIONER, along_of, arm_tables, wire_tables
+from catenary.meshgen.topologies.all_topologies import make_line
+from catenary.meshgen.topologies.line_data import LineData
+from catenary.meshgen.wires import End, Wire
+from catenary.solver.problem.along_track import AlongTrack
+
+if TYPE_CHECKING:
+    from catenary.cases.scene.scene import Scene
+
+
+_ACROSS = "lateral_motion"
+
+
+def check_lateral(scene: Scene) -> Iterator[Fault]:
+    """Keys of lateral motion without it."""
+    line = scene.line
+    if scene.switches()[_ACROSS]:
+        return
+    given: dict[str, object] = {
+        **{
+            f"{key}.{name}": getattr(arm, name)
+            for key, arm in arm_tables(line).items()
+            for name in ("inclination_deg", "registration_stiffness_N_per_m")
+        },
+        "line.messenger_stagger_m": line.messenger_stagger_m,
+        "line.curve.radius_m": line.curve and line.curve.radius_m,
+        "line.damping.lateral": line.damping.lateral,
+    }
+    for key, value in given.items():
+        if value is not None and _ACROSS not in scene.effects:
+            why = (
+                f"it acts only with effects.{_ACROSS} = true; write that, or false to leave it out"
+            )
+            yield refusal(scene.origin, key, value, why)
+
+
+_ALONG = "axial_motion"
+_GRAVITY = 9.81
+# A place is at a mast if it is nearer than this [m].
+_AT_MAST = 1e-3
+_SIDES = ("start", "end")
+_ARM = "line.steady_arm"
+# Weights fit a tension if they differ by a smaller share.
+_FITS = 1e-6
+
+
+def check_along(scene: Scene, line: LineData) -> Iterator[Fault]:
+    """Data that motion along the track lacks, and data that only it has a use for."""
+    on = scene.switches()[_ALONG]
+    if not on and _ALONG not in scene.effects:
+        for key, value in _data_of_effect(scene).items():
+            why = f"it acts only with effects.{_ALONG} = true; write that, or false to leave it out"
+            yield refusal(scene.origin, key, value, why)
+    yield from _mid_points(scene, line)
+    yield from _weights(scene, line)
+    if not scene.origin.recorded:
+        yield from _idle_tensioners(scene)
+    if on:
+        yield from _wires(scene)
+        yield from _arms(scene, line)
+        yield from _held(scene, line)
+        yield from _held_free(scene, line)
+        yield from _elsewhere(scene)
+
+
+def _data_of_effect(scene: Scene) -> dict[str, object]:
+    """Keys and values of a line that nothing but motion along the track reads."""
+    table = scene.line
+    found: dict[str, object] = {}
+    overlap = table.overlap
+    if overlap and "along" in overlap.model_fields_set and not scene.origin.recorded:
+        found["line.overlap.along"] = overlap.along
+    for side, end in (("start", table.ends.start), ("end", table.ends.end)):
+        if end.along == TENSIONER:
+            found[f"line.ends.{side}.along"] = end.along
+    if table.temperature.difference_K:
+        found["line.temperature.difference_K"] = table.temperature.difference_K
+    if table.mid_points_m:
+        found["line.mid_points_m"] = table.mid_points_m
+    if not scene.origin.recorded:
+        found |= dict.fromkeys(_ends_of_free_wires(table), TENSIONER)
+        # Without any tensioner it is idle in any case, see below.
+        if not found and overlap and overlap.along == TENSIONER:
+            for name in sorted(table.tensioner.model_fields_set):
+                found[f"line.tensioner.{name}"] = getattr(table.tensioner, name)
+    return found
+
+
+def _ends_of_free_wires(table: LineTable) -> list[str]:
+    """Keys of the ends of free wires that have tensioners of their own."""
+    wires = enumerate(table.wires or [])
+    ends = ((f"line.wires.{i}.{side}", getattr(wire, side)) for i, wire in wires for side in _SIDES)
+    return [key for key, end in ends if end == TENSIONER]
+
+
+def _idle_tensioners(scene: Scene) -> Iterator[Fault]:
+    """What is said of tensioners on a line without any, and of a stop that nothing reaches."""
+    table = scene.line
+    said = table.tensioner.model_fields_set
+    if not said or scene.effects.get("tensioners") is False:
+        return
+    ends = [table.ends.start.along, table.ends.end.along]
+    ends += [] if table.overlap is None else [table.overlap.along]
+    if TENSIONER not in ends and not _ends_of_free_wires(table):
+        key = "line.tensioner"
+        yield Fault(
+            key,
+            f"{key} {scene.origin.of(key)} has {', '.join(sorted(said))}, but no wire ends at a "
+            "tensioner: line.ends.start.along or line.ends.end.along must be tensioner"
+            + (", or start or end of a wire of line.wires" if table.wires else ""),
+        )
+    elif "stop_stiffness_N_per_m" in said and table.tensioner.travel_m is None:
+        key, value = "line.tensioner.stop_stiffness_N_per_m", table.tensioner.stop_stiffness_N_per_m
+        why = "it acts only with line.tensioner.travel_m, where the stop stands"
+        yield refusal(scene.origin, key, value, why)
+
+
+def _wires(scene: Scene) -> Iterator[Fault]:
+    for key, wire in wire_tables(scene.line).items():
+        if wire.stiffness_along() is None:
+            field = LineTable.model_fields.get(key.removeprefix("line."))
+            what = wire.name if isinstance(wire, FreeWireTable) else field and field.description
+            yield Fault(
+                f"{key}.axial_stiffness_N",
+                f"effects.{_ALONG} is on, but {key} ({what}) {scene.origin.of(key)} has no "
+                "axial stiffness; give it axial_stiffness_N, or section_mm2 and youngs_modulus_GPa",
+            )
+
+
+def _arms(scene: Scene, line: LineData) -> Iterator[Fault]:
+    """Arms without a length, along which nothing could swing."""
+    made = make_line(line)
+    keys = {getattr(table, "name", ""): key for key, table in arm_tables(scene.line).items()}
+    for arms in made.steady_arms:
+        if arms.kind.length == 0 and made.wire(arms.wire).radial_force(np.array(arms.x)).any():
+            yield refusal(
+                scene.origin,
+                f"{keys.get(arms.name, _ARM)}.length_m",
+                0.0,
+                f"effects.{_ALONG} is on, and an arm that carries the radial force of its wire's "
+                "stagger swings about its hinge: it must be greater than 0",
+            )
+            return
+
+
+def _held(scene: Scene, line: LineData) -> Iterator[Fault]:
+    """Sections with a tensioner at both ends and nothing in between that holds their wires."""
+    along, masts, overlaps = along_of(scene.line), line.support_positions, line.overlaps
+    sections = [[0.0, float(masts[-1])]]
+    if overlaps is not None:
+        sections = overlaps.sections(masts).tolist()
+    between = len(sections) - 1
+    tensioned = [along.start, *[along.overlap] * between, along.end]
+    keys = [*["line.overlap.along"] * between, "line.ends.end.along"]
+    for (start, end), both, key in zip(sections, pairwise(tensioned), keys, strict=True):
+        if all(both) and not any(start < x < end for x in along.mid_points):
+            yield refusal(
+                scene.origin,
+                key,
+                TENSIONER,
+                f"the wires from {start:g} to {end:g} m would have tensioners at both ends and "
+                "nothing to hold them in between: name a mast there in line.mid_points_m, or hold "
+                "one end (fixed)",
+            )
+
+
+def _held_free(scene: Scene, line: LineData) -> Iterator[Fault]:
+    """Free wires with tensioners of their own at both ends and nothing in between."""
+    along = along_of(scene.line)
+    of_line = {"start": along.start, "end": along.end}
+    for i, wire in enumerate(line.wires or ()):
+        sides = zip(_SIDES, wire.tensioned, wire.clamped_to, strict=True)
+        both = [(of_line[side] if own is None else own) and not on for side, own, on in sides]
+        if not all(both) or wire.tensioned == (None, None):
+            continue
+        for start, end in wire.stretches:
+            if not any(start < x < end for x in along.mid_points):
+                why = (
+                    f"it would have tensioners at both ends from {start:g} to {end:g} m and "
+                    "nothing to hold it in between: name a mast there in line.mid_points_m, or "
+                    "hold one end (fixed)"
+                )
+                key = f"line.wires.{i}.{'start' if wire.tensioned[0] else 'end'}"
+                yield refusal(scene.origin, key, TENSIONER, why)
+                break
+
+
+def _mid_points(scene: Scene, line: LineData) -> Iterator[Fault]:
+    masts = line.support_positions[1:-1]
+    for i, x in enumerate(scene.line.mid_points_m):
+        if masts.size == 0 or np.abs(masts - x).min() > _AT_MAST:
+            near = f", such as {masts[np.abs(masts - x).argmin()]:g} m" if masts.size else ""
+            why = f"a mid-point anchor stands at a mast between two spans{near}"
+            yield refusal(scene.origin, f"line.mid_points_m.{i}", x, why)
+
+
+def _weights(scene: Scene, line: LineData) -> Iterator[Fault]:
+    """Weights of wires that are none, or whose wheel would turn at rest."""
+    along = along_of(scene.line)
+    tensioner = along.tensioner
+    if not tensioner.weights:
+        return
+    wires = {wire.name: wire for wire in make_line(line).wires}
+    tensioned = [name for name, wire in wires.items() if _has_tensioner(wire, along, line)]
+    for name, mass in tensioner.weights.items():
+        key = f"line.tensioner.weights_kg.{name}"
+        if name not in wires:
+            yield refusal(scene.origin, key, mass, f"the line has {', '.join(wires)}")
+            continue
+        if tensioned and name not in tensioned and not scene.origin.recorded:
+            why = f"no end of this wire has a tensioner, only those of {', '.join(tensioned)}"
+            yield refusal(scene.origin, key, mass, why + TAKE_AWAY)
+            continue
+        tension = wires[name].tension
+        low, high = tensioner.band(name, wires[name], _GRAVITY)
+        if not low * (1 - _FITS) <= tension <= high * (1 + _FITS):
+            fits = tension / (tensioner.ratio * _GRAVITY)
+            holds = f"{low:g} N" if low == high else f"{low:g} to {high:g} N"
+            yield refusal(
+                scene.origin,
+                key,
+                mass,
+                f"it would hold {holds} by line.tensioner.ratio and efficiency, but "
+                f"the wire has {tension:g} N, which {fits:.6g} kg hold",
+            )
+
+
+def _has_tensioner(wire: Wire, along: AlongTrack, line: LineData) -> bool:
+    line_ends = float(line.support_positions[0]), float(line.support_positions[-1])
+    return any(
+        along.tensioned(float(x), line_ends, _AT_MAST) if own is None else own
+        for piece in wire.pieces
+        for x, kind, own in zip((piece.x[0], piece.x[-1]), piece.ends, piece.tensioned, strict=True)
+        if kind is not End.CLAMPED
+    )
+
+
+def _elsewhere(scene: Scene) -> Iterator[Fault]:
+    """What the motion along the track does not go with."""
+    for side, end in (("start", scene.line.ends.start), ("end", scene.line.ends.end)):
+        if end.kind == "periodic":
+            yield refusal(
+                scene.origin,
+                f"line.ends.{side}.kind",
+                "periodic",
+                f"with effects.{_ALONG} a line ends fixed or in an absorbing_layer: waves along "
+                "the track would go on beyond the end for ever",
+            )
+    if scene.window.mode == "bounded" and scene.window.tolerance is None:
+        yield refusal(
+            scene.origin,
+            "window.mode",
+            "bounded",
+            f"with effects.{_ALONG} waves along the track run far ahead of a window of some "
+            "spans; take exact, or off",
+        )

@@ -1,0 +1,220 @@
+"""Whether contact law, scheme, iterations and window of a scene fit together."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from catenary.cases.scene.input.faults import Fault
+from catenary.cases.scene.keys.error_sentences import refusal
+from catenary.cases.scene.keys.table import TAKE_AWAY
+from catenary.cases.scene.problem import problem_of
+from catenary.cases.scene.run.contact import HERTZ, WITH_RESTITUTION
+from catenary.cases.scene.train.pantograph import LumpedTable
+from catenary.solver.problem.integrator_parameters import NEWMARK
+from catenary.solver.window.where_possible import why_no_window
+
+if TYPE_CHECKING:
+    from catenary.cases.scene.scene import Scene
+
+
+def check_contact(scene: Scene) -> Iterator[Fault]:
+    """What contradicts itself about contact."""
+    yield from _damping(scene)
+    yield from _loss(scene)
+    yield from _kinematic(scene)
+
+
+def _damping(scene: Scene) -> Iterator[Fault]:
+    contact, switches = scene.contact, scene.switches()
+    law, on = contact.law, switches["contact_damping"]
+    said = "contact_damping" in scene.effects
+    if law == "linear":
+        key, value, dissipates = "damping_N_s_per_m", contact.damping_N_s_per_m, "greater than 0"
+        acts = value > 0
+    elif law in WITH_RESTITUTION:
+        assert contact.restitution is not None
+        key, value, dissipates = "restitution", contact.restitution, "below 1"
+        acts = value < 1
+    else:
+        if on:
+            yield refusal(
+                scene.origin,
+                "effects.contact_damping",
+                True,
+                f"contact.law {law} has no damping; leave it out or take another law",
+            )
+        return
+    key = f"contact.{key}"
+    if on and not acts:
+        why = f"effects.contact_damping is on and needs a value {dissipates}"
+        yield refusal(scene.origin, key, value, why)
+    if acts and not on and not said:
+        yield refusal(
+            scene.origin,
+            key,
+            value,
+            "it acts only with effects.contact_damping = true; write that, or false to leave it "
+            "out",
+        )
+
+
+def _loss(scene: Scene) -> Iterator[Fault]:
+    if scene.contact.law in HERTZ and not scene.switches()["contact_loss"]:
+        yield refusal(
+            scene.origin,
+            "effects.contact_loss",
+            False,
+            f"contact.law {scene.contact.law} has no force that pulls; take law linear",
+        )
+
+
+# Below it the force of a moving kinematic contact alternates with a growing amplitude:
+# accelerations of Newmark's average acceleration remember a jump forever.
+KINEMATIC_GAMMA = 0.55
+
+
+def _kinematic(scene: Scene) -> Iterator[Fault]:
+    if scene.contact.law != "kinematic":
+        return
+    numerics = scene.numerics
+    for key, value, needed in (
+        ("scheme", numerics.scheme, "one_solve"),
+        ("coupling", numerics.coupling or "implicit", "implicit"),
+    ):
+        if value != needed:
+            yield refusal(
+                scene.origin,
+                f"numerics.{key}",
+                value,
+                f"contact.law kinematic has no force before the motion is known: take {needed}",
+            )
+    if numerics.adaptive_tolerance_N is not None:
+        yield refusal(
+            scene.origin,
+            "numerics.adaptive_tolerance_N",
+            numerics.adaptive_tolerance_N,
+            "contact.law kinematic has no stiffness to estimate an error with: take another law",
+        )
+    if scene.train.start_below_m:
+        yield refusal(
+            scene.origin,
+            "train.start_below_m",
+            scene.train.start_below_m,
+            "contact.law kinematic has no gap that a head could rise through: take another law",
+        )
+    if numerics.integrator != NEWMARK:
+        yield refusal(
+            scene.origin,
+            "numerics.integrator",
+            numerics.integrator,
+            "contact.law kinematic keeps line and pantographs together only if one method steps "
+            f"both: take newmark, with numerics.newmark_gamma of at least {KINEMATIC_GAMMA:g}",
+        )
+    if numerics.newmark_gamma < KINEMATIC_GAMMA:
+        yield refusal(
+            scene.origin,
+            "numerics.newmark_gamma",
+            numerics.newmark_gamma,
+            f"contact.law kinematic needs at least {KINEMATIC_GAMMA:g}, with "
+            "numerics.newmark_beta at least 0.28: without numerical damping its force alternates",
+        )
+
+
+def check_scheme(scene: Scene) -> Iterator[Fault]:
+    """What a scene's scheme cannot simulate.
+
+    The names of its pantographs must be known.
+    """
+    if scene.numerics.scheme != "ts_alpha2":
+        return
+    knows = "numerics.scheme ts_alpha2 knows only"
+    if scene.contact.law != "linear":
+        yield refusal(scene.origin, "contact.law", scene.contact.law, f"{knows} law linear")
+    for key in ("twin", "overlap"):
+        if getattr(scene.line, key) is not None:
+            why = f"{knows} one contact wire: take one_solve or fixed_point"
+            yield Fault(f"line.{key}", f"line.{key} {scene.origin.of(f'line.{key}')}; {why}")
+    switches = scene.switches()
+    for i, incident in enumerate(scene.incidents):
+        if switches[incident.type]:
+            why = f"{knows} lines and pantographs that stay what they are"
+            yield refusal(scene.origin, f"incidents.{i}.type", incident.type, why)
+    for i, defect in enumerate(scene.defects):
+        if defect.type == "kink" and switches["kink"]:
+            yield refusal(scene.origin, f"defects.{i}.type", defect.type, f"{knows} smooth wires")
+    if scene.irregularities.running_surface is not None and switches["running_surface"]:
+        key = "irregularities.running_surface"
+        why = f"{knows} smooth wires: write effects.running_surface = false"
+        yield Fault(key, f"{key} {scene.origin.of(key)} is not smooth; {why}")
+    for name in ("head_roll", "vehicle_motion"):
+        if switches[name]:
+            yield refusal(
+                scene.origin,
+                f"effects.{name}",
+                True,
+                f"{knows} heads and bases that move along a vertical: switch it off",
+            )
+    for name in {place.name: None for place in scene.train.pantographs}:
+        table = scene.pantographs[name]
+        if not isinstance(table, LumpedTable):
+            key = f"pantographs.{name}.type"
+            yield refusal(scene.origin, key, table.type, f"{knows} type lumped")
+            continue
+        switches_of = {"laws": "pantograph_laws", "regulation": "regulated_lift"}
+        for part, effect in switches_of.items():
+            if getattr(table, part) and switches[effect]:
+                key = f"pantographs.{name}.{part}"
+                why = f"{knows} linear pantographs: write effects.{effect} = false"
+                yield Fault(key, f"{key} {scene.origin.of(key)} is not linear; {why}")
+        key = f"pantographs.{name}.strips"
+        if table.strips.number != 1:
+            yield refusal(scene.origin, f"{key}.number", table.strips.number, f"{knows} one strip")
+        if table.strips.stiffness_N_per_m is not None:
+            value = table.strips.stiffness_N_per_m
+            yield refusal(
+                scene.origin,
+                f"{key}.stiffness_N_per_m",
+                value,
+                f"{knows} strips that are fixed to the head",
+            )
+
+
+_CORRECTED = 'scheme = "fixed_point"'
+_EXCHANGED = 'coupling = "iterated"'
+# What reads each key.
+_READ_BY = {
+    "eps_d_m": (_CORRECTED,),
+    "eps_v_m_per_s": (_CORRECTED,),
+    "eps_force_N": (_EXCHANGED,),
+    "max_iterations": (_CORRECTED, _EXCHANGED),
+}
+
+
+def check_iterations(scene: Scene) -> Iterator[Fault]:
+    """Keys of iterations that the scene's scheme does not make."""
+    numerics = scene.numerics
+    if scene.origin.recorded:
+        return
+    made = {
+        _CORRECTED: numerics.scheme == "fixed_point",
+        _EXCHANGED: numerics.coupling == "iterated",
+    }
+    coupling = f" and coupling {numerics.coupling or 'implicit'}"
+    scheme = numerics.scheme + (coupling if numerics.scheme == "one_solve" else "")
+    for name, readers in _READ_BY.items():
+        if name in numerics.model_fields_set and not any(made[reader] for reader in readers):
+            needed = " or ".join(f"numerics.{reader}" for reader in readers)
+            why = f"nothing reads it with scheme {scheme}; take {needed}, or leave the key out"
+            yield refusal(
+                scene.origin, f"numerics.{name}", getattr(numerics, name), why + TAKE_AWAY
+            )
+
+
+def check_window(scene: Scene) -> Iterator[Fault]:
+    """A window with a scheme that has none."""
+    if scene.window.mode == "off":
+        return
+    why = why_no_window(problem_of(scene))
+    if why:
+        yield refusal(scene.origin, "window.mode", scene.window.mode, f"it must be off, as {why}")

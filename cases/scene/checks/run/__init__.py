@@ -1,1 +1,0 @@
-"""What a run must hold beyond the range of each key."""

@@ -1,0 +1,184 @@
+"""Whether a scene gives the tables that its line's topology is made of, and no others."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from catenary.cases.scene.checks.free import check_free_places, check_free_tables
+from catenary.cases.scene.input.faults import Fault
+from catenary.cases.scene.keys.error_sentences import refusal
+from catenary.cases.scene.line.line import LineTable
+from catenary.cases.scene.run.incidents import TensionLossTable
+from catenary.meshgen.topologies.all_topologies import make_line, registered
+from catenary.meshgen.topologies.free import FREE
+from catenary.meshgen.topologies.line_data import SHORTEST_GAP, LineData
+
+if TYPE_CHECKING:
+    from catenary.cases.scene.scene import Scene
+
+
+# Keys of ``line`` that come with a part of a topology.
+_WITH = {"messenger_wire": ("encumbrance_m",)}
+
+
+def check_topology(scene: Scene) -> Iterator[Fault]:
+    """An unknown topology, tables that it lacks, and tables that it has no use for."""
+    table, known = scene.line, registered()
+    if table.topology not in known:
+        near = difflib.get_close_matches(table.topology, known, n=1)
+        hint = f"did you mean {near[0]}?" if near else f"it must be one of {', '.join(known)}"
+        yield refusal(scene.origin, "line.topology", table.topology, hint)
+        return
+    needed = _keys(known[table.topology].parts)
+    for name in needed:
+        if getattr(table, name) is None:
+            key = f"line.{name}"
+            meaning = LineTable.model_fields[name].description
+            yield Fault(key, f"{key} ({meaning}) is missing {scene.origin.of(key)}")
+    takes = {name: {**_keys(entry.parts), **_keys(entry.may)} for name, entry in known.items()}
+    every = {name for keys in takes.values() for name in keys}
+    for name in sorted(every - takes[table.topology].keys()):
+        if getattr(table, name) is not None:
+            key = f"line.{name}"
+            users = [one for one, keys in takes.items() if name in keys]
+            yield Fault(
+                key,
+                f"{key} {scene.origin.of(key)} is no part of the topology {table.topology}; leave "
+                f"it out, or take line.topology = {' or '.join(users)}",
+            )
+    if table.topology == FREE and table.wires is not None and table.links is not None:
+        yield from check_free_tables(scene)
+
+
+def _keys(parts: tuple[str, ...]) -> dict[str, None]:
+    """Keys of ``line`` that parts of a topology come from, in order."""
+    return dict.fromkeys(key for part in parts for key in (part, *_WITH.get(part, ())))
+
+
+def check_parts(scene: Scene, line: LineData) -> Iterator[Fault]:
+    """Parts of a topology that do not fit to each other."""
+    if line.wires is not None:
+        yield from check_free_places(scene, line)
+        return
+    yield from _stitch_wire(scene, line)
+    yield from _auxiliary_wire(scene, line)
+    yield from _bridle(scene, line)
+    yield from _overlap(scene, line)
+
+
+def check_names(scene: Scene, line: LineData) -> Iterator[Fault]:
+    """Names of parts of the line in other tables: damping by component, wires of incidents."""
+    made = make_line(line)
+    for name in scene.line.damping.per_component:
+        yield from _known(scene, f"line.damping.per_component.{name}", name, made.components)
+    wires = tuple(wire.name for wire in made.wires)
+    for i, table in enumerate(scene.incidents):
+        if isinstance(table, TensionLossTable):
+            yield from _known(scene, f"incidents.{i}.wire", table.wire, wires)
+    for where, entries in (("defects", scene.defects), ("line.fittings", scene.line.fittings)):
+        for i, entry in enumerate(entries):
+            wire = getattr(entry, "wire", None)
+            if wire is not None:
+                yield from _known(scene, f"{where}.{i}.wire", wire, wires)
+
+
+def _known(scene: Scene, key: str, name: str, known: tuple[str, ...]) -> Iterator[Fault]:
+    if name not in known:
+        near = difflib.get_close_matches(name, known, n=1)
+        meant = f"did you mean {near[0]}? " if near else ""
+        why = f"{meant}the line has {', '.join(known)}"
+        yield refusal(scene.origin, key, name, why)
+
+
+def _stitch_wire(scene: Scene, line: LineData) -> Iterator[Fault]:
+    stitch, messenger = line.stitch_wire, line.messenger_wire
+    if stitch is None or messenger is None:
+        return
+    key, tension = "line.stitch_wire.length_m", stitch.conductor.tension
+    if line.n_spans < 2:
+        why = "a stitched line needs a support, that is two spans"
+        yield refusal(scene.origin, "line.n_spans", line.n_spans, why)
+        return
+    yield from _length(scene, line, key, stitch.length)
+    clamps = line.around_supports(stitch.length).ravel()
+    apart = abs(line.dropper_x[:, None] - clamps)
+    if apart.min() < SHORTEST_GAP:
+        at = clamps[apart.min(axis=0).argmin()]
+        why = f"its clamp at {at:g} m of the line would stand on a dropper"
+        yield refusal(scene.origin, key, stitch.length, why)
+    nearest = abs(line.dropper_x[:, None] - line.support_positions[1:-1]).min()
+    if nearest > 0.5 * stitch.length:
+        why = f"no dropper would hang from it: the nearest one is {nearest:g} m from a support"
+        yield refusal(scene.origin, key, stitch.length, why)
+    yield from _tension(scene, "stitch_wire", tension, "messenger_wire", messenger.tension)
+
+
+def _bridle(scene: Scene, line: LineData) -> Iterator[Fault]:
+    if line.bridle is not None:
+        yield from _length(scene, line, "line.bridle.length_m", line.bridle.length)
+        tensions = line.bridle.conductor.tension, line.contact_wire.tension
+        yield from _tension(scene, "bridle", tensions[0], "contact_wire", tensions[1])
+
+
+def _length(scene: Scene, line: LineData, key: str, length: float) -> Iterator[Fault]:
+    shortest = min(line.span_lengths)
+    if length >= shortest:
+        why = f"it must be less than the shortest span ({shortest:g} m)"
+        yield refusal(scene.origin, key, length, why)
+
+
+def _tension(scene: Scene, wire: str, tension: float, bearer: str, whole: float) -> Iterator[Fault]:
+    """A wire between clamps that would take all tension of the one that it is clamped to."""
+    if tension >= whole:
+        yield refusal(
+            scene.origin,
+            f"line.{wire}.tension_N",
+            tension,
+            f"it must be less than line.{bearer}.tension_N ({whole:g} N), of which it takes its "
+            "part between the clamps",
+        )
+
+
+def _auxiliary_wire(scene: Scene, line: LineData) -> Iterator[Fault]:
+    auxiliary = line.auxiliary_wire
+    if auxiliary is not None and auxiliary.height >= line.encumbrance:
+        yield refusal(
+            scene.origin,
+            "line.auxiliary_wire.height_m",
+            auxiliary.height,
+            f"it must be less than line.encumbrance_m ({line.encumbrance:g} m)",
+        )
+
+
+def _overlap(scene: Scene, line: LineData) -> Iterator[Fault]:
+    overlaps, table = line.overlaps, scene.line.overlap
+    if overlaps is None or table is None:
+        return
+    needs = f"an overlap of {overlaps.n_spans} spans needs a running span before it and behind it"
+    first, last = line.n_transition[0] + 2, line.n_spans - line.n_transition[1] - overlaps.n_spans
+    for i, number in enumerate(table.first_span):
+        if not first <= number <= last:
+            inside = (
+                f"from {first} to {last}" if first <= last else "none, as the line is too short"
+            )
+            key = "line.overlap.first_span" + (f".{i}" if len(table.first_span) > 1 else "")
+            yield refusal(scene.origin, key, number, f"{needs}: possible are {inside}")
+        first = number + overlaps.n_spans + 1
+    every = table.repeat_every_spans
+    if every is not None and every <= overlaps.n_spans:
+        yield refusal(
+            scene.origin,
+            "line.overlap.repeat_every_spans",
+            every,
+            f"{needs}: it must be at least {overlaps.n_spans + 1}",
+        )
+    free = line.encumbrance - (line.auxiliary_wire.height if line.auxiliary_wire else 0.0)
+    if line.messenger_wire is not None and overlaps.rise >= free:
+        yield refusal(
+            scene.origin,
+            "line.overlap.rise_m",
+            overlaps.rise,
+            f"it must be less than the {free:g} m that the messenger wire is above at the supports",
+        )

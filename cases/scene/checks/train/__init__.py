@@ -1,1 +1,0 @@
-"""What a train must hold beyond the range of each key."""

@@ -1,1 +1,0 @@
-"""From a scene's tables to lines, pantographs and problems in SI units."""

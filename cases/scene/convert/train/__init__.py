@@ -1,1 +1,0 @@
-"""From a scene's tables to pantographs, their laws and the vehicle, in SI units."""

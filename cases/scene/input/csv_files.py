@@ -1,0 +1,262 @@
+"""Numbers that stand in CSV files, put into the scene in place of the files' names.
+
+A result then holds the numbers themselves, and does not change with the file. Courses and curves
+are pairs of numbers. Tables of spans and of droppers have columns with names, as planners export
+them: separated by commas, or by semicolons with decimal points or decimal commas.
+"""
+
+from __future__ import annotations
+
+import csv
+import difflib
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from catenary.base.errors import InputError
+from catenary.cases.scene.input.faults import Fault, Origin, shown
+from catenary.cases.scene.input.plain_text import decode, read_whole
+
+_LONGEST_NAME = 1000
+
+
+def take_in_files(
+    raw: dict[str, Any], origin: Origin, folder: Path | None
+) -> tuple[Origin, list[Fault]]:
+    """Replace keys ``..._file`` of a raw scene by the numbers that the files hold, in place.
+
+    Returns where all keys were written then, and faults: a file is not there, holds something else,
+    or stands beside the numbers themselves.
+
+    Names in the case file are relative to its ``folder``, those of the command line to the working
+    directory.
+    """
+    taken, faults = list(origin.taken_in), []
+    for where, table, named, key, read in _places(raw):
+        name = table.get(named) if isinstance(table, dict) else None
+        if not isinstance(name, str) or not name:
+            continue
+        file_key, pairs_key = f"{where}.{named}", f"{where}.{key}"
+        del table[named]
+        own = origin.is_overridden(file_key) or folder is None
+        path = (Path.cwd() if own else folder or Path()) / name
+        try:
+            if key in table:
+                raise InputError(
+                    f"{file_key} is {shown(name)} {origin.of(file_key)}; {pairs_key} is given too: "
+                    "take one of them away"
+                )
+            table[key] = read(path, f"{file_key} is {_named(name)} {origin.of(file_key)}", raw)
+            taken.append((pairs_key, str(path)))
+        except InputError as error:
+            faults.append(Fault(where, str(error)))
+            if read is _spans:  # nothing more is said of what the file would have given
+                table.update(span_m=[50.0], n_spans=1000)
+    return replace(origin, taken_in=tuple(taken)), faults
+
+
+def absolute_names(raw: dict[str, Any], folder_of: Callable[[str], Path]) -> None:
+    """Write every name of a file with numbers as a path from the root, in place; by its key
+    ``folder_of`` says to which folder it is relative."""
+    for where, table, named, _, _ in _places(raw):
+        name = table.get(named) if isinstance(table, dict) else None
+        if isinstance(name, str) and name:
+            table[named] = str(folder_of(f"{where}.{named}") / name)
+
+
+# What reads a file: its path, the begin of a sentence about it, and the raw scene.
+_Read = Callable[[Path, str, dict[str, Any]], Any]
+
+
+def _places(raw: dict[str, Any]) -> Iterator[tuple[str, Any, str, str, _Read]]:
+    """Tables that may name files: their keys, they themselves, the key of the name, the key of the
+    numbers, and what reads the file. Spans come before the droppers in them."""
+
+    def below(table: Any, name: str) -> Any:
+        return table.get(name) if isinstance(table, dict) else None
+
+    vehicle, line = raw.get("vehicle"), raw.get("line")
+    for direction in ("vertical", "lateral"):
+        for course in ("by_time", "by_place"):
+            where = f"vehicle.{direction}"
+            yield where, below(vehicle, direction), f"{course}_file", course, _pairs
+    yield "line", line, "spans_file", "span_m", _spans
+    links = below(line, "links")
+    hung = [("line.dropper", below(line, "dropper"))]
+    hung += [("line.auxiliary_wire.dropper", below(below(line, "auxiliary_wire"), "dropper"))]
+    hung += [(f"line.links.{i}", one) for i, one in enumerate(links if _is_list(links) else ())]
+    for where, table in hung:
+        yield where, table, "curve_file", "curve", _pairs
+        yield where, table, "patterns_file", "patterns", _patterns
+
+
+def _is_list(value: Any) -> bool:
+    return isinstance(value, list)
+
+
+def span_table(path: Path, where: str = "") -> list[float]:
+    """Lengths of all spans of a file [m]; ``where`` begins sentences about it.
+
+    Raises
+    ------
+    InputError
+        If it is no such table.
+    """
+    where = where or f"the table of spans is {_named(str(path))}"
+    rows = _rows(path, where, {"span_m": True, "span": False})
+    for count, (number, row) in enumerate(rows, start=1):
+        if row.get("span", count) != count:
+            raise InputError(f"{where}; its line {number} must be about span {count}")
+    return [row["span_m"] for _, row in rows]
+
+
+def _spans(path: Path, where: str, raw: dict[str, Any]) -> list[float]:
+    """Lengths of all spans [m]; their number if the scene does not say it, the first ones if it
+    says fewer."""
+    lengths = span_table(path, where)
+    wanted = raw["line"].setdefault("n_spans", len(lengths))
+    if isinstance(wanted, int) and wanted > len(lengths):
+        raise InputError(
+            f"{where}; it has {len(lengths)} spans, and line.n_spans is {wanted}: leave that out"
+        )
+    return lengths[:wanted] if isinstance(wanted, int) and wanted > 0 else lengths
+
+
+# Columns of a table of droppers, and whether they must be there.
+DROPPER_COLUMNS = {"span": True, "position_m": True, "pre_sag_mm": False}
+
+
+def dropper_table(
+    path: Path, where: str, columns: dict[str, bool]
+) -> dict[int, list[dict[str, float]]]:
+    """Droppers of each span by its number, each by names of columns; ``where`` begins sentences.
+
+    Raises
+    ------
+    InputError
+        If it is no table with these columns, in the order of spans and positions.
+    """
+    hung: dict[int, list[dict[str, float]]] = {}
+    before, last = 0.0, 0.0
+    for number, row in _rows(path, where, columns):
+        span, position = row["span"], row["position_m"]
+        if span < 1 or span != int(span) or span < before:
+            raise InputError(
+                f"{where}; its line {number} must have the number of a span, from 1 on in "
+                f"ascending order, and has {span:g}"
+            )
+        if span == before and position <= last:
+            raise InputError(
+                f"{where}; its line {number} must have a position greater than the {last:g} m of "
+                f"the dropper before it in span {span:g}, and has {position:g}"
+            )
+        before, last = span, position
+        hung.setdefault(int(span), []).append(row)
+    return hung
+
+
+def _patterns(path: Path, where: str, raw: dict[str, Any]) -> list[dict[str, Any]]:
+    """Droppers of all spans, those of like spans together; spans beyond the line are left out."""
+    hung = dropper_table(path, where, DROPPER_COLUMNS)
+    n = raw["line"].get("n_spans")
+    most = n if isinstance(n, int) else max(hung)
+    like: dict[tuple[tuple[float, ...], ...], list[int]] = {}
+    first = next(iter(hung.values()))[0]
+    names = [name for name in ("position_m", "pre_sag_mm") if name in first]
+    for span, own in hung.items():
+        if span <= most:
+            columns = tuple(tuple(row[name] for row in own) for name in names)
+            like.setdefault(columns, []).append(span)
+    keys = ("positions_m", "pre_sag_mm")
+    return [
+        {"spans": spans} | {key: list(own) for key, own in zip(keys, columns, strict=False)}
+        for columns, spans in like.items()
+    ]
+
+
+def _rows(path: Path, where: str, columns: dict[str, bool]) -> list[tuple[int, dict[str, float]]]:
+    """Lines of a table with their numbers in the file, by the names of its columns.
+
+    ``columns`` says which there may be, and whether they must be there.
+    """
+    text = decode(read_whole(path, f"{where}; it"), f"{where}; it")
+    semicolons = ";" in text
+    named: list[str] = []
+    rows: list[tuple[int, dict[str, float]]] = []
+    for number, line in enumerate(text.splitlines(), start=1):
+        line = line.split("#")[0]
+        cells = [cell.strip().strip('"') for cell in line.split(";" if semicolons else ",")]
+        if not any(cells):
+            continue
+        if not named:
+            named = cells
+            _check_names(where, named, columns)
+            continue
+        if semicolons:
+            cells = [cell.replace(",", ".") for cell in cells]
+        try:
+            values = [float(cell) for cell in cells]
+        except ValueError:
+            values = []
+        if len(values) != len(named) or not all(map(math.isfinite, values)):
+            raise InputError(
+                f"{where}; its line {number} must hold a number for each of {', '.join(named)}"
+            )
+        rows.append((number, dict(zip(named, values, strict=True))))
+    if not rows:
+        raise InputError(f"{where}; it holds no line of numbers below the names of columns")
+    return rows
+
+
+def _check_names(where: str, named: list[str], columns: dict[str, bool]) -> None:
+    takes = f"it takes {', '.join(columns)}"
+    for name in named:
+        if name == "length_m" and name not in columns:
+            raise InputError(
+                f"{where}; droppers are cut for the pre-sag, so that it takes no length_m: give "
+                "pre_sag_mm, which `catenary new --droppers` finds from lengths"
+            )
+        if name not in columns:
+            near = difflib.get_close_matches(name, columns, n=1)
+            meant = f"did you mean {near[0]}? " if near else ""
+            raise InputError(f"{where}; its column {shown(name)} is unknown: {meant}{takes}")
+        if named.count(name) > 1:
+            raise InputError(f"{where}; it has several columns {name}")
+    missing = [name for name, needed in columns.items() if needed and name not in named]
+    if missing:
+        raise InputError(
+            f"{where}; it has no column {missing[0]}: its first line names the columns, and {takes}"
+        )
+
+
+def _pairs(path: Path, where: str, raw: dict[str, Any]) -> list[list[float]]:
+    """Two columns of numbers; comments after #, and one line of names before the numbers."""
+    text = decode(read_whole(path, f"{where}; it"), f"{where}; it")
+    pairs: list[list[float]] = []
+    named = False
+    for number, cells in enumerate(csv.reader(text.splitlines()), start=1):
+        line = [cell.strip() for cell in ",".join(cells).split("#")[0].split(",")]
+        if line == [""]:
+            continue
+        try:
+            values = [float(cell) for cell in line]
+        except ValueError:
+            values = []
+        if len(values) == 2:
+            pairs.append(values)
+        elif pairs or named:
+            raise InputError(
+                f"{where}; its line {number} must hold two numbers and a comma between"
+            )
+        else:
+            named = True
+    if not pairs:
+        raise InputError(f"{where}; it holds no pairs of numbers")
+    return pairs
+
+
+def _named(name: str) -> str:
+    """A file's name, whole if it can be one, otherwise its end."""
+    return f'"{name}"' if len(name) <= _LONGEST_NAME and name.isprintable() else shown(name)

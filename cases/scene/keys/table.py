@@ -1,0 +1,64 @@
+"""What all tables of a scene share: strict types, no unknown keys, bounds, courses of pairs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Annotated, Any
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+
+
+class Table(BaseModel):
+    """A table of ``case.toml``.
+
+    Strict: "20 kN" is not a number and 1 is not true. Validators raise ``ValueError`` with a
+    predicate ("must be ...") that ``messages.sentence`` completes with key, value and place.
+    """
+
+    # A validator is built when it is first used: that of a scene has those of all tables in it.
+    model_config = ConfigDict(
+        strict=True, extra="forbid", frozen=True, allow_inf_nan=False, defer_build=True
+    )
+
+
+# How to get rid of a key that a case file gives, for sentences about keys that exclude others.
+TAKE_AWAY = " (--set KEY= takes one away)"
+
+
+def _as_list(value: Any) -> Any:
+    return [value] if isinstance(value, int | float) and not isinstance(value, bool) else value
+
+
+def exactly_one(table: Table, *names: str) -> None:
+    """Raise ``ValueError`` unless exactly one of the keys ``names`` is given."""
+    given = [name for name in names if getattr(table, name) is not None]
+    if len(given) != 1:
+        but = "none is given" if not given else f"{' and '.join(given)} are given{TAKE_AWAY}"
+        raise ValueError(f"needs exactly one of {', '.join(names)}, but {but}")
+
+
+def ascending(values: Sequence[float], what: str) -> None:
+    """Raise ``ValueError`` unless each value is greater than the one before."""
+    for before, after in zip(values, values[1:], strict=False):
+        if after <= before:
+            raise ValueError(
+                f"must list {what} in ascending order, but {after:g} follows {before:g}"
+            )
+
+
+# A list for which a person may write one number.
+OneOrMore = BeforeValidator(_as_list)
+PAIR = Annotated[list[Annotated[float, Field(ge=-1e6, le=1e6)]], Field(min_length=2, max_length=2)]
+
+
+def within(most: float) -> Callable[[list[list[float]]], list[list[float]]]:
+    """The check that pairs have ascending first numbers and deviations up to ``most`` [m]."""
+
+    def check(pairs: list[list[float]]) -> list[list[float]]:
+        ascending([pair[0] for pair in pairs], "its first numbers")
+        for at, value in pairs:
+            if abs(value) > most:
+                raise ValueError(f"must stay within {most:g} m, but is {value:g} m at {at:g}")
+        return pairs
+
+    return check

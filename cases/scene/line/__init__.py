@@ -1,0 +1,1 @@
+"""The line, one subject a file: its keys and their conversion to SI units."""

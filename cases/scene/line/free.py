@@ -1,0 +1,219 @@
+"""A free line: tables of wires by name, and of links between them and to the ground."""
+
+from __future__ import annotations
+
+import re
+from typing import Annotated, ClassVar, Literal
+
+from pydantic import AfterValidator, Field, model_validator
+
+from catenary.cases.scene.keys.table import TAKE_AWAY, OneOrMore, Table, ascending
+from catenary.cases.scene.line.droppers import DropperTable
+from catenary.cases.scene.line.hardware import SteadyArmTable, SupportTable
+from catenary.cases.scene.line.wires import WireTable
+
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+
+
+def _is_name(text: str) -> str:
+    if not _NAME.fullmatch(text):
+        raise ValueError("must be a name of letters, digits and _ that begins with a letter")
+    return text
+
+
+# Names are those of groups in a mesh file and of components in the damping.
+PartName = Annotated[str, Field(min_length=1, max_length=60), AfterValidator(_is_name)]
+Place = Annotated[float, Field(ge=0, le=1e7)]
+Away = Annotated[float, Field(ge=-500, le=500)]
+SupportNumber = Annotated[int, Field(ge=0, le=20_000)]
+SpanNumber = Annotated[int, Field(ge=1, le=20_000)]
+Height = Annotated[float, Field(gt=0, le=30)]
+Sideways = Annotated[float, Field(ge=-5, le=5)]
+Stretch = Annotated[list[Place], Field(min_length=2, max_length=2)]
+Point = Annotated[list[Annotated[float, Field(ge=-1e7, le=1e7)]], Field(min_length=3, max_length=3)]
+
+
+class FreeWireTable(WireTable):
+    """A wire of a free line: where it runs, at what height, and how it ends."""
+
+    name: PartName = Field(description="its name: letters, digits, _, beginning with a letter")
+    role: Literal["contact", "messenger", "auxiliary", "stitch"] = Field(
+        description="what it is there for; heads run on all contact wires"
+    )
+    stretches_m: list[Stretch] | None = Field(
+        None,
+        min_length=1,
+        max_length=20_000,
+        description="from and to of each of its pieces along the line; all of the line if absent",
+    )
+    from_supports_m: Annotated[list[Away], Field(min_length=2, max_length=2)] | None = Field(
+        None, description="in place of that, from and to of a piece, measured from each support"
+    )
+    supports: list[SupportNumber] | None = Field(
+        None,
+        min_length=1,
+        max_length=20_001,
+        description="support numbers; 0 is the first support; all inner ones if absent",
+    )
+    height_m: Annotated[list[Height], OneOrMore, Field(min_length=1, max_length=20_001)] | None = (
+        Field(
+            None,
+            description="height above the rail at the supports, one number or one for each; of a "
+            "contact wire line.contact_height_m if absent",
+        )
+    )
+    stagger_m: (
+        Annotated[list[Sideways], OneOrMore, Field(min_length=1, max_length=20_001)] | None
+    ) = Field(
+        None,
+        description="lateral place at the supports, alternating, or one for each; if absent "
+        "line.stagger_m of contact wires, that of the wire that it is clamped to, or "
+        "line.messenger_stagger_m",
+    )
+    sideways_m: float = Field(0.0, ge=-5, le=5, description="added to all its lateral places")
+    course_m: list[Point] | None = Field(
+        None,
+        min_length=2,
+        max_length=20_000,
+        description="in place of height_m and stagger_m, points [along, to the left, height] that "
+        "it passes, along the line or, with from_supports_m, from each support",
+    )
+    start: str | None = Field(
+        None,
+        min_length=1,
+        max_length=100,
+        description="where it starts: tensioner, fixed, or the name of the wire that it is clamped "
+        "to; if absent as line.ends says, and fixed inside the line",
+    )
+    end: str | None = Field(
+        None, min_length=1, max_length=100, description="the same of where it ends"
+    )
+    clamp_kg: float = Field(0.0, ge=0, le=100, description="mass of each clamp at its ends")
+    clamp_stiffness_N_per_m: float = Field(
+        1e7, gt=0, le=1e10, description="stiffness of each such clamp, in tension and compression"
+    )
+
+    @model_validator(mode="after")
+    def _consistent(self) -> FreeWireTable:
+        if self.stretches_m is not None and self.from_supports_m is not None:
+            raise ValueError(f"takes stretches_m or from_supports_m, but both are given{TAKE_AWAY}")
+        if self.supports is not None and self.from_supports_m is None:
+            raise ValueError("takes supports with from_supports_m, which is not given")
+        for key in ("height_m", "stagger_m"):
+            if self.course_m is not None and getattr(self, key) is not None:
+                raise ValueError(f"takes course_m or {key}, but both are given{TAKE_AWAY}")
+        if self.supports is not None:
+            ascending(self.supports, "supports")
+        if self.course_m is not None:
+            ascending([point[0] for point in self.course_m], "course_m along the line")
+        if self.from_supports_m is not None:
+            ascending(self.from_supports_m, "from_supports_m")
+        if self.stretches_m is not None:
+            ascending([x for stretch in self.stretches_m for x in stretch], "stretches_m")
+        return self
+
+
+class FreeDroppersTable(DropperTable):
+    """Droppers from one wire down to another."""
+
+    PLACED_BY: ClassVar[tuple[str, ...]] = ("positions_m", "count", "patterns", "at_m")
+
+    type: Literal["droppers"] = Field(description="kind of link")
+    name: PartName = Field(description="name of the group")
+    upper: str = Field(min_length=1, max_length=100, description="name of the wire above")
+    lower: str = Field(min_length=1, max_length=100, description="name of the wire below")
+    spans: list[SpanNumber] | None = Field(
+        None,
+        min_length=1,
+        max_length=20_000,
+        description="numbers of the spans that have them, from 1; all if absent",
+    )
+    at_m: list[Place] | None = Field(
+        None, min_length=1, max_length=100_000, description="places along the line"
+    )
+
+    @model_validator(mode="after")
+    def _by_place(self) -> FreeDroppersTable:
+        if self.at_m is not None:
+            ascending(self.at_m, "at_m")
+            if self.spans is not None:
+                raise ValueError("takes spans with places in a span, not with at_m")
+            if self.pre_sag_mid_mm is not None:
+                raise ValueError("takes pre_sag_mid_mm with places in a span, not with at_m")
+            if self.pre_sag_mm is not None and len(self.pre_sag_mm) != len(self.at_m):
+                raise ValueError(
+                    f"must give one pre_sag_mm per dropper, but there are {len(self.pre_sag_mm)} "
+                    f"values for {len(self.at_m)} droppers"
+                )
+        if self.spans is not None:
+            ascending(self.spans, "spans")
+        return self
+
+
+class FreeClampsTable(Table):
+    """Clamps between two wires that meet."""
+
+    type: Literal["clamps"] = Field(description="kind of link")
+    name: PartName = Field(description="name of the group")
+    upper: str = Field(min_length=1, max_length=100, description="name of the wire that carries")
+    lower: str = Field(min_length=1, max_length=100, description="name of the wire that hangs")
+    at_m: list[Place] = Field(min_length=1, max_length=100_000, description="places along the line")
+    clamp_kg: float = Field(0.0, ge=0, le=100, description="mass of each")
+    stiffness_N_per_m: float = Field(
+        1e7, gt=0, le=1e10, description="stiffness of each, in tension and compression"
+    )
+
+    @model_validator(mode="after")
+    def _in_order(self) -> FreeClampsTable:
+        ascending(self.at_m, "at_m")
+        return self
+
+
+class _AtSupports(Table):
+    """What stands under one wire."""
+
+    name: PartName = Field(description="name of the group")
+    wire: str = Field(min_length=1, max_length=100, description="name of the wire")
+    supports: list[SupportNumber] | None = Field(
+        None,
+        min_length=1,
+        max_length=20_001,
+        description="support numbers; 0 is the first support; if absent all inner ones "
+        "that the wire passes",
+    )
+    at_m: list[Place] | None = Field(
+        None, min_length=1, max_length=100_000, description="in place of these, places of the line"
+    )
+
+    @model_validator(mode="after")
+    def _one_way(self) -> _AtSupports:
+        if self.supports is not None and self.at_m is not None:
+            raise ValueError(f"takes supports or at_m, but both are given{TAKE_AWAY}")
+        for key in ("supports", "at_m"):
+            ascending(getattr(self, key) or [], key)
+        return self
+
+
+class FreeSupportsTable(_AtSupports, SupportTable):
+    """What carries a wire at masts."""
+
+    type: Literal["supports"] = Field(description="kind of link")
+    holds: str | None = Field(
+        None,
+        min_length=1,
+        max_length=100,
+        description="name of a wire that is to have its height there at rest; each support is as "
+        "high as that takes. If absent, the support is relaxed at the height of its own wire",
+    )
+
+
+class FreeArmsTable(_AtSupports, SteadyArmTable):
+    """Steady arms of a wire."""
+
+    type: Literal["steady_arms"] = Field(description="kind of link")
+
+
+FreeLinkTable = Annotated[
+    FreeDroppersTable | FreeClampsTable | FreeSupportsTable | FreeArmsTable,
+    Field(discriminator="type"),
+]

@@ -1,1 +1,0 @@
-"""Keys of the line: wires, hardware, ends, mesh."""

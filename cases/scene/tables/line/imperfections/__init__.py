@@ -1,1 +1,0 @@
-"""Keys of what is not as it was meant to be: irregularities, defects."""

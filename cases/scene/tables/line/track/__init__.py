@@ -1,1 +1,0 @@
-"""Keys of the track beneath a line: curve, tunnels."""

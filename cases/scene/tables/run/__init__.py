@@ -1,1 +1,0 @@
-"""Keys of the run: contact, numerics, incidents, output, evaluation."""

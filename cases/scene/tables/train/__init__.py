@@ -1,1 +1,0 @@
-"""Keys of the train: pantographs, their mechanisms, the vehicle."""

@@ -1,0 +1,249 @@
+"""``catenary new`` and ``catenary doctor``: a case to begin with, and whether the program works."""
+
+from __future__ import annotations
+
+import os
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner
+
+from catenary.base.errors import InputError
+from catenary.cases.cli.main import app
+from catenary.cases.process import installation
+from catenary.cases.process.installation import BROKEN, MISSING, OK, Finding
+from catenary.cases.scene.input.case_files import shipped
+from catenary.cases.scene.load import load_scene
+from catenary.cases.scene.problem import line_data_of
+from catenary.cases.scene.starter import BEGINNINGS, write_case
+
+
+def invoke(*words: str) -> Any:
+    return CliRunner().invoke(app, list(words))
+
+
+@pytest.mark.parametrize("kind", BEGINNINGS)
+def test_a_new_case_is_checked_and_named_after_its_folder(tmp_path: Path, kind: str) -> None:
+    done = invoke("new", str(tmp_path / "my_line"), "--topology", kind)
+    assert done.exit_code == 0, done.output
+    checked = invoke("check", str(tmp_path / "my_line"))
+    assert checked.exit_code == 0, checked.output
+    scene = load_scene(tmp_path / "my_line")
+    assert scene.case.name == scene.case.title == "my_line"
+    assert BEGINNINGS[kind].case in scene.case.source
+    begun = load_scene(BEGINNINGS[kind].case)
+    if not BEGINNINGS[kind].changes:
+        assert scene.model_dump(exclude={"case"}) == begun.model_dump(exclude={"case"})
+
+
+def test_two_messenger_wires_share_what_one_had(tmp_path: Path) -> None:
+    scene, twin = load_scene(write_case(tmp_path / "a", "twin_messenger")), load_scene("dc_twin")
+    own, whole = scene.line.messenger_wire, twin.line.messenger_wire
+    assert own is not None and whole is not None
+    for key in ("tension_N", "mass_kg_per_m", "bending_stiffness_N_m2"):
+        assert 2 * getattr(own, key) == getattr(whole, key)
+
+
+def test_a_new_case_names_usual_values_of_the_key_below(tmp_path: Path) -> None:
+    lines = write_case(tmp_path / "a", "simple").read_text().splitlines()
+    at = lines.index("tension_N = 22000.0")
+    assert lines[at - 1] == "# usual: 10000 to 20000, high speed 20000 to 31500"
+
+
+@pytest.mark.parametrize("case", shipped())
+def test_every_shipped_case_may_be_a_beginning(tmp_path: Path, case: str) -> None:
+    path = write_case(tmp_path / "a", case)
+    assert tomllib.loads(path.read_text())["case"]["title"] == "a"
+
+
+def tables(folder: Path, n: int) -> tuple[Path, Path]:
+    """A planner's tables of ``n`` spans of three lengths with seven droppers each."""
+    lengths = [(50.0, 55.0, 60.0)[i % 3] for i in range(n)]
+    rows = [
+        f"{i};{4.5 + k * (length - 9) / 6:.2f};{(0, 12, 20, 24, 20, 12, 0)[k]}"
+        for i, length in enumerate(lengths, start=1)
+        for k in range(7)
+    ]
+    spans, droppers = folder / "line 7.csv", folder / "hung.csv"
+    spans.write_text("span_m\n" + "".join(f"{length}\n" for length in lengths))
+    droppers.write_text("\n".join(["span;position_m;pre_sag_mm", *rows]).replace(".", ",") + "\n")
+    return spans, droppers
+
+
+@pytest.mark.parametrize("kind", ["simple", "stitched", "compound", "twin"])
+@pytest.mark.parametrize("n", [16, 31])
+def test_tables_of_a_planner_make_a_case(tmp_path: Path, kind: str, n: int) -> None:
+    spans, droppers = tables(tmp_path, n)
+    path = write_case(tmp_path / "deep" / "my_line", kind, spans, droppers)
+    spans.unlink()
+    droppers.unlink()
+    for shortened in (False, True):
+        scene = load_scene(path, shortened=shortened)
+        data = line_data_of(scene)
+        assert data.span_lengths[:4] == (50.0, 55.0, 60.0, 50.0)
+        assert data.dropper_positions[2][3] == 30.0 and data.pre_sag[2][3] == 0.024
+        assert len(data.span_lengths) == (12 if shortened else n)
+    assert sorted(p.name for p in path.parent.iterdir()) == [
+        "case.toml",
+        "droppers.csv",
+        "spans.csv",
+    ]
+
+
+def test_a_case_of_ones_own_may_be_a_beginning(tmp_path: Path) -> None:
+    spans, droppers = tables(tmp_path, 20)
+    wires = write_case(tmp_path / "wires", "windy_viaduct")
+    wires.write_text(wires.read_text().replace("tension_N = 22000.0", "tension_N = 21000.0"))
+    path = write_case(tmp_path / "line", str(wires.parent), spans, droppers)
+    text = path.read_text()
+    assert text.count("# usual: 10000 to 20000, high speed 20000") == 1  # not once more
+    scene = load_scene(path)
+    assert scene.line.contact_wire is not None and scene.line.contact_wire.tension_N == 21000.0
+    # The places of the evaluated stretch are changed, and none of another table.
+    assert scene.wind == load_scene("windy_viaduct").wind
+    again = write_case(tmp_path / "next", str(tmp_path / "line"), spans, droppers)
+    assert load_scene(again).line == scene.line
+
+
+def test_a_line_without_droppers_takes_spans_alone(tmp_path: Path) -> None:
+    spans, _ = tables(tmp_path, 20)
+    assert load_scene(write_case(tmp_path / "a", "tramway", spans)).line.n_spans == 20
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (["--topology", "simpel"], "there is no kind of line named simpel: name one of simple,"),
+        (["--droppers", "hung.csv"], "--droppers needs --spans too"),
+        (["--spans", "none.csv"], "none.csv cannot be read: no such file"),
+        (["--spans", "few.csv", "--droppers", "hung.csv"], "a new case needs 12 spans"),
+        (["--spans", "line 7.csv"], "line.dropper.positions_m"),
+        (["--spans", "hung.csv"], "the table of spans is"),
+    ],
+)
+def test_what_makes_no_case_writes_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: list[str], sentence: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    tables(tmp_path, 20)
+    (tmp_path / "few.csv").write_text("span_m\n55\n55\n")
+    before = sorted(tmp_path.iterdir())
+    done = invoke("new", "a", *words)
+    assert done.exit_code == 2 and sentence in done.output, done.output
+    assert sorted(tmp_path.iterdir()) == before
+
+
+def test_a_folder_that_is_there_is_left_alone(tmp_path: Path) -> None:
+    (tmp_path / "a").mkdir()
+    with pytest.raises(InputError, match="is there already"):
+        write_case(tmp_path / "a", "simple")
+    assert list((tmp_path / "a").iterdir()) == []
+    file = tmp_path / "file"
+    file.write_text("")
+    done = invoke("new", str(file / "a"))
+    assert done.exit_code == 2 and "cannot be made" in done.output
+
+
+@pytest.mark.parametrize("name", ['q"uote', "back\\slash", "ümläut", "two words"])
+def test_any_name_of_a_folder_may_be_that_of_a_case(tmp_path: Path, name: str) -> None:
+    assert load_scene(write_case(tmp_path / name, "simple")).case.title == name
+
+
+@pytest.mark.process
+def test_the_doctor_finds_that_runs_are_possible_here(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    done = invoke("doctor")
+    assert done.exit_code == 0, done.output
+    lines = done.output.splitlines()
+    assert lines[-1] == "runs are possible"
+    assert {line.split()[0] for line in lines[:-1]} <= {OK, MISSING, BROKEN}
+    said = {line[9:24].strip(): line for line in lines[:-1]}
+    for part in ("Python", "compiled kernels", "PETSc", "HDF5", "MPI", "results folder"):
+        assert any(line.startswith(f"{OK:8} {part}") for line in lines), said
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_what_is_broken_is_told_with_a_remedy(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = [
+        Finding("PETSc", BROKEN, "ended by signal 11", "install another", needed=True),
+        Finding("films", MISSING, "no pyvista", "pip install it"),
+    ]
+    monkeypatch.setattr(installation, "examined", lambda folder: iter(found))
+    done = invoke("doctor")
+    assert done.exit_code == 1
+    assert "broken   PETSc           ended by signal 11; to mend it: install another" in done.output
+    assert "no run is possible before these work: PETSc" in done.output
+    monkeypatch.setattr(installation, "examined", lambda folder: iter(found[1:]))
+    assert invoke("doctor").exit_code == 0
+
+
+@pytest.mark.process
+@pytest.mark.parametrize(
+    ("program", "says", "state"),
+    [
+        ("import no_such_module_at_all", "No module named", MISSING),
+        ("raise ValueError('it is old')", "ValueError: it is old", BROKEN),
+        ("import os; os.kill(os.getpid(), 11)", "ended by signal 11", BROKEN),
+        ("import time; time.sleep(60)", "no answer within 1 s", BROKEN),
+        ("print('7.1')", "7.1", OK),
+    ],
+)
+def test_a_part_that_fails_is_a_finding(
+    monkeypatch: pytest.MonkeyPatch, program: str, says: str, state: str
+) -> None:
+    monkeypatch.setattr(installation._answer, "__defaults__", (1.0,))
+    if state == OK:
+        monkeypatch.setattr(installation._answer, "__defaults__", (30.0,))
+    found = installation._tried("a part", program, "mend it", needed=True)
+    assert found.state == state and says in found.says
+    assert found.prevents_runs == (state != OK)
+
+
+def test_without_mpirun_one_rank_is_left(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(installation, "_answer", lambda command: (0, "ranks 1 An MPI"))
+    monkeypatch.setenv("PATH", str(tmp_path))
+    found = installation._mpi()
+    assert found.state == MISSING and not found.prevents_runs
+    launcher = tmp_path / "mpirun"
+    launcher.write_text("")
+    launcher.chmod(0o755)
+    # Two processes that do not know each other: mpirun is that of another library.
+    found = installation._mpi()
+    assert found.state == BROKEN and "different MPI libraries" in found.says
+
+
+def test_a_folder_that_cannot_be_written_to_is_told(tmp_path: Path) -> None:
+    assert installation._folder(tmp_path).state == OK
+    found = installation._folder(tmp_path / "none")
+    assert found.state == BROKEN and "-o FOLDER" in found.remedy
+
+
+def test_several_threads_a_rank_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("OMP_NUM_THREADS", "1")
+    assert installation._threads().state == OK
+    monkeypatch.setenv("OMP_NUM_THREADS", "8")
+    assert "OMP_NUM_THREADS=8" in installation._threads().says
+
+
+@pytest.mark.parametrize(
+    ("version", "bounds", "fits"),
+    [
+        ("1.24.2", ">=1.24,<3", True),
+        ("3.0", "<3,>=1.24", False),
+        ("1.9", ">=1.24", False),
+        ("3.11.2", ">=3.11", True),
+        ("2.0rc1", ">=1", True),
+        ("0.1", "", True),
+    ],
+)
+def test_versions_are_compared_part_by_part(version: str, bounds: str, fits: bool) -> None:
+    assert installation._fits(version, bounds) is fits
+
+
+def test_memory_is_that_of_the_system() -> None:
+    assert 1e8 < installation._available() < 1e14
+    assert f"{len(os.sched_getaffinity(0))} cores" in installation._memory().says
