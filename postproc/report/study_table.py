@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -38,7 +38,9 @@ class Column(NamedTuple):
         """A value where people read it; ``unknown`` stands for None."""
         if value is None:
             return unknown
-        text = format(value, self.format) if self.format else str(cell(value))
+        if not self.format:
+            return str(cell(value))
+        text = format(value, self.format)
         return text.removeprefix("-") if not text.strip("-0.") else text
 
 
@@ -116,6 +118,22 @@ class StudyTable:
             for row, own in zip(self.rows, cells, strict=True)
         ]
         return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
+def texts_table(
+    heads: Sequence[str],
+    rows: Sequence[Sequence[Any]],
+    right: Collection[int] = (),
+    title: str = "",
+    note: str = "",
+) -> StudyTable:
+    """A table of texts for people, with the columns ``right`` at the right."""
+    columns = [
+        Column(str(number), head or " ", ">" if number in right else "")
+        for number, head in enumerate(heads)
+    ]
+    texts = [{str(number): cell for number, cell in enumerate(row)} for row in rows]
+    return StudyTable(columns, texts, title, note)
 
 
 def rows_csv(rows: Sequence[Row]) -> str:

@@ -53,7 +53,7 @@ ROOMS = {
         "studies.sweep", "studies.pantograph", "studies.accuracy",
         "studies.hard",
         "studies.scaling", "studies.stability", "studies.effect_cost", "studies.waves",
-        "studies.case_study",
+        "studies.case_study", "studies.paper",
         "ambrosio2012", "cli", FACE,
     ),
 }  # fmt: skip
