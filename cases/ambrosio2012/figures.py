@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from catenary.cases.ambrosio2012.measures import leading_position, mid_span
-from catenary.cases.ambrosio2012.statements import AVERAGE, LIGHT, SINGLE, Force, Run, Runs
+from catenary.cases.studies.paper.runs import LEADING, SINGLE, TRAILING, Rows, name_of
 from catenary.postproc.evaluate import filters
+from catenary.postproc.evaluate.passages import leading_position, mid_span
 from catenary.postproc.evaluate.statistics import histogram
 from catenary.postproc.read.results import Results
 from catenary.postproc.report.pictures import figures
@@ -21,42 +21,43 @@ from catenary.postproc.report.study_report import StudyFigure
 Folders = Mapping[str, Mapping[str, Path]]
 Columns = dict[str, Any]
 
+LIGHT, AVERAGE = "light", "average"
 _PANELS = {LIGHT: "(a) alpha = 0.00275 s", AVERAGE: "(b) alpha = 0.0275 s"}
 _SHOWN_PAIRS = ("31m", "200m")  # figures 11 and 12 show two separations; the text names these
-_STATISTICS: tuple[tuple[str, Callable[[Force], float]], ...] = (
-    ("maximum", lambda f: f.maximum),
-    ("minimum", lambda f: f.minimum),
-    ("mean", lambda f: f.mean),
-    ("deviation", lambda f: f.std),
-    ("mean + 3 sigma", lambda f: f.mean + 3 * f.std),
-    ("mean - 3 sigma", lambda f: f.mean - 3 * f.std),
+_STATISTICS: tuple[tuple[str, Callable[[Columns], float]], ...] = (
+    ("maximum", lambda f: float(f["max_N"])),
+    ("minimum", lambda f: float(f["min_N"])),
+    ("mean", lambda f: float(f["mean_N"])),
+    ("deviation", lambda f: float(f["std_N"])),
+    ("mean + 3 sigma", lambda f: float(f["mean_N"] + 3 * f["std_N"])),
+    ("mean - 3 sigma", lambda f: float(f["mean_N"] - 3 * f["std_N"])),
 )
 _BIN = 20.0  # [N]
 
 
-def draw(folders: Folders, runs: Runs) -> list[StudyFigure]:
+def draw(folders: Folders, rows: Rows) -> list[StudyFigure]:
     """Figures 8 to 14 of what is there; one whose runs are all missing is left out.
 
     Parameters
     ----------
     folders : result files of the runs that are done
-    runs : their statistics
+    rows : their statistics
     """
     figures = []
     if any(folders.values()):
-        figures = [_forces(folders), _overview(runs), _histograms(folders)]
+        figures = [_forces(folders), _overview(rows), _histograms(folders)]
         shown = {
             damping: {t: f for t, f in trains.items() if t in _SHOWN_PAIRS}
             for damping, trains in folders.items()
         }
         if any(shown.values()):
             figures += [_uplift(shown), _droppers(shown)]
-        figures += [_by_separation(13, LIGHT, runs), _by_separation(14, AVERAGE, runs)]
+        figures += [_by_separation(13, LIGHT, rows), _by_separation(14, AVERAGE, rows)]
     return figures
 
 
 def _places(n: int) -> tuple[str, ...]:
-    return ("single",) if n == 1 else ("leading", "trailing")
+    return (SINGLE,) if n == 1 else (LEADING, TRAILING)
 
 
 def _label(train: str, place: str) -> str:
@@ -105,14 +106,14 @@ def _force_panel(axes: Axes, folder: Path, train: str, damping: str, columns: Co
 
 
 @figures.own_style()
-def _overview(runs: Runs) -> StudyFigure:
+def _overview(rows: Rows) -> StudyFigure:
     """Figure 9: statistics of all pantographs, a panel for each damping."""
     figure = figures.new_figure(6.4)
     panels = figure.subplots(2, 1)
     columns: Columns = {"damping": [], "pantograph": []}
     columns |= {f"{name} [N]": [] for name, _ in _STATISTICS}
-    for axes, (damping, trains) in zip(panels, runs.items(), strict=True):
-        forces = _labelled(trains)
+    for axes, damping in zip(panels, _PANELS, strict=True):
+        forces = {name_of(row): row for row in rows.rows if row["damping"] == damping}
         for number, (name, value) in enumerate(_STATISTICS):
             at = np.arange(len(forces)) + 0.13 * (number - 2.5)
             values = [value(force) for force in forces.values()]
@@ -128,16 +129,6 @@ def _overview(runs: Runs) -> StudyFigure:
     return StudyFigure(
         "figure_09", "Figure 9: statistics of the contact force.", figure, columns
     )  # fmt: skip
-
-
-def _labelled(trains: Mapping[str, Run | None]) -> dict[str, Force]:
-    """Forces of all pantographs of a damping by "train place"."""
-    return {
-        _label(train, place): force
-        for train, run in trains.items()
-        if run is not None
-        for place, force in zip(_places(len(run.forces)), run.forces, strict=True)
-    }
 
 
 @figures.own_style()
@@ -229,20 +220,16 @@ def _passages(
 
 
 @figures.own_style()
-def _by_separation(number: int, damping: str, runs: Runs) -> StudyFigure:
+def _by_separation(number: int, damping: str, rows: Rows) -> StudyFigure:
     """Figures 13 and 14: statistics over the separation beside the single pantograph's."""
     figure = figures.new_figure(3.6)
     panels = figure.subplots(1, 2, sharey=True)
-    trains = runs[damping]
+    own = [row for row in rows.rows if row["damping"] == damping]
     columns: Columns = {"pantograph": [], "train": []}
     columns |= {f"{name} [N]": [] for name, _ in _STATISTICS}
-    for panel, place in enumerate(("leading", "trailing")):
+    for panel, place in enumerate((LEADING, TRAILING)):
         axes = panels[panel]
-        shown = {
-            train: run.forces[min(panel, len(run.forces) - 1)]
-            for train, run in trains.items()
-            if run is not None
-        }
+        shown = {row["train"]: row for row in own if row["place"] in (place, SINGLE)}
         for index, (name, value) in enumerate(_STATISTICS):
             values = [value(force) for force in shown.values()]
             axes.plot(range(len(shown)), values, "o-", ms=4, linewidth=1.1,

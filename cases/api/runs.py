@@ -149,7 +149,7 @@ def sweep(
     import pandas as pd
 
     from catenary.cases.studies.sweep.jobs import RunOptions, interrupted
-    from catenary.cases.studies.sweep.output import rows
+    from catenary.cases.studies.sweep.output import table_of
     from catenary.cases.studies.sweep.sweep import run_sweep, sweep_of
 
     if not vary or not all(len(values) for values in vary.values()):
@@ -173,7 +173,9 @@ def sweep(
         ended, _ = run_sweep(made, folder, comm, plan, "a sweep of a Python program", ())
     if interrupted(ended):
         raise KeyboardInterrupt
-    return pd.DataFrame(on_root(comm, lambda: rows(ended)))  # times of a rank are its own
+    return pd.DataFrame(
+        on_root(comm, lambda: table_of(ended).records())
+    )  # times of a rank are its own
 
 
 def _communicator(comm: Any) -> Any:

@@ -21,7 +21,7 @@ from catenary.cases.cli.app import (
 from catenary.cases.terminal import console
 
 if TYPE_CHECKING:
-    from catenary.cases.studies.choice.study import Costs, Wish
+    from catenary.cases.studies.effect_cost.study import Costs, Wish
 
 _RUNS = "runs"
 _MOST_ROUNDS = 1000
@@ -80,7 +80,7 @@ def plan(
     given = [*(assignments or []), *(extras or [])]
     if cost:
         from catenary.cases.studies.accuracy.analysis import parse_target
-        from catenary.cases.studies.choice.study import Wish
+        from catenary.cases.studies.effect_cost.study import Wish
 
         wanted = 0.01 if tolerance is None else parse_target(tolerance, "--tolerance") / 100
         wish = Wish(
@@ -133,7 +133,7 @@ def _cost(wish: Wish, out: Path | None, as_json: bool, force: bool) -> int:
     scene = load_scene(wish.case, wish.overrides, wish.shortened)
     comm = console.alone()
     start_petsc(as_arguments(scene.petsc.given(), []))
-    from catenary.cases.studies.choice import output, study
+    from catenary.cases.studies.effect_cost import output, study
 
     def say(line: str) -> None:
         if not as_json:
@@ -165,7 +165,7 @@ def _refuse_other(out: Path, name: str, force: bool) -> None:
 
 
 def _print(found: Costs, files: list[Path], as_json: bool) -> None:
-    from catenary.cases.studies.choice import output
+    from catenary.cases.studies.effect_cost import output
 
     if as_json:
         console.say(output.as_json(found).rstrip())

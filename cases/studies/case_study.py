@@ -146,7 +146,7 @@ def _conclude(
         for one, job in zip(ended, plan.jobs, strict=True)
     }
     study = module.conclude(runs)
-    table = sweep_output.rows(ended)
+    table = sweep_output.table_of(ended)
     wall = sum(one.wall for one in ended)
     facts = {
         "runs": f"{len(ended)}, of which {sum(not one.done for one in ended)} broke",
@@ -154,8 +154,8 @@ def _conclude(
         "time of this call": f"{time.perf_counter() - begin:.0f} s, "
         f"{sum(one.skipped for one in ended)} of the runs had been done before",
     }
-    files = write_study(study, out_dir, table, facts)
-    files += write_all(out_dir, {"study.csv": sweep_output.as_csv(table)})
+    files = write_study(study, out_dir, table.records(), facts)
+    files += write_all(out_dir, {"study.csv": table.csv()})
     told = [f"{name}: {value}" for name, value in facts.items()]
     listed = [str(path) for path in files if path.stem == "study"]
     remarks = sweep_output.remarks_of(ended)

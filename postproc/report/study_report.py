@@ -5,24 +5,24 @@ A study compares many runs with what a source states of its own; who made it fil
 
 from __future__ import annotations
 
-import base64
 import json
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from matplotlib.figure import Figure
 
 from catenary.postproc.files.csv_text import csv_text, number_text
 from catenary.postproc.files.disk import plain, write_all
+from catenary.postproc.report.page import page
 from catenary.postproc.report.pictures import figures
+from catenary.postproc.report.sections.section import Folded, Picture, Section
+from catenary.postproc.report.study_table import StudyTable, texts_table
 
 REPRODUCED, NOT_REPRODUCED, UNDECIDED = "reproduced", "not reproduced", "cannot be decided"
-_TEMPLATES = Path(__file__).parent / "templates"
 
 
 @dataclass(frozen=True)
@@ -60,16 +60,6 @@ class Reading:
     def n_reproduced(self) -> int:
         """How many statements are reproduced."""
         return sum(one.verdict == REPRODUCED for one in self.findings)
-
-
-@dataclass(frozen=True)
-class StudyTable:
-    """A table: column heads and rows of text; numbers are written by who made it."""
-
-    title: str
-    note: str
-    head: Sequence[str]
-    rows: Sequence[Sequence[str]]
 
 
 @dataclass(frozen=True)
@@ -111,12 +101,15 @@ def write_study(
     content: dict[str, bytes | str] = {f"{name}.png": data for name, data in pictures.items()}
     for figure in study.figures:
         content[f"{figure.name}.csv"] = columns_csv(figure.columns)
-    content["study.html"] = _html(study, pictures, facts)
+    content["study.html"] = page(study.title, study.lead, _sections(study, facts), pictures)
     record = {
         "title": study.title,
         "facts": dict(facts),
         "readings": [asdict(reading) for reading in study.readings],
-        "tables": [asdict(table) for table in study.tables],
+        "tables": [
+            {"title": table.title, "note": table.note, "head": table.head, "rows": table.texts()}
+            for table in study.tables
+        ],
         "runs": list(rows),
     }
     content["study.json"] = json.dumps(plain(record), indent=1, ensure_ascii=False) + "\n"
@@ -153,19 +146,42 @@ def verdict_text(study: Study) -> str:
     return "\n".join(lines)
 
 
-def _html(study: Study, pictures: Mapping[str, bytes], facts: Mapping[str, Any]) -> str:
-    environment = Environment(
-        loader=FileSystemLoader(_TEMPLATES),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    uris = {
-        name: "data:image/png;base64," + base64.b64encode(data).decode("ascii")
-        for name, data in pictures.items()
-    }
-    css = {REPRODUCED: "yes", NOT_REPRODUCED: "no", UNDECIDED: "open"}
-    return environment.get_template("study.html.j2").render(
-        study=study, uris=uris, facts=facts, css=css
-    )
+def _sections(study: Study, facts: Mapping[str, Any]) -> Iterator[Section]:
+    first, *others = study.readings
+    rows = [
+        [one.number, f"{one.statement} ({one.criterion})", one.verdict, one.found, one.reason]
+        for one in first.findings
+    ]
+    heads = ["no.", "the source states", "verdict", "found", "where it differs, why"]
+    yield Section("", [texts_table(["", ""], list(facts.items()))])
+    yield Section("Verdicts", [texts_table(heads, rows)])
+    if others:
+        short = {REPRODUCED: "yes", NOT_REPRODUCED: "no", UNDECIDED: "?"}
+        numbers = [str(one.number) for one in first.findings]
+        rows = [
+            [one.title, " ".join(one.changes) or "none",
+             *(short[finding.verdict] for finding in one.findings),
+             f"{one.n_reproduced} of {len(one.findings)}"]
+            for one in study.readings
+        ]  # fmt: skip
+        folded = [
+            Folded(
+                f"Figures: {one.title}",
+                texts_table(["", "", ""], [[f.number, f.verdict, f.found] for f in one.findings]),
+            )
+            for one in others
+        ]
+        title = "The same statements under other readings of what is left open"
+        yield Section(
+            title, [texts_table(["reading", "changes", *numbers, "reproduced"], rows)], (), folded
+        )
+    for table in study.tables:
+        yield Section(table.title, [replace(table, title="")])
+    if study.figures:
+        shown = [
+            Picture(
+                one.name, f"{one.caption} Data: {one.name}.csv", partial(getattr, one, "figure")
+            )
+            for one in study.figures
+        ]
+        yield Section("Figures", [], shown)

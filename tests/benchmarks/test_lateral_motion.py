@@ -16,7 +16,7 @@ from step_cost import room
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.problem import problem_of
-from catenary.cases.studies.choice.turns import RepeatedMarch, in_turns
+from catenary.cases.studies.effect_cost.step_timing import RepeatedMarch, in_turns
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
 from catenary.solver.effects.effect import Effect
 from catenary.solver.model.builder import ModelBuilder

@@ -10,7 +10,7 @@ from mpi4py import MPI
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.problem import problem_of
-from catenary.cases.studies.choice.turns import RepeatedMarch, in_turns
+from catenary.cases.studies.effect_cost.step_timing import RepeatedMarch, in_turns
 from catenary.solver.statics.line_at_rest import line_at_rest
 
 LUMPED = 'train.pantographs=[{name="lumped"}]'

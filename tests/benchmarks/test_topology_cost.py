@@ -11,7 +11,7 @@ from mpi4py import MPI
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.problem import problem_of
-from catenary.cases.studies.choice.turns import RepeatedMarch, beside
+from catenary.cases.studies.effect_cost.step_timing import RepeatedMarch, beside
 from catenary.solver.statics.line_at_rest import line_at_rest
 
 # Case, changes, what makes the line without it, and how much dearer it may be. A third wire all

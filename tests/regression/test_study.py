@@ -64,7 +64,9 @@ def test_every_statement_has_a_verdict_under_every_reading(done: tuple[Path, str
     ] * 2
     # Eq. (1.1) without its first term: 441.5 km/h.
     critical = 3.6 * math.sqrt(20000.0 / 1.33)
-    assert study["readings"][0]["findings"][8]["found"].startswith(f"{critical:.1f} km/h")
+    assert study["readings"][0]["findings"][8]["found"].startswith(
+        f"light, single: wave speed [km/h] {critical:.1f}"
+    )
 
 
 def test_figures_show_what_the_runs_hold(done: tuple[Path, str]) -> None:

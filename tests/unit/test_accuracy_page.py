@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from catenary.cases.studies.accuracy import markdown, output, runs
+from catenary.cases.studies.accuracy import output, runs
 from catenary.cases.studies.accuracy.analysis import QUANTITIES, Row
 from catenary.cases.studies.accuracy.axes import AXES, mesh
 from catenary.cases.studies.accuracy.plan import Plan, PlannedAxis
@@ -27,14 +27,15 @@ def planned(name: str = "elements") -> PlannedAxis:
 
 def row(level: str, error: float) -> Row:
     errors = dict.fromkeys(QUANTITIES, error)
-    return Row("elements", level, "done", {"h": 1.0}, errors, errors, 0.05, 3, 1.0, 1.01)
+    sizes = {"h": 1.0 / int(level[0])}
+    return Row("elements", level, "done", sizes, errors, errors, 0.05, 3, 1.0, 1.01)
 
 
 def test_a_page_has_words_for_names_and_no_empty_column() -> None:
     rows = [row("1_elements", 4.0), row("5_elements", 1.0), Row("elements", "9_elements", "broke")]
     plan = Plan("a_case", [planned()], [], 2, True, ["a=[1, 2]"], ["elements"])
     found = Measured(plan, rows, {"elements": dict.fromkeys(QUANTITIES, 0.1)}, 60.0)
-    lines = markdown.page(found, ["A sentence."], {"elements": []}, "").splitlines()
+    lines = output.page(found, ["A sentence."], "").splitlines()
     assert any(
         line.startswith(
             "Reference: 0.2 ms 40 elements. Uncertainty of the reference, from 0.2 ms 40 "
@@ -61,15 +62,15 @@ def test_remarks_stand_below_the_tables_with_the_levels_that_they_are_of() -> No
     plan = Plan("a_case", [planned()], [], 2, True, [], ["elements"])
     percent = {"elements": dict.fromkeys(QUANTITIES, 0.1)}
     found = Measured(plan, rows, percent, 60.0, runs_of)
-    lines = markdown.page(found, [], {"elements": []}, "").splitlines()
+    lines = output.page(found, [], "").splitlines()
     table = [line for line in lines if line.startswith("|")]
     assert [line.split("|")[-2].strip() for line in table] == ["remarks", "---", "1", ""]
     told = ["elements 1 element: lost", "elements 0.2 ms 40 elements: stiff"]
     assert [line for line in lines if line.startswith("- ")] == [f"- {text}" for text in told]
     text = output.as_text(found, 1.0).splitlines()
     assert text[-2:] == [f"REMARK      {line}" for line in told]
-    assert [line.split()[-1] for line in text[1:4]] == ["remarks", "1", "0"]
-    assert output.as_table(rows[0])["remarks"] == ["lost"]
+    assert [line.split()[-1] for line in text[1:4]] == ["remarks", "1", "-"]
+    assert output.table_of(rows).records()[0]["remarks"] == ["lost"]
 
 
 @pytest.mark.parametrize(
@@ -83,7 +84,7 @@ def test_remarks_stand_below_the_tables_with_the_levels_that_they_are_of() -> No
     ],
 )
 def test_names_of_levels_as_words(name: str, words: str) -> None:
-    assert markdown.in_words(name) == words
+    assert output.in_words(name) == words
 
 
 def test_the_least_time_is_told() -> None:

@@ -50,10 +50,10 @@ ROOMS = {
         "scene.problem", "scene.cost_model", "scene.checks", "scene.load", "scene.starter",
         "terminal", "process",
         "result_folder", "run",
-        "studies.told_remarks", "studies.sweep", "studies.pantograph", "studies.accuracy",
+        "studies.sweep", "studies.pantograph", "studies.accuracy",
         "studies.hard",
-        "studies.scaling", "studies.stability", "studies.choice", "studies.waves",
-        "studies.case_study",
+        "studies.scaling", "studies.stability", "studies.effect_cost", "studies.waves",
+        "studies.case_study", "studies.paper",
         "ambrosio2012", "cli", FACE,
     ),
 }  # fmt: skip

@@ -19,8 +19,9 @@ from catenary.cases.run.runner import run_case
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.problem import problem_of
-from catenary.cases.studies.choice import advice, output
-from catenary.cases.studies.choice.study import (
+from catenary.cases.studies.effect_cost import output
+from catenary.cases.studies.effect_cost.step_timing import RepeatedMarch, beside
+from catenary.cases.studies.effect_cost.study import (
     Costs,
     Measured,
     Size,
@@ -29,8 +30,11 @@ from catenary.cases.studies.choice.study import (
     measure,
     size_of,
 )
-from catenary.cases.studies.choice.switches import Choice, Switch, choice_of
-from catenary.cases.studies.choice.turns import RepeatedMarch, beside
+from catenary.cases.studies.effect_cost.switches import (
+    Switch,
+    SwitchableEffects,
+    switchable_effects,
+)
 from catenary.solver.effects import all_effects as effects
 from catenary.solver.effects.build_model import build
 from catenary.solver.effects.effect import Effect
@@ -67,20 +71,22 @@ def found(tmp_path_factory: pytest.TempPathFactory) -> Costs:
 
 
 def test_effects_that_require_each_other_are_switched_together() -> None:
-    choice = choice_of(load_scene("ac_simple"))
+    choice = switchable_effects(load_scene("ac_simple"))
     gravity = next(switch for switch in choice.switches if switch.name == "gravity")
     assert gravity.on and set(gravity.together) == {"pre_sag", "dropper_slackening"}
     assert "effects.dropper_slackening=false" in gravity.assignments
     ratio = "line.dropper.residual_stiffness_ratio=0.1"
     out = "effects.residual_dropper_stiffness=false"
     off = load_scene("ac_simple", [*gravity.assignments, ratio, out])
-    residual = next(s for s in choice_of(off).switches if s.name == "residual_dropper_stiffness")
+    residual = next(
+        s for s in switchable_effects(off).switches if s.name == "residual_dropper_stiffness"
+    )
     assert not residual.on and set(residual.together) == {"dropper_slackening", "gravity"}
 
 
 @pytest.mark.parametrize("case", ["ac_simple", "ambrosio2012", "tramway"])
 def test_every_effect_is_switched_lacks_data_or_is_part_of_all_scenes(case: str) -> None:
-    choice = choice_of(load_scene(case))
+    choice = switchable_effects(load_scene(case))
     told = [s.name for s in choice.switches] + choice.always + list(choice.lacking)
     assert sorted(told) == sorted(effects.registry())
     for switch in choice.switches:
@@ -103,7 +109,7 @@ def test_changes_are_those_of_two_runs(found: Costs, tmp_path: Path) -> None:
         (own,) = figures
         assert own["std_N"] == summary["pantographs"][0]["std_N"]
         assert own["max_uplift_mm"] == summary["supports"]["max_uplift_mm"]
-    rows = {row["effect"]: row for row in output.rows_of(found)}
+    rows = {row["effect"]: row for row in output.table_of(found).records()}
     for name, summary in zip(TWO, summaries[1:], strict=True):
         expected = summary["pantographs"][0]["max_N"] - summaries[0]["pantographs"][0]["max_N"]
         assert rows[name]["change_of_max_N"] == expected != 0.0
@@ -113,7 +119,7 @@ def test_counts_are_those_of_the_model() -> None:
     with registered(SIDEWAYS):
         scene = load_scene(CASE, SHORT)
         problem, mesh = problem_of(scene), mesh_of(scene)
-        switch = next(s for s in choice_of(scene).switches if s.name == SIDEWAYS.name)
+        switch = next(s for s in switchable_effects(scene).switches if s.name == SIDEWAYS.name)
         assert not switch.on
         wide = replace(problem, effects=problem.effects | {SIDEWAYS.name})
         for one, planes in ((problem, (4,)), (wide, (4, 4))):
@@ -156,7 +162,7 @@ def test_rounds_that_a_busy_machine_slows_down_do_not_change_a_ratio() -> None:
 
 
 def costs_of(row: Measured, as_it_is: list[dict[str, float | None]]) -> Costs:
-    choice = Choice([row.switch], ["vertical"], {"pre_sag": "a pre-sag"})
+    choice = SwitchableEffects([row.switch], ["vertical"], {"pre_sag": "a pre-sag"})
     size = Size(100, (4, 4), (4,))
     return Costs(Wish("x"), choice, (0.0, 50.0), 10, size, 12.5, as_it_is, ["p"], [row])
 
@@ -180,9 +186,9 @@ def test_advice_weighs_cost_against_change() -> None:
         (off, 0.8, figures(None), "makes steps cheaper, 0.80 times, and with it sigma comes or go"),
     ):  # fmt: skip
         row = Measured(switch, "done", size, ratio, after)
-        assert words in advice.advice(costs_of(row, figures(30.0)), row)
+        assert words in output.advice(costs_of(row, figures(30.0)), row)
     broken = Measured(on, "at 3 s it broke.")
-    assert advice.advice(costs_of(broken, figures(1.0)), broken).endswith("here: at 3 s it broke.")
+    assert output.advice(costs_of(broken, figures(1.0)), broken).endswith("here: at 3 s it broke.")
 
 
 def test_table_csv_and_json_hold_the_same(found: Costs, tmp_path: Path) -> None:
@@ -194,7 +200,7 @@ def test_table_csv_and_json_hold_the_same(found: Costs, tmp_path: Path) -> None:
     assert record["rows"][1]["std_N"] == pytest.approx(float(rows[1]["std_N"]), rel=1e-8)
     assert "vertical" in record["always"] and "pre_sag" in record["lacking_data"]
     change = record["rows"][2]["change_of_mean_N"]
-    assert f"{change:+9.2f}" in next(line for line in text.splitlines() if "arm_stiff" in line)
+    assert f"{change:+.2f}" in next(line for line in text.splitlines() if "arm_stiff" in line)
     assert f"without {TWO[1]}" in text and "evaluated from 90 to 120 m" in text
     assert found.remarks and "; ".join(found.remarks) == rows[0]["remarks"]
     for number, row in enumerate(found.rows, start=1):

@@ -14,7 +14,7 @@ from catenary.cases.scene.input.faults import SceneError
 from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.problem import problem_of
 from catenary.cases.studies.accuracy.models import planes
-from catenary.cases.studies.choice.switches import choice_of
+from catenary.cases.studies.effect_cost.switches import switchable_effects
 from catenary.cases.studies.waves.excited import Asked, excitation_of
 from catenary.solver.effects import all_effects as effects
 from catenary.solver.effects.build_model import numbering_of
@@ -163,14 +163,14 @@ def test_what_is_planned_counts_shared_unknowns_once(topology: str, relative: bo
 
 def test_other_effects_are_switched_on_with_the_relative_motion() -> None:
     """`plan --cost` and `accuracy` of the shipped case, whose wires move as one."""
-    switches = {one.name: one for one in choice_of(load_scene(TWIN)).switches}
+    switches = {one.name: one for one in switchable_effects(load_scene(TWIN)).switches}
     assert switches["relative_motion"].keys == {"relative_motion": True}
     keys = {"lateral_motion": True, "relative_motion": True}
     assert switches["lateral_motion"].keys == keys
     whole = load_scene(TWIN, switches["lateral_motion"].assignments)
     mesh = mesh_of(whole)
     assert numbering_of(problem_of(whole), mesh).width == 12
-    apart = choice_of(load_scene(TWIN, ["effects.relative_motion=true"])).switches
+    apart = switchable_effects(load_scene(TWIN, ["effects.relative_motion=true"])).switches
     keys_apart = {one.name: one.keys for one in apart}
     assert keys_apart["lateral_motion"] == {"lateral_motion": True}
     assert keys_apart["relative_motion"] == {"relative_motion": False}

@@ -14,15 +14,14 @@ from matplotlib.figure import Figure
 from typer.testing import CliRunner
 
 from catenary.base.errors import InputError
-from catenary.cases.ambrosio2012.conclusion import changes_of
-from catenary.cases.ambrosio2012.study import variants
-from catenary.cases.ambrosio2012.variations import read_table, searched
+from catenary.cases.ambrosio2012.study import TABLE, variants
 from catenary.cases.cli.main import app
 from catenary.cases.scene.input.case_files import shipped
 from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.problem import resolved
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.case_study import StudyVariant, make_plan
+from catenary.cases.studies.paper.runs import PaperStudy, changes_of
 from catenary.postproc.report.study_report import (
     NOT_REPRODUCED,
     REPRODUCED,
@@ -94,7 +93,7 @@ def scene_of(one: StudyVariant) -> Scene:
 def test_every_train_runs_under_both_dampings_and_so_does_every_variation(
     planned: list[StudyVariant],
 ) -> None:
-    table = read_table()
+    table = PaperStudy.read(TABLE).table
     variations = sum(len(group) for group in table["variations"].values())
     options = sum(len(group) for group in table["search"]["inputs"].values())
     readings = len(table["readings"]) + options
@@ -125,7 +124,10 @@ def test_the_kind_of_pantograph_is_the_cases_own_or_the_readings(
     planned: list[StudyVariant],
 ) -> None:
     own = load_scene("ambrosio2012").train.pantographs[0].name
-    kinds = {reading["name"]: reading.get("kind", own) for reading in read_table()["readings"]}
+    kinds = {
+        reading["name"]: reading.get("kind", own)
+        for reading in PaperStudy.read(TABLE).table["readings"]
+    }
     assert {own, "lumped"} == set(kinds.values())
     for one in planned:
         reading, train = (one.variant.varied[key] for key in ("reading", "train"))
@@ -134,7 +136,9 @@ def test_the_kind_of_pantograph_is_the_cases_own_or_the_readings(
 
 
 def test_the_changes_of_a_reading_name_its_kind_of_pantograph() -> None:
-    told = {reading["name"]: changes_of(reading) for reading in read_table()["readings"]}
+    told = {
+        reading["name"]: changes_of(reading) for reading in PaperStudy.read(TABLE).table["readings"]
+    }
     assert told["case"] == []
     assert told["two_masses"] == ["train.pantographs.0.name=lumped"]
     assert told["two_masses_50"] == ["train.pantographs.0.name=lumped", "line.span_m=50"]
@@ -155,7 +159,7 @@ def test_the_search_takes_each_option_in_the_place_of_the_best_readings(
     }
     best = scenes.pop("best")
     del scenes["best_released"]
-    assert len(scenes) == len(searched(read_table()))
+    assert len(scenes) == len(PaperStudy.read(TABLE).searched())
     records = [json.dumps(resolved(scene), sort_keys=True, default=str) for scene in
                (best, *scenes.values())]  # fmt: skip
     assert len(set(records)) == len(records)

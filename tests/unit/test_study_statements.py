@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,176 +10,190 @@ import pytest
 from measuring import check
 from small_lines import BARE, bare_wires, mesh_of, problem_of
 
-from catenary.cases.ambrosio2012 import ranking, ringing, statements
-from catenary.cases.ambrosio2012.statements import AVERAGE, LIGHT, Force, Run, Runs, Slack
+from catenary.base.errors import InputError
+from catenary.cases.ambrosio2012.study import TABLE
+from catenary.cases.studies.paper import conclusion, statements
+from catenary.cases.studies.paper.runs import PaperStudy, Rows
+from catenary.cases.studies.waves.theory import first_band
 from catenary.postproc.report.study_report import NOT_REPRODUCED, REPRODUCED, UNDECIDED
 from catenary.solver.effects.build_model import build
 
-SEPARATIONS = {"single": None, "31m": 31.0, "85m": 85.0, "200m": 200.0}
+LIGHT, AVERAGE = "light", "average"
+TRAINS = ("single", "31m", "85m", "200m")
+PAPER = PaperStudy.read(TABLE)
+STATEMENTS = statements.statements_of(PAPER.table)
+Runs = dict[tuple[str, str], list[dict[str, Any]] | None]
 
 
-def force(std: float, reach: float, mean: float = 150.0, loss: float = 0.0) -> Force:
-    """A force whose extremes lie ``reach`` [N] from its mean."""
-    return Force(mean, std, mean + reach, mean - reach, loss, 0.8 * std, 0.6 * std)
+def force(std: float, reach: float, slack: tuple[int, int]) -> dict[str, Any]:
+    """Figures of a pantograph whose extreme forces lie ``reach`` [N] from its mean."""
+    return {
+        "mean_N": 150.0, "std_N": std, "max_N": 150.0 + reach, "min_N": 150.0 - reach,
+        "loss_percent": 0.0, "std_0_5_N": 0.8 * std, "std_5_20_N": 0.6 * std, "uplift_mm": 50.0,
+        "onset_m": 12.0, "slack_before": slack[0], "slack_after": slack[1],
+        "wave_speed_km_h": 441.2, "speed_over_wave": 300.0 / 441.2,
+    }  # fmt: skip
 
 
-def run(separation: float | None, forces: list[Force], slack: Slack) -> Run:
-    return Run(
-        separation=separation,
-        named=separation != 85.0,
-        forces=forces,
-        uplift=0.05,
-        onset=12.0,
-        slack=slack,
-        wave_speed=441.2 / 3.6,
-        train_speed=300 / 3.6,
-    )
-
-
-def as_the_paper_says() -> dict[str, dict[str, Run | None]]:
+def as_the_paper_says() -> Runs:
     """Runs that satisfy all nine statements."""
-    light: dict[str, Run | None] = {}
-    average: dict[str, Run | None] = {}
-    for name, separation in SEPARATIONS.items():
-        if separation is None:
-            light[name] = run(None, [force(50, 110)], Slack(4, 0, 16))
-            average[name] = run(None, [force(38, 80)], Slack(0, 0, 16))
-            continue
-        worst = 10.0 if separation == 200.0 else 0.0
-        leading = force(52 if separation == 31.0 else 50, 112)
-        light[name] = run(separation, [leading, force(55 + worst, 125 + worst)], Slack(4, 6, 16))
-        average[name] = run(
-            separation,
-            [force(38, 80), force(40 + worst / 4, 86 + worst / 4)],
-            Slack(0, 2 if worst else 0, 16),
-        )
-    return {LIGHT: light, AVERAGE: average}
+    runs: Runs = {
+        (LIGHT, "single"): [force(50, 110, (4, 0))],
+        (AVERAGE, "single"): [force(38, 80, (0, 0))],
+    }
+    for train in TRAINS[1:]:
+        worst = 10.0 if train == "200m" else 0.0
+        pair = force(52 if train == "31m" else 50, 112, (4, 6))
+        runs[LIGHT, train] = [pair, force(55 + worst, 125 + worst, (4, 6))]
+        slack = (0, 2 if worst else 0)
+        runs[AVERAGE, train] = [
+            force(38, 80, slack),
+            force(40 + worst / 4, 86 + worst / 4, slack),
+        ]
+    return runs
+
+
+def findings(runs: Runs) -> list[Any]:
+    return statements.judge(STATEMENTS, Rows.of(runs))
 
 
 def verdicts(runs: Runs) -> list[str]:
-    return [finding.verdict for finding in statements.judge(runs)]
+    return [finding.verdict for finding in findings(runs)]
 
 
 def changed(damping: str, train: str, place: int | None = None, **values: Any) -> Runs:
-    """The paper's runs with one figure of one run, or of one of its pantographs, replaced."""
+    """The paper's runs with figures of one run, or of one of its pantographs, replaced."""
     runs = as_the_paper_says()
-    one = runs[damping][train]
-    assert one is not None
-    if place is None:
-        runs[damping][train] = replace(one, **values)
-    else:
-        forces = list(one.forces)
-        forces[place] = replace(forces[place], **values)
-        runs[damping][train] = replace(one, forces=forces)
+    own = runs[damping, train]
+    assert own is not None
+    for number, one in enumerate(own):
+        if place in (None, number):
+            one |= values
     return runs
 
 
 def test_runs_as_the_paper_says_reproduce_all_nine() -> None:
-    findings = statements.judge(as_the_paper_says())
-    assert [finding.number for finding in findings] == list(range(1, 10))
-    assert [finding.verdict for finding in findings] == [REPRODUCED] * 9
+    found = findings(as_the_paper_says())
+    assert [finding.number for finding in found] == list(range(1, 10))
+    assert [finding.verdict for finding in found] == [REPRODUCED] * 9
 
 
 @pytest.mark.parametrize(
     ("number", "runs", "told"),
     [
-        (1, changed(AVERAGE, "85m", 1, mean=156.0), "150.0 to 156.0 N"),
-        (1, changed(LIGHT, "single", 0, mean=144.0), "144.0 to 150.0 N"),
-        (2, changed(AVERAGE, "31m", 1, std=45.1), "the largest 30.1 % (45.1 N, 31m trailing)"),
-        (2, changed(LIGHT, "single", 0, std=44.9), "the smallest 29.9 % (44.9 N, single)"),
-        (3, changed(LIGHT, "85m", 1, maximum=400.0), "maximum 400.0 N 85m trailing"),
-        (3, changed(AVERAGE, "31m", 0, minimum=1.0), "minimum 1.0 N 31m leading"),
-        (3, changed(AVERAGE, "single", 0, std=60.0), "deviation 60.0 N single"),
-        (4, changed(LIGHT, "31m", 1, maximum=200.0), "31m -49"),
-        (4, changed(AVERAGE, "200m", 1, maximum=400.0, minimum=20.0), "average: 31m +12"),
-        (5, changed(LIGHT, "31m", 0, std=49.0), "-2.0 %"),
-        (5, changed(LIGHT, "31m", 0, std=60.0), "+20.0 %"),
-        (6, changed(AVERAGE, "200m", 1, loss_percent=0.4), "at most 0.4 % of the time (200m"),
-        (7, changed(AVERAGE, "85m", uplift=0.0701), "70.1 mm (85m, average)"),
-        (7, changed(LIGHT, "31m", onset=-0.5), "-0.5 m or more to go"),
-        (8, changed(LIGHT, "31m", slack=Slack(0, 0, 16)), "31m 0+0"),
-        (8, changed(AVERAGE, "85m", slack=Slack(0, 1, 16)), "85m 0+1"),
-        (8, changed(AVERAGE, "200m", slack=Slack(1, 3, 16)), "200m 1+3"),
-        (8, changed(AVERAGE, "200m", slack=Slack(0, 0, 16)), "200m 0+0"),
-        (9, changed(LIGHT, "single", wave_speed=440.0 / 3.6), "440.0 km/h"),
-        (9, changed(LIGHT, "single", train_speed=310.0 / 3.6), "310 km/h"),
+        (1, changed(AVERAGE, "85m", 1, mean_N=156.0), "to 156.0 (85m trailing, average), 13 of 14"),
+        (1, changed(LIGHT, "single", 0, mean_N=144.0), "mean [N] 144.0 (single, light) to 150.0"),
+        (2, changed(AVERAGE, "31m", 1, std_N=45.1), "to 30.1 (31m trailing), 6 of 7 as stated"),
+        (2, changed(LIGHT, "single", 0, std_N=44.9), "light: std / mean [%] 29.9 (single) to"),
+        (3, changed(LIGHT, "85m", 1, max_N=400.0), "max [N] largest 400.0 (85m trailing)"),
+        (3, changed(AVERAGE, "31m", 0, min_N=1.0), "min [N] smallest 1.0 (31m leading)"),
+        (3, changed(AVERAGE, "single", 0, std_N=60.0), "std [N] largest 60.0 (single)"),
+        (4, changed(LIGHT, "31m", 1, max_N=200.0), "leading one's [N] -49.0 (31m trailing)"),
+        (4, changed(AVERAGE, "200m", 1, max_N=400.0, min_N=20.0), "average +32.7, average +81.3"),
+        (5, changed(LIGHT, "31m", 0, std_N=49.0), "-2.0 (31m leading)"),
+        (5, changed(LIGHT, "31m", 0, std_N=60.0), "+20.0 (31m leading)"),
+        (
+            6,
+            changed(AVERAGE, "200m", 1, loss_percent=0.4),
+            "to 0.4 (200m trailing, average), 13 of",
+        ),
+        (7, changed(AVERAGE, "85m", uplift_mm=70.1), "to 70.1 (85m, average), 7 of 8 as stated"),
+        (7, changed(LIGHT, "31m", onset_m=-0.5), "-0.5 (31m, light)"),
+        (8, changed(LIGHT, "31m", slack_before=0, slack_after=0), "slack at mid-span 0 (31m)"),
+        (8, changed(AVERAGE, "85m", slack_after=1), "to 1 (85m), 2 of 3 as stated"),
+        (8, changed(AVERAGE, "200m", slack_before=1), "before the trailing one 1 (200m)"),
+        (8, changed(AVERAGE, "200m", slack_after=0), "after the trailing one 0 (200m)"),
+        (9, changed(LIGHT, "single", wave_speed_km_h=440.0), "wave speed [km/h] 440.0"),
+        (9, changed(LIGHT, "single", speed_over_wave=0.703), "over wave speed 0.703"),
     ],
 )
 def test_one_figure_is_enough_to_refute(number: int, runs: Runs, told: str) -> None:
-    finding = statements.judge(runs)[number - 1]
+    finding = findings(runs)[number - 1]
     assert finding.verdict == NOT_REPRODUCED
     assert told in finding.found
 
 
 def test_a_run_that_broke_leaves_open_what_it_would_decide() -> None:
     runs = as_the_paper_says()
-    runs[AVERAGE]["85m"] = None
+    runs[AVERAGE, "85m"] = None
     found = verdicts(runs)
     # The statements about light damping at 31 m and about the wire's data need no such run.
     assert [number for number, one in enumerate(found, 1) if one != UNDECIDED] == [5, 9]
-    assert "85m, average" in statements.judge(runs)[0].found
+    assert "85m, average" in findings(runs)[0].found
 
 
 def test_without_the_separation_of_200_m_its_statements_are_open() -> None:
-    runs = as_the_paper_says()
-    for trains in runs.values():
-        del trains["200m"]
+    runs = {key: own for key, own in as_the_paper_says().items() if key[1] != "200m"}
     found = verdicts(runs)
     assert found[2] == found[7] == UNDECIDED
     assert found[1] == REPRODUCED
-    assert verdicts({LIGHT: {}, AVERAGE: {}}) == [UNDECIDED] * 9
+    assert verdicts({}) == [UNDECIDED] * 9
 
 
 def test_a_difference_within_the_discretisations_error_decides_nothing() -> None:
-    assert verdicts(changed(LIGHT, "31m", 0, std=50.2))[4] == UNDECIDED
+    assert verdicts(changed(LIGHT, "31m", 0, std_N=50.2))[4] == UNDECIDED
 
 
 def test_missing_arms_leave_the_uplift_open() -> None:
-    assert verdicts(changed(LIGHT, "31m", onset=None))[6] == UNDECIDED
+    assert verdicts(changed(LIGHT, "31m", onset_m=None))[6] == UNDECIDED
 
 
 def test_only_the_separations_of_the_text_may_be_judged() -> None:
-    runs = changed(AVERAGE, "85m", 1, std=80.0, maximum=400.0)
+    runs = changed(AVERAGE, "85m", 1, std_N=80.0, max_N=400.0)
+    assert PAPER.named_trains == ["single", "31m", "200m"]
     assert verdicts(runs)[1:3] == [NOT_REPRODUCED] * 2
-    assert verdicts(statements.named_only(runs))[1:3] == [REPRODUCED] * 2
+    named = statements.judge(STATEMENTS, Rows.of(runs).only(PAPER.named_trains))
+    assert [one.verdict for one in named][1:3] == [REPRODUCED] * 2
 
 
-def single(std: float, **values: Any) -> Run:
-    return replace(run(None, [force(std, 100)], Slack(2, 0, 16)), **values)
+@pytest.mark.parametrize(
+    ("condition", "says"),
+    [({"figure": "mean", "above": 1.0}, "must be one of mean_N"),
+     ({"figure": "mean_N", "over": 1.0}, "over: Extra inputs")],
+)  # fmt: skip
+def test_a_wrong_condition_is_told(condition: dict[str, Any], says: str) -> None:
+    table = {"statements": [{"says": "A.", "criterion": "B", "conditions": [condition]}]}
+    with pytest.raises(InputError, match=says):
+        statements.statements_of(table)
 
 
-def ranked() -> list[ranking.Row]:
-    base = {LIGHT: single(70), AVERAGE: single(71)}
-    varied: dict[str, dict[str, Run | None]] = {
-        "little": {LIGHT: single(70.5), AVERAGE: single(71)},
-        "much": {LIGHT: single(50), AVERAGE: single(44)},
-        "broke": {LIGHT: single(10), AVERAGE: None},
-        "worse": {LIGHT: single(70), AVERAGE: single(81)},
-    }
-    return ranking.rank(base, varied)
+def single(light: float, average: float | None) -> Rows:
+    return Rows.of({
+        (LIGHT, "single"): [force(light, 100, (2, 0))],
+        (AVERAGE, "single"): None if average is None else [force(average, 100, (2, 0))],
+    })  # fmt: skip
+
+
+def ranked() -> list[conclusion.Ranked]:
+    varied = {
+        "little": single(70.5, 71), "much": single(50, 44), "broke": single(10, None),
+        "worse": single(70, 81),
+    }  # fmt: skip
+    return conclusion.rank(single(70, 71), varied, PAPER)
 
 
 def test_variations_are_ranked_by_their_larger_effect_on_the_deviation() -> None:
     assert [row.title for row in ranked()] == ["", "much", "worse", "little"]
-    rows = ranking.table(ranked()).rows
-    assert [row[0] for row in rows] == ["the case as it stands", "much", "worse", "little"]
-    assert list(rows[1][1:5]) == ["50.0", "44.0", "-20.0", "-27.0"]
+    rows = conclusion.ranking_table(PAPER, ranked()).texts()
+    assert [row[0] for row in rows] == ["the case", "much", "worse", "little"]
+    assert rows[1][1:5] == ["50.0", "44.0", "-20.0", "-27.0"]
 
 
 def test_the_reason_names_what_moves_a_figure_and_what_meets_the_statement() -> None:
-    text = ranking.movers(2, ranked())
-    assert "71.0 N in the case; moved most by much: 44.0; worse: 81.0." in text
+    text = conclusion.movers(STATEMENTS[1], ranked())
+    assert "std [N] 71.0 in the case; moved most by much: 44.0; worse: 81.0." in text
     assert "The statement holds for it with much." in text
-    none = ranking.movers(2, [row for row in ranked() if row.title != "much"])
+    none = conclusion.movers(STATEMENTS[1], [row for row in ranked() if row.title != "much"])
     assert "None of the 2 variations alone makes the statement hold" in none
-    assert "It satisfies the statement: the second pantograph makes" in ranking.movers(6, ranked())
-    assert ranking.movers(3, ranked()) == ""
+    alone = conclusion.movers(STATEMENTS[5], ranked())
+    assert "It satisfies the statement: the second pantograph makes" in alone
+    assert conclusion.movers(STATEMENTS[2], ranked()) == ""
 
 
 def test_without_the_case_itself_nothing_is_ranked() -> None:
-    assert ranking.rank({LIGHT: None, AVERAGE: single(70)}, {}) == []
-    assert ranking.table([]).rows == []
-    assert ranking.movers(2, []) == ""
+    assert conclusion.rank(single(70, None), {}, PAPER) == []
+    assert conclusion.ranking_table(PAPER, []).rows == []
+    assert conclusion.movers(STATEMENTS[1], []) == ""
 
 
 def test_the_first_mode_of_bare_wires_is_that_of_a_string_with_some_stiffness() -> None:
@@ -196,15 +209,15 @@ def test_the_first_mode_of_bare_wires_is_that_of_a_string_with_some_stiffness() 
         math.sqrt((w.tension * k**2 + w.bending_stiffness * k**4) / w.mass_per_length) / math.tau
         for w in (line.contact_wire, line.messenger_wire)
     )
-    band = ringing.first_band(model, 2)
-    check("lower first mode [Hz]", band.lowest, expected[0], within=1e-9)
-    check("higher first mode [Hz]", band.highest, expected[1], within=1e-9)
+    band = first_band(model, 2)
+    check("lower first mode [Hz]", band[0], expected[0], within=1e-9)
+    check("higher first mode [Hz]", band[1], expected[1], within=1e-9)
 
 
 def test_the_delay_is_told_in_periods_and_the_deviation_beside_the_single_ones() -> None:
     runs = as_the_paper_says()
-    runs[AVERAGE]["200m"] = None
-    rows = ringing.table({"case": (ringing.Band(1.0, 1.25), runs)}).rows
+    runs[AVERAGE, "200m"] = None
+    rows = conclusion.separation_table(PAPER, {"case": ((1.0, 1.25), Rows.of(runs))}).texts()
     # 200 m at 300 km/h are 2.4 s; 65 N beside 50 N with light damping.
-    assert list(rows[-1]) == ["case", "1.00 to 1.25", "200m", "2.40", "2.40 to 3.00", "1.30", "-"]
+    assert rows[-1] == ["case", "1.00 to 1.25", "200m", "2.40", "2.40 to 3.00", "1.30", "-"]
     assert [row[2] for row in rows] == ["31m", "85m", "200m"]

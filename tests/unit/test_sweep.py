@@ -20,10 +20,9 @@ from catenary.cases.cli.main import app
 from catenary.cases.result_folder import output_folder
 from catenary.cases.run.planning.needs import needs_before_meshing
 from catenary.cases.run.runner import run_case
-from catenary.cases.studies.sweep.axis_words import STATISTICS_IN_WORDS, key_in_words
 from catenary.cases.studies.sweep.done_before import read_record, read_summary
 from catenary.cases.studies.sweep.jobs import STATISTICS, Ended, Job, RunOptions, make_jobs
-from catenary.cases.studies.sweep.output import as_text, draw, rows, write
+from catenary.cases.studies.sweep.output import as_text, draw, key_in_words, table_of, write
 from catenary.cases.studies.sweep.run_jobs import run_jobs
 from catenary.cases.studies.sweep.sweep import refuse_other_sweep
 from catenary.cases.studies.sweep.variants import Variant, parse_vary, product
@@ -311,7 +310,7 @@ def fake(name: str, varied: dict[str, str], *sigmas: float | None) -> Ended:
 
 def test_rows_have_one_line_per_pantograph_and_one_per_broken_variant() -> None:
     ended = [fake("a", {"k": "1"}, 10.0, None), Ended(Variant("b", (), {"k": "2"}), "it broke")]
-    table = rows(ended)
+    table = table_of(ended).records()
     assert [(row["variant"], row["k"], row["pantograph"]) for row in table] == [
         ("a", 1, "leading"), ("a", 1, "trailing"), ("b", 2, ""),
     ]  # fmt: skip
@@ -333,7 +332,8 @@ def test_statistics_are_drawn_over_the_key_with_numbers() -> None:
         for law in ("hard", "soft")
         for speed in ("300", "200")
     ]
-    figure = draw(rows(ended), ["contact.law", "train.speed_km_h"], ["std_N", "max_uplift_mm"])
+    keys, shown = ["contact.law", "train.speed_km_h"], ["std_N", "max_uplift_mm"]
+    figure = draw(table_of(ended).rows, keys, shown)
     assert curves_of(figure) == {
         "leading, law hard": [(200.0, 200.0), (300.0, 300.0)],
         "leading, law soft": [(200.0, 200.0), (300.0, 300.0)],
@@ -345,7 +345,7 @@ def test_statistics_are_drawn_over_the_key_with_numbers() -> None:
 
 def test_words_stand_on_the_axis_where_no_key_has_numbers() -> None:
     ended = [fake("a", {"contact.law": "hard"}, 3.0), fake("b", {"contact.law": "soft"}, 4.0)]
-    figure = draw(rows(ended), ["contact.law"], ["std_N"])
+    figure = draw(table_of(ended).rows, ["contact.law"], ["std_N"])
     assert curves_of(figure) == {"leading": [(0.0, 3.0), (1.0, 4.0)]}
     assert [label.get_text() for label in figure.axes[0].get_xticklabels()] == ["hard", "soft"]
 
@@ -366,7 +366,7 @@ def test_varied_values_keep_their_types(tmp_path: Path) -> None:
 
 def test_what_failed_is_told_by_name(tmp_path: Path) -> None:
     ended = [fake("hard250", {"k": "1"}, 3.0), fake("b", {"k": "2"}, 3.0)]
-    failed, passed = rows(ended)
+    failed, passed = table_of(ended).records()
     assert failed["failed"] == ["maximum contact force"] and not failed["passed"]
     assert passed["failed"] == [] and passed["passed"]
     said = as_text(ended).splitlines()
@@ -391,8 +391,8 @@ def test_axes_are_in_the_fields_words(key: str, words: str) -> None:
 
 
 def test_every_statistic_has_words_with_a_unit() -> None:
-    assert set(STATISTICS_IN_WORDS) == set(STATISTICS)
-    assert all(words.endswith("]") and "_" not in words for words in STATISTICS_IN_WORDS.values())
+    meanings = [column.meaning for column in STATISTICS.values()]
+    assert all(words.endswith("]") and "_" not in words for words in meanings)
 
 
 def test_a_sweep_without_room_for_all_its_runs_is_refused(

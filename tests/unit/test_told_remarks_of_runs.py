@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import csv
 
-from catenary.cases.cli.studies.hard import as_csv, as_markdown
 from catenary.cases.studies.hard.cases import hard_cases
 from catenary.cases.studies.hard.checks import Criterion
-from catenary.cases.studies.told_remarks import remark_lines
+from catenary.cases.studies.hard.output import criteria, page
+from catenary.postproc.report.study_table import remark_lines
 
 
 def test_a_remark_of_several_runs_is_told_once() -> None:
@@ -28,11 +28,11 @@ def test_tables_of_hard_cases_have_the_remarks_on_them() -> None:
     cases = hard_cases(["undamped_line", "four"])
     found = [Criterion(case.name, "everything is finite", 1.0, 1.0, True) for case in cases]
     told = {"undamped_line": {}, "four": {"four": ["lost"], "four at half the step": ["lost"]}}
-    rows = list(csv.DictReader(as_csv(found, told).splitlines()))
+    rows = list(csv.DictReader(criteria(found, told).csv().splitlines()))
     assert [row["criterion"] for row in rows] == ["everything is finite"] * 2 + ["remarks"]
     assert rows[2]["case"] == "four" and rows[2]["value"] == "2" and rows[2]["kept"] == ""
     assert rows[2]["note"] == "four: lost; four at half the step: lost"
-    page = as_markdown(cases, found, told).splitlines()
-    assert page[-1] == "- four, four at half the step: lost"
-    head, sound, lost = ([cell.strip() for cell in page[n].split("|")] for n in (0, 2, 3))
+    lines = page(cases, found, told).splitlines()
+    assert lines[-1] == "- four, four at half the step: lost"
+    head, sound, lost = ([cell.strip() for cell in lines[n].split("|")] for n in (0, 2, 3))
     assert sound[head.index("remarks")] == "" and lost[head.index("remarks")] == "2"

@@ -35,9 +35,9 @@ def stability_map(
     """Serial."""
     from catenary.cases.studies.stability import map as study
     from catenary.cases.studies.stability.picture import draw
-    from catenary.cases.studies.sweep.output import as_csv
     from catenary.postproc.files.disk import write_all
     from catenary.postproc.report.pictures import figures
+    from catenary.postproc.report.study_table import rows_csv
 
     refuse_impossible(out)
     if (out / TABLE).exists() and not force:
@@ -47,7 +47,7 @@ def stability_map(
     given = [*(assignments or []), *(extras or [])]
     grid = study.QUICK if quick else study.Grid()
     found = study.make_map(case, given, shortened, console.alone(), grid, console.say)
-    content: dict[str, bytes | str] = {TABLE: as_csv(study.as_rows(found))}
+    content: dict[str, bytes | str] = {TABLE: rows_csv(study.as_rows(found))}
     content |= figures.painted(PICTURE, lambda: draw(found))
     files = write_all(out, content)
     console.say("\n" + study.as_text(found) + "\n" + "\n".join(map(str, files)))

@@ -1,10 +1,12 @@
-"""What an accuracy study leaves: tables as CSV, JSON and text, the work-precision diagram."""
+"""What an accuracy study leaves: tables as CSV, JSON, text and page, the work-precision diagram."""
 
 from __future__ import annotations
 
 import json
 import math
-from collections.abc import Sequence
+import re
+import shlex
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +14,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from catenary.cases.studies.accuracy import markdown as accuracy_markdown
 from catenary.cases.studies.accuracy.analysis import (
     HISTORY,
     QUANTITIES,
@@ -21,21 +22,19 @@ from catenary.cases.studies.accuracy.analysis import (
     observed_orders,
     pareto,
 )
+from catenary.cases.studies.accuracy.axes import AXES
 from catenary.cases.studies.accuracy.axis import DISCRETISATION, Axis
-from catenary.cases.studies.accuracy.markdown import (
-    run_in_words,
-    runs_with_remarks,
-    uncertainty_text,
-)
+from catenary.cases.studies.accuracy.plan import PlannedAxis
 from catenary.cases.studies.accuracy.runs import Measured
-from catenary.cases.studies.sweep import output as sweep_output
-from catenary.cases.studies.told_remarks import remark_lines
+from catenary.postproc.evaluate.wording import counted
 from catenary.postproc.files.disk import plain, write_all
 from catenary.postproc.report.pictures import figures
+from catenary.postproc.report.study_table import Column, StudyTable, remark_lines
 
 TABLE, RECORD, PAGE = "accuracy.csv", "accuracy.json", "accuracy.md"
 PICTURE = "work_precision.png"
 _ADVISED = ("std", HISTORY)
+_USUAL_REPEATS = 3  # that of the command line
 # Width and height that a name takes in the diagram, in its pixels.
 _ROOM = np.array([50.0, 12.0])
 # Share of the axis beside the outermost points, for their names.
@@ -48,25 +47,44 @@ def write(found: Measured, out_dir: Path, target: float) -> list[Path]:
     The diagram is left out if no axis of discretisation was varied.
     """
     content: dict[str, bytes | str] = {
-        TABLE: sweep_output.as_csv([as_table(row) for row in found.rows]),
+        TABLE: table_of(found.rows).csv(),
         RECORD: json.dumps(plain(_record(found, target)), indent=1, ensure_ascii=False) + "\n",
     }
     if any(row.done for axis in _precise(found) for row in found.rows_of(axis.name)):
         content |= figures.painted(PICTURE, lambda: draw(found))
-    orders = {
-        planned.axis.name: _order_lines(planned.axis, found.rows_of(planned.axis.name))
-        for planned in found.plan.axes
-    }
-    picture = PICTURE if PICTURE in content else ""
-    content[PAGE] = accuracy_markdown.page(found, advices(found, target), orders, picture)
+    content[PAGE] = page(found, advices(found, target), PICTURE if PICTURE in content else "")
     return write_all(out_dir, content)
 
 
-def as_table(row: Row) -> dict[str, Any]:
+def table_of(rows: Sequence[Row], axis: Axis | None = None) -> StudyTable:
+    """Rows, those of one axis for people, or of all axes for files."""
+    shown: dict[str, str] = {}
+    if axis is not None:
+        shown = {f"error_{name}_percent": name for name in QUANTITIES}
+        if any(row.by_step for row in rows):
+            shown |= {
+                f"error_{HISTORY}_by_{part}_percent": f"{HISTORY} by {part}"
+                for part in ("step", "mesh")
+            }
+        shown |= {"estimate_over_true": "est/true", "rounds_per_step": "solves"}
+        shown |= {"march_s_per_s": "s/s", "n_remarks": "remarks"}
+    files = [name for name in _figures_of(Row("", "", "done")) if name not in _FOR_PEOPLE]
+    for_people = [Column("setting", axis.name if axis else "", in_files=False)]
+    for_people += [
+        Column(name, head, "d" if name == "n_remarks" else ".3g", in_files=False)
+        for name, head in shown.items()
+    ]
+    return StudyTable([*map(Column, files), *for_people], [_figures_of(row, axis) for row in rows])
+
+
+_FOR_PEOPLE = ("setting", "estimate_over_true", "n_remarks")
+
+
+def _figures_of(row: Row, axis: Axis | None = None) -> dict[str, Any]:
     """A row under names with units; what is unknown is None."""
+    h, true = row.sizes.get("h"), row.errors.get(HISTORY)
     table: dict[str, Any] = {"axis": row.axis, "level": row.level, "outcome": row.outcome}
     table["dt_s"] = row.sizes.get("dt")
-    h = row.sizes.get("h")
     table["elements_per_gap"] = None if h is None else round(1.0 / h)
     for name, quantity in QUANTITIES.items():
         table[f"error_{name}_{quantity.unit}"] = row.errors.get(name)
@@ -79,7 +97,10 @@ def as_table(row: Row) -> dict[str, Any]:
     table["march_s_per_s"] = _known(row.cost)
     table["n_timed"] = row.timings
     table["remarks"] = list(row.remarks)
-    return table
+    of_step = axis is not None and axis.refined == "dt" and true
+    ratio = row.estimate / true if of_step and true else math.nan
+    for_people = (in_words(row.level), _known(ratio), len(row.remarks) or None)
+    return table | dict(zip(_FOR_PEOPLE, for_people, strict=True))
 
 
 def as_text(found: Measured, target: float) -> str:
@@ -87,12 +108,123 @@ def as_text(found: Measured, target: float) -> str:
     parts = []
     for planned in found.plan.axes:
         axis, rows = planned.axis, found.rows_of(planned.axis.name)
-        parts.append(_axis_text(axis, planned.reference, rows))
+        against = "difference of models from the case as it is"
         if axis.kind == DISCRETISATION:
-            parts.append(f"  {uncertainty_text(planned, found.uncertainty[axis.name])}")
-        parts += _order_lines(axis, rows)
-        parts.append("")
+            against = f"error against {run_in_words(planned.reference)}"
+        parts += [f"{axis.title}: {against} [%]", table_of(rows, axis).text()]
+        if axis.kind == DISCRETISATION:
+            parts.append(uncertainty_text(planned, found.uncertainty[axis.name]))
+        parts += [*order_lines(axis, rows), ""]
     return "\n".join([*parts, *advices(found, target), *remark_lines(runs_with_remarks(found))])
+
+
+def page(found: Measured, sentences: Sequence[str], picture: str) -> str:
+    """A page of Markdown with one table an axis, and what the study recommends first.
+
+    Parameters
+    ----------
+    found : what was measured
+    sentences : the recommendations
+    picture : file of the work-precision diagram, empty for none
+    """
+    parts = [
+        f"# Accuracy and cost: {found.plan.case}",
+        f"`{_command(found)}`; {counted(len(found.rows), 'setting')}, "
+        f"{counted(round(found.wall / 60.0), 'minute')}. Errors in percent: of the reference's own "
+        "value for mean, deviations and uplift, of its standard deviation for maximum, minimum and "
+        'the force "history" (rms). "est/true" is the error that a run estimates itself over the '
+        'true one, "solves" those of the contact problem a step, "s/s" processor time of the '
+        "march per simulated second, the least of those timed: only ratios within this page mean "
+        "anything. Where step and mesh are refined together, errors of the history by the step and "
+        "by the mesh alone stand beside the whole error, in which they may cancel.",
+    ]
+    if picture:
+        parts.append(f"![work and precision]({picture})")
+    parts.append("\n".join(f"- {sentence}" for sentence in sentences))
+    for planned in found.plan.axes:
+        axis, rows = planned.axis, found.rows_of(planned.axis.name)
+        parts.append(f"## {_capital(axis.title)}")
+        if axis.kind == DISCRETISATION:
+            doubt = uncertainty_text(planned, found.uncertainty[axis.name])
+            parts.append(f"Reference: {run_in_words(planned.reference)}. {_capital(doubt)}.")
+        else:
+            parts.append("Differences from the case as it is: of models, not errors.")
+        parts.append(table_of(rows, axis).markdown())
+        parts += [f"{_capital(line)}." for line in order_lines(axis, rows)]
+    told = remark_lines(runs_with_remarks(found))
+    if told:
+        parts.append("## Remarks")
+        parts.append("\n".join(f"- {line.split(maxsplit=1)[1]}" for line in told))
+    return "\n\n".join(parts) + "\n"
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]
+
+
+def _command(found: Measured) -> str:
+    """The words that make this study again, the folder left out."""
+    names = list(found.plan.asked)
+    some = "" if names == list(AXES) else f" --axes {','.join(names)}"
+    quick = " --quick" if found.plan.quick else ""
+    repeats = "" if found.plan.repeats == _USUAL_REPEATS else f" --repeats {found.plan.repeats}"
+    changes = "".join(f" --set {shlex.quote(one)}" for one in found.plan.overrides)
+    return f"catenary accuracy {found.plan.case}{some}{quick}{repeats}{changes}"
+
+
+def runs_with_remarks(found: Measured) -> list[tuple[str, Sequence[str]]]:
+    """All runs in words, by the levels that they are of, with their remarks.
+
+    A run of several axes has the words of each; one that is of none, such as a reference, has its
+    own.
+    """
+    words: dict[str, list[str]] = {}
+    for planned in found.plan.axes:
+        for level, name in planned.runs.items():
+            words.setdefault(name, []).append(f"{planned.axis.name} {in_words(level)}")
+    return [
+        (" or ".join(words.get(name, [_whole_in_words(name)])), remarks)
+        for name, remarks in found.remarks.items()
+    ]
+
+
+def _whole_in_words(name: str) -> str:
+    """The name of a run as axis and level in words."""
+    axis, _, level = name.rpartition("__")
+    return f"{axis} {in_words(level)}".strip()
+
+
+def uncertainty_text(planned: PlannedAxis, percent: Mapping[str, float]) -> str:
+    """How far the reference itself may be wrong, and from which runs that is known."""
+    chains = [", ".join(map(run_in_words, chain)) for chain in planned.chains]
+    from_runs = " and from ".join(chains)
+    known = {what: value for what, value in percent.items() if math.isfinite(value)}
+    if not known:
+        return f"the uncertainty of the reference is not known from {from_runs}"
+    told = ", ".join(f"{what} {f'{value:.3g}'}" for what, value in known.items())
+    return f"uncertainty of the reference, from {from_runs} [%]: {told}"
+
+
+def order_lines(axis: Axis, rows: Sequence[Row]) -> list[str]:
+    """A line on the observed orders of each quantity that settings are chosen by."""
+    lines = []
+    for quantity in _ADVISED if axis.refined else ():
+        orders = observed_orders(rows, axis.refined, quantity)
+        if orders:
+            told = ", ".join(f"{order:.2f}" for _, order in orders)
+            lines.append(f"observed orders of {quantity}, from the coarsest on: {told}")
+    return lines
+
+
+def in_words(level: str) -> str:
+    """A level's name as words: ``1_ms_1_elements`` is "1 ms 1 element"."""
+    words = re.sub(r"\b1 elements\b", "1 element", level.replace("_", " "))
+    return re.sub(r"\b([2-9]) mass\b", r"\1 masses", words)
+
+
+def run_in_words(name: str) -> str:
+    """The name of a run, axis and level, as that of its level alone."""
+    return in_words(name.rpartition("__")[2])
 
 
 def advices(found: Measured, target: float) -> list[str]:
@@ -194,57 +326,10 @@ def _record(found: Measured, target: float) -> dict[str, Any]:
         "advice": advices(found, target),
         "wall_s": found.wall,
         "axes": axes,
-        "rows": [as_table(row) for row in found.rows],
+        "rows": table_of(found.rows).records(),
         "remarks": {name: list(told) for name, told in found.remarks.items() if told},
     }
 
 
-def _axis_text(axis: Axis, reference: str, rows: Sequence[Row]) -> str:
-    what = "error against" if axis.kind == DISCRETISATION else "difference of models from"
-    if axis.kind != DISCRETISATION:
-        reference = "the case as it is"
-    reference = run_in_words(reference)
-    width = max(len(row.level) for row in rows)
-    names = list(QUANTITIES)
-    head = "".join(f"{name:>9}" for name in names)
-    both = any(row.by_step for row in rows)
-    head += f"{'by step':>9}{'by mesh':>9}" if both else ""
-    lines = [
-        f"{axis.title}: {what} {reference} [%]",
-        f"  {'':{width}}{head}{'est/true':>10}{'solves':>8}{'s/s':>9}{'remarks':>9}",
-    ]
-    for row in rows:
-        if not row.done:
-            lines.append(f"  {row.level:{width}}  {row.outcome}")
-            continue
-        figures = "".join(f"{_short(row.percent.get(name)):>9}" for name in names)
-        if both:
-            alone = (row.by_step.get(HISTORY), row.by_mesh.get(HISTORY))
-            figures += "".join(f"{_short(value):>9}" for value in alone)
-        true = row.errors.get(HISTORY, math.nan)
-        ratio = row.estimate / true if axis.refined == "dt" and true else math.nan
-        lines.append(
-            f"  {row.level:{width}}{figures}{_short(_known(ratio)):>10}{row.iterations:>8.2f}"
-            f"{row.cost:>9.4f}{len(row.remarks):>9}"
-        )
-    return "\n".join(lines)
-
-
-def _order_lines(axis: Axis, rows: Sequence[Row]) -> list[str]:
-    if not axis.refined:
-        return []
-    lines = []
-    for quantity in _ADVISED:
-        orders = observed_orders(rows, axis.refined, quantity)
-        if orders:
-            told = ", ".join(f"{order:.2f}" for _, order in orders)
-            lines.append(f"  observed orders of {quantity}, from the coarsest on: {told}")
-    return lines
-
-
 def _known(value: float) -> float | None:
     return None if math.isnan(value) else value
-
-
-def _short(value: float | None) -> str:
-    return "-" if value is None else f"{value:.3g}"

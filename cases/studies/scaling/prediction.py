@@ -21,12 +21,16 @@ from catenary.cases.scene.cost_model import STEP_OVERHEAD
 from catenary.cases.scene.problem import problem_of
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.scaling.messages import Sizes, Wire
+from catenary.postproc.report.study_table import Column, StudyTable
 from catenary.solver.effects.build_model import numbering_of
 
 # Bytes of a number; numbers before the answers in a share, before the forces in a reply, and links
 # with their compensations that a reply has room for.
 _BYTES, _FLAGS, _HEAD, _LINKS = 8, 4, 4, 32
 MOST_RANKS = 1_000_000
+# Times in the table of a prediction, and their heads.
+_PARTS = (("step", "us a step"), ("line", "line"), ("neighbours", "neighbours"), ("tree", "tree"),
+          ("fixed", "rank 0"))  # fmt: skip
 # What steps take longer that are taken one by one, as on several ranks, and not in blocks: measured
 # on lines of 25 to 1000 spans before and after there were blocks [s].
 _ONE_BY_ONE = 1e-5
@@ -154,18 +158,17 @@ def as_text(
         f"{work.sizes.neighbour} B to each neighbour and {work.sizes.share} B to rank 0, which "
         f"answers with {work.sizes.reply} B",
         "",
-        f"{'ranks':>8}{'us a step':>11}{'line':>8}{'neighbours':>12}{'tree':>8}"
-        f"{'rank 0':>8}{'efficiency':>12}",
     ]
     one = predict(work, wire, 1).step
-    for number in ranks:
-        found = predict(work, wire, number)
-        parts = (found.line, found.neighbours, found.tree, found.fixed)
-        told = "".join(
-            f"{1e6 * value:>{w}.1f}" for value, w in zip(parts, (8, 12, 8, 8), strict=True)
-        )
-        share = 100.0 * one / (number * found.step)
-        lines.append(f"{number:8}{1e6 * found.step:11.1f}{told}{share:10.3g} %")
+    found = [predict(work, wire, number) for number in ranks]
+    rows = [
+        {"ranks": own.ranks, "efficiency": 100.0 * one / (own.ranks * own.step)}
+        | {name: 1e6 * getattr(own, name) for name, _ in _PARTS}
+        for own in found
+    ]
+    columns = [Column("ranks", "ranks", "d"), *(Column(*names, ".1f") for names in _PARTS)]
+    columns.append(Column("efficiency", "efficiency [%]", ".3g"))
+    lines.append(StudyTable(columns, rows).text())
     if exchange is not None:
         there, fastest, half = exchange
         expected = 1e6 * predict(work, wire, there).messages

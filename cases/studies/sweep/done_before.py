@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from catenary.cases.studies.sweep.jobs import PANTOGRAPH_COLUMNS
+from catenary.cases.studies.sweep.jobs import OF_PANTOGRAPH
 from catenary.postproc.files.disk import plain
 from catenary.postproc.read.validation import is_number
 
@@ -72,9 +72,9 @@ def _summary_fault(content: dict[str, Any]) -> str:
     for one in found:
         if not isinstance(one, dict) or not isinstance(one.get("name"), str):
             return "pantographs is no list of tables"
-        for name in PANTOGRAPH_COLUMNS:
-            if name not in one or not _number_or_null(one[name]):
-                return f"{name} is no number"
+        for column in OF_PANTOGRAPH:
+            if column.name not in one or not _number_or_null(one[column.name]):
+                return f"{column.name} is no number"
     for path in _NUMBERS:
         place: Any = content
         for key in path:

@@ -13,23 +13,29 @@ from catenary.cases.scene.keys.keys import nearest
 from catenary.cases.scene.load import Draft, load_scene
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.sweep.variants import NAMES, Variant
+from catenary.postproc.report.study_table import Column
 
-# Columns of a sweep's table: of a row's pantograph, and of the line.
-PANTOGRAPH_COLUMNS = (
-    "mean_N",
-    "std_N",
-    "std_0_5_N",
-    "std_5_20_N",
-    "max_N",
-    "min_N",
-    "stat_max_N",
-    "stat_min_N",
-    "loss_percent",
-    "arcing_percent",
-    "contact_height_range_mm",
+# Statistics in a sweep's table: of a row's pantograph, and of the line.
+OF_PANTOGRAPH = (
+    Column("mean_N", "mean [N]", ".1f", "mean contact force [N]"),
+    Column("std_N", "std [N]", ".1f", "standard deviation, 0-20 Hz [N]"),
+    Column("std_0_5_N", meaning="standard deviation, 0-5 Hz [N]"),
+    Column("std_5_20_N", meaning="standard deviation, 5-20 Hz [N]"),
+    Column("max_N", "max [N]", ".1f", "maximum force [N]"),
+    Column("min_N", "min [N]", ".1f", "minimum force [N]"),
+    Column("stat_max_N", meaning="mean + 3 standard deviations [N]"),
+    Column("stat_min_N", meaning="mean - 3 standard deviations [N]"),
+    Column("loss_percent", "loss [%]", ".3f", "loss of contact [%]"),
+    Column("arcing_percent", meaning="arcing NQ [%]"),
+    Column("contact_height_range_mm", meaning="contact point, vertical range [mm]"),
 )
-LINE_COLUMNS = ("max_uplift_mm", "n_slackened", "max_dropper_force_N", "min_dropper_force_N")
-STATISTICS = (*PANTOGRAPH_COLUMNS, *LINE_COLUMNS)
+OF_LINE = (
+    Column("max_uplift_mm", "uplift [mm]", ".1f", "largest uplift at arms [mm]"),
+    Column("n_slackened", "slackened", "d", "droppers slackened [-]"),
+    Column("max_dropper_force_N", meaning="maximum dropper force [N]"),
+    Column("min_dropper_force_N", meaning="minimum dropper force [N]"),
+)
+STATISTICS = {column.name: column for column in (*OF_PANTOGRAPH, *OF_LINE)}
 
 
 def check_statistics(names: Sequence[str]) -> None:

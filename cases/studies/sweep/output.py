@@ -11,25 +11,22 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from catenary.cases.scene.input.toml_input import REMOVED, parse_assignment
-from catenary.cases.studies.sweep.axis_words import (
-    STATISTICS_IN_WORDS,
-    key_in_words,
-    value_in_words,
-)
-from catenary.cases.studies.sweep.jobs import LINE_COLUMNS, PANTOGRAPH_COLUMNS, Ended
+from catenary.cases.scene.keys.keys import ANY
+from catenary.cases.scene.keys.units import SUFFIXES, unit_of
+from catenary.cases.studies.sweep.jobs import OF_LINE, OF_PANTOGRAPH, STATISTICS, Ended
 from catenary.cases.studies.sweep.variants import NAMES
-from catenary.cases.studies.told_remarks import remark_lines
-from catenary.postproc.evaluate.wording import fixed
-from catenary.postproc.files.csv_text import csv_text, number_text
+from catenary.cases.terminal.key_list import Key, keys_of_a_scene
 from catenary.postproc.files.disk import plain, write_all
 from catenary.postproc.report.pictures import figures
+from catenary.postproc.report.study_table import Column, StudyTable, cell, remark_lines
 
 TABLE, RECORD, PICTURE = "sweep.csv", "sweep.json", "sweep.png"
 PLOTTED = ("mean_N", "std_N", "max_N", "min_N", "max_uplift_mm")
 _MOST_LABELS = 10  # curves that a legend can name
+_LONGEST = 48  # a longer meaning of a key explains more than an axis has room for
 
 
-def rows(ended: Sequence[Ended]) -> list[dict[str, Any]]:
+def table_of(ended: Sequence[Ended]) -> StudyTable:
     """One row per variant and pantograph; a variant that broke has one without figures.
 
     Columns: ``variant``, the varied keys with values of their own types, ``outcome``,
@@ -37,23 +34,27 @@ def rows(ended: Sequence[Ended]) -> list[dict[str, Any]]:
     ``failed`` (the criteria that failed), ``remarks`` (what decides the results), ``wall_s``.
     """
     keys = varied_keys(ended)
-    table = []
+    rows = []
     for one in ended:
-        head = {"variant": one.variant.name}
+        head: dict[str, Any] = {"variant": one.variant.name, "outcome": one.outcome}
         head |= {key: _typed(key, one.variant.varied.get(key)) for key in keys}
-        head["outcome"] = one.outcome
-        tail: dict[str, Any] = {
-            "passed": one.summary.get("passed"),
-            "failed": failed_criteria(one.summary),
-            "remarks": one.remarks,
-            "wall_s": one.wall,
-        }
+        failed = failed_criteria(one.summary)
+        head |= {"passed": one.summary.get("passed"), "failed": failed, "remarks": one.remarks}
+        head |= {"wall_s": one.wall, "accepted": _verdict(one.summary.get("passed"), failed)}
         for pantograph in one.summary.get("pantographs", [{}]):
             row: dict[str, Any] = {**head, "pantograph": pantograph.get("name", "")}
-            row |= {name: pantograph.get(name) for name in PANTOGRAPH_COLUMNS}
-            row |= _of_line(one.summary)
-            table.append(row | tail)
-    return table
+            row |= {column.name: pantograph.get(column.name) for column in OF_PANTOGRAPH}
+            rows.append(row | _of_line(one.summary))
+    columns = [
+        Column("variant", "variant"),
+        *(Column(key) for key in keys if key != "variant"),
+        Column("outcome"),
+        Column("pantograph", "pantograph"),
+        *STATISTICS.values(),
+        Column("accepted", "accepted", in_files=False),
+        *(Column(name) for name in ("passed", "failed", "remarks", "wall_s")),
+    ]
+    return StudyTable(columns, rows)
 
 
 def _typed(key: str, text: str | None) -> Any:
@@ -70,15 +71,19 @@ def failed_criteria(summary: Mapping[str, Any]) -> list[str]:
     return list(dict.fromkeys(row["criterion"] for row in rows if row["passed"] is False))
 
 
+def _verdict(passed: bool | None, failed: Sequence[str]) -> str:
+    if failed:
+        return f"FAILED {', '.join(failed)}"
+    return "passed" if passed else "not judged"
+
+
 def _of_line(summary: dict[str, Any]) -> dict[str, Any]:
     droppers = summary.get("droppers", {})
     values = (
         summary.get("supports", {}).get("max_uplift_mm"),
-        droppers.get("n_slackened"),
-        droppers.get("max_force_N"),
-        droppers.get("min_force_N"),
+        *(droppers.get(name) for name in ("n_slackened", "max_force_N", "min_force_N")),
     )
-    return dict(zip(LINE_COLUMNS, values, strict=True))
+    return {column.name: value for column, value in zip(OF_LINE, values, strict=True)}
 
 
 def varied_keys(ended: Sequence[Ended]) -> list[str]:
@@ -86,44 +91,9 @@ def varied_keys(ended: Sequence[Ended]) -> list[str]:
     return list(dict.fromkeys(key for one in ended for key in one.variant.varied))
 
 
-def as_csv(table: Sequence[dict[str, Any]]) -> str:
-    """The rows as CSV text; what is unknown is empty. ``table`` has at least one row."""
-    heads = list(table[0])
-    return csv_text(heads, ([_cell(row[key]) for key in heads] for row in table))
-
-
-def _cell(value: Any) -> Any:
-    if value is None:
-        return ""
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, list) and all(isinstance(entry, str) for entry in value):
-        return "; ".join(value)
-    if isinstance(value, list | dict):
-        return json.dumps(value)
-    return number_text(value) if isinstance(value, float) else value
-
-
 def as_text(ended: Sequence[Ended]) -> str:
-    """The table for a terminal: the most important figures."""
-    width = max(len(one.variant.name) for one in ended)
-    lines = [
-        f"{'variant':{width}}  {'pantograph':12}{'mean':>8}{'std':>8}{'max':>8}{'min':>8}  [N]"
-        f"{'loss [%]':>10}{'uplift [mm]':>13}{'slackened':>11}  accepted"
-    ]
-    for row in rows(ended):
-        if row["outcome"] != "done":
-            lines.append(f"{row['variant']:{width}}  BROKE: {row['outcome']}")
-            continue
-        forces = "".join(
-            f"{_short(row[name]):>8}" for name in ("mean_N", "std_N", "max_N", "min_N")
-        )
-        lines.append(
-            f"{row['variant']:{width}}  {row['pantograph']:12}{forces}     "
-            f"{_short(row['loss_percent'], 3):>10}{_short(row['max_uplift_mm']):>13}"
-            f"{_short(row['n_slackened'], 0):>11}  {_verdict(row)}"
-        )
-    return "\n".join([*lines, *remarks_of(ended)])
+    """The table for a terminal: the most important figures, and the remarks on the variants."""
+    return "\n".join([table_of(ended).text(), *remarks_of(ended)])
 
 
 def remarks_of(ended: Sequence[Ended]) -> list[str]:
@@ -131,22 +101,12 @@ def remarks_of(ended: Sequence[Ended]) -> list[str]:
     return remark_lines((one.variant.name, one.remarks) for one in ended)
 
 
-def _verdict(row: Mapping[str, Any]) -> str:
-    if row["failed"]:
-        return f"FAILED {', '.join(row['failed'])}"
-    return "passed" if row["passed"] else "not judged"
-
-
-def _short(value: float | None, digits: int = 1) -> str:
-    return "-" if value is None else fixed(value, digits)
-
-
 def write(out_dir: Path, case: str, ended: Sequence[Ended], plotted: Sequence[str]) -> list[Path]:
     """Write table, record and picture of a sweep; returns the files. Not collective.
 
     The picture is left out if fewer than two variants are done.
     """
-    table = rows(ended)
+    table = table_of(ended)
     record = {
         "case": case,
         "varied": varied_keys(ended),
@@ -154,24 +114,24 @@ def write(out_dir: Path, case: str, ended: Sequence[Ended], plotted: Sequence[st
         "variants": [
             {"name": one.variant.name, "assignments": one.variant.assignments} for one in ended
         ],
-        "rows": table,
+        "rows": table.records(),
     }
     content: dict[str, bytes | str] = {
-        TABLE: as_csv(table),
+        TABLE: table.csv(),
         RECORD: json.dumps(plain(record), indent=1, ensure_ascii=False) + "\n",
     }
     if sum(one.done for one in ended) > 1:
-        content |= figures.painted(PICTURE, lambda: draw(table, varied_keys(ended), plotted))
+        content |= figures.painted(PICTURE, lambda: draw(table.rows, varied_keys(ended), plotted))
     return write_all(out_dir, content)
 
 
 @figures.own_style()
-def draw(table: Sequence[dict[str, Any]], keys: Sequence[str], plotted: Sequence[str]) -> Figure:
+def draw(table: Sequence[Mapping[str, Any]], keys: Sequence[str], plotted: Sequence[str]) -> Figure:
     """Statistics over the first varied key with numbers, a curve for each value of the others.
 
     Parameters
     ----------
-    table : what ``rows`` gives, at least one row done
+    table : the rows of ``table_of``, at least one of them done
     keys : varied keys; without any the variants' names stand on the axis
     plotted : names out of ``STATISTICS``
     """
@@ -179,17 +139,17 @@ def draw(table: Sequence[dict[str, Any]], keys: Sequence[str], plotted: Sequence
     key = next((k for k in keys if all(_is_number(row[k]) for row in done)), None)
     axis = key or (keys[0] if keys else "variant")
     others = [k for k in keys if k != axis]
-    curves: dict[str, list[dict[str, Any]]] = {}
+    curves: dict[str, list[Mapping[str, Any]]] = {}
     for row in done:
         label = ", ".join(value_in_words(k, row[k]) for k in others)
         label = ", ".join(part for part in (row["pantograph"], label) if part)
         curves.setdefault(label, []).append(row)
-    places = list(dict.fromkeys(_cell(row[axis]) for row in done))
+    places = list(dict.fromkeys(cell(row[axis]) for row in done))
     figure = figures.new_figure(0.6 + 2.0 * len(plotted))
     panels = figure.subplots(len(plotted), 1, sharex=True, squeeze=False)[:, 0]
     for name, axes in zip(plotted, panels, strict=True):
         for number, (label, own) in enumerate(curves.items()):
-            x = [float(row[axis]) if key else places.index(_cell(row[axis])) for row in own]
+            x = [float(row[axis]) if key else places.index(cell(row[axis])) for row in own]
             y = [np.nan if row[name] is None else float(row[name]) for row in own]
             order = np.argsort(x, kind="stable")
             axes.plot(
@@ -201,7 +161,7 @@ def draw(table: Sequence[dict[str, Any]], keys: Sequence[str], plotted: Sequence
                 color=figures.colour(number),
                 label=label,
             )
-        figures.tidy(axes, "", STATISTICS_IN_WORDS[name])
+        figures.tidy(axes, "", STATISTICS[name].meaning)
     if len(curves) <= _MOST_LABELS:
         figures.legend_above(panels[0], columns=min(len(curves), 3))
     if key is None:
@@ -213,3 +173,39 @@ def draw(table: Sequence[dict[str, Any]], keys: Sequence[str], plotted: Sequence
 def _is_number(value: Any) -> bool:
     real = isinstance(value, int | float) and not isinstance(value, bool)
     return real and bool(np.isfinite(value))
+
+
+def key_in_words(key: str) -> str:
+    """What a dotted key is, with its table and unit: ``contact wire: tension [N]``."""
+    parts = [part for part in key.split(".") if not part.isdigit()]
+    known = _known(key)
+    told = known is not None and len(known.meaning) <= _LONGEST
+    meaning = known.meaning if known is not None and told else _plain(parts[-1])
+    tables = [_plain(part) for part in parts[1 if told or len(parts) > 2 else 0 : -1]]
+    unit = unit_of(key)
+    words = f"{', '.join(tables)}: {meaning}" if tables else meaning
+    return f"{words} [{unit}]" if unit else words
+
+
+def value_in_words(key: str, value: Any) -> str:
+    """A key's last part with its value and unit: ``speed 250 km/h``."""
+    name = _plain(key.rsplit(".", 1)[-1])
+    told = str(value).lower() if isinstance(value, bool) else str(value)
+    return f"{name} {told} {unit_of(key)}".rstrip()
+
+
+def _known(key: str) -> Key | None:
+    parts = key.split(".")
+    for one in keys_of_a_scene():
+        pattern = one.name.split(".")
+        if len(pattern) == len(parts) and all(
+            want in (ANY, part) for want, part in zip(pattern, parts, strict=True)
+        ):
+            return one
+    return None
+
+
+def _plain(name: str) -> str:
+    """A name as it is written in code, without its unit and with spaces."""
+    bare = next((name.removesuffix(end) for end in SUFFIXES if name.endswith(end)), name)
+    return bare.replace("_", " ")

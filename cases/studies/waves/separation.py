@@ -23,14 +23,14 @@ from matplotlib.figure import Figure
 
 from catenary.base.errors import InputError
 from catenary.cases.scene.scene import Scene
-from catenary.cases.studies.sweep.axis_words import value_in_words
 from catenary.cases.studies.sweep.jobs import Ended, Job, RunOptions, make_jobs
-from catenary.cases.studies.sweep.output import as_csv, rows
+from catenary.cases.studies.sweep.output import table_of, value_in_words
 from catenary.cases.studies.sweep.run_jobs import run_jobs
 from catenary.cases.studies.sweep.variants import Variant, VariedKey, product, slug
 from catenary.cases.studies.waves.theory import WaveTheory
 from catenary.postproc.files.disk import write_all
 from catenary.postproc.report.pictures import figures
+from catenary.postproc.report.study_table import rows_csv
 
 RUNS, TABLE, PICTURE, PERIODS = "runs", "separations.csv", "separations.png", "periods.csv"
 SEPARATION, WITH = "separation_m", "with"
@@ -223,10 +223,10 @@ def period_of(curve: Curve, theory: WaveTheory, span: float) -> Period:
 def write(folder: Path, ended: Sequence[Ended], theory: WaveTheory, span: float) -> list[Path]:
     """Write table, periods and picture; returns the files. Not collective."""
     curves = curves_of(ended)
-    content: dict[str, bytes | str] = {TABLE: as_csv(rows(ended))}
+    content: dict[str, bytes | str] = {TABLE: table_of(ended).csv()}
     if curves:
         found = [period_of(curve, theory, span) for curve in curves]
-        content[PERIODS] = as_csv(
+        content[PERIODS] = rows_csv(
             [
                 {
                     "with": curve.name, "fitted_m": one.fitted, "explains": one.explains,

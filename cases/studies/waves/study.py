@@ -19,7 +19,6 @@ from catenary.cases.scene.input.faults import Origin
 from catenary.cases.scene.load import scene_from
 from catenary.cases.scene.problem import problem_of
 from catenary.cases.scene.scene import Scene
-from catenary.cases.studies.sweep.output import as_csv
 from catenary.cases.studies.waves import ends, obstacles, pictures
 from catenary.cases.studies.waves.energy import EnergyMotion, EnergySeen
 from catenary.cases.studies.waves.excited import Asked, Watch, excitation_of, without_train
@@ -40,6 +39,7 @@ from catenary.postproc.film.snapshots import Snapshots
 from catenary.postproc.read.guard import examined
 from catenary.postproc.read.results import Results
 from catenary.postproc.report.pictures import figures
+from catenary.postproc.report.study_table import rows_csv
 from catenary.solver.statics.elasticity import middle_span
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest
 from catenary.solver.time_loop.views.observers import Observer
@@ -145,7 +145,7 @@ def study_obstacles(scene: Scene, folder: Path, force: bool) -> tuple[str, list[
     problem = problem_of(scene)
     rest = line_at_rest(problem, mesh_of(scene))
     results = [obstacles.result_of(one, problem) for one in obstacles.obstacles_of(rest)]
-    content: dict[str, bytes | str] = {OBSTACLES: as_csv(obstacles.as_rows(results))}
+    content: dict[str, bytes | str] = {OBSTACLES: rows_csv(obstacles.as_rows(results))}
     content |= figures.painted("obstacles.png", lambda: obstacles.picture(results))
     lines = [
         f"{one.name.replace('_', ' ')}: measured within {100.0 * one.error.max():.2g} % of theory"
@@ -192,9 +192,9 @@ def _write(
         *measured_rows(theory, seen), *ends.reflection_rows(reflections, theory.speed)
     ]  # fmt: skip
     content: dict[str, bytes | str] = {
-        "energy.csv": as_csv(energy_rows(energy, seen)),
-        TABLE: as_csv([*as_rows(theory), *measured]),
-        "pass_bands.csv": as_csv(band_rows(theory)),
+        "energy.csv": rows_csv(energy_rows(energy, seen)),
+        TABLE: rows_csv([*as_rows(theory), *measured]),
+        "pass_bands.csv": rows_csv(band_rows(theory)),
     }
     drawings: dict[str, Callable[[], Figure]] = {
         "space_time.png": lambda: pictures.space_time(seen, theory, supports, moving),
@@ -205,7 +205,7 @@ def _write(
         drawings["end_reflection.png"] = lambda: ends.picture(
             reflections, rest.problem.ends, theory.speed
         )
-        content["end_reflection.csv"] = as_csv(ends.curve_rows(reflections))
+        content["end_reflection.csv"] = rows_csv(ends.curve_rows(reflections))
     spectra = transmitted(theory, seen)
     if spectra is not None:
         drawings["transmission.png"] = lambda: pictures.transmission(spectra)

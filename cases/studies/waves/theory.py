@@ -5,10 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.sparse import linalg as sparse_linalg
 
 from catenary.base.errors import InputError
 from catenary.meshgen.slowest_wave import bends, slowest_wave_of
 from catenary.meshgen.wires import Role
+from catenary.solver.model.matrices import stiffness_matrix, whole_matrix
+from catenary.solver.model.model import Model
 from catenary.solver.problem.problem import Problem
 from catenary.solver.statics.elasticity import middle_span
 from catenary.solver.statics.line_at_rest import LineAtRest
@@ -98,3 +101,16 @@ def wave_theory(problem: Problem, rest: LineAtRest) -> WaveTheory:
     wires = tuple((wire.name, slowest_wave_of(problem.line, wire)) for wire in problem.line.wires)
     bent = bends(c, contact.tension, contact.mass_per_length)
     return WaveTheory(v, c, wires, doppler, reflection, reflection / doppler, waves, why_not, bent)
+
+
+def first_band(model: Model, n_modes: int) -> tuple[float, float]:
+    """Lowest and highest frequency of a line's first modes [Hz], undamped, all droppers taut.
+
+    Not collective. From K x = omega^2 M x on the unknowns that are not held.
+    """
+    free = np.setdiff1d(np.arange(model.n_dofs), model.constrained)
+    matrices = stiffness_matrix(model), whole_matrix(model, mass=1.0)
+    stiffness, mass = (matrix[free][:, free].tocsc() for matrix in matrices)
+    squares = sparse_linalg.eigsh(stiffness, n_modes, mass, sigma=0.0, return_eigenvectors=False)
+    frequencies = np.sqrt(squares) / (2.0 * np.pi)
+    return float(frequencies.min()), float(frequencies.max())

@@ -20,12 +20,11 @@ from catenary.base.errors import InputError, RunBroken
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.problem import problem_of
 from catenary.cases.scene.scene import Scene
-from catenary.cases.studies.sweep.output import as_csv
-from catenary.cases.studies.told_remarks import remark_lines
 from catenary.postproc.evaluate.filters import low_pass
 from catenary.postproc.files.disk import write_all
 from catenary.postproc.record.run_watch import RunWatch, watch_cadence, watched
 from catenary.postproc.report.pictures import figures
+from catenary.postproc.report.study_table import remark_lines, rows_csv
 from catenary.solver.problem.window import WindowChoice
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest
 from catenary.solver.time_loop.march import March
@@ -156,7 +155,7 @@ def write(folder: Path, curves: Sequence[Curve]) -> list[Path]:
         for curve in curves
         for one in curve.errors
     ]  # fmt: skip
-    content: dict[str, bytes | str] = {TABLE: as_csv(rows)}
+    content: dict[str, bytes | str] = {TABLE: rows_csv(rows)}
     content |= figures.painted(PICTURE, lambda: draw(curves))
     return write_all(folder, content)
 

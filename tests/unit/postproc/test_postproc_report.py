@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-import catenary.postproc.report.report
+import catenary.postproc.report.page
 from catenary.base.errors import InputError
 from catenary.postproc.evaluate.compare import compare
 from catenary.postproc.read.results import Results
@@ -22,7 +22,7 @@ from catenary.postproc.report import csv_tables
 from catenary.postproc.report.pictures import line_pictures
 from catenary.postproc.report.report import write_report
 
-TEMPLATES = Path(catenary.postproc.report.report.__file__).parent / "templates"
+TEMPLATES = Path(catenary.postproc.report.page.__file__).parent / "templates"
 PNG = b"\x89PNG\r\n\x1a\n"
 PICTURES = (
     "contact_force",
@@ -137,10 +137,9 @@ def test_report_is_one_file_that_needs_no_network(report_folder: Path) -> None:
         assert base64.b64decode(data).startswith(PNG)
 
 
-@pytest.mark.parametrize("page", ["report", "study"])
-def test_pages_are_printed_on_a4(page: str) -> None:
+def test_pages_are_printed_on_a4() -> None:
     """And nothing is cut off there: what scrolls on a screen is shown in full on paper."""
-    template = (TEMPLATES / f"{page}.html.j2").read_text(encoding="utf-8")
+    template = (TEMPLATES / "page.html.j2").read_text(encoding="utf-8")
     assert "@page { size: A4;" in template
     printed = template[template.index("@media print") :]
     assert ".scroll { overflow: visible; }" in printed

@@ -20,8 +20,12 @@ from catenary.cases.scene.input.toml_input import Assigned
 from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.problem import end_of, problem_of
 from catenary.cases.scene.scene import Scene
-from catenary.cases.studies.choice.switches import Choice, Switch, choice_of
-from catenary.cases.studies.choice.turns import RepeatedMarch, beside, in_turns
+from catenary.cases.studies.effect_cost.step_timing import RepeatedMarch, beside, in_turns
+from catenary.cases.studies.effect_cost.switches import (
+    Switch,
+    SwitchableEffects,
+    switchable_effects,
+)
 from catenary.cases.studies.sweep.jobs import Job, RunOptions, interrupted
 from catenary.cases.studies.sweep.run_jobs import run_jobs
 from catenary.cases.studies.sweep.variants import Variant
@@ -106,7 +110,7 @@ class Costs:
 
     Attributes
     ----------
-    wish, choice : what was asked for, and what the scene leaves to choose
+    wish, effects : what was asked for, and what the scene leaves to choose
     stretch : evaluated, from and to [m]
     n_steps : of a timed round
     size, figures, remarks : of the scene as it is, as in ``Measured``
@@ -116,7 +120,7 @@ class Costs:
     """
 
     wish: Wish
-    choice: Choice
+    effects: SwitchableEffects
     stretch: tuple[float, float]
     n_steps: int
     size: Size
@@ -127,7 +131,7 @@ class Costs:
     remarks: list[str] = field(default_factory=list)
 
 
-def jobs_of(wish: Wish) -> tuple[Choice, list[Job], dict[str, str]]:
+def jobs_of(wish: Wish) -> tuple[SwitchableEffects, list[Job], dict[str, str]]:
     """What can be chosen, the runs to be made, and why others cannot. Not collective.
 
     The first run is of the scene as it is; those of switches have the names of their effects.
@@ -140,24 +144,26 @@ def jobs_of(wish: Wish) -> tuple[Choice, list[Job], dict[str, str]]:
     whole = load_scene(wish.case, wish.overrides, wish.shortened)
     shorter = _shortened(whole, wish.stretch)
     scene = _scene(wish, shorter)
-    choice = choice_of(scene)
+    effects = switchable_effects(scene)
     if wish.only:
-        choice = Choice(_named(choice, wish.only), choice.always, choice.lacking)
+        effects = SwitchableEffects(_named(effects, wish.only), effects.always, effects.lacking)
     jobs, refused = [_job(AS_IT_IS, scene)], {}
-    for switch in choice.switches:
+    for switch in effects.switches:
         try:
             jobs.append(_job(switch.name, _scene(wish, [*shorter, *switch.assignments])))
         except InputError as error:
             refused[switch.name] = str(error)
-    return choice, jobs, refused
+    return effects, jobs, refused
 
 
-def _named(choice: Choice, names: Sequence[str]) -> list[Switch]:
-    known = {switch.name: switch for switch in choice.switches}
+def _named(effects: SwitchableEffects, names: Sequence[str]) -> list[Switch]:
+    known = {switch.name: switch for switch in effects.switches}
     for name in names:
-        if name in choice.lacking:
-            raise InputError(f"--only {name}: the scene has no data for it: {choice.lacking[name]}")
-        if name in choice.always:
+        if name in effects.lacking:
+            raise InputError(
+                f"--only {name}: the scene has no data for it: {effects.lacking[name]}"
+            )
+        if name in effects.always:
             raise InputError(f"--only {name}: it is part of every scene and cannot be left out")
         if name not in known:
             raise InputError(f"--only {name} is no effect; there are {', '.join(known)}")
@@ -204,7 +210,7 @@ def measure(
     InputError, RunBroken
         If the scene is wrong; if it breaks as it is, or a signal comes while steps are timed.
     """
-    choice, jobs, refused = jobs_of(wish)
+    effects, jobs, refused = jobs_of(wish)
     comm = MPI.COMM_SELF
     ended = run_jobs(jobs, folder, comm, RunOptions(force, (), say))
     if interrupted(ended):
@@ -222,9 +228,9 @@ def measure(
         RepeatedMarch(comm, _at_rest(scene), first, n_steps) as as_it_is,
     ):
         step = in_turns({AS_IT_IS: as_it_is}, wish.rounds)[AS_IT_IS]
-        for number, switch in enumerate(choice.switches, start=1):
+        for number, switch in enumerate(effects.switches, start=1):
             phase.next(f"steps without or with {switch.name} were timed")
-            say(f"[{number}/{len(choice.switches)}] steps: {switch.name}")
+            say(f"[{number}/{len(effects.switches)}] steps: {switch.name}")
             if switch.name in refused:
                 rows.append(Measured(switch, refused[switch.name]))
                 continue
@@ -242,7 +248,7 @@ def measure(
     start, end = scene.evaluation.from_m, scene.evaluation.to_m
     figures = figures_of(whole.summary)
     stretch = start, end
-    return Costs(wish, choice, stretch, n_steps, size, step, figures, names, rows, whole.remarks)
+    return Costs(wish, effects, stretch, n_steps, size, step, figures, names, rows, whole.remarks)
 
 
 def _round_of(problem: Problem) -> tuple[int, int]:

@@ -42,8 +42,8 @@ class Switch:
 
 
 @dataclass(frozen=True)
-class Choice:
-    """What can be chosen in a scene.
+class SwitchableEffects:
+    """Which effects of a scene can be switched, and why others cannot.
 
     Attributes
     ----------
@@ -57,8 +57,8 @@ class Choice:
     lacking: dict[str, str]
 
 
-def choice_of(scene: Scene) -> Choice:
-    """What can be chosen in a scene. Not collective."""
+def switchable_effects(scene: Scene) -> SwitchableEffects:
+    """Which effects of a scene can be switched. Not collective."""
     problem, known = problem_of(scene), effects.registry()
     active = {effect.name for effect in effects.active(problem)}
     is_on = scene.switches()
@@ -79,7 +79,7 @@ def choice_of(scene: Scene) -> Choice:
         else:
             lacking[name] = effect.data or _NO_DATA
     switches.sort(key=lambda switch: not switch.on)
-    return Choice(switches, [n for n, e in known.items() if e.always], lacking)
+    return SwitchableEffects(switches, [n for n, e in known.items() if e.always], lacking)
 
 
 def _keys(name: str, others: list[str], on: bool) -> dict[str, bool]:

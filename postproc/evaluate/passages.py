@@ -1,4 +1,4 @@
-"""What the study takes from a result file beside the summary, as plain numbers."""
+"""Passages of single pantographs: droppers that slacken in them, uplift that begins before."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ MID_SPAN = 2  # droppers nearest to mid-span that stand for it, as an even numbe
 
 
 def measure(results: Results) -> dict[str, Any]:
-    """Slack droppers by passage, where the uplift of the arms begins, wave and train speed."""
+    """Slack droppers by passage, onset of the arms' uplift, wave and train speed: plain values."""
     return {
         "slack": slack_droppers(results),
         "onset_m": uplift_onset(results),

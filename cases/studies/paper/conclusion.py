@@ -1,0 +1,386 @@
+"""From the runs of a paper's study to verdicts, reasons and tables."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from catenary.cases.run.scene_mesh import mesh_of
+from catenary.cases.scene.problem import problem_of
+from catenary.cases.studies.case_study import StudyRun
+from catenary.cases.studies.paper.runs import (
+    FIGURES,
+    SINGLE,
+    PaperStudy,
+    Rows,
+    changes_of,
+    run_name,
+)
+from catenary.cases.studies.paper.statements import (
+    Statement,
+    holds_alone,
+    judge,
+    n_met,
+    statements_of,
+)
+from catenary.cases.studies.waves.theory import first_band
+from catenary.postproc.report.study_report import (
+    NOT_REPRODUCED,
+    REPRODUCED,
+    Finding,
+    Reading,
+    Study,
+    StudyFigure,
+)
+from catenary.postproc.report.study_table import Column, StudyTable, texts_table
+from catenary.solver.statics.form_finding.equilibrium import find_form
+
+# Result folders by damping and train, and figures of the same runs, to pictures.
+Draw = Callable[[Mapping[str, Mapping[str, Path]], Rows], list[StudyFigure]]
+_NAMED = 4  # variations that a reason names
+_BY_READING = ("mean_N", "std_N", "std_percent", "max_N", "min_N", "loss_percent", "uplift_mm",
+               "slack_before", "slack_after")  # fmt: skip
+
+
+class Ranked(NamedTuple):
+    """A variation, or the case without title, and its rows of one pantograph."""
+
+    title: str
+    rows: Rows
+
+
+def conclude(study: PaperStudy, runs: Mapping[str, StudyRun], draw: Draw) -> Study:
+    """Verdicts under each reading, the search, the ranking of inputs, and pictures.
+
+    Parameters
+    ----------
+    runs : by name, those that broke included; what was not run of the table is left out
+    draw : makes pictures of the runs of a reading that are done
+    """
+    table, statements = study.table, statements_of(study.table)
+    readings = [
+        one
+        for one in table["readings"]
+        if run_name(one["name"], study.dampings[0], study.trains[0]) in runs
+    ]
+    rows = {one["name"]: study.rows(runs, one["name"]) for one in readings}
+    found = {name: judge(statements, own) for name, own in rows.items()}
+    first, *others = readings
+    start = rows[first["name"]].only(study.trains[:1])
+    ranked = rank(start, dict(study.rows_of_variations(runs)), study)
+    named = judge(statements, rows[first["name"]].only(study.named_trains))
+    explained = [
+        _explained(
+            one, named[i], {r["title"]: found[r["name"]][i] for r in others}, statements[i], ranked
+        )
+        for i, one in enumerate(found[first["name"]])
+    ]
+    shown = [one for one in readings if one.get("figures")]
+    return Study(
+        table["title"],
+        table["lead"],
+        [
+            Reading(
+                one["name"],
+                one["title"],
+                changes_of(one),
+                explained if one is first else found[one["name"]],
+            )
+            for one in readings
+        ],  # fmt: skip
+        [
+            _side_by_side(shown, found),
+            search_table(study, statements, _searched(study, runs)),
+            *(_table_of(one, rows[one["name"]]) for one in readings),
+            separation_table(study, _bands(study, runs, readings, rows)),
+            ranking_table(study, ranked),
+        ],
+        _drawn(study, runs, shown, rows, draw),
+    )
+
+
+def _drawn(
+    study: PaperStudy,
+    runs: Mapping[str, StudyRun],
+    shown: Sequence[Mapping[str, Any]],
+    rows: Mapping[str, Rows],
+    draw: Draw,
+) -> list[StudyFigure]:
+    """The pictures of all readings that are to be shown, beside each other."""
+    drawn: list[tuple[str, StudyFigure]] = []
+    for number, reading in enumerate(shown):
+        folders = {
+            damping: {
+                train: run.folder
+                for train in study.trains
+                if (run := runs.get(run_name(reading["name"], damping, train))) is not None
+                and run.ended.done
+            }
+            for damping in study.dampings
+        }
+        for one in draw(folders, rows[reading["name"]]):
+            renamed = replace(
+                one,
+                name=f"{one.name}_{reading['name']}",
+                caption=f"{one.caption[:-1]}: {reading['title']}.",
+            )
+            drawn.append((one.name, renamed if number else one))
+    return [one for _, one in sorted(drawn, key=lambda pair: pair[0])]
+
+
+def _explained(
+    finding: Finding,
+    named: Finding,
+    others: Mapping[str, Finding],
+    statement: Statement,
+    ranked: Sequence[Ranked],
+) -> Finding:
+    """The finding with the reason that the runs give where it differs from the paper."""
+    if finding.verdict != NOT_REPRODUCED:
+        return finding
+    parts = []
+    if named.found != finding.found:
+        parts.append(
+            f"With only the separations that the text names: {named.verdict} ({named.found})."
+        )
+    met = {title: one for title, one in others.items() if one.verdict == REPRODUCED}
+    parts += [f"Reproduced with {title}: {one.found}." for title, one in met.items()]
+    if others and not met:
+        parts.append(f"None of the {len(others)} other readings reproduces it.")
+    return replace(finding, reason=" ".join([*parts, movers(statement, ranked)]).strip())
+
+
+def _table(
+    title: str, note: str, heads: Sequence[str], rows: Sequence[Sequence[Any]]
+) -> StudyTable:
+    return texts_table(heads, rows, (), title, note)
+
+
+def _side_by_side(
+    readings: Sequence[Mapping[str, Any]], found: Mapping[str, Sequence[Finding]]
+) -> StudyTable:
+    """All statements under some readings, each with its figures."""
+    columns = [found[one["name"]] for one in readings]
+    met = [sum(one.verdict == REPRODUCED for one in column) for column in columns]
+    note = "; ".join(
+        f"{reading['title']}: {n} of {len(column)} reproduced"
+        for reading, n, column in zip(readings, met, columns, strict=True)
+    )
+    return _table(
+        "The statements beside each other",
+        f"{note}.",
+        ["no.", "statement", *(reading["title"] for reading in readings)],
+        [
+            [one[0].number, one[0].statement, *(f"{own.verdict}: {own.found}" for own in one)]
+            for one in zip(*columns, strict=True)
+        ],
+    )
+
+
+def _table_of(reading: Mapping[str, Any], rows: Rows) -> StudyTable:
+    """All pantographs of a reading."""
+    changes = " ".join(changes_of(reading))
+    broke = [{**run, "place": "", "outcome": "there is no such run"} for run in rows.missing]
+    columns = [Column(name, name) for name in ("train", "damping")]
+    columns += [Column("place", "pantograph"), *(FIGURES[name] for name in _BY_READING)]
+    title = f"All configurations: {reading['title']}"
+    note = f"Changes: {changes}." if changes else "No changes."
+    return StudyTable(columns, [*rows.rows, *broke], title, note)
+
+
+# ---- which reading meets most statements ---------------------------------------------------------
+
+
+def _searched(study: PaperStudy, runs: Mapping[str, StudyRun]) -> dict[str, Rows]:
+    """The reading that is searched around, and each option in the place of one of its inputs."""
+    around = study.table["search"]["around"]
+    names = {one["title"]: one["name"] for one in study.table["readings"] if one["name"] == around}
+    names |= {title: one["name"] for title, one in study.searched().items()}
+    found = {title: study.rows(runs, name) for title, name in names.items()}
+    return {title: rows for title, rows in found.items() if rows.rows or rows.missing}
+
+
+def search_table(
+    study: PaperStudy, statements: Sequence[Statement], searched: Mapping[str, Rows]
+) -> StudyTable:
+    """The readings of a search, the best first: by statements met, then by pantographs that meet
+    the one that the search counts."""
+    search, found = study.table["search"], []
+    for title, rows in searched.items():
+        met = [one.number for one in judge(statements, rows) if one.verdict == REPRODUCED]
+        kept, of = n_met(statements[search["counts"] - 1], rows)
+        cells = [_range(rows, **one) for one in search["shown"]]
+        listed = ", ".join(map(str, met))
+        found.append((len(met), kept, [title, len(met), listed, f"{kept} of {of}", *cells]))
+    found.sort(key=lambda one: one[:2], reverse=True)
+    counts = {n: sum(one[0] == n for one in found) for n in range(len(statements), -1, -1)}
+    spread = ", ".join(f"{many} meet {n}" for n, many in counts.items() if many)
+    return _table(
+        "Search: which reading of the open inputs meets most statements",
+        "The reading searched around, and each option of an input in its place ([search] in "
+        + (f"study.toml): of {len(found)}, {spread}." if found else "study.toml): none was run."),
+        ["reading", "met", "statements", f"pantographs that meet {search['counts']}",
+         *(" ".join([*one.get("where", {}).values(), FIGURES[one["figure"]].head])
+           for one in search["shown"])],
+        [cells for *_, cells in found],
+    )  # fmt: skip
+
+
+def _range(rows: Rows, figure: str, where: Mapping[str, str] | None = None) -> str:
+    values = rows.at(figure, **(where or {}))
+    if not values:
+        return ""
+    low, high = (format(which(values), FIGURES[figure].format) for which in (min, max))
+    return f"{low} to {high}"
+
+
+# ---- which input moves what ----------------------------------------------------------------------
+
+
+def rank(start: Rows, varied: Mapping[str, Rows], study: PaperStudy) -> list[Ranked]:
+    """The case, then the variations by how much they move the ranking's figure at either damping.
+
+    Variations that broke are left out; there is no row if the case itself broke.
+    """
+    figure = study.table["ranking"]["figure"]
+
+    def effect(one: Ranked) -> float:
+        return max(
+            abs(one.rows.at(figure, damping=damping)[0] - start.at(figure, damping=damping)[0])
+            for damping in study.dampings
+        )
+
+    if start.missing or not start.rows:
+        return []
+    whole = [Ranked(title, rows) for title, rows in varied.items() if not rows.missing]
+    return [Ranked("", start), *sorted(whole, key=effect, reverse=True)]
+
+
+def ranking_table(study: PaperStudy, ranked: Sequence[Ranked]) -> StudyTable:
+    """The ranking for the report."""
+    ranking, dampings = study.table["ranking"], study.dampings
+    figure, head = ranking["figure"], FIGURES[ranking["figure"]].head
+
+    def values(rows: Rows, name: str) -> list[float]:
+        return [rows.at(name, damping=damping)[0] for damping in dampings]
+
+    rows = []
+    for one in ranked:
+        own = values(one.rows, figure)
+        changes = [
+            f"{a - b:+.1f}" for a, b in zip(own, values(ranked[0].rows, figure), strict=True)
+        ]
+        pairs = [
+            " / ".join(format(value, FIGURES[name].format) for value in values(one.rows, name))
+            for name in ranking["shown"]
+        ]
+        changes = changes if one.title else ["" for _ in changes]
+        rows.append([one.title or "the case", *(f"{v:.1f}" for v in own), *changes, *pairs])
+    return _table(
+        "What the open inputs decide",
+        f"One input at a time, one pantograph, in the order of their effect on {head}; "
+        f"{' / '.join(dampings)} damping.",
+        ["input", *(f"{head} {damping}" for damping in dampings),
+         *(f"change {damping}" for damping in dampings),
+         *(FIGURES[name].head for name in ranking["shown"])],
+        rows,
+    )  # fmt: skip
+
+
+def movers(statement: Statement, ranked: Sequence[Ranked]) -> str:
+    """The variations that move a statement's figure most, as sentences; "" without any."""
+    alone = statement.alone
+    if alone is None or len(ranked) < 2:
+        return ""
+    column = FIGURES[alone.figure]
+
+    def of(one: Ranked) -> float:
+        return one.rows.at(alone.figure, damping=alone.damping)[0]
+
+    def said(value: float) -> str:
+        return format(value, column.format)
+
+    case, *varied = ranked
+    start = of(case)
+    most = sorted(varied, key=lambda one: abs(of(one) - start), reverse=True)[:_NAMED]
+    listed = "; ".join(
+        f"{one.title}: {said(of(one))}" for one in most if said(of(one)) != said(start)
+    )
+    moved = f"moved most by {listed}" if listed else "moved by no variation"
+    text = f"One pantograph, {alone.damping}: {column.head} {said(start)} in the case; {moved}. "
+    holds = holds_alone(statement, case.rows)
+    turned = [one.title for one in varied if holds_alone(statement, one.rows) != holds]
+    if holds:
+        text += "It satisfies the statement: the second pantograph makes the difference. "
+        return text + (f"Alone it fails with {_some(turned)}." if turned else "").strip()
+    if not turned:
+        return text + f"None of the {len(varied)} variations alone makes the statement hold for it."
+    return text + f"The statement holds for it with {_some(turned)}."
+
+
+def _some(titles: Sequence[str]) -> str:
+    """The first titles, and how many more there are."""
+    more = len(titles) - _NAMED
+    return "; ".join(titles[:_NAMED]) + (f" and {more} more" if more > 0 else "")
+
+
+# ---- which separation is critical ----------------------------------------------------------------
+
+
+def _bands(
+    study: PaperStudy,
+    runs: Mapping[str, StudyRun],
+    readings: Sequence[Mapping[str, Any]],
+    rows: Mapping[str, Rows],
+) -> dict[str, tuple[tuple[float, float], Rows]]:
+    """Frequencies of the first modes of each reading's running spans [Hz], and its figures; one
+    mode a span, as shorter transition spans lie above."""
+    found = {}
+    for one in readings:
+        run = runs[run_name(one["name"], study.dampings[0], study.trains[0])]
+        if run.ended.done:
+            problem = problem_of(run.scene)
+            model, _ = find_form(problem, mesh_of(run.scene))
+            line = problem.line
+            band = first_band(model, line.n_spans - sum(line.n_transition))
+            found[one["title"]] = band, rows[one["name"]]
+    return found
+
+
+def separation_table(
+    study: PaperStudy, readings: Mapping[str, tuple[tuple[float, float], Rows]]
+) -> StudyTable:
+    """Delay of the trailing pantograph in periods of the ringing spans, and its deviation beside
+    that of one alone.
+
+    A span that has been passed rings in the line's first modes; their frequencies lie close
+    together, one for each span, so that the ringing stays there until the trailing one comes.
+    """
+    rows = []
+    for title, (band, found) in readings.items():
+        for train in study.table["trains"]:
+            own = [row for row in found.rows if row["train"] == train["name"]]
+            if "separation_m" not in train or not own:
+                continue
+            speed = own[0]["speed_over_wave"] * own[0]["wave_speed_km_h"] / 3.6
+            delay = train["separation_m"] / speed
+            ratios = [_ratio(found, train["name"], damping) for damping in study.dampings]
+            periods = " to ".join(f"{delay * frequency:.2f}" for frequency in band)
+            modes = " to ".join(f"{frequency:.2f}" for frequency in band)
+            rows.append([title, modes, train["name"], f"{delay:.2f}", periods, *ratios])
+    return _table(
+        "Which separation is critical",
+        "A span rings in the first modes after the leading pantograph has passed. The trailing one "
+        "comes after so many periods; its standard deviation is so many times the single one's.",
+        ["reading", "first modes [Hz]", "train", "delay [s]", "delay [periods]",
+         *(f"deviation / single, {damping}" for damping in study.dampings)],
+        rows,
+    )  # fmt: skip
+
+
+def _ratio(rows: Rows, train: str, damping: str) -> str:
+    trailing = rows.at("std_N", train=train, damping=damping)
+    alone = rows.at("std_N", place=SINGLE, damping=damping)
+    return f"{trailing[-1] / alone[0]:.2f}" if trailing and alone else "-"

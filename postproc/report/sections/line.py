@@ -1,0 +1,126 @@
+"""The line in motion and at rest: uplift, droppers, elasticity, registration."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from catenary.postproc.read.results import Results
+from catenary.postproc.report import csv_tables
+from catenary.postproc.report.csv_tables import DropperRow
+from catenary.postproc.report.sections.section import (
+    EvaluatedRun,
+    Folded,
+    Picture,
+    Section,
+    Text,
+    number,
+)
+from catenary.postproc.report.study_table import StudyTable, texts_table
+from catenary.postproc.standards import en50367 as standards
+
+
+def in_motion(run: EvaluatedRun) -> Section:
+    """Uplift and dropper forces."""
+    droppers, supports = run.statistics.droppers, run.statistics.supports
+    rows: list[list[Any]] = [
+        ["largest uplift at a steady arm", number(1e3 * supports.maximum), "mm"],
+        ["droppers that slackened", droppers.n_slackened, f"of {droppers.evaluated.sum()}"],
+        ["largest dropper force", number(droppers.maximum), "N"],
+        ["smallest dropper force", number(droppers.minimum), "N"],
+    ]
+    table = texts_table(["in the evaluation stretch", "value", "unit"], rows, {1})
+    return Section("Line in motion", [table], _of_motion(run))
+
+
+def _of_motion(run: EvaluatedRun) -> Iterator[Picture]:
+    from catenary.postproc.report.pictures import line_pictures
+    from catenary.postproc.report.pictures.channel_pictures import channel_pictures
+
+    results, statistics = run.results, run.statistics
+    if results.n_rows("time") > 1 and statistics.supports.x.size:
+        limit = standards.EDITIONS[results.attributes["edition"]].arm_uplift
+        text = "Uplift of the contact wire at the steady arms."
+        yield Picture("uplift", text, lambda: line_pictures.arm_uplift(results, statistics, limit))
+    if results.n_rows("time") > 1 and statistics.droppers.x.size:
+        text = "Dropper forces."
+        yield Picture("droppers", text, lambda: line_pictures.dropper_force(results, statistics))
+    yield Picture("energy", "Energies of the line.", lambda: line_pictures.energies(results))
+    yield from (Picture(*drawn) for drawn in channel_pictures(results))
+
+
+def at_rest(run: EvaluatedRun) -> Section:
+    """Elasticity, and the droppers as they are cut."""
+    from catenary.postproc.report.pictures import line_pictures
+
+    results = run.results
+    text = "Profile and elasticity of the line."
+    picture = Picture("static", text, lambda: line_pictures.static_line(results))
+    return Section("Line at rest", _of_rest(results), [picture], _all_droppers(results))
+
+
+def _of_rest(results: Results) -> Iterator[Text | StudyTable]:
+    elasticity, span = 1e3 * results.static("elasticity"), results.reference_span + 1
+    if elasticity.size:
+        low, high = elasticity.min(), elasticity.max()
+        yield Text(
+            f"Elasticity between {number(low, 3)} and {number(high, 3)} mm/N (non-uniformity "
+            f"{number(100 * (high - low) / (high + low))} %)."
+        )
+    own = [row for row in csv_tables.dropper_table(results) if row.span == span]
+    yield _droppers(results, own, f"Droppers of span {span}")
+
+
+def _all_droppers(results: Results) -> Iterator[Folded]:
+    rows = csv_tables.dropper_table(results)
+    title = f"Droppers of all spans ({len(rows)}), also in droppers.csv"
+    yield Folded(title, _droppers(results, rows))
+
+
+def _droppers(results: Results, rows: Sequence[DropperRow], title: str = "") -> StudyTable:
+    heads = ["span", "dropper", "position in span [m]", "position [m]", "length [m]"]
+    heads.append("force at rest [N]")
+    several = csv_tables.joins_several(results)
+    heads += ["hangs from", "and carries"] if several else []
+    cells = [
+        [row.span, row.number, number(row.position, 3), number(row.x, 3), number(row.length, 3),
+         number(row.force), *((row.upper, row.lower) if several else ())]
+        for row in rows
+    ]  # fmt: skip
+    return texts_table(heads, cells, set(range(6)), title)
+
+
+def from_above(run: EvaluatedRun) -> Section:
+    """Where the contact wires are laterally, and their steady arms."""
+    from catenary.postproc.report.pictures.plan_view import plan_view
+
+    results = run.results
+    text = "The line at rest from above, and its steady arms."
+    picture = Picture("plan_view", text, lambda: plan_view(results))
+    there = results.registration() is not None
+    heading = "Line from above" if there else ""
+    return Section(heading, _lateral(results), [picture], _registration(results))
+
+
+def _lateral(results: Results) -> Iterator[Text]:
+    """From where to where contact wires that move sideways are at rest in the running spans."""
+    if not results.has_static("contact_y"):
+        return
+    first, last = results.line("running_range")
+    for name, wire in results.contact_profiles().items():
+        assert wire.y is not None
+        own = wire.y[(wire.x >= first) & (wire.x <= last)]
+        yield Text(
+            f"{name} lies between {number(float(own.min()), 3)} and {number(float(own.max()), 3)} "
+            "m to the left of the track's axis in the running spans."
+        )
+
+
+def _registration(results: Results) -> Iterator[Folded]:
+    found = results.registration()
+    if found is None:
+        return
+    heads = ["position [m]", "stagger [m]", "radial force [N]", "lift [N]", "slope [deg]"]
+    heads += ["force along the track [N]", "slew [deg]", *(["wire"] if found.wires else [])]
+    title = f"Registration: {len(found.x)} steady arms, also in registration.csv"
+    yield Folded(title, texts_table(heads, list(found.rows()), set(range(7))))

@@ -1,0 +1,93 @@
+"""What a section of a report is made of: sentences, tables, pictures, and what is folded away."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from catenary.postproc.evaluate import verdict as acceptance
+from catenary.postproc.evaluate.error_indicators import Indicators, indicate
+from catenary.postproc.evaluate.statistics import RunStatistics
+from catenary.postproc.evaluate.verdict import Criterion
+from catenary.postproc.evaluate.wording import fixed
+from catenary.postproc.read.results import Results
+from catenary.postproc.report.study_table import StudyTable
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True)
+class EvaluatedRun:
+    """A run as sections take it: its results, their statistics and the criteria."""
+
+    results: Results
+    statistics: RunStatistics
+    criteria: Sequence[Criterion] = ()
+
+    @cached_property
+    def indicators(self) -> Indicators:
+        """Estimates of its errors."""
+        return indicate(self.results)
+
+    @property
+    def verdict(self) -> bool | None:
+        """Whether all criteria are met, None if that is not known."""
+        return acceptance.verdict(list(self.criteria))
+
+
+class Text(NamedTuple):
+    """A sentence, or several.
+
+    Attributes
+    ----------
+    text : what it says
+    look : "good", "bad" or "open" for a verdict, "remark" for a remark, "code" for what is shown to
+        the letter; empty for plain text
+    first : words before the text, in bold
+    items : a list below it
+    """
+
+    text: str
+    look: str = ""
+    first: str = ""
+    items: Sequence[str] = ()
+
+
+class Picture(NamedTuple):
+    """A picture: name of the file without its end, caption, and what makes the figure, if any."""
+
+    name: str
+    caption: str
+    draw: Callable[[], Figure | None]
+
+
+class Folded(NamedTuple):
+    """What a reader unfolds: a title, and a text or table."""
+
+    title: str
+    block: Text | StudyTable
+
+
+class Section(NamedTuple):
+    """A section of a report, in the order of its parts.
+
+    Attributes
+    ----------
+    heading : empty for what stands below the title of the page
+    blocks : texts and tables; made when the page is, such as by a generator
+    pictures : those that the run has
+    folded : what few want to see
+    """
+
+    heading: str
+    blocks: Iterable[Text | StudyTable]
+    pictures: Iterable[Picture] = ()
+    folded: Iterable[Folded] = ()
+
+
+def number(value: Any, digits: int = 1) -> str:
+    """``value`` with so many decimals, a dash for NaN and None."""
+    return "–" if value is None or value != value else fixed(value, digits)

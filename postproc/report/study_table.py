@@ -1,0 +1,182 @@
+"""Tables of studies: rows below typed columns, as CSV, for terminals and as Markdown."""
+
+from __future__ import annotations
+
+import io
+import json
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+from catenary.postproc.files.csv_text import csv_text, number_text
+
+Row = Mapping[str, Any]
+# More runs than this are not named one by one if a remark is of them all.
+_NAMED = 4
+
+
+class Column(NamedTuple):
+    """A column of a table.
+
+    Attributes
+    ----------
+    name : key of its values in the rows; names of figures end in their unit
+    head : above the column where people read it; empty where it stands in files alone
+    format : Python's format of a figure where people read it, with which the column stands at the
+        right; empty for words at the left
+    meaning : with the unit in brackets, for axes of pictures
+    in_files : whether CSV and JSON have it
+    """
+
+    name: str
+    head: str = ""
+    format: str = ""
+    meaning: str = ""
+    in_files: bool = True
+
+    def shown(self, value: Any, unknown: str) -> str:
+        """A value where people read it; ``unknown`` stands for None."""
+        if value is None:
+            return unknown
+        if not self.format:
+            return str(cell(value))
+        text = format(value, self.format)
+        return text.removeprefix("-") if not text.strip("-0.") else text
+
+
+@dataclass(frozen=True)
+class StudyTable:
+    """Columns, rows by names of columns, title and a note for reports.
+
+    Where ``outcome`` of a row is not "done", people read it in the place of figures.
+    """
+
+    columns: Sequence[Column]
+    rows: Sequence[Row]
+    title: str = ""
+    note: str = ""
+
+    def records(self) -> list[dict[str, Any]]:
+        """The rows as files have them."""
+        names = [column.name for column in self.columns if column.in_files]
+        return [{name: row[name] for name in names} for row in self.rows]
+
+    def csv(self) -> str:
+        """CSV text with all digits; what is unknown is empty."""
+        heads = [column.name for column in self.columns if column.in_files]
+        return csv_text(heads, ([cell(row[name]) for name in heads] for row in self.rows))
+
+    @property
+    def read(self) -> list[Column]:
+        """The columns that people read."""
+        return [column for column in self.columns if column.head]
+
+    @property
+    def head(self) -> list[str]:
+        """What stands above the columns that people read."""
+        return [column.head for column in self.read]
+
+    def texts(self, unknown: str = "") -> list[list[str]]:
+        """The cells that people read, row by row; an outcome stands in the second one."""
+        empty = [""] * (len(self.read) - 2)
+        return [
+            [column.shown(row.get(column.name), unknown) for column in self.read]
+            if _is_done(row)
+            else [self.read[0].shown(row[self.read[0].name], unknown), _outcome(row), *empty]
+            for row in self.rows
+        ]
+
+    def text(self) -> str:
+        """The table for a terminal."""
+        from rich.console import Console
+        from rich.table import Table
+        from rich.text import Text
+
+        table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="")
+        for column in self.read:
+            justify: Any = "right" if column.format else "left"
+            table.add_column(Text(column.head), justify=justify, no_wrap=True)
+        table.add_column()
+        for row, cells in zip(self.rows, self.texts("-"), strict=True):
+            behind = "" if _is_done(row) else cells[1]
+            shown = cells if _is_done(row) else cells[:1]
+            padded = [*shown, *[""] * (len(cells) - len(shown)), behind]
+            table.add_row(*(Text(cell) for cell in padded))
+        # Wide enough for any row: what is folded cannot be searched for.
+        stream = io.StringIO()
+        Console(file=stream, width=10_000, color_system=None).print(table)
+        return "\n".join(line.rstrip() for line in stream.getvalue().splitlines())
+
+    def markdown(self) -> str:
+        """The table of a page, without columns that are empty in all rows."""
+        cells = self.texts()
+        done = [own for row, own in zip(self.rows, cells, strict=True) if _is_done(row)]
+        used = [i for i in range(len(self.head)) if any(own[i] for own in done)] or [0, 1]
+        lines = [[self.head[i] for i in used], ["---"] * len(used)]
+        lines += [
+            [own[i] for i in used] if _is_done(row) else [*own[:2], *[""] * (len(used) - 2)]
+            for row, own in zip(self.rows, cells, strict=True)
+        ]
+        return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
+def texts_table(
+    heads: Sequence[str],
+    rows: Sequence[Sequence[Any]],
+    right: Collection[int] = (),
+    title: str = "",
+    note: str = "",
+) -> StudyTable:
+    """A table of texts for people, with the columns ``right`` at the right."""
+    columns = [
+        Column(str(number), head or " ", ">" if number in right else "")
+        for number, head in enumerate(heads)
+    ]
+    texts = [{str(number): cell for number, cell in enumerate(row)} for row in rows]
+    return StudyTable(columns, texts, title, note)
+
+
+def rows_csv(rows: Sequence[Row]) -> str:
+    """Rows with the same keys, at least one, as CSV text."""
+    return StudyTable([Column(name) for name in rows[0]], rows).csv()
+
+
+def remark_lines(runs: Iterable[tuple[str, Sequence[str]]]) -> list[str]:
+    """Lines for below a table, each remark once with the runs that it is of; none without remarks.
+
+    Parameters
+    ----------
+    runs : the name of each run, and its remarks
+    """
+    told = list(runs)
+    names: dict[str, list[str]] = {}
+    for name, remarks in told:
+        for text in dict.fromkeys(remarks):
+            names.setdefault(text, []).append(name)
+    return [f"REMARK      {_of(own, len(told))}: {text}" for text, own in names.items()]
+
+
+def _of(names: Sequence[str], n_runs: int) -> str:
+    return f"all {n_runs} runs" if len(names) == n_runs > _NAMED else ", ".join(names)
+
+
+def _is_done(row: Row) -> bool:
+    return bool(row.get("outcome", "done") == "done")
+
+
+def _outcome(row: Row) -> str:
+    said = str(row["outcome"])
+    return said if said.startswith("not possible") else f"BROKE: {said}"
+
+
+def cell(value: Any) -> Any:
+    """A value as a cell of a CSV file."""
+    if value is None:
+        return ""
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, list) and all(isinstance(entry, str) for entry in value):
+        return "; ".join(value)
+    if isinstance(value, list | dict):
+        return json.dumps(value)
+    return number_text(value) if isinstance(value, float) else value
