@@ -97,6 +97,7 @@ class CalledHead(Head):
     ) -> None: ...
 
 RESERVE: np.dtype[np.void]
+MOST_UNKNOWNS: int
 NODE: np.dtype[np.void]
 SAMPLE: np.dtype[np.void]
 TOUCH: np.dtype[np.void]
@@ -165,18 +166,25 @@ remember: Kernel
 agrees: Kernel
 
 class Layout:
-    """How the unknowns of a station stand in lanes; see ``station_layout.Layout``."""
+    """How the unknowns of a station stand in vectors, and which products blocks of such rows or
+    factors need: those of a kernel that was compiled for them, if there is one of few more."""
 
-    def __init__(
-        self,
-        widths: Sequence[int],
-        own: Sequence[int],
-        beside: Sequence[int],
-        damped: bool,
-        sparse: bool,
-        general: bool,
-        strands: Sequence[Sequence[int]],
-    ) -> None: ...
+    def __init__(self, own: np.ndarray, beside: np.ndarray, damped: bool, sparse: bool) -> None: ...
+    def places(self, which: str) -> np.ndarray:
+        """Row and column of each number of a packed block (2, n), -1 where it is zero: of the
+        station's ``own``, of those ``beside`` it, or of ``half`` of a symmetric own."""
+
+    @property
+    def n_products(self) -> int:
+        """Products of vectors that a row of such blocks makes."""
+
+    @property
+    def n_vectors(self) -> int:
+        """Vectors that hold the unknowns of a station."""
+
+    @property
+    def row_size(self) -> int:
+        """Numbers of a packed row."""
 
 class Products:
     """Products with rows of K, and C, of stations of each make-up."""
@@ -332,12 +340,6 @@ class Simulation:
     @property
     def strip_force(self) -> np.ndarray:
         """Of each strip, strips of one pantograph after another (n_strips,) [N]."""
-
-def has_widths(widths: Sequence[int]) -> bool:
-    """Whether kernels were compiled for stations with planes of these widths."""
-
-def has_strands(factors: Layout) -> bool:
-    """Whether kernels were compiled for factors with these strands."""
 
 def targets() -> list[str]:
     """Processors that kernels were compiled for and that this one can be, the best last."""

@@ -16,6 +16,7 @@ from catenary.solver.linear.stations.station_products import (
     StationProduct,
     joining,
     layout_of,
+    of_pairs,
     station_product,
     with_damping,
 )
@@ -28,8 +29,8 @@ _COEFFICIENTS = {
     "stiffness": (0.0, 1.0, 0.0),
     "damping": (0.0, 0.0, 1.0),
 }
-# Terms that a row of M is to have less than one of K to take its place.
-FEWER = 3
+# Products of each vector that a row of M is to have less than one of K to take its place.
+FEWER = 1.5
 
 
 class LineProducts:
@@ -141,8 +142,10 @@ class LineProducts:
         if rows is None:
             return None
         rows = rows._replace(blocks=-mass / stiffness * rows.blocks)
-        layout = joining(self.layout.changed(own=(0, 1), beside=(0, 1)), rows.blocks)
-        if layout.n_terms + FEWER > self.layout.n_terms:
+        pairs = of_pairs(self.layout.pitch)
+        layout = joining(self.layout.changed(own=pairs, beside=pairs), rows.blocks)
+        found, of_stiffness = layout.native, self.layout.native
+        if found.n_products + FEWER * found.n_vectors > of_stiffness.n_products:
             return None
         columns, first = self._columns()
         return station_product(rows, first, layout, None, columns)

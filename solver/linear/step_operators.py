@@ -31,7 +31,7 @@ from catenary.solver.linear.petsc_solvers import (
 from catenary.solver.linear.pieces.operator_pieces import OperatorPieces
 from catenary.solver.linear.stations.like_stations import LikeStations
 from catenary.solver.linear.stations.sections import Sections
-from catenary.solver.linear.stations.station_layout import WIDEST
+from catenary.solver.linear.stations.station_layout import MOST_UNKNOWNS
 from catenary.solver.linear.stations.station_products import StationProduct
 from catenary.solver.linear.step_arrays import StepArrays
 from catenary.solver.linear.unit_responses import Windows
@@ -179,8 +179,8 @@ class LineOperators:
         reasons = {
             1: "the options of PETSc choose another solver",
             2: "the nodes of the wires are too many or too few to form stations",
-            3: f"the model joins stations further apart, or has more than {WIDEST} unknowns a "
-            "station in a plane",
+            3: f"the model joins stations further apart, or has more than {MOST_UNKNOWNS} unknowns "
+            "a station",
         }
         found = 1
         if not self._in_stations:

@@ -10,47 +10,50 @@
 #include "motion/two_passes.hpp"
 #include "python/from_python.hpp"
 #include "stations/elimination.hpp"
+#include "stations/known_layouts.hpp"
 #include "stations/records.hpp"
 
 namespace catenary::python {
 
 namespace {
 
-Widths widths_of(const std::vector<int>& given) {
-    if (given.empty() || given.size() > kMostPlanes)
-        throw py::value_error("a layout has 1 to " + std::to_string(kMostPlanes) + " planes");
-    Widths widths{};
-    for (size_t p = 0; p < given.size(); ++p) {
-        if (given[p] < 1 || given[p] > kMostTerms)
-            throw py::value_error("a plane has 1 to " + std::to_string(kMostTerms) + " unknowns");
-        widths[p] = static_cast<int8_t>(given[p]);
-    }
-    return widths;
+using Joined = py::array_t<bool, py::array::c_style | py::array::forcecast>;
+
+Layout layout_of(const Joined& own, const Joined& beside, bool damped, bool sparse) {
+    const py::ssize_t n = own.ndim() == 2 ? own.shape(0) : 0;
+    for (const Joined& joined : {own, beside})
+        if (joined.ndim() != 2 || joined.shape(0) != n || joined.shape(1) != n)
+            throw py::value_error("what is joined is a square of unknowns, the same twice");
+    if (n < 1 || n > kMostUnknowns)
+        throw py::value_error("a station has 1 to " + std::to_string(kMostUnknowns) + " unknowns");
+    const Pieces pieces{static_cast<int>(n)};
+    auto mask = [&pieces](const Joined& joined) {
+        return mask_of(pieces, [&joined](int i, int j) { return joined.at(i, j); });
+    };
+    return fitting({pieces.unknowns, mask(own), mask(beside), damped, sparse});
 }
 
-Layout layout_of(const std::vector<int>& widths, const std::vector<int>& own,
-                 const std::vector<int>& beside, bool damped, bool sparse, bool general,
-                 const std::vector<std::vector<int>>& strands) {
-    Layout layout;
-    layout.widths = widths_of(widths);
-    for (const auto& [differences, into] :
-         {std::pair{&own, &layout.own}, {&beside, &layout.beside}})
-        for (int d : *differences) {
-            if (d < 0 || d >= kMostTerms)
-                throw py::value_error("a difference of lanes is from 0 to 15");
-            *into |= 1u << d;
-        }
-    if (strands.size() > kMostStrands) {
-        layout.strands[0][0] = kMostLanes + 1;  // none that kernels have
-    } else {
-        for (size_t s = 0; s < strands.size(); ++s)
-            for (size_t u = 0; u < strands[s].size(); ++u)
-                layout.strands[s].at(u) = static_cast<int8_t>(strands[s][u] + 1);
-    }
-    layout.damped = damped;
-    layout.sparse = sparse;
-    layout.general = general;
-    return layout;
+/// Row and column of each number of a packed block, (2, n), -1 where it is of none.
+py::array_t<int64_t> places(const Layout& layout, const std::string& which) {
+    const Mask mask = which == "own"      ? layout.own
+                      : which == "beside" ? layout.beside
+                      : which == "half"   ? upper(layout.own)
+                                          : throw py::key_error(which);
+    const Pieces pieces = layout.pieces();
+    py::array_t<int64_t> found({2, layout.size_of(mask)});
+    auto at = found.mutable_unchecked<2>();
+    py::ssize_t n = 0;
+    for (int i = 0; i < pieces.n(); ++i)
+        for (int j = 0; j < pieces.n(); ++j)
+            for (int kind = 0; kind < kKinds; ++kind) {
+                if (!(mask[i][j] >> kind & 1)) continue;
+                for (int lane = 0; lane < pieces.vector(); ++lane, ++n) {
+                    const Joint joint = joint_of(pieces, i, j, kind, lane);
+                    at(0, n) = joint.row;
+                    at(1, n) = joint.column;
+                }
+            }
+    return found;
 }
 
 using Layouts = std::vector<Layout>;
@@ -194,12 +197,16 @@ void offer_stations(py::module_& m) {
           "Factors of stations eliminated from one end, their kinds, and which each station has.");
     offer(m, "join", join, "Fill in factors of stations where elimination from both ends meets.");
     py::class_<Layout>(m, "Layout")
-        .def(py::init(&layout_of), py::arg("widths"), py::arg("own"), py::arg("beside"),
-             py::arg("damped"), py::arg("sparse"), py::arg("general"), py::arg("strands"));
-    m.def(
-        "has_widths", [](const std::vector<int>& widths) { return has_widths(widths_of(widths)); },
-        py::arg("widths"));
-    m.def("has_strands", &has_strands, py::arg("factors"));
+        .def(py::init(&layout_of), py::arg("own"), py::arg("beside"), py::arg("damped"),
+             py::arg("sparse"))
+        .def("places", &places, py::arg("which"))
+        .def_property_readonly("n_products", [](const Layout& layout) { return layout.of_row(); })
+        .def_property_readonly("n_vectors",
+                               [](const Layout& layout) { return layout.pieces().n(); })
+        .def_property_readonly("row_size", [](const Layout& layout) {
+            return layout.of_row() * layout.pieces().vector();
+        });
+    m.attr("MOST_UNKNOWNS") = kMostUnknowns;
     m.def("targets", &targets);
     m.def("set_target", &set_target, py::arg("name"));
     py::class_<Products>(m, "Products")

@@ -13,7 +13,6 @@ CATENARY_DECLARE(baseline)
 #if defined(__x86_64__) && !defined(__clang__)
 #define CATENARY_X86 1
 CATENARY_DECLARE(avx2)
-CATENARY_DECLARE(avx512)
 #endif
 
 namespace catenary {
@@ -24,7 +23,6 @@ using Make = std::unique_ptr<Kernels> (*)(const Layout&, const Layout&);
 struct Target {
     std::string name;
     Make make;
-    bool has_known;
 };
 
 /// What this processor can be told to be, the best last.
@@ -32,12 +30,11 @@ const std::vector<Target>& of_processor() {
     static const std::vector<Target> found = [] {
         std::vector<Target> targets;
 #ifdef CATENARY_X86
-        targets.push_back({"baseline", baseline::make, false});
+        targets.push_back({"baseline", baseline::make});
         __builtin_cpu_init();
-        if (__builtin_cpu_supports("x86-64-v3")) targets.push_back({"avx2", avx2::make, true});
-        if (__builtin_cpu_supports("x86-64-v4")) targets.push_back({"avx512", avx512::make, true});
+        if (__builtin_cpu_supports("x86-64-v3")) targets.push_back({"avx2", avx2::make});
 #else
-        targets.push_back({"baseline", baseline::make, true});
+        targets.push_back({"baseline", baseline::make});
 #endif
         return targets;
     }();
@@ -66,31 +63,22 @@ bool set_target(const std::string& name) {
     return false;
 }
 
-bool has_widths(const Widths& widths) {
-    return chosen()->has_known &&
-           std::find(std::begin(kWidths), std::end(kWidths), widths) != std::end(kWidths);
-}
-
-bool has_strands(const Layout& factors) {
-    return chosen()->has_known && factors == kTensioned.factors;
-}
-
 std::unique_ptr<Kernels> kernels_of(const Layout& rows, const Layout& factors) {
-    if (rows.widths != factors.widths || rows.general != factors.general) return nullptr;
+    if (rows.unknowns != factors.unknowns) return nullptr;
     return chosen()->make(rows, factors);
 }
 
 std::unique_ptr<Kernels> kernels_of_rows(const Layout& rows) {
     for (const Shipped& shipped : kShipped)
         if (shipped.rows == rows) return kernels_of(rows, shipped.factors);
-    return kernels_of(rows, sparse_factors(rows));
+    Layout factors;
+    factors.unknowns = rows.unknowns;
+    return kernels_of(rows, factors);
 }
 
 std::unique_ptr<Kernels> kernels_of_factors(const Layout& factors) {
     Layout rows;
-    rows.widths = factors.widths;
-    rows.general = factors.general;
-    rows.own = rows.beside = 1;
+    rows.unknowns = factors.unknowns;
     return kernels_of(rows, factors);
 }
 

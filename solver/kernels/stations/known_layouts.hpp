@@ -6,114 +6,95 @@
 
 namespace catenary {
 
-constexpr uint32_t bits(std::initializer_list<int> differences) {
-    uint32_t found = 0;
-    for (int d : differences) found |= 1u << d;
-    return found;
-}
-constexpr Layout rows_of(std::initializer_list<int> widths, std::initializer_list<int> own,
-                         bool damped = false, std::initializer_list<int> beside = {0, 1}) {
-    Layout layout;
-    int n = 0;
-    for (int width : widths) layout.widths[n++] = static_cast<int8_t>(width);
-    layout.own = bits(own);
-    layout.beside = bits(beside);
-    layout.damped = damped;
-    return layout;
-}
+/// Wires of unknowns: of heights and slopes; of two wires that also stretch, and move sideways.
+using Wires = std::array<int8_t, kMostUnknowns>;
+constexpr Wires kPairs = [] {
+    Wires wires{};
+    for (int u = 0; u < kMostUnknowns; ++u) wires[u] = static_cast<int8_t>(u / 2);
+    return wires;
+}();
+constexpr Wires kStretching = {0, 0, 1, 1, 0, 1, 0, 0, 1, 1};
 
-/// Factors of rows that join all of a plane.
-constexpr Layout dense_factors(const Layout& rows) {
-    Layout layout;
-    layout.widths = rows.widths;
-    layout.general = rows.general;
-    layout.own = layout.beside = (1u << layout.largest()) - 1;
-    return layout;
-}
-/// Factors that keep the matrix's own blocks between stations.
-constexpr Layout sparse_factors(const Layout& rows) {
-    Layout layout;
-    layout.widths = rows.widths;
-    layout.general = rows.general;
-    layout.own = 1;
-    layout.beside = rows.beside | 3;
-    layout.sparse = true;
-    return layout;
-}
-constexpr Layout listed_factors(const Layout& rows) {
-    Layout layout = sparse_factors(rows);
-    layout.by_lists = true;
-    return layout;
-}
-
-/// Rows of some widths, whatever they join.
-constexpr Layout listed_rows(const Widths& widths) {
-    Layout layout;
-    layout.widths = widths;
-    layout.by_lists = true;
-    return layout;
-}
-
-/// Widths that kernels are compiled for.
-constexpr Widths kWidths[] = {{2}, {2, 2}, {4}, {4, 4}, {6}, {8}, {10}, {12}, {16}};
-
-/// Rows and factors of the shipped kinds of lines.
+/// Rows and factors of the stations of a kind of line.
 struct Shipped {
     Layout rows, factors;
     /// Whether such stations stand in one line with others, so that chains often go one by one.
     bool is_mixed = false;
 };
-constexpr Shipped dense(const Layout& rows) {
-    return {rows, dense_factors(rows)};
+/// Rows that join within a station unknowns whose places differ by one of these numbers, in the
+/// sense of exclusive or: 1 a beam's deflection and slope, 2 the deflections of two wires. Unknowns
+/// of one wire are joined from station to station. Factors join all of a plane of so many unknowns.
+constexpr Shipped shipped(int unknowns, std::initializer_list<int> differences, bool is_sparse,
+                          int plane = kMostUnknowns, bool is_damped = false,
+                          const Wires& wires = kPairs) {
+    const Pieces pieces{unknowns};
+    const Mask beside = mask_of(
+        pieces, [&](int i, int j) { return wires[i] == wires[j] || kPairs[i] == kPairs[j]; });
+    const Mask own = mask_of(pieces, [&](int i, int j) {
+        for (int d : differences)
+            if ((i ^ j) == d) return true;
+        return false;
+    });
+    const Mask whole = mask_of(pieces, [&](int i, int j) { return i / plane == j / plane; });
+    return {{unknowns, own, beside, is_damped, false},
+            {unknowns, whole, is_sparse ? beside : Mask{}, false, is_sparse}};
 }
-constexpr Shipped sparse(const Layout& rows) {
-    return {rows, sparse_factors(rows)};
+constexpr Shipped mixed(Shipped of) {
+    of.is_mixed = true;
+    return of;
 }
-constexpr Shipped mixed(Shipped shipped) {
-    shipped.is_mixed = true;
-    return shipped;
+/// The same stations by M, which joins a wire's own deflections and slopes only.
+constexpr Shipped by_mass(Shipped of) {
+    of.rows = shipped(of.rows.unknowns, {0, 1}, true).rows;
+    return of;
 }
-/// Two wires that stretch, in three planes, and the factors of each wire by itself.
 constexpr Shipped kTensioned = [] {
-    Shipped of = sparse(rows_of({10}, {0, 1, 2, 3, 4, 5, 6, 7, 8, 10, 11, 12, 13, 14}, true,
-                                {0, 1, 2, 3, 4, 5, 6, 7, 10, 11, 12, 13}));
-    of.factors.strands[0] = {1, 2, 5, 7, 8};
-    of.factors.strands[1] = {3, 4, 6, 9, 10};
+    Shipped of = shipped(10, {}, true, kMostUnknowns, true, kStretching);
+    of.rows.own = of.factors.own;
     return of;
 }();
-/// The same by M, and two wires that stretch in their plane.
-constexpr Shipped kThreePlanes = {rows_of({10}, {0, 1}), kTensioned.factors};
-constexpr Shipped kStretching = [] {
-    Shipped of = sparse(rows_of({6}, {0, 1}));
-    of.factors.beside = bits({0, 1, 4, 5, 6, 7});
-    return of;
-}();
+
 constexpr Shipped kShipped[] = {
-    dense(rows_of({2}, {0, 1})),                  // one wire
-    dense(rows_of({2, 2}, {0, 1})),               // in two planes
-    mixed(dense(rows_of({4}, {0, 1, 2}))),        // two wires with droppers
-    sparse(rows_of({4}, {0, 1, 2})),              // the same where no two spans are alike
-    mixed(dense(rows_of({4, 4}, {0, 1, 2}))),     // two such lines side by side, in an overlap
-    sparse(rows_of({4, 4}, {0, 1, 2})),           // two wires in two planes
-    dense(rows_of({6}, {0, 1, 2, 6})),            // compound
-    sparse(rows_of({6}, {0, 1, 2, 6})),           //
-    dense(rows_of({6}, {0, 1, 4, 6})),            // twin, with relative motion
-    mixed(dense(rows_of({4}, {0, 1}))),           // stitched, by M: two wires
-    mixed(sparse(rows_of({4}, {0, 1}))),          //
-    mixed(dense(rows_of({6}, {0, 1}))),           // and three
-    mixed(sparse(rows_of({6}, {0, 1}))),          //
-    mixed(sparse(rows_of({8}, {0, 1}))),          // two wires in planes that arms join, by M
-    sparse(rows_of({8}, {0, 1, 2, 4, 6}, true)),  // in wind
-    sparse(rows_of({12}, {0, 1})),                // three wires in planes that arms join, by M
-    sparse(rows_of({16}, {0, 1})),                // an overlap of such lines of two wires
+    shipped(2, {0, 1}, false),                   // one wire
+    shipped(4, {0, 1}, false, 2),                // in two planes
+    mixed(shipped(4, {0, 1, 2}, false)),         // two wires with droppers
+    shipped(4, {0, 1, 2}, true),                 // the same where no two spans are alike
+    mixed(shipped(8, {0, 1, 2}, false, 4)),      // two such lines side by side, in an overlap
+    shipped(8, {0, 1, 2}, true, 4),              // two wires in two planes
+    shipped(6, {0, 1, 2, 6}, false),             // compound
+    shipped(6, {0, 1, 2, 6}, true),              //
+    shipped(6, {0, 1, 4, 6}, false),             // twin, with relative motion
+    mixed(shipped(4, {0, 1}, false)),            // stitched, by M: two wires
+    mixed(shipped(4, {0, 1}, true)),             //
+    mixed(shipped(6, {0, 1}, false)),            // and three
+    mixed(shipped(6, {0, 1}, true)),             //
+    mixed(shipped(8, {0, 1}, true)),             // two wires in planes that arms join, by M
+    shipped(8, {0, 1, 2, 4, 6}, true, 8, true),  // in wind
+    shipped(12, {0, 1}, true),                   // three wires in planes that arms join, by M
+    shipped(16, {0, 1}, true),                   // an overlap of such lines of two wires
     // Lines whose wires and droppers are damped each in its own way.
-    dense(rows_of({2}, {0, 1}, true)),
-    dense(rows_of({4}, {0, 1, 2}, true)),
-    sparse(rows_of({4}, {0, 1, 2}, true)),
-    dense(rows_of({6}, {0, 1, 2, 6}, true)),
-    kStretching,
-    kThreePlanes,
+    shipped(2, {0, 1}, false, 2, true),
+    shipped(4, {0, 1, 2}, false, 4, true),
+    shipped(4, {0, 1, 2}, true, 4, true),
+    shipped(6, {0, 1, 2, 6}, false, 6, true),
+    // Two wires that stretch, in their plane and in three.
+    by_mass(shipped(6, {}, true, 6, false, kStretching)),
+    by_mass(kTensioned),
     kTensioned,
 };
+
+/// The layout of the least products among those that kernels were compiled for which has all of a
+/// layout's: itself if there is none, or none of less than 1.5 times its products.
+constexpr Layout fitting(const Layout& wanted) {
+    Layout found = wanted;
+    int least = 3 * wanted.of_row() / 2;
+    for (const Shipped& one : kShipped)
+        for (const Layout& layout : {one.rows, one.factors})
+            if (layout.holds(wanted) && layout.of_row() < least) {
+                found = layout;
+                least = layout.of_row();
+            }
+    return found;
+}
 
 }  // namespace catenary

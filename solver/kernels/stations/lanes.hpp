@@ -10,11 +10,6 @@
 
 namespace catenary::CATENARY_TARGET {
 
-#if defined(__AVX512F__)
-constexpr int kNative = 8;
-#else
-constexpr int kNative = 4;
-#endif
 // A function that is not put in the place of its call keeps vectors in memory.
 #define CATENARY_INLINE inline __attribute__((always_inline))
 #define CATENARY_HOT __attribute__((always_inline))
@@ -62,35 +57,18 @@ CATENARY_INLINE void write(double* to, Vector<Wide> x) {
         }(Below<Size>{});
 }
 
-/// The vectors that hold the lanes of a layout: pieces of its registers.
-struct Pieces {
-    std::array<int8_t, kMostLanes / 2> first{}, size{}, of_register{}, offset{};
-    int n = 0, wide = 0;  ///< how many, and the lanes of each, of which the last may be unused
-};
-constexpr Pieces pieces_of(const Layout& layout) {
-    Pieces pieces;
-    const Registers registers = registers_of(layout);
-    int largest = 2, lane = 0;
-    for (int r = 0; r < registers.n; ++r)
-        largest = registers.size[r] > largest ? registers.size[r] : largest;
-    pieces.wide = largest < kNative ? largest : kNative;
-    for (int r = 0; r < registers.n; ++r)
-        for (int at = 0; at < registers.size[r]; at += pieces.wide) {
-            const int left = registers.size[r] - at;
-            pieces.first[pieces.n] = static_cast<int8_t>(lane);
-            pieces.size[pieces.n] = static_cast<int8_t>(left < pieces.wide ? left : pieces.wide);
-            pieces.of_register[pieces.n] = static_cast<int8_t>(r);
-            pieces.offset[pieces.n] = static_cast<int8_t>(at);
-            lane += pieces.size[pieces.n++];
-        }
-    return pieces;
-}
-
 /// N vectors of so many lanes.
 template <int N, int Wide>
 struct Lanes {
     Vector<Wide> piece[N];
 
+    Lanes() = default;
+    // Piece by piece: compilers copy a whole one in numbers of other sizes, by way of memory.
+    CATENARY_INLINE Lanes(const Lanes& y) { *this = y; }
+    CATENARY_INLINE Lanes& operator=(const Lanes& y) {
+        each<N>([&](auto i) CATENARY_HOT { piece[i] = y.piece[i]; });
+        return *this;
+    }
     CATENARY_INLINE static Lanes all(double number) {
         Lanes x;
         each<N>([&](auto i) CATENARY_HOT { x.piece[i] = number - Vector<Wide>{}; });

@@ -1,265 +1,112 @@
 #pragma once
-// How the unknowns of a station stand in vector lanes, and which products with blocks need.
+// How the unknowns of a station stand in vectors, and which products a block of a matrix needs.
 //
-// Planes are sets of unknowns that no matrix joins. They stand side by side, each in as many lanes
-// as it needs. A block of a matrix is kept by terms: each joins lanes whose places in their plane
-// differ by one number, in the sense of exclusive or: 0 those with themselves, 1 a beam's
-// deflection and slope, 2 the deflections of two wires. `station_layout.py` packs blocks in this
-// order; what is constant here is known when the kernels are compiled.
+// Unknowns follow each other in pieces, vectors of four lanes; what is left in the last one may be
+// two. A block of a matrix is a grid of squares, each of the rows of one piece and the columns of
+// another, and a square is the sum of four products, lane by lane, of its numbers with
+//
+//     kind   what the lanes of x are      to which lanes of the sum
+//     0      as they are                  as they are
+//     1      as they are                  0 and 1, 2 and 3 exchanged
+//     2      pairs 0,1 and 2,3 exchanged  as they are
+//     3      pairs 0,1 and 2,3 exchanged  0 and 1, 2 and 3 exchanged
+//
+// So x is exchanged once for all rows, and sums once when all columns are added. Where the columns
+// are a piece of two, x holds them twice; where the rows are, both halves of the sum are added up
+// in the end: of both, kinds 0 and 1 are enough. Which products are there is the mask of a block:
+// those that matrices lack are neither stored nor multiplied.
 #include <array>
 #include <cstdint>
 
 namespace catenary {
 
-constexpr int kMostPlanes = 8, kMostLanes = 32, kMostTerms = 16, kMostStrands = 4;
-constexpr int kRegister = 8;  // lanes that stand together in a packed block, at most
+constexpr int kMostUnknowns = 32, kMostPieces = 8, kKinds = 4;
 
-constexpr int power_of_two_from(int n) {
-    int power = 1;
-    while (power < n) power *= 2;
-    return power;
+/// Kinds of products of each square, a bit for each.
+using Mask = std::array<std::array<uint8_t, kMostPieces>, kMostPieces>;
+
+/// Vectors that hold so many unknowns.
+struct Pieces {
+    int unknowns = 0;
+
+    /// Lanes of kernels that take them: all even numbers, and multiples of four of wide stations.
+    constexpr int lanes() const { return unknowns <= 16 ? (unknowns + 1) / 2 * 2 : 4 * n(); }
+    constexpr int vector() const { return unknowns <= 2 ? 2 : 4; }
+    constexpr int n() const { return (unknowns + vector() - 1) / vector(); }
+    constexpr bool is_half(int piece) const { return lanes() - piece * vector() < vector(); }
+};
+
+/// What a lane of a product's numbers joins; -1 if there is none.
+struct Joint {
+    int row = -1, column = -1;
+};
+constexpr Joint joint_of(const Pieces& pieces, int i, int j, int kind, int lane) {
+    const int v = pieces.vector(), turned = lane ^ (kind & 1), crossed = lane ^ (kind & 2);
+    const bool few_rows = pieces.is_half(i), few_columns = pieces.is_half(j);
+    if (crossed >= v || ((few_rows || few_columns) && kind >= 2)) return {};
+    if (few_rows && few_columns && lane >= 2) return {};
+    const Joint found{v * i + (few_rows ? turned % 2 : turned),
+                      v * j + (few_columns ? lane % 2 : crossed)};
+    return found.row < pieces.unknowns && found.column < pieces.unknowns ? found : Joint{};
 }
 
-/// Unknowns of each plane, 0 after the last.
-using Widths = std::array<int8_t, kMostPlanes>;
+/// The mask of a block that joins what `joins(row, column)` says.
+template <class Joins>
+constexpr Mask mask_of(const Pieces& pieces, const Joins& joins) {
+    Mask mask{};
+    for (int i = 0; i < pieces.n(); ++i)
+        for (int j = 0; j < pieces.n(); ++j)
+            for (int kind = 0; kind < kKinds; ++kind)
+                for (int lane = 0; lane < pieces.vector(); ++lane) {
+                    const Joint at = joint_of(pieces, i, j, kind, lane);
+                    if (at.row >= 0 && joins(at.row, at.column)) mask[i][j] |= 1 << kind;
+                }
+    return mask;
+}
 
-/// Which unknowns of a station matrices join. See `Layout` of station_layout.py.
+/// Of a symmetric block: the squares of which kernels read the numbers, for both halves.
+constexpr Mask upper(const Mask& mask) {
+    Mask half = mask;
+    for (int i = 0; i < kMostPieces; ++i)
+        for (int j = 0; j < i; ++j) half[i][j] = 0;
+    return half;
+}
+
+/// How many products a mask has, and whether all of another's are among them.
+constexpr int n_products(const Mask& mask) {
+    int n = 0;
+    for (const auto& row : mask)
+        for (int kinds : row)
+            for (; kinds; kinds &= kinds - 1) ++n;
+    return n;
+}
+constexpr bool holds(const Mask& mask, const Mask& other) {
+    for (int i = 0; i < kMostPieces; ++i)
+        for (int j = 0; j < kMostPieces; ++j)
+            if (other[i][j] & ~mask[i][j]) return false;
+    return true;
+}
+
+/// Which unknowns of a station the blocks of rows, or of factors, join. See `station_layout.py`.
 struct Layout {
-    Widths widths{};
-    uint32_t own = 0, beside = 0;  ///< terms of blocks, a bit for each difference
-    bool damped = false;           ///< whether rows hold -C as well as K
-    bool sparse = false;           ///< whether factors keep the matrix's own blocks
-    bool general = false;          ///< whether its widths are known at run time only
-    bool by_lists = false;         ///< whether its differences are
-    /// Unknowns + 1 of each strand, 0 after the last.
-    std::array<std::array<int8_t, kMostTerms>, kMostStrands> strands{};
+    int unknowns = 0;
+    Mask own{};     ///< of a row's diagonal block; of factors S^-1, and S^-1 B unless sparse
+    Mask beside{};  ///< of the matrix's blocks between stations
+    bool is_damped = false;  ///< whether rows hold -C as well as K
+    bool is_sparse = false;  ///< whether factors keep the matrix's own blocks, and half of S^-1
 
     constexpr bool operator==(const Layout&) const = default;
 
-    constexpr int n_planes() const {
-        int n = 0;
-        while (n < kMostPlanes && widths[n]) ++n;
-        return n;
+    constexpr Pieces pieces() const { return {unknowns}; }
+    /// Numbers of a packed block.
+    constexpr int size_of(const Mask& mask) const { return n_products(mask) * pieces().vector(); }
+    constexpr bool holds(const Layout& other) const {
+        return unknowns == other.unknowns && is_damped == other.is_damped &&
+               is_sparse == other.is_sparse && catenary::holds(own, other.own) &&
+               catenary::holds(beside, other.beside);
     }
-    constexpr int pitch() const {
-        int n = 0;
-        for (int width : widths) n += width;
-        return n;
-    }
-    constexpr int widest() const {
-        int most = 0;
-        for (int width : widths) most = width > most ? width : most;
-        return most;
-    }
-    constexpr int plane_lanes(int plane) const {
-        if (general) return (widths[plane] + 3) / 4 * 4;
-        for (int lanes : {2, 4, 6, 8, 10, 12, 16})
-            if (widths[plane] <= lanes) return lanes;
-        return -1;
-    }
-    constexpr int first_lane(int plane) const {
-        int n = 0;
-        for (int p = 0; p < plane; ++p) n += plane_lanes(p);
-        return n;
-    }
-    constexpr int first_unknown(int plane) const {
-        int n = 0;
-        for (int p = 0; p < plane; ++p) n += widths[p];
-        return n;
-    }
-    constexpr int n_lanes() const { return first_lane(n_planes()); }
-    constexpr int plane_of(int lane) const {
-        int plane = 0;
-        while (lane >= first_lane(plane + 1)) ++plane;
-        return plane;
-    }
-    /// Unknown of a lane, -1 if it has none.
-    constexpr int unknown(int lane) const {
-        const int plane = plane_of(lane), place = lane - first_lane(plane);
-        return place < widths[plane] ? first_unknown(plane) + place : -1;
-    }
-    constexpr int lane_of(int wanted) const {
-        for (int lane = 0; lane < n_lanes(); ++lane)
-            if (unknown(lane) == wanted) return lane;
-        return -1;
-    }
-    /// Least power of two of lanes that holds a plane.
-    constexpr int largest() const {
-        int most = 0;
-        for (int p = 0; p < n_planes(); ++p) most = plane_lanes(p) > most ? plane_lanes(p) : most;
-        return power_of_two_from(most);
-    }
-    /// Whether lanes 0 and 1, 2 and 3 and so on of a second sum are exchanged at its end.
-    constexpr bool turns() const {
-        return !general && largest() <= kRegister && widest() > largest() - 2;
-    }
+    /// Products that a row of such blocks makes.
+    constexpr int of_row() const { return n_products(own) + 2 * n_products(beside); }
 };
-
-/// Lanes of each register, whose numbers of a packed block stand together.
-struct Registers {
-    std::array<int8_t, kMostLanes / 2> size{};
-    int n = 0;
-};
-
-constexpr Registers registers_of(const Layout& layout) {
-    Registers found;
-    auto cut = [&found](int lanes, int most) {
-        while (lanes) {
-            int size = 1;
-            while (2 * size <= lanes && 2 * size <= most) size *= 2;
-            found.size[found.n++] = static_cast<int8_t>(size);
-            lanes -= size;
-        }
-    };
-    const int first = layout.plane_lanes(0);
-    bool alike = first == power_of_two_from(first);
-    for (int p = 0; p < layout.n_planes(); ++p) alike = alike && layout.plane_lanes(p) == first;
-    if (layout.general)
-        cut(layout.n_lanes(), 4);
-    else if (alike)
-        cut(layout.n_lanes(), kRegister);
-    else
-        for (int p = 0; p < layout.n_planes(); ++p) cut(layout.plane_lanes(p), kRegister);
-    return found;
-}
-
-/// What a block times a vector is the sum of, and how its numbers are stored. There are two sums,
-/// which a processor works on side by side.
-struct Terms {
-    int n = 0;
-    std::array<std::array<int8_t, kMostLanes>, kMostTerms> source{};  ///< lane, -1 if there is none
-    std::array<int8_t, kMostTerms> sum{};                             ///< which sum, 0 or 1
-    /// Where the numbers of each register and term begin, -1 if there are none.
-    std::array<std::array<int16_t, kMostTerms>, kMostLanes / 2> begin{};
-    int size = 0;  ///< numbers of the block
-};
-
-/// Numbers of a register stand together, those of the largest ones first.
-constexpr void put_in_order(const Layout& layout, Terms& terms) {
-    const Registers registers = registers_of(layout);
-    int end = 0, largest = 1;
-    for (int size = kRegister; size; size /= 2)
-        for (int r = registers.n - 1; r >= 0; --r) {
-            if (registers.size[r] != size) continue;
-            largest = size > largest ? size : largest;
-            int first = 0;
-            for (int q = 0; q < r; ++q) first += registers.size[q];
-            for (int k = 0; k < terms.n; ++k) {
-                bool any = false;
-                for (int lane = first; lane < first + size; ++lane)
-                    any = any || terms.source[k][lane] >= 0;
-                terms.begin[r][k] = static_cast<int16_t>(any ? end : -1);
-                if (any) end += size;
-            }
-        }
-    terms.size = (end + largest - 1) / largest * largest;
-}
-
-/// Terms of the differences whose bits are set.
-constexpr Terms terms_of(const Layout& layout, uint32_t differences) {
-    Terms terms;
-    for (int d = 0; d < kMostTerms; ++d) {
-        if (!(differences >> d & 1)) continue;
-        // An odd difference is an even one of sources, and an exchange at the end: few are
-        // exchanged.
-        const int apart = layout.turns() ? d & ~1 : d;
-        for (int lane = 0; lane < layout.n_lanes(); ++lane) {
-            const int plane = layout.plane_of(lane), first = layout.first_lane(plane);
-            const int other = first + ((lane - first) ^ apart);
-            const bool there = other < first + layout.plane_lanes(plane);
-            terms.source[terms.n][lane] = static_cast<int8_t>(there ? other : -1);
-        }
-        terms.sum[terms.n] = static_cast<int8_t>(layout.turns() ? d & 1 : terms.n % 2);
-        ++terms.n;
-    }
-    put_in_order(layout, terms);
-    return terms;
-}
-
-constexpr Terms own_terms(const Layout& layout) {
-    return terms_of(layout, layout.own);
-}
-
-/// Of a block that joins all unknowns of each plane.
-constexpr Terms whole_terms(const Layout& layout) {
-    if (layout.turns() || layout.general) return terms_of(layout, (1u << layout.largest()) - 1);
-    Terms terms;
-    terms.n = layout.widest();
-    for (int column = 0; column < terms.n; ++column) {
-        for (int lane = 0; lane < layout.n_lanes(); ++lane) {
-            const int plane = layout.plane_of(lane);
-            const bool there = column < layout.plane_lanes(plane);
-            terms.source[column][lane] =
-                static_cast<int8_t>(there ? layout.first_lane(plane) + column : -1);
-        }
-        terms.sum[column] = static_cast<int8_t>(column % 2);
-    }
-    put_in_order(layout, terms);
-    return terms;
-}
-
-/// Of a block that joins a station to one beside it: by differences, or by the columns of strands.
-constexpr Terms beside_terms(const Layout& layout) {
-    if (!layout.strands[0][0]) return terms_of(layout, layout.beside);
-    Terms terms;
-    for (auto& lanes : terms.source) lanes.fill(-1);
-    for (const auto& strand : layout.strands) {
-        int n = 0;
-        while (n < kMostTerms && strand[n]) ++n;
-        terms.n = n > terms.n ? n : terms.n;
-        for (int column = 0; column < n; ++column)
-            for (int row = 0; row < n; ++row)
-                terms.source[column][layout.lane_of(strand[row] - 1)] =
-                    static_cast<int8_t>(layout.lane_of(strand[column] - 1));
-    }
-    for (int k = 0; k < terms.n; ++k)
-        terms.sum[k] = static_cast<int8_t>(layout.turns() ? 0 : k % 2);
-    put_in_order(layout, terms);
-    return terms;
-}
-
-/// A symmetric block of which one half is stored: term d has the unknown that is d places further,
-/// round and round in its plane. Where it is mirrored, lane `back` of its numbers times the vector
-/// is what the other half makes.
-struct Halves {
-    Terms terms;
-    std::array<bool, kMostTerms> mirrored{};
-    std::array<std::array<int8_t, kMostLanes>, kMostTerms> back{};
-};
-
-constexpr Halves halves_of(const Layout& layout) {
-    Halves halves;
-    Terms& terms = halves.terms;
-    terms.n = layout.widest() / 2 + 1;
-    for (int d = 0; d < terms.n; ++d) {
-        for (int lane = 0; lane < layout.n_lanes(); ++lane) {
-            terms.source[d][lane] = -1;
-            halves.back[d][lane] = static_cast<int8_t>(lane);
-        }
-        halves.mirrored[d] = d >= 1 && d < (layout.widest() + 1) / 2;
-        terms.sum[d] = static_cast<int8_t>(layout.turns() ? 0 : d % 2);
-    }
-    for (int plane = 0; plane < layout.n_planes(); ++plane) {
-        const int width = layout.widths[plane], first = layout.first_lane(plane);
-        for (int d = 0; d <= width / 2; ++d)
-            for (int place = 0; place < width; ++place) {
-                const int other = first + (place + d) % width;
-                terms.source[d][first + place] = static_cast<int8_t>(other);
-                halves.back[d][other] = static_cast<int8_t>(first + place);
-            }
-    }
-    put_in_order(layout, terms);
-    return halves;
-}
-
-/// Numbers of a station's packed row of K, and of -C.
-constexpr int row_size(const Layout& layout) {
-    return (own_terms(layout).size + 2 * beside_terms(layout).size) * (layout.damped ? 2 : 1);
-}
-/// Numbers of a station's packed factors.
-constexpr int factor_size(const Layout& layout) {
-    if (!layout.sparse) return 3 * whole_terms(layout).size;
-    return layout.general ? whole_terms(layout).size : halves_of(layout).terms.size;
-}
 
 }  // namespace catenary

@@ -8,14 +8,14 @@ namespace catenary {
 Line::Line(std::vector<std::unique_ptr<Kernels>> kernels, std::vector<std::vector<int>> make_ups)
     : kernels_(std::move(kernels)), make_ups_(std::move(make_ups)) {
     const size_t n = make_ups_.size();
-    place_.assign(n * n * kMostLanes, -1);
+    place_.assign(n * n * kMostUnknowns, -1);
     for (size_t from = 0; from < n; ++from)
         for (size_t to = 0; to < n; ++to)
             for (size_t u = 0; u < make_ups_[to].size(); ++u) {
                 const auto& there = make_ups_[from];
                 const auto found = std::find(there.begin(), there.end(), make_ups_[to][u]);
                 if (found != there.end())
-                    place_[(from * n + to) * kMostLanes + u] =
+                    place_[(from * n + to) * kMostUnknowns + u] =
                         static_cast<int8_t>(found - there.begin());
             }
 }
@@ -26,7 +26,7 @@ void Line::set_runs(const Work& work, int64_t n, int64_t low) {
     const Places &solved = work.factored.places, &read = work.product.places;
     const int64_t first = work.product.first;
     if (!solved.make_up) {
-        const int64_t pitch = kernels_[0]->rows.pitch();
+        const int64_t pitch = kernels_[0]->rows.unknowns;
         // There is one station more to be read at both ends.
         runs_.push_back({-1, n + 1, pitch * first, 0, -pitch * low});
         return;
@@ -35,7 +35,7 @@ void Line::set_runs(const Work& work, int64_t n, int64_t low) {
     for (int64_t begin = 0, end; begin < n; begin = end) {
         for (end = begin; end < n && solved.make_up[end] == solved.make_up[begin]; ++end)
             run_number_[end] = static_cast<int32_t>(runs_.size());
-        const int64_t before = kernels_[solved.make_up[begin]]->rows.pitch() * begin;
+        const int64_t before = kernels_[solved.make_up[begin]]->rows.unknowns * begin;
         const int64_t here = solved.starts[begin] - before;
         const int64_t by_read = read.starts ? read.starts[first + begin] - before : 0;
         runs_.push_back({begin, end, by_read, here, here - solved.starts[low]});
@@ -45,7 +45,7 @@ void Line::set_runs(const Work& work, int64_t n, int64_t low) {
 void Line::convert(int from, int to, Station& station) const {
     if (from == to) return;
     const Station given = station;
-    const int8_t* place = &place_[(from * make_ups_.size() + to) * kMostLanes];
+    const int8_t* place = &place_[(from * make_ups_.size() + to) * kMostUnknowns];
     for (size_t u = 0; u < make_ups_[to].size(); ++u)
         station.unknowns[u] = place[u] < 0 ? 0.0 : given.unknowns[place[u]];
 }
@@ -55,7 +55,7 @@ void Line::outside(const Work& work, int64_t station, int make_up, Outside& foun
     const Product& product = work.product;
     const int64_t at = product.first + station;
     const int8_t* place =
-        &place_[(product.places.make_up[at] * make_ups_.size() + make_up) * kMostLanes];
+        &place_[(product.places.make_up[at] * make_ups_.size() + make_up) * kMostUnknowns];
     const double* position = product.factor + product.places.starts[at];
     const double* velocity = product.velocity + product.places.starts[at];
     for (size_t u = 0; u < make_ups_[make_up].size(); ++u) {

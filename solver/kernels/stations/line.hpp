@@ -88,11 +88,11 @@ struct Work {
 
 /// Unknowns of a station in the order of its make-up.
 struct Station {
-    double unknowns[kMostLanes];
+    double unknowns[kMostUnknowns];
 };
 /// Displacement and velocity of a station outside of a run, in the order of the run's make-up.
 struct Outside {
-    double position[kMostLanes], velocity[kMostLanes];
+    double position[kMostUnknowns], velocity[kMostUnknowns];
 };
 /// A chain of n stations of one run: from `first` on, towards the end of the line or its start.
 struct Chain {
@@ -128,10 +128,6 @@ std::unique_ptr<Kernels> kernels_of(const Layout& rows, const Layout& factors);
 /// Kernels that make products only, and kernels that solve only.
 std::unique_ptr<Kernels> kernels_of_rows(const Layout& rows);
 std::unique_ptr<Kernels> kernels_of_factors(const Layout& factors);
-/// Whether kernels were compiled for stations of these widths; if not their layouts are general.
-bool has_widths(const Widths& widths);
-/// Whether they were compiled for factors with these strands.
-bool has_strands(const Layout& factors);
 /// Names of the processors that kernels were compiled for, and this one can be: the best last.
 std::vector<std::string> targets();
 /// Choose one of these; whether there is such a one.

@@ -1,7 +1,6 @@
 #pragma once
 // The kernels of `line.hpp` for one kind of blocks.
-#include "stations/general_blocks.hpp"
-#include "stations/known_blocks.hpp"
+#include "stations/blocks.hpp"
 #include "stations/line.hpp"
 
 namespace catenary::CATENARY_TARGET {
@@ -23,6 +22,13 @@ struct Chained {
     using X = typename Blocks::X;
     struct State {
         X position, velocity;
+        CATENARY_INLINE State(const X& x, const X& v) : position(x), velocity(v) {}
+        CATENARY_INLINE State(const State& of) : State(of.position, of.velocity) {}
+        CATENARY_INLINE State& operator=(const State& of) {
+            position = of.position;
+            velocity = of.velocity;
+            return *this;
+        }
     };
     struct Place {
         const double *position, *velocity;
@@ -60,7 +66,7 @@ struct Chained {
     }
     CATENARY_INLINE State state(const Place& at) const {
         const X here = blocks.load(at.position);
-        if (blocks.is_damped()) return {here, blocks.load(at.velocity)};
+        if (blocks.is_damped) return {here, blocks.load(at.velocity)};
         return {here, here};
     }
     /// The station before a chain.
@@ -77,13 +83,13 @@ struct Chained {
     CATENARY_INLINE Sums<X> product(int64_t i, int step, const State& before, const State& here,
                                     const State& after) const {
         const double* numbers = kept(rows.at(i));
-        const int to_start = blocks.own_size(), to_end = to_start + blocks.row_beside_size();
+        const int to_start = blocks.own_size, to_end = to_start + blocks.row_beside_size;
         Sums<X> sums = no_sums<X>();
         blocks.add_own(sums, numbers, here.position);
         blocks.add_row_beside(sums, numbers + (step > 0 ? to_start : to_end), before.position);
         blocks.add_row_beside(sums, numbers + (step > 0 ? to_end : to_start), after.position);
-        if (blocks.is_damped()) {
-            numbers += to_end + blocks.row_beside_size();
+        if (blocks.is_damped) {
+            numbers += to_end + blocks.row_beside_size;
             blocks.add_own(sums, numbers, here.velocity);
             blocks.add_row_beside(sums, numbers + (step > 0 ? to_start : to_end), before.velocity);
             blocks.add_row_beside(sums, numbers + (step > 0 ? to_end : to_start), after.velocity);
@@ -94,11 +100,11 @@ struct Chained {
     CATENARY_INLINE Sums<X> row(int64_t i, int step, const State& before, const State& here,
                                 const State& after) const {
         Sums<X> sums = product(i, step, before, here, after);
-        if (loads) sums.one += blocks.load(loads + i * blocks.pitch);
+        if (loads) sums.one += blocks.load_once(loads + i * blocks.pitch);
         return sums;
     }
     CATENARY_INLINE Sums<X> right(int64_t i) const {
-        return sums_from(blocks.load(right_side + i * blocks.pitch));
+        return sums_from(blocks.load_once(right_side + i * blocks.pitch));
     }
     /// S^-1 times what is left of a right-hand side.
     CATENARY_INLINE X divided(int64_t i, const X& left) const {
@@ -108,7 +114,7 @@ struct Chained {
     }
     /// Add the matrix's own block with the station behind in a chain with this step.
     CATENARY_INLINE void add_behind(Sums<X>& sums, int64_t i, int step, const X& behind) const {
-        blocks.add_beside(sums, kept(joined.at(i)) + (step > 0 ? 0 : blocks.beside_size()), behind);
+        blocks.add_beside(sums, kept(joined.at(i)) + (step > 0 ? 0 : blocks.beside_size), behind);
     }
     /// Leave in `answer` what the right-hand side is after the stations outwards are eliminated;
     /// what the one inwards takes of it.
@@ -126,15 +132,15 @@ struct Chained {
     template <class T>
     CATENARY_INLINE X solved(int64_t i, int step, const X& inward, T then) const {
         double* at = answer + i * blocks.pitch;
-        X own = blocks.load(at);
+        X own;
         if (blocks.is_sparse) {
-            Sums<X> sums = sums_from(own);
+            Sums<X> sums = sums_from(blocks.load_once(at));
             add_behind(sums, i, step, inward);
             own = divided(i, blocks.total_of(sums));
         } else {
             const double* numbers = kept(inverse.at(i));
             Sums<X> sums = no_sums<X>();
-            blocks.add_whole(sums, numbers, own);
+            blocks.add_whole(sums, numbers, blocks.load(at));
             blocks.add_whole(sums, numbers + blocks.whole_size, inward);
             own = blocks.total_of(sums);
         }
@@ -148,9 +154,9 @@ struct Chained {
     /// after.
     CATENARY_INLINE X met(int64_t middle, const X& after) const {
         double* at = answer + middle * blocks.pitch;
-        Sums<X> sums = sums_from(blocks.load(at));
+        Sums<X> sums = sums_from(blocks.load_once(at));
         if (blocks.is_sparse)
-            blocks.add_beside(sums, joined.at(middle) + blocks.beside_size(), after);
+            blocks.add_beside(sums, joined.at(middle) + blocks.beside_size, after);
         else
             blocks.add_whole(sums, inverse.at(middle) + blocks.whole_size, after);
         const X own = divided(middle, blocks.total_of(sums));
@@ -163,10 +169,10 @@ struct Chained {
     CATENARY_INLINE void go_on(int64_t i, X solution, T then) const {
         const Changes& c = changes;
         const int64_t at = i * blocks.pitch;
-        const X here = blocks.load(x + at);
+        const X here = blocks.load_once(x + at);
         if (c.by_mass != 0.0) solution = solution.plus(c.by_mass, here);
         if (then == Then::kAlpha) return go_on_by_alpha(at, here, solution);
-        const X v = blocks.load(y + at), a = solution.plus(-c.damping_share, v);
+        const X v = blocks.load_once(y + at), a = solution.plus(-c.damping_share, v);
         blocks.store(z + at, a);
         blocks.store(x + at, here.plus(-c.dt, v).plus(c.by_position, a));
         blocks.store(y + at, v.plus(c.by_velocity, a));
@@ -174,9 +180,10 @@ struct Chained {
     /// The same for the generalized-alpha method; see `AlphaAhead`.
     CATENARY_INLINE void go_on_by_alpha(int64_t at, const X& here, const X& solution) const {
         const Changes& c = changes;
-        const X before = blocks.load(z + at), then = blocks.load(known + at), none = X::all(0.0);
+        const X before = blocks.load_once(z + at), then = blocks.load_once(known + at),
+                none = X::all(0.0);
         const X known_now = none.plus(c.known[0], before).plus(c.known[1], then);
-        const X v = blocks.load(y + at).plus(c.velocity[0], before).plus(c.velocity[1], then);
+        const X v = blocks.load_once(y + at).plus(c.velocity[0], before).plus(c.velocity[1], then);
         const X b = solution.plus(-c.damping_share, v);
         const X total = none.plus(c.balance[0], b).plus(c.balance[1], known_now);
         blocks.store(known + at, known_now);

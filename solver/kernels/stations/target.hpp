@@ -6,13 +6,13 @@
 
 namespace catenary::CATENARY_TARGET {
 
-/// General kernels of as many vectors as stations need; null if these are too many.
-template <int N = 1>
+/// Kernels of the lanes that rows take, whatever they join.
+template <int W = 2>
 std::unique_ptr<Kernels> make_general(const Layout& rows, const Layout& factors) {
-    if (rows.n_lanes() <= 4 * N)
-        return std::make_unique<KernelsOf<GeneralBlocks<N>>>(rows, factors);
-    if constexpr (4 * N < kMostLanes)
-        return make_general<N + 1>(rows, factors);
+    if (rows.pieces().lanes() == W)
+        return std::make_unique<KernelsOf<Blocks<W, GivenMasks>>>(rows, factors);
+    if constexpr (W < kMostUnknowns)
+        return make_general<W + (W < 16 ? 2 : 4)>(rows, factors);
     else
         return nullptr;
 }
@@ -24,40 +24,23 @@ constexpr bool kHasKnown = false;
 constexpr bool kHasKnown = true;
 #endif
 
-/// Kernels of rows of these widths, whatever they join; null if none were compiled.
-template <int K = 0>
-std::unique_ptr<Kernels> make_listed(const Layout& rows, const Layout& factors) {
-    if constexpr (kHasKnown && K < std::size(kWidths)) {
-        constexpr Layout r = listed_rows(kWidths[K]);
-        if (rows.widths != r.widths) return make_listed<K + 1>(rows, factors);
-        if constexpr (r.widths == kTensioned.factors.widths)
-            if (factors.strands[0][0])
-                return std::make_unique<KernelsOf<KnownBlocks<r, kTensioned.factors>>>(rows,
-                                                                                       factors);
-        if (factors.sparse)
-            return std::make_unique<KernelsOf<KnownBlocks<r, listed_factors(r)>>>(rows, factors);
-        return std::make_unique<KernelsOf<KnownBlocks<r, dense_factors(r)>>>(rows, factors);
-    }
-    return nullptr;
-}
-
 /// Kernels that were compiled for both, or null.
 template <int K = 0>
 std::unique_ptr<Kernels> make_quick(const Layout& rows, const Layout& factors) {
     if constexpr (kHasKnown && K < std::size(kShipped)) {
         constexpr Shipped s = kShipped[K];
+        using Known = Blocks<s.rows.unknowns, KnownMasks<K>>;
         if (rows == s.rows && factors == s.factors)
-            return std::make_unique<QuickKernels<KnownBlocks<s.rows, s.factors>, s.is_mixed>>(
-                rows, factors, make_listed(rows, factors));
+            return std::make_unique<QuickKernels<Known, s.is_mixed>>(rows, factors,
+                                                                     make_general(rows, factors));
         return make_quick<K + 1>(rows, factors);
     }
     return nullptr;
 }
 
 std::unique_ptr<Kernels> make(const Layout& rows, const Layout& factors) {
-    if (rows.general) return make_general(rows, factors);
     auto quick = make_quick(rows, factors);
-    return quick ? std::move(quick) : make_listed(rows, factors);
+    return quick ? std::move(quick) : make_general(rows, factors);
 }
 
 }  // namespace catenary::CATENARY_TARGET

@@ -13,7 +13,6 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy import sparse
-from scipy.sparse import csgraph
 
 from catenary.base.petsc import PETSc
 from catenary.solver.kernels import native
@@ -26,7 +25,7 @@ from catenary.solver.linear.factors.meeting_station import (
 )
 from catenary.solver.linear.stations.sections import Places, Sections
 from catenary.solver.linear.stations.station_layout import Layout
-from catenary.solver.linear.stations.station_products import kinds_by_make_up
+from catenary.solver.linear.stations.station_products import kinds_by_make_up, of_pairs
 from catenary.solver.linear.stations.station_rows import StationRows, rows_of
 
 # Bytes of factors from which on they keep the matrix's own blocks and half of what is symmetric:
@@ -193,7 +192,7 @@ def _packed(
     """Layout, kinds of factors, their numbers, how many there are, and ``besides``, as
     ``StationFactors`` keeps them; ``share`` of them is read in a step."""
     # Factors join all of a plane, whatever matrices join: the same kernels serve them all.
-    layout = Layout(layout.widths, make_ups=layout.make_ups)
+    layout = Layout(layout.widths, beside=layout.beside & False, make_ups=layout.make_ups)
     make_up = stations.make_up[rows.chosen][found.kinds]
     kinds, numbers, n_kinds, unfit = packed_factors(layout, make_up, lacks, found)
     besides: tuple[np.ndarray, np.ndarray] | None = NO_BESIDES
@@ -211,8 +210,8 @@ def _packed(
 def packed_blocks(layout: Layout, factors: np.ndarray) -> np.ndarray:
     """Numbers (m, k) of ``factors`` (m, 3, b, b) as ``StationFactors`` keeps them."""
     if layout.sparse:
-        return layout.packed_inverse(factors[:, 0])
-    packed = layout.packed(factors, layout.whole_terms)
+        return layout.packed(factors[:, 0], "half")
+    packed = layout.packed(factors, "own")
     return packed.reshape(packed.shape[0], 3 * packed.shape[2])  # of no factor, too
 
 
@@ -233,7 +232,7 @@ def packed_factors(
     if layout.sparse:
         # Halves hold some numbers twice, others of each make-up.
         count = sum(
-            np.count_nonzero(part.packed(found.factors[make_up == number, 0], part.whole_terms))
+            np.count_nonzero(part.packed(found.factors[make_up == number, 0], "own"))
             for number, part in enumerate(layout.parts)
         )
     all_of_them = np.count_nonzero(found.factors[:, :n_blocks])
@@ -248,20 +247,8 @@ def _sparse(layout: Layout, blocks: np.ndarray) -> Layout:
     blocks take a share of them, and are alike where S is not.
     """
     joined = (blocks[0] != 0).any(axis=0) | (blocks[2] != 0).any(axis=0)
-    beside = tuple(sorted({0, 1, *layout.differences(joined)}))
-    sparse = Layout(layout.widths, (0,), beside, make_ups=layout.make_ups, sparse=True)
-    strands = _strands(joined)
-    by_strands = sparse.changed(strands=strands)
-    fewer = max(map(len, strands)) < len(beside)
-    if fewer and all(native.has_strands(part.native) for part in by_strands.parts):
-        return by_strands
-    return sparse
-
-
-def _strands(joined: np.ndarray) -> tuple[tuple[int, ...], ...]:
-    """Sets of the unknowns that ``joined`` (b, b) joins, directly or through others."""
-    n_sets, of_set = csgraph.connected_components(joined, directed=False)
-    return tuple(tuple(np.flatnonzero(of_set == n).tolist()) for n in range(n_sets))
+    joined |= of_pairs(layout.pitch)
+    return Layout(layout.widths, beside=joined, make_ups=layout.make_ups, sparse=True)
 
 
 def besides_of(
@@ -271,7 +258,7 @@ def besides_of(
     None if a station is joined to unknowns of one beside it that it lacks itself."""
 
     def pack(part: Layout, chosen: slice | np.ndarray) -> np.ndarray:
-        packed = [part.packed(-rows.blocks[place][chosen], part.beside_terms) for place in (0, 2)]
+        packed = [part.packed(-rows.blocks[place][chosen], "beside") for place in (0, 2)]
         return np.concatenate(packed, axis=1)
 
     kinds, numbers, _, count = kinds_by_make_up(layout, stations.make_up[rows.chosen], pack)

@@ -53,7 +53,7 @@ class FactorPieces:
         besides = NO_BESIDES
         self._besides: Slots | None = None
         if layout.sparse:
-            kept = [part.packed(none[:, 0], part.beside_terms) for part in layout.parts]
+            kept = [part.packed(none[:, 0], "beside") for part in layout.parts]
             widths = tuple(2 * numbers.shape[1] for numbers in kept)
             self._besides = Slots(pieces.n_slots, size, widths)
             besides = np.zeros(n, dtype=np.int32), self._besides.numbers

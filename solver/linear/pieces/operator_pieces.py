@@ -102,7 +102,7 @@ class OperatorPieces:
             layout = with_damping(layout, None if joined is None else joined[0])
         stations, pieces = self._stations.padded(), self.pieces
         sets = 1 if damping is None else 2
-        widths = tuple(sets * part.row_size for part in layout.parts)
+        widths = tuple(sets * part.native.row_size for part in layout.parts)
         table = Slots(pieces.n_slots, pieces.size, widths)
         kinds = np.zeros(self._stations.size, dtype=np.int32)
         product = StationProduct(layout, stations, kinds, table.numbers, 1, 0)

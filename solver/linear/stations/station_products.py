@@ -10,21 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from scipy import sparse
 
 from catenary.solver.kernels import aligned_arrays, native
 from catenary.solver.linear.stations.sections import Places, Sections
-from catenary.solver.linear.stations.station_layout import (
-    MOST_LANES,
-    MOST_PLANES,
-    REGISTER,
-    WIDEST,
-    Layout,
-    registers_of,
-)
+from catenary.solver.linear.stations.station_layout import MOST_UNKNOWNS, Layout
 from catenary.solver.linear.stations.station_rows import StationRows, rows_of
 from catenary.solver.linear.stations.unique_rows import kinds_of
 
@@ -35,21 +28,20 @@ def layout_of(
     """Layout of a line by its blocks of A and K, see ``neighbours``, and by the make-ups of its
     stations if there are several.
 
-    None if there are more unknowns, or planes, than kernels take.
+    None if there are more unknowns than kernels take.
     """
     joined = (operator != 0).any(axis=(0, 1)) | (stiffness != 0).any(axis=(0, 1))
-    planes = _planes(joined)
-    if max(planes) > WIDEST:
+    widths = _planes(joined)
+    if sum(widths) > MOST_UNKNOWNS:
         return None
-    widths = _without_gaps(planes)
-    if len(widths) > MOST_PLANES:
-        return None
-    # A plane of one or two wires has the terms of beams that droppers join, some of which a bare or
-    # a straight line lacks: few kernels serve them all.
-    usual = ((0, 1, 2), (0, 1)) if max(widths) in (3, 4) else ((0, 1), (0, 1))
-    own, beside = usual if max(widths) <= 4 else ((), ())
-    layout = Layout(widths, own, beside, make_ups=make_ups)
-    return joining(layout, stiffness) if layout.n_lanes <= MOST_LANES else None
+    pairs = of_pairs(sum(widths))
+    return joining(Layout(widths, pairs, pairs, make_ups=make_ups), stiffness)
+
+
+def of_pairs(size: int) -> np.ndarray:
+    """What the deflection and slope of each wire join (size, size), as M has it."""
+    wire = np.arange(size) // 2
+    return wire[:, None] == wire
 
 
 def with_damping(layout: Layout, damping: np.ndarray | None) -> Layout:
@@ -60,12 +52,8 @@ def with_damping(layout: Layout, damping: np.ndarray | None) -> Layout:
 
 def joining(layout: Layout, blocks: np.ndarray) -> Layout:
     """A layout for a matrix of these blocks, see ``neighbours``, too."""
-    joined = (blocks != 0).any(axis=1)
-    own = layout.differences(joined[1])
-    beside = layout.differences(joined[0] | joined[2])
-    return layout.changed(
-        own=tuple(sorted({*layout.own, *own})), beside=tuple(sorted({*layout.beside, *beside}))
-    )
+    before, own, after = (blocks != 0).any(axis=1)
+    return layout.changed(own=layout.own | own, beside=layout.beside | before | after)
 
 
 def _planes(joined: np.ndarray) -> tuple[int, ...]:
@@ -74,24 +62,6 @@ def _planes(joined: np.ndarray) -> tuple[int, ...]:
     reach = np.where(joined | joined.T, np.arange(size), 0).max(axis=1, initial=0)
     ends = np.flatnonzero(np.maximum.accumulate(np.maximum(reach, np.arange(size))) == range(size))
     return tuple(int(width) for width in np.diff(ends, prepend=-1))
-
-
-def _without_gaps(widths: tuple[int, ...]) -> tuple[int, ...]:
-    """Planes beside each other put together where vectors are fewer then, and one holds both.
-
-    Planes of six and two unknowns take three vectors, one of eight a single one. A step of a long
-    line takes 1.3 times as long with the three.
-    """
-    planes = list(widths)
-    place = 0
-    while place < len(planes) - 1:
-        together = [*planes[:place], sum(planes[place : place + 2]), *planes[place + 2 :]]
-        fits = together[place] <= REGISTER
-        if fits and len(registers_of(together)) < len(registers_of(planes)):
-            planes = together
-        else:
-            place += 1
-    return tuple(planes)
 
 
 def kinds_by_make_up(
@@ -105,8 +75,8 @@ def kinds_by_make_up(
     """
     begins, numbers = np.zeros(make_up.size, dtype=np.int32), [np.zeros(0)]
     end = n_kinds = count = 0
-    # Blocks of large registers begin at lines of a cache if those of small ones stand behind them.
-    for number in sorted(range(len(layout.parts)), key=lambda n: -max(layout.parts[n].registers)):
+    # Blocks of large vectors begin at lines of a cache if those of small ones stand behind them.
+    for number in sorted(range(len(layout.parts)), key=lambda n: -layout.parts[n].pitch):
         stations = np.flatnonzero(make_up == number) if layout.varies else slice(None)
         packed = pack(layout.parts[number], stations)
         count += np.count_nonzero(packed)
@@ -208,14 +178,14 @@ def packed_rows(
 
     ``make_up`` (n,) of the stations; None if the matrices join what the layout does not.
     """
-    numbers: list[tuple[np.ndarray, str]] = []
+    numbers: list[tuple[np.ndarray, Literal["own", "beside"]]] = []
     for part, sign in ((rows, 1.0), (damping, -1.0)):
         if part is not None:
-            for place, terms in ((1, "own_terms"), (0, "beside_terms"), (2, "beside_terms")):
-                numbers.append((sign * part.blocks[place], terms))
+            before, own, after = sign * part.blocks
+            numbers += [(own, "own"), (before, "beside"), (after, "beside")]
 
     def pack(part: Layout, which: slice | np.ndarray) -> np.ndarray:
-        packed = [part.packed(blocks[which], getattr(part, terms)) for blocks, terms in numbers]
+        packed = [part.packed(blocks[which], place) for blocks, place in numbers]
         return np.concatenate(packed, axis=1)
 
     kinds, packed, n_kinds, count = kinds_by_make_up(layout, make_up[rows.chosen], pack)

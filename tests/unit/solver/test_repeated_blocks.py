@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 import numpy as np
 import pytest
 from repeating_line import layout, line, widths_of
@@ -11,8 +13,12 @@ from scipy.sparse.linalg import spsolve
 from catenary.solver.linear.factors import station_factors as module
 from catenary.solver.linear.factors.station_factors import station_factors
 from catenary.solver.linear.stations.sections import neighbours
-from catenary.solver.linear.stations.station_layout import WIDEST, Layout, ranges_of
-from catenary.solver.linear.stations.station_products import layout_of, station_product
+from catenary.solver.linear.stations.station_layout import MOST_UNKNOWNS, Layout
+from catenary.solver.linear.stations.station_products import (
+    layout_of,
+    of_pairs,
+    station_product,
+)
 
 RNG = np.random.default_rng(7)
 # Sums of a dozen products of numbers of order one; solves lose a few digits to the condition, 1e2.
@@ -53,7 +59,7 @@ def test_factors_and_products_of_any_width(widths: tuple[int, ...], joined: bool
     matrix = line(40, widths=widths, joined=joined)
     lanes = layout(matrix)
     assert lanes.widths == widths
-    assert (lanes.beside == (0, 1)) is (not joined or max(widths) == 2)
+    assert (lanes.beside <= of_pairs(lanes.pitch)).all() == (not joined or max(widths) == 2)
     compare_product(matrix, 0, lanes)
 
 
@@ -86,61 +92,42 @@ def test_large_factors_of_wires_that_only_stations_join_keep_blocks_by_wires(
     matrix = line(40, widths=widths, joined=True, wire=wire)
     found = station_factors(matrix, layout(matrix))
     assert found is not None
-    if widths == (10,):  # the only ones that kernels were compiled for
-        expected = tuple(tuple(np.flatnonzero(wire == number).tolist()) for number in (0, 1))
-        assert found.layout.strands == expected
-        assert found.layout.n_terms_beside == np.bincount(wire).max() < len(found.layout.beside)
+    together = (wire[:, None] == wire) | of_pairs(wire.size)
+    assert np.array_equal(found.layout.beside, together)
+    assert found.layout.packed(together, "beside").size < found.layout.packed(together, "own").size
     compare_factors(40, 0, 40, widths, wire=wire)
 
 
-PLANES = [(1,), (2,), (5,), (6,), (8,), (9,), (4, 2), (6, 4), (9, 12), (3, 8, 4)]
+PLANES = [(1,), (2,), (5,), (6,), (8,), (9,), (4, 2), (6, 4), (9, 12), (3, 8, 4), (32,)]
 
 
 @pytest.mark.parametrize("widths", PLANES)
-def test_half_of_a_symmetric_block_makes_its_whole_product(widths: tuple[int, ...]) -> None:
-    lanes, block = Layout(widths, (0,), (0,)), block_of(widths)
-    block += block.T
-    halves, x, expected = lanes.halves, *factor_and_product(lanes, block)
-    numbers = by_terms(lanes, lanes.packed_halves(block), halves.sources)
-    result = (numbers * np.where(halves.sources >= 0, x[halves.sources], 0.0)).sum(axis=0)
-    for term in np.flatnonzero(halves.mirrored):
-        result += (numbers[term] * x)[halves.back[term]]
-    assert np.abs(result - expected).max() < ROUND_OFF * 100
-
-
-@pytest.mark.parametrize("widths", PLANES)
-def test_packed_blocks_make_the_product_and_no_load_crosses_a_line_of_a_cache(
-    widths: tuple[int, ...],
-) -> None:
+def test_packed_blocks_hold_each_number_once(widths: tuple[int, ...]) -> None:
     lanes, block = Layout(widths), block_of(widths)
-    terms, x, expected = lanes.whole_terms, *factor_and_product(lanes, block)
-    packed = lanes.packed(block, terms)
-    numbers = by_terms(lanes, packed, terms.sources)
-    result = np.zeros(lanes.n_lanes)
-    for source, target, number in zip(terms.sources, terms.targets, numbers, strict=True):
-        there = source >= 0
-        np.add.at(result, target[there], (number * x[source])[there])
-    assert np.abs(result - expected).max() < ROUND_OFF * 100
-    assert np.count_nonzero(packed) == np.count_nonzero(block)
-    begins, size = lanes.order_of(terms.sources)
-    for register, those in zip(lanes.registers, begins, strict=True):
-        assert not (those[those >= 0] % register).any()
-    assert size % max(lanes.registers) == 0 and size == packed.size
+    assert np.array_equal(unpacked(lanes, block, "own"), block)
+    # Vectors of four begin where a line of a cache may not end.
+    assert lanes.packed(block, "own").size % (2 if lanes.pitch <= 2 else 4) == 0
 
 
-def test_planes_take_the_lanes_that_they_need() -> None:
-    # The first four have kernels of their own.
-    for widths, registers in {
-        (6,): (4, 2),
-        (10,): (8, 2),
-        (12,): (8, 4),
-        (4, 4): (8,),
-        (6, 4): (4, 4, 4),
-        (4, 2): (4, 4),
-        (4, 4, 4): (4, 4, 4),
-        (5, 3): (4, 4, 4),
-    }.items():
-        assert Layout(widths).registers == registers
+@pytest.mark.parametrize("widths", PLANES)
+def test_half_of_a_symmetric_block_holds_all_of_it(widths: tuple[int, ...]) -> None:
+    lanes, block = Layout(widths, sparse=True), block_of(widths)
+    block += block.T
+    half = unpacked(lanes, block, "half")
+    assert np.array_equal(np.where(half != 0, half, half.T), block)
+    sizes = [lanes.packed(block, which).size for which in ("half", "own")]
+    assert (sizes[0] < sizes[1]) == (max(widths) > 4)
+
+
+def test_kernels_of_a_line_serve_those_that_join_little_less() -> None:
+    apart = np.bitwise_xor.outer(np.arange(6), np.arange(6))
+
+    def products(*differences: int) -> int:
+        return Layout((6,), np.isin(apart, differences), of_pairs(6)).native.n_products
+
+    # Of a compound line's three wires the third may hang on nothing; bare ones have kernels of
+    # their own.
+    assert products(0, 1, 2) == products(0, 1, 2, 6) > products(0, 1)
 
 
 def block_of(widths: tuple[int, ...]) -> np.ndarray:
@@ -149,21 +136,11 @@ def block_of(widths: tuple[int, ...]) -> np.ndarray:
     return RNG.standard_normal((planes.size, planes.size)) * (planes[:, None] == planes)
 
 
-def factor_and_product(lanes: Layout, block: np.ndarray) -> np.ndarray:
-    """A vector and its product with a block, both in lanes, 0 in those without an unknown."""
-    factor, there = RNG.standard_normal(lanes.pitch), lanes.unknowns >= 0
-    result = np.zeros((2, lanes.n_lanes))
-    result[:, there] = np.array([factor, block @ factor])[:, lanes.unknowns[there]]
-    return result
-
-
-def by_terms(lanes: Layout, packed: np.ndarray, sources: np.ndarray) -> np.ndarray:
-    """Numbers of a packed block by terms and lanes, 0 where none are stored."""
-    result, ranges = np.zeros(sources.shape), ranges_of(lanes.registers)
-    begins = lanes.order_of(sources).begins
-    for register, term in np.argwhere(begins >= 0):
-        (first, size), begin = ranges[register], begins[register, term]
-        result[term, first : first + size] = packed[begin : begin + size]
+def unpacked(lanes: Layout, block: np.ndarray, which: Literal["own", "half"]) -> np.ndarray:
+    """A block by its packed numbers, the sum of those in one place."""
+    (row, column), numbers = lanes.native.places(which), lanes.packed(block, which)
+    result, there = np.zeros(block.shape), row >= 0
+    np.add.at(result, (row[there], column[there]), numbers[there])
     return result
 
 
@@ -227,20 +204,7 @@ def test_planes_are_what_no_matrix_joins() -> None:
         joined = apart.copy()
         joined[place] = 0.1
         assert layout_of(joined, apart).widths == layout_of(apart, joined).widths == (6,)
-    assert layout_of(*[np.ones((3, 2, WIDEST + 1, WIDEST + 1))] * 2) is None
-
-
-def test_planes_are_put_together_where_one_vector_then_holds_them() -> None:
-    for widths, together in (
-        ((4, 2, 2), (4, 4)),
-        ((5, 1), (6,)),
-        ((6, 2), (8,)),
-        ((2, 6), (8,)),
-        ((4, 2), (4, 2)),
-        ((6, 4), (6, 4)),
-        ((8, 2), (8, 2)),
-    ):
-        assert layout(line(10, widths=widths)).widths == together
+    assert layout_of(*[np.ones((3, 2, MOST_UNKNOWNS + 1, MOST_UNKNOWNS + 1))] * 2) is None
 
 
 def test_what_is_not_positive_definite_gives_no_number_and_no_error() -> None:

@@ -1,6 +1,0 @@
-#include "stations/before_target.hpp"
-#if defined(__x86_64__) && !defined(__clang__)
-#pragma GCC target("arch=x86-64-v4")
-#define CATENARY_TARGET avx512
-#include "stations/target.hpp"
-#endif

@@ -1,0 +1,219 @@
+#pragma once
+// Products of packed blocks with the unknowns of a station; see layout.hpp.
+#include "stations/known_layouts.hpp"
+#include "stations/lanes.hpp"
+
+namespace catenary::CATENARY_TARGET {
+
+/// Masks of rows and factors and the numbers of their blocks, of one of the shipped lines.
+template <int K>
+struct KnownMasks {
+    static constexpr bool is_known = true;
+    static constexpr Layout r = kShipped[K].rows, f = kShipped[K].factors;
+    static constexpr int pitch = r.unknowns;
+    static constexpr bool is_damped = r.is_damped, is_sparse = f.is_sparse;
+    static constexpr Mask row_own = r.own, row_beside = r.beside, whole = f.own, beside = f.beside;
+    static constexpr int own_size = r.size_of(row_own), row_beside_size = r.size_of(row_beside),
+                         whole_size = f.size_of(whole), beside_size = f.size_of(beside);
+
+    KnownMasks(const Layout&, const Layout&) {}
+};
+
+/// The same found at run time. Whether a product is there is asked before each: a processor knows
+/// the answer, which is that of the station before.
+struct GivenMasks {
+    static constexpr bool is_known = false;
+    int pitch;
+    bool is_damped, is_sparse;
+    Mask row_own, row_beside, whole, beside;
+    int own_size, row_beside_size, whole_size, beside_size;
+
+    GivenMasks(const Layout& r, const Layout& f)
+        : pitch(r.unknowns),
+          is_damped(r.is_damped),
+          is_sparse(f.is_sparse),
+          row_own(r.own),
+          row_beside(r.beside),
+          whole(f.own),
+          beside(f.beside),
+          own_size(r.size_of(row_own)),
+          row_beside_size(r.size_of(row_beside)),
+          whole_size(f.size_of(whole)),
+          beside_size(f.size_of(beside)) {}
+};
+
+/// Blocks of stations that take W lanes.
+template <int W, class Masks>
+struct Blocks : Masks {
+    static constexpr Pieces kPieces{W};
+    static constexpr int kN = kPieces.n(), kVector = kPieces.vector();
+    static constexpr int kInLast = W - (kN - 1) * kVector;
+    static constexpr bool kHalf = kInLast < kVector;
+    using V = Vector<kVector>;
+    using X = Lanes<kN, kVector>;
+
+    using Masks::Masks;
+
+    /// Unknowns from a place on; both halves of a vector hold those of a piece of two.
+    CATENARY_INLINE X load(const double* from) const {
+        X x = load_once(from);
+        if constexpr (kHalf)
+            x.piece[kN - 1] = this->pitch == W ? twice(from + kVector * (kN - 1))
+                                               : x.piece[kN - 1] + crossed(x.piece[kN - 1]);
+        return x;
+    }
+    /// The same with zeros behind a piece of two, as a sum begins.
+    CATENARY_INLINE X load_once(const double* from) const {
+        X x;
+        each<kN - 1>([&](auto i)
+                         CATENARY_HOT { x.piece[i] = read<kVector, kVector>(from + kVector * i); });
+        const double* const last = from + kVector * (kN - 1);
+        if (this->pitch == W) {
+            x.piece[kN - 1] = read<kVector, kInLast>(last);
+        } else {
+            x.piece[kN - 1] = V{};
+            for (int k = 0; k < this->pitch - kVector * (kN - 1); ++k) x.piece[kN - 1][k] = last[k];
+        }
+        return x;
+    }
+    CATENARY_INLINE void store(double* to, const X& x) const {
+        each<kN - 1>([&](auto i)
+                         CATENARY_HOT { write<kVector, kVector>(to + kVector * i, x.piece[i]); });
+        double* const last = to + kVector * (kN - 1);
+        if (this->pitch == W)
+            write<kVector, kInLast>(last, x.piece[kN - 1]);
+        else
+            for (int k = 0; k < this->pitch - kVector * (kN - 1); ++k) last[k] = x.piece[kN - 1][k];
+    }
+    CATENARY_INLINE static X total_of(const Sums<X>& sums) {
+        X x;
+        each<kN>([&](auto i) CATENARY_HOT {
+            x.piece[i] = sums.one.piece[i] + turned(sums.other.piece[i]);
+        });
+        if constexpr (kHalf) x.piece[kN - 1] += crossed(x.piece[kN - 1]);
+        return x;
+    }
+
+    CATENARY_INLINE void add_own(Sums<X>& sums, const double* numbers, const X& x) const {
+        add(sums, numbers, this->row_own, x);
+    }
+    CATENARY_INLINE void add_row_beside(Sums<X>& sums, const double* numbers, const X& x) const {
+        add(sums, numbers, this->row_beside, x);
+    }
+    CATENARY_INLINE void add_beside(Sums<X>& sums, const double* numbers, const X& x) const {
+        add(sums, numbers, this->beside, x);
+    }
+    CATENARY_INLINE void add_whole(Sums<X>& sums, const double* numbers, const X& x) const {
+        add(sums, numbers, this->whole, x);
+    }
+    /// S^-1 times x: of this symmetric block one half is stored if factors are sparse.
+    CATENARY_INLINE void add_inverse(Sums<X>& sums, const double* numbers, const X& x) const {
+        if (this->is_sparse)
+            add_symmetric(sums, numbers, x);
+        else
+            add_whole(sums, numbers, x);
+    }
+
+  private:
+    CATENARY_INLINE static V turned(V x) {
+        return [&]<int... I>(Numbers<I...>) CATENARY_HOT {
+            return __builtin_shufflevector(x, x, (I ^ 1)...);
+        }(Below<kVector>{});
+    }
+    CATENARY_INLINE static V crossed(V x) {
+        V y = x;
+#if defined(__AVX__)
+        // GCC takes vpermpd, which takes AMD's processors twice as long: a chain waits for it.
+        if constexpr (kVector == 4) asm("vperm2f128 $1, %1, %1, %0" : "=x"(y) : "x"(x));
+#else
+        if constexpr (kVector == 4) y = __builtin_shufflevector(x, x, 2, 3, 0, 1);
+#endif
+        return y;
+    }
+    CATENARY_INLINE static V twice(const double* two) {
+#if defined(__AVX__)
+        return __builtin_ia32_vbroadcastf128_pd256(reinterpret_cast<const Vector<2>*>(two));
+#else
+        const auto found = read<2, 2>(two);
+        return __builtin_shufflevector(found, found, 0, 1, 0, 1);
+#endif
+    }
+    /// Numbers of the next product, if it is there: those of two unknowns are followed by zeros.
+    CATENARY_INLINE static V next(const double*& numbers) {
+        const V found = read<kVector, kVector>(numbers);
+        numbers += kVector;
+        return found;
+    }
+
+    /// Add a block times x. Kernels of wide stations that find masks at run time do so in one place
+    /// for all of their blocks: their code is long.
+    CATENARY_INLINE static void add(Sums<X>& sums, const double* numbers, const Mask& mask,
+                                    const X& x) {
+        if constexpr (Masks::is_known || kN < 4)
+            add_here(sums, numbers, mask, x);
+        else
+            add_apart(sums, numbers, mask, x);
+    }
+    __attribute__((noinline)) static void add_apart(Sums<X>& sums, const double* numbers,
+                                                    const Mask& mask, const X& x) {
+        add_here(sums, numbers, mask, x);
+    }
+    CATENARY_INLINE static void add_here(Sums<X>& sums, const double* numbers, const Mask& mask,
+                                         const X& x) {
+        each<kN>([&](auto i) CATENARY_HOT {
+            each<kN>([&](auto j) CATENARY_HOT { add_square<i, j>(sums, numbers, mask[i][j], x); });
+        });
+    }
+    template <int I, int J>
+    CATENARY_INLINE static void add_square(Sums<X>& sums, const double*& numbers, int kinds,
+                                           const X& x) {
+        V &one = sums.one.piece[I], &other = sums.other.piece[I];
+        if (kinds & 1) one += next(numbers) * x.piece[J];
+        if (kinds & 2) other += next(numbers) * x.piece[J];
+        if constexpr (has_crossed(I, J)) {
+            if (kinds & 4) one += next(numbers) * crossed(x.piece[J]);
+            if (kinds & 8) other += next(numbers) * crossed(x.piece[J]);
+        }
+    }
+    /// Add a symmetric block times x: each square above the diagonal counts for two.
+    CATENARY_INLINE void add_symmetric(Sums<X>& sums, const double* numbers, const X& x) const {
+        if constexpr (Masks::is_known || kN < 4)
+            add_symmetric_here(sums, numbers, this->whole, x);
+        else
+            add_symmetric_apart(sums, numbers, this->whole, x);
+    }
+    __attribute__((noinline)) static void add_symmetric_apart(Sums<X>& sums, const double* numbers,
+                                                              const Mask& mask, const X& x) {
+        add_symmetric_here(sums, numbers, mask, x);
+    }
+    CATENARY_INLINE static void add_symmetric_here(Sums<X>& sums, const double* numbers,
+                                                   const Mask& mask, const X& x) {
+        X crossing = X::all(0.0);  // what the transpose makes, of kinds 2 and 3
+        each<kN>([&](auto i) CATENARY_HOT {
+            const V turned_here = turned(x.piece[i]);
+            add_square<i, i>(sums, numbers, mask[i][i], x);
+            each<kN - 1 - i>([&](auto further) CATENARY_HOT {
+                constexpr int j = i + 1 + further;
+                const int kinds = mask[i][j];
+                const double* again = numbers;
+                add_square<i, j>(sums, numbers, kinds, x);
+                V& there = sums.one.piece[j];
+                if (kinds & 1) there += next(again) * x.piece[i];
+                if (kinds & 2) there += next(again) * turned_here;
+                if constexpr (has_crossed(i, j)) {
+                    if (kinds & 4) crossing.piece[j] += next(again) * x.piece[i];
+                    if (kinds & 8) crossing.piece[j] += next(again) * turned_here;
+                }
+            });
+        });
+        each<kN>([&](auto j) CATENARY_HOT {
+            if constexpr (j > 0 && has_crossed(0, j))
+                sums.one.piece[j] += crossed(crossing.piece[j]);
+        });
+    }
+    static constexpr bool has_crossed(int i, int j) {
+        return kVector == 4 && !kPieces.is_half(i) && !kPieces.is_half(j);
+    }
+};
+
+}  // namespace catenary::CATENARY_TARGET
