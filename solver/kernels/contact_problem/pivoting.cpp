@@ -57,11 +57,11 @@ void find_bends(const System& system, const Room& room) {
     auto along = [&](int64_t i, int64_t j) {
         const Beside one{matrix, i}, other{matrix, j};
         if (i == j || scale[i] == 0.0 || scale[j] == 0.0) return 0.0;
+        if (std::abs(other[peak[i]]) < 0.99 * scale[j]) return 0.0;  // of most rows
         const double sign = std::copysign(1.0, one[peak[i]] * other[peak[i]]);
         auto differ = [&](int64_t k) {
             return !(std::abs(one[k] / scale[i] - sign * other[k] / scale[j]) <= kAlike);
         };
-        if (differ(peak[i])) return 0.0;
         for (int64_t k = 0; k < n; ++k)
             if (differ(k)) return 0.0;
         return sign;
@@ -69,6 +69,8 @@ void find_bends(const System& system, const Room& room) {
     for (int64_t i = 0; i < n; ++i)
         for (int64_t j = 0; j < n; ++j) {
             const double sign = along(i, j);
+            needs(i, j) = excludes(i, j) = false;
+            if (sign == 0.0) continue;
             // Where along u of row i both begin to act, i below its place.
             const double place = right[i] / scale[i], other = sign * right[j] / scale[j];
             needs(i, j) = sign > 0.0 && other > place;

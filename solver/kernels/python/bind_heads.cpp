@@ -1,7 +1,8 @@
-// What Python calls of pantographs' heads, which it makes and keeps.
+// What Python calls of pantographs: heads, and multibody systems.
 #include "heads/lawful_chain.hpp"
 #include "heads/linear_chain.hpp"
 #include "heads/raised_head.hpp"
+#include "multibody/joints_and_lines.hpp"
 #include "python/from_python.hpp"
 
 namespace catenary::python {
@@ -85,7 +86,7 @@ void extrapolate(Head& head, const py::object& drive, const py::object& early) {
 
 }  // namespace
 
-void offer_heads(py::module_& m) {
+void offer_heads(py::module_& module) {
     PYBIND11_NUMPY_DTYPE(Drive, time, force, part, base, base_velocity, base_acceleration, roof,
                          roof_velocity, head_air, arm_air, bodies_air);
     PYBIND11_NUMPY_DTYPE(HeadLaw, by_base, zero, of_rate, begin, end);
@@ -94,14 +95,14 @@ void offer_heads(py::module_& m) {
     PYBIND11_NUMPY_DTYPE(ControlGains, measured, of_error, of_integral, of_rate);
     PYBIND11_NUMPY_DTYPE(RegulationMemory, time, next, filtered, integral, error, samples, acting);
     PYBIND11_NUMPY_DTYPE(LoweringMemory, height, caught_at, phase);
-    m.attr("LOWERING_MEMORY") = py::dtype::of<LoweringMemory>();
-    m.attr("DRIVE") = py::dtype::of<Drive>();
-    m.attr("HEAD_LAW") = py::dtype::of<HeadLaw>();
-    m.attr("HEAD_LAW_POINT") = py::dtype::of<HeadLawPoint>();
-    m.attr("REGULATION") = py::dtype::of<RegulationSettings>();
-    m.attr("CONTROL_GAINS") = py::dtype::of<ControlGains>();
-    m.attr("REGULATION_MEMORY") = py::dtype::of<RegulationMemory>();
-    py::class_<Head>(m, "Head")
+    module.attr("LOWERING_MEMORY") = py::dtype::of<LoweringMemory>();
+    module.attr("DRIVE") = py::dtype::of<Drive>();
+    module.attr("HEAD_LAW") = py::dtype::of<HeadLaw>();
+    module.attr("HEAD_LAW_POINT") = py::dtype::of<HeadLawPoint>();
+    module.attr("REGULATION") = py::dtype::of<RegulationSettings>();
+    module.attr("CONTROL_GAINS") = py::dtype::of<ControlGains>();
+    module.attr("REGULATION_MEMORY") = py::dtype::of<RegulationMemory>();
+    py::class_<Head>(module, "Head")
         .def_property("first", &Head::first, &Head::set_first)
         .def_property("added_force", &Head::added_force, &Head::set_added_force)
         .def("bend",
@@ -123,25 +124,25 @@ void offer_heads(py::module_& m) {
                  head.advance(numbers(contact_force, "contact_force", head.n_strips()));
              })
         .def("extrapolate", &extrapolate);
-    py::class_<LinearChain, Head>(m, "LinearChain")
+    py::class_<LinearChain, Head>(module, "LinearChain")
         .def(py::init([](const py::object& arrays, const py::object& linear) {
             return make<LinearChain, HeadArrays, LinearStep>(
                 {{"arrays", arrays}, {"linear", linear}});
         }));
-    py::class_<LawfulChain, Head>(m, "LawfulChain")
+    py::class_<LawfulChain, Head>(module, "LawfulChain")
         .def(py::init([](const py::object& arrays, const py::object& masses, const py::object& laws,
                          const py::object& carrier) {
             return make<LawfulChain, HeadArrays, SprungMasses, HeadLaws, int64_t>(
                 {{"arrays", arrays}, {"masses", masses}, {"laws", laws}, {"carrier", carrier}});
         }));
-    py::class_<RaisedHead, Head>(m, "RaisedHead")
+    py::class_<RaisedHead, Head>(module, "RaisedHead")
         .def(py::init([](const py::object& arrays, const py::object& masses, const py::object& laws,
                          const py::object& mechanism) {
             return make<RaisedHead, HeadArrays, SprungMasses, HeadLaws, ReducedMechanism>(
                 {{"arrays", arrays}, {"masses", masses}, {"laws", laws}, {"mechanism", mechanism}});
         }))
         .def_property_readonly("height", &RaisedHead::height);
-    py::class_<CalledHead, Head>(m, "CalledHead")
+    py::class_<CalledHead, Head>(module, "CalledHead")
         .def(py::init(
             [](const py::object& out, const py::object& predict, const py::object& advance) {
                 Kept kept;
@@ -154,6 +155,22 @@ void offer_heads(py::module_& m) {
                 return std::unique_ptr<CalledHead>(std::make_unique<HeldHead<CalledHead>>(
                     std::move(kept), arrays, predict, advance));
             }));
+
+    PYBIND11_NUMPY_DTYPE(BodyProduct, body, start, end, between, normal, at_start, at_end);
+    PYBIND11_NUMPY_DTYPE(BodyLine, i, j, at_i, at_j);
+    module.attr("BODY_PRODUCT") = py::dtype::of<BodyProduct>();
+    module.attr("BODY_LINE") = py::dtype::of<BodyLine>();
+    offer(module, "rotation_matrices", rotation_matrices,
+          "Fill in matrices from body to space axes of unit Euler parameters.");
+    offer(module, "move_bodies", move_bodies, "Displace and turn bodies in place.");
+    offer(module, "add_gyroscopic_moments", add_gyroscopic_moments,
+          "Add -omega x J omega to generalised forces in place.");
+    offer(module, "body_products", body_products,
+          "Fill in scalar products of vectors of bodies with their derivatives.");
+    offer(module, "body_lines", body_lines,
+          "Fill in lengths between points of bodies, their rates and gradients.");
+    offer(module, "independent_rows", independent_rows,
+          "Numbers of rows that are not combinations of rows before them.");
 }
 
 }  // namespace catenary::python

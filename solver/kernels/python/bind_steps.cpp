@@ -1,6 +1,9 @@
-// What Python calls of steps, and of lines that are prepared for steps from outside.
+// What Python calls of steps, their rows and errors, and of lines prepared for steps from outside.
 #include "python/from_python.hpp"
+#include "schemes/step_error.hpp"
 #include "simulation/simulation.hpp"
+#include "views/extremes.hpp"
+#include "views/points.hpp"
 
 namespace catenary::python {
 
@@ -109,6 +112,12 @@ void offer_steps(py::module_& module) {
         .def_property_readonly("head_height", output(&TrainOutputs::head_height))
         .def_property_readonly("wire_height", output(&TrainOutputs::wire_height))
         .def_property_readonly("strip_force", output(&TrainOutputs::strip_force));
+
+    offer(module, "step_error", step_error, "Largest error of a contact force by a step [N].");
+    offer(module, "accept_step", accept_step, "Append a step to those of the past.");
+
+    offer(module, "take_extremes", take_extremes, "Take columns of rows into extremes.");
+    offer(module, "take_points", take_points, "Fill in points of rows, one row after another.");
 }
 
 }  // namespace catenary::python

@@ -1,6 +1,8 @@
 // Steps of the scheme `one_solve`.
 #include "steps/steps.hpp"
 
+#include "base/checks.hpp"
+
 namespace catenary {
 
 Taken Steps::take(int64_t first, int64_t end) {
@@ -80,6 +82,16 @@ void Steps::finish(int64_t n_compensations) {
     for (Head* head : parts_.heads) head->move(force);
     write_outputs(parts_.train_outputs, force, parts_.law.reported.reported, problem.heads,
                   problem.found.depth);
+    check();
+}
+
+/// Look whether the step has left numbers, in builds that look for faults.
+void Steps::check() const {
+    const auto& [x, y, z, shares] = parts_.shown.motion;
+    for (auto numbers : {x, y, z}) check_numbers(numbers, "the line's motion");
+    for (const Head* head : parts_.heads) check_numbers(head->arrays().state, "a head's motion");
+    check_numbers(parts_.train_outputs.contact_force, "contact forces");
+    check_numbers(parts_.train_outputs.head_height, "heights of heads");
 }
 
 /// Fill in a row: what pantographs show, the line, and further channels.

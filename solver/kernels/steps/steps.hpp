@@ -80,6 +80,7 @@ class Steps {
     bool predict_heads(int64_t number);
     int64_t find_forces(int64_t number);
     void finish(int64_t n_compensations);
+    void check() const;
     void show(int64_t number);
 
     StepParts parts_;
