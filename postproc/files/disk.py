@@ -1,4 +1,4 @@
-"""What the writers of result files share: attributes, room on the disk, files that appear whole."""
+"""Writing result files: attributes, room on the disk, files that appear whole or not at all."""
 
 from __future__ import annotations
 
@@ -26,8 +26,9 @@ _NO_LOCKS = (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP)
 # Room for HDF5's own tables and for the last words of a run that has filled the disk [bytes].
 MARGIN = 128 * 1024
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
-# Where a superblock of each version keeps the end of what the file holds [bytes].
-_END_AT = {0: 40, 1: 44, 2: 28, 3: 28}
+# Where a superblock keeps the end of what the file holds, of the versions that `FORMAT_BOUNDS` make
+# [bytes].
+_END_AT, _VERSIONS = 28, (2, 3)
 
 
 def plain(value: Any) -> Any:
@@ -184,13 +185,9 @@ def trimmed(file: h5py.File) -> Iterator[None]:
 
 def _end(head: bytes) -> int | None:
     """The end of a file by the first bytes of it; None if its superblock is not understood."""
-    if not head.startswith(_SIGNATURE) or head[8] not in _END_AT:
+    if not head.startswith(_SIGNATURE) or head[8] not in _VERSIONS or head[9] != 8:
         return None
-    version = head[8]
-    width = head[13] if version < 2 else head[9]
-    if width != 8:
-        return None
-    (end,) = struct.unpack_from("<Q", head, _END_AT[version])
+    (end,) = struct.unpack_from("<Q", head, _END_AT)
     return int(end)
 
 
@@ -287,7 +284,7 @@ def write_all(folder: Path, content: Mapping[str, bytes | str]) -> list[Path]:
 
 
 def write_into(folder: Path, content: Mapping[str, bytes | str]) -> list[Path]:
-    """The same for a folder that is there already.
+    """Write files as ``write_all``, into a folder that exists.
 
     Raises
     ------

@@ -37,7 +37,7 @@ def code_of(error: Exception) -> int | None:
 
 
 def reason(error: Exception) -> str:
-    """What the system says of an error, without a figure or a path."""
+    """The system's message of an error, without a figure or a path."""
     code = code_of(error)
     if code:
         return os.strerror(code)
@@ -47,6 +47,6 @@ def reason(error: Exception) -> str:
 
 
 def remedy(error: Exception) -> str:
-    """What a user can do about an error."""
+    """The remedy of an error, for the user."""
     code = code_of(error)
     return _REMEDIES.get(code, _OTHER_FOLDER) if code else _OTHER_FOLDER

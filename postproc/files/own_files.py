@@ -54,8 +54,8 @@ def part_of(path: Path, process: int) -> Path:
 
 
 def new_part(path: Path) -> Path:
-    """The same name for this process, under which nothing is: what a dead process of its number
-    left there, or a link that a stranger did, is removed."""
+    """The name for this process, free to be written: a file of a dead process with the same number,
+    or a link, is removed."""
     part = part_of(path, os.getpid())
     part.unlink(missing_ok=True)
     return part

@@ -74,7 +74,7 @@ _SLOTS = ("0", "1")
 
 
 class LineRows(NamedTuple):
-    """What a flush appends of the line's channels.
+    """Rows of the line's channels that a flush appends.
 
     Attributes
     ----------
@@ -396,8 +396,10 @@ def _rows(tables: Mapping[str, h5py.Dataset]) -> list[int]:
 
 
 def committed_rows(file: h5py.File) -> tuple[list[int], str]:
-    """Committed rows of the three clocks, those that are there where the counts are damaged, and
-    what is wrong with these. The file may be damaged. Not collective."""
+    """Committed rows of the three clocks, and the fault of the counts, empty if there is none.
+
+    Damaged counts are replaced by the lengths of the tables. Not collective.
+    """
     there = [_length(file, clock) for clock in CLOCKS]
     try:
         found = np.asarray(file[COMPLETE][...])

@@ -82,8 +82,8 @@ class FilmData:
         return self.contacts[int(self._at_rest(np.array([x]))[:, 0].argmin())]
 
     def _at_rest(self, x: np.ndarray) -> np.ndarray:
-        """Heights of the contact wires (n_wires, n) [m]; of those that are not there infinite, but
-        at places where none is."""
+        """Heights of the contact wires (n_wires, n) [m], inf where a wire is absent; extrapolated
+        where all are."""
         chains = [self.points[self.wires[name]] for name in self.contacts]
         there = np.array([self._is_there(name, x) for name in self.contacts])
         heights = np.array([np.interp(x, at[:, 0], at[:, 2]) for at in chains])

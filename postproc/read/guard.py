@@ -81,7 +81,7 @@ def examined(path: Path, limit: float | None = None) -> Records | None:
 
 
 def _child(words: list[str], limit: float) -> subprocess.CompletedProcess[bytes]:
-    """What a Python of its own makes of ``words`` within ``limit`` [s]."""
+    """Run Python with ``words`` in a process of its own, for ``limit`` [s] at most."""
     return subprocess.run(
         [sys.executable, "-P", *words],
         env=_environment(),
@@ -106,7 +106,7 @@ def _environment() -> dict[str, str]:
 
 
 def examine(path: Path) -> str:
-    """What is found in a file as JSON: the fields of ``Records``, or why it is refused."""
+    """Examine a file; returns the fields of ``Records``, or the refusal, as JSON."""
     try:
         file = ValidatedFile(path)
         found = file.records

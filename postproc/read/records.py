@@ -35,7 +35,7 @@ class Records(NamedTuple):
     ----------
     rows : of the steps, the energies and the line's channels
     damaged : path of a damaged table -> its rows before the damage; later ones read as NaN
-    told : a clause for each thing that is damaged
+    told : the faults, as clauses
     last : time of the last valid step [s], NaN without one
     """
 
@@ -48,7 +48,7 @@ class Records(NamedTuple):
 def table_faults(
     file: h5py.File, record: LineRecord, sizes: dict[str, int], most: int
 ) -> dict[str, str]:
-    """What is wrong with growing tables that are missing or have the wrong type or width, by path.
+    """Faults of growing tables by path: missing, of the wrong type or of the wrong width.
 
     Parameters
     ----------

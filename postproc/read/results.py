@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import logging
 from collections.abc import Iterator
 from functools import cached_property
@@ -17,8 +16,8 @@ from catenary.meshgen.wires import Role
 from catenary.postproc.channels.line_record import LineRecord
 from catenary.postproc.files.hdf5 import block_reading
 from catenary.postproc.files.run_schema import ALL_COLUMNS, DONE, LINE_TIME, PLACES, RUNNING
-from catenary.postproc.read.line_of_run import LineOfRun
 from catenary.postproc.read.records import Records
+from catenary.postproc.read.train_of_run import TrainOfRun
 from catenary.postproc.read.validated_file import ValidatedFile
 from catenary.solver.time_loop.views import channels
 
@@ -27,7 +26,7 @@ logger = logging.getLogger("catenary.results")
 RESULT_FILE = "run.h5"
 
 
-class Results(LineOfRun):
+class Results(TrainOfRun):
     """A result file opened for reading. A context manager; not collective.
 
     All channels are cut to the rows that are whole, so that a file whose writer was killed reads
@@ -99,10 +98,6 @@ class Results(LineOfRun):
         """
         return float(self._file.facts[name])
 
-    def facts_of(self, name: str) -> np.ndarray:
-        """A fact of each pantograph, shape (n_pantographs,), NaN likewise."""
-        return np.broadcast_to(self._file.facts[name], self.n_pantographs)
-
     def facts_of_wires(self, name: str) -> dict[str, float]:
         """A fact of each contact wire by its name, NaN likewise."""
         wires = self.wires_of(Role.CONTACT)
@@ -128,7 +123,7 @@ class Results(LineOfRun):
 
     @cached_property
     def _line_length(self) -> int:
-        """Rows of the line's channels, none of which is later than the last step."""
+        """Rows of the line's channels up to the last step."""
         n = self._file.records.rows[2]
         return min(n, (self._length - 1) // self.line_record.every + 1) if self._length else 0
 
@@ -253,50 +248,6 @@ class Results(LineOfRun):
         return int(self._file[path].shape[0]) if path in self._file else 0
 
     @property
-    def n_pantographs(self) -> int:
-        """Number of pantographs."""
-        return int(self._file["channels/contact_force"].shape[1])
-
-    def n_strips(self) -> list[int]:
-        """Number of strips of each pantograph, by their order."""
-        told: list[int] = self.attributes["n_strips"]
-        return told or [1] * self.n_pantographs
-
-    @property
-    def several_strips(self) -> bool:
-        """Whether a pantograph has more than one strip."""
-        return max(self.n_strips(), default=1) > 1
-
-    def strip_columns(self) -> list[range]:
-        """Columns of ``strip_force`` of each pantograph."""
-        ends = np.cumsum([0, *self.n_strips()]).tolist()
-        return [range(*pair) for pair in itertools.pairwise(ends)]
-
-    def wire_columns(self) -> list[dict[str, int]]:
-        """Column of ``contact_wire_force`` by the name of a contact wire, of each pantograph."""
-        names = self.wires_of(Role.CONTACT)
-        numbers = itertools.count()
-        return [{name: next(numbers) for name in names} for _ in range(self.n_pantographs)]
-
-    def contact_columns(self) -> list[slice]:
-        """Columns of ``lateral_place`` of each pantograph: its strips, each with all wires."""
-        n = len(self.wires_of(Role.CONTACT))
-        return [slice(n * own.start, n * own.stop) for own in self.strip_columns()]
-
-    def contact_names(self) -> list[list[str]]:
-        """What the same columns are called: "strip 1 contact wire", without what there is one of;
-        empty words where there is one of both."""
-        wires, found = self.wires_of(Role.CONTACT), []
-        for strips in self.strip_columns():
-            parts = [
-                [*([f"strip {n + 1}"] if len(strips) > 1 else ()), *([w] if len(wires) > 1 else ())]
-                for n in range(len(strips))
-                for w in wires
-            ]
-            found.append([" ".join(words) for words in parts])
-        return found
-
-    @property
     def has_violations(self) -> bool:
         """Whether a pantograph has joints in the time loop."""
         return self.has("constraint_violation")
@@ -308,29 +259,6 @@ class Results(LineOfRun):
             return [None] * self.n_pantographs
         found = self.extremes("constraint_violation")[1]
         return [None if np.isnan(largest) else float(largest) for largest in found]
-
-    def pantograph_words(self) -> list[dict[str, Any]]:
-        """Words about each pantograph, by their order: ``kind``, ``model``, ``description``; empty
-        tables in files without."""
-        told: list[dict[str, Any]] = self.attributes.get("pantographs", [])
-        return told or [{} for _ in range(self.n_pantographs)]
-
-    def pantograph_names(self) -> list[str]:
-        """How the pantographs are called, by their order on the train."""
-        n = self.n_pantographs
-        if n == 1:
-            return ["pantograph"]
-        first = self.first_position if self._length else -np.arange(n, dtype=float)
-        names = [""] * n
-        for place, index in enumerate(np.argsort(-first, kind="stable")):
-            middle = f"no. {place + 1}"
-            names[index] = "leading" if place == 0 else "trailing" if place == n - 1 else middle
-        return names
-
-    @property
-    def first_position(self) -> np.ndarray:
-        """Where the pantographs are in the first record, (n_pantographs,) [m]."""
-        return np.asarray(self._file["channels/contact_position"][0])
 
     def energies(self) -> dict[str, np.ndarray]:
         """Energies by name, each (m,), empty if the run did not record them."""

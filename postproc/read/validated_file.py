@@ -140,7 +140,7 @@ class ValidatedFile:
         return faults
 
     def _constant_faults(self) -> list[str]:
-        """What is wrong with tables that are written once."""
+        """Faults of the tables that are written once."""
         file, faults = self._file, []
         wires, breaks = names_in(file, "line/wires"), names_in(file, "line/breaks")
         largest: dict[str, int] = {}
@@ -157,8 +157,10 @@ class ValidatedFile:
         return faults or self._references(largest, wires)
 
     def _references(self, largest: dict[str, int], wires: list[str]) -> list[str]:
-        """What does not fit together: numbers of nodes, wires, spans and columns that are not
-        there, of which ``largest`` is the largest of each table."""
+        """Faults of numbers of nodes, wires, spans and columns: beyond the number that there are.
+
+        ``largest`` is the largest number in each table.
+        """
         sizes = self.sizes
         limits = {
             "line/droppers": sizes["node"],
@@ -185,7 +187,7 @@ class ValidatedFile:
         return ["line/evaluation_range lies beyond the contact wires"] if beyond else []
 
     def _misfits(self) -> list[str]:
-        """What does not fit the numbers of pantographs, strips and wires."""
+        """Faults of tables whose sizes do not fit the numbers of pantographs, strips and wires."""
         sizes, n = self.sizes, self.sizes["pantograph"]
         if n < 1:
             return ["channels/contact_force has no columns"]
@@ -228,7 +230,7 @@ class ValidatedFile:
         return [] if ascend else ["static/contact_x does not ascend"]
 
     def _usable(self) -> str:
-        """What can still be used of a file of which no report can be made."""
+        """A clause on the records that can be read where no report can be made."""
         dt = float(self.facts.get("time_step", np.nan))
         if not dt > 0.0:
             return "no part of it can be reported"

@@ -94,7 +94,7 @@ def _validated(
 
 
 def _decoded(text: Any) -> Any:
-    """What JSON text says; None if it says nothing that can be stored."""
+    """The value of JSON text, None if it is invalid."""
     try:
         return json.loads(text, parse_constant=_refuse)
     except (ValueError, TypeError, RecursionError):
@@ -114,11 +114,11 @@ def _shown(value: Any) -> str:
 def table_values(
     file: h5py.File, path: str, declared: Table, sizes: dict[str, int]
 ) -> tuple[np.ndarray | None, str]:
-    """The values of a table and an empty text, or None and what is wrong with it.
+    """The values of a table and an empty text, or None and its fault.
 
     Parameters
     ----------
-    sizes : of dimensions by name; those that the table has and that are not there are added
+    sizes : of dimensions by name; those of the table are added
     """
     try:
         values = np.asarray(file[path][()])
@@ -129,7 +129,7 @@ def table_values(
 
 
 def values_fault(values: np.ndarray, declared: Table, sizes: dict[str, int]) -> str:
-    """What is wrong with the values of a table, empty if nothing is; ``sizes`` as there."""
+    """The fault of the values of a table, empty if they are valid; ``sizes`` as there."""
     if values.dtype.kind not in ("iu" if declared.whole else "fiu"):
         return f"holds {values.dtype} where numbers belong"
     if values.ndim != len(declared.dimensions):
@@ -150,6 +150,6 @@ def values_fault(values: np.ndarray, declared: Table, sizes: dict[str, int]) -> 
 
 
 def listed(faults: Collection[str], most: int = 3) -> str:
-    """Faults as one clause, of which not more than ``most`` are named."""
+    """Faults as one clause; the first ``most`` are named, the others counted."""
     shown, more = list(faults)[:most], len(faults) - most
     return "; ".join(shown) + (f"; and {more} more faults" if more > 0 else "")

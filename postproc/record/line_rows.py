@@ -37,7 +37,7 @@ class _KeptRows:
         self._parts: list[tuple[int, np.ndarray]] = []
 
     def columns_within(self, edges: tuple[np.ndarray, np.ndarray] | None) -> slice:
-        """Columns that rows are to have, of which ``edges`` are from and to of a window [m]."""
+        """Columns to keep of rows whose window reaches from and to ``edges`` [m]."""
         if self.is_whole or edges is None or self._x is None:
             return slice(0, self._n_columns)
         begin = int(np.searchsorted(self._x, edges[0].min()))
@@ -45,7 +45,7 @@ class _KeptRows:
         return slice(begin, max(begin, end))
 
     def put(self, rows: np.ndarray, columns: slice) -> None:
-        """Keep ``rows`` (n, ...) of these columns, behind those that were kept before."""
+        """Append ``rows`` (n, ...) of these columns."""
         if self.is_whole:
             self._rows[self._n_rows : self._n_rows + len(rows)] = rows
         else:

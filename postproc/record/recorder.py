@@ -202,7 +202,7 @@ class Recorder(Observer):
             self._take_waiting()
 
     def _take_waiting(self) -> None:
-        """Take in those that wait, which are the latest rows."""
+        """Flush the pending rows into the buffers of the line's channels."""
         n, self._n_waiting = self._n_waiting, 0
         if n:
             self._take(self._first_step + self._n_taken, self._waiting[:n], all_move=True)
@@ -212,7 +212,7 @@ class Recorder(Observer):
         self._n_taken += len(rows)
 
     def _columns(self, name: str) -> np.ndarray:
-        """What is kept of a channel of the train, shape (rows, columns); the buffer itself."""
+        """The buffer of a channel of the train, as far as it is filled, (rows, columns)."""
         return self._kept[name][1][: self._rows]
 
     # ---- rank 0 ------------------------------------------------------------------------------
@@ -272,7 +272,7 @@ class Recorder(Observer):
         self._extremes = found
 
     def _blocks(self) -> dict[str, np.ndarray]:
-        """What a flush appends of each step."""
+        """Rows of the steps that a flush appends, by path."""
         blocks = {f"channels/{name}": self._columns(name) for name in self._names}
         if self._energies:
             table = np.array(self._energies)

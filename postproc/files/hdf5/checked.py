@@ -99,7 +99,7 @@ def sum_of_arrays(arrays: Mapping[str, Any]) -> int:
 
 
 def _added(total: int, name: str, array: Any) -> int:
-    """The CRC-32 of arrays of which the latest is added to ``total``."""
+    """``total``, a CRC-32, continued by the name and the numbers of an array."""
     total, values = zlib.crc32(name.encode(), total), np.asarray(array)
     if values.dtype.kind in "OSU":
         return zlib.crc32(str(text_of(values.item())).encode(), total)

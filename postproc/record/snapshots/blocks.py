@@ -30,7 +30,7 @@ _NO_PAIRS = np.zeros((0, 2), dtype=np.int64)
 
 @dataclass(frozen=True)
 class RecordedLine:
-    """What of a line snapshots are made of.
+    """The parts of a line that snapshots show.
 
     Attributes
     ----------
@@ -59,7 +59,7 @@ class RecordedLine:
     def of(
         cls, line: Line, mesh: LineMesh, slope: np.ndarray, lateral: LateralShape | None = None
     ) -> RecordedLine:
-        """That of a line with its mesh."""
+        """The parts of a line with its mesh."""
         return cls(
             mesh.wires,
             mesh.droppers,

@@ -32,7 +32,7 @@ class FieldKind:
     meaning : what it is, and which sign it has
     components : numbers of a value
     motions : unknowns that it takes at all nodes, each with whether their rate is meant
-    of_wires : whether wires alone have it; other blocks that move have those that are not
+    of_wires : whether wires alone have it, and not other blocks that move
     of_droppers : whether it belongs to the cells of the droppers
     only_with : unknown without which it takes no motion, "" if it always does
     number : how it is stored, a type of NumPy
@@ -54,7 +54,7 @@ class FieldKind:
         return int(self.number[-1]) * self.components
 
     def motions_of(self, unknowns: Sequence[str]) -> list[tuple[str, bool]]:
-        """Those of ``motions`` that it takes where nodes have these unknowns."""
+        """The ``motions`` that it needs where nodes have these unknowns."""
         if self.only_with and self.only_with not in unknowns:
             return []
         return [motion for motion in self.motions if motion[0] in unknowns]

@@ -62,7 +62,7 @@ class FieldRecord:
         return kinds_of(self.fields)
 
     def chosen(self, blocks: list[Block]) -> list[Block]:
-        """The blocks that are recorded, as far as they are."""
+        """The selected blocks, cut to the recorded stretch."""
         chosen = [one for one in blocks if self.parts is None or one.name in self.parts]
         if self.stretch is not None:
             chosen = [block.between(*self.stretch) for block in chosen]
@@ -161,7 +161,7 @@ class Slots(BlockTables):
         return slice(int(self.first[snapshot]), int(self.first[snapshot] + self.count[snapshot]))
 
     def bytes(self) -> int:
-        """What its tables take [B]."""
+        """Size of its tables [B]."""
         of_fields = sum(kind.item_bytes * self.rows(kind) for kind in self.kinds)
         tables = sum(table.nbytes for table in self.tables().values())
         return of_fields + tables + (7 + len(self.kinds)) * _TABLES

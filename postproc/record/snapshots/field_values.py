@@ -23,7 +23,7 @@ from catenary.solver.model.axial_elements import rows_in_curve, slope_rows
 
 @dataclass(frozen=True)
 class Gathered:
-    """What is known of some snapshots that follow one another, of all nodes and droppers.
+    """Motions and forces of all nodes and droppers in successive snapshots.
 
     Attributes
     ----------

@@ -80,11 +80,6 @@ class FieldsFile:
         self._published = False
 
     @property
-    def is_open(self) -> bool:
-        """Whether it can be appended to."""
-        return self._handle >= 0
-
-    @property
     def is_published(self) -> bool:
         """Whether it has its name, in place of an earlier one."""
         return self._published
@@ -163,7 +158,7 @@ class FieldsFile:
         return True
 
     def _lengthen(self, numbers: np.ndarray) -> None:
-        """Put a file with room for more snapshots in place of this one, with those that it has."""
+        """Replace the file by one with room for more snapshots, and copy those that there are."""
         self.make(numbers)
         with opened(self.path, "r") as old, opened(self._made_as, "r+") as new:
             new["times"][: len(self._written)] = self._written
@@ -220,7 +215,7 @@ class FieldsFile:
         self._layout = layout_of(self._record, self._blocks, times)
 
     def _n_bytes(self) -> int:
-        """What the file takes at most [B]."""
+        """Largest size of the file [B]."""
         of_time = 8 * len(self._planned) * (1 + self._n_numbers)
         return MARGIN + of_time + sum(slots.bytes() for slots in self._layout)
 

@@ -80,7 +80,7 @@ class FieldTables(NamedTuple):
 
 
 class FieldsFault(Exception):
-    """What is wrong with a file of snapshots; the message is a clause."""
+    """A file of snapshots is invalid; the message is a clause."""
 
 
 def read_fields(file: h5py.File) -> FieldTables:
@@ -189,7 +189,7 @@ def _block(file: h5py.File, name: str, n_planned: int, n_nodes: int) -> BlockTab
 
 
 def _cells_fault(block: BlockTables) -> str:
-    """What is wrong with the cells of the snapshots, as a clause behind the name of the block."""
+    """The fault of the cells of the snapshots, as a clause behind the name of the block."""
     begin, number = block.cell_first, block.cell_count
     if (begin + number > len(block.cells)).any():
         return f"cell_count shows other cells than its {len(block.cells)}"
