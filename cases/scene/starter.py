@@ -117,8 +117,8 @@ def starting_text(kind: str, name: str, spans: Sequence[float] = (), droppers: b
     ----------
     kind : a name of ``BEGINNINGS``, or a case: name of a shipped one, file or folder
     name : name of the new case, for its title
-    spans : lengths of all spans [m], which stand in ``spans.csv`` beside the case; those of the
-        case that it begins as if empty
+    spans : lengths of all spans [m], as ``spans.csv`` beside the case has them; if empty the
+        spans of the case that it begins as
     droppers : whether droppers stand in ``droppers.csv`` beside the case
 
     Raises
