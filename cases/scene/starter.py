@@ -14,7 +14,7 @@ from catenary.cases.scene.input.case_files import CASE_FILE, find_case
 from catenary.cases.scene.input.csv_files import span_table
 from catenary.cases.scene.input.plain_text import decode, plain, read_whole
 from catenary.cases.scene.input.toml_input import read_toml
-from catenary.cases.scene.keys.usual_values import TYPICAL
+from catenary.cases.scene.keys.usual_values import USUAL, Usual
 from catenary.cases.scene.load import load_scene
 
 
@@ -170,8 +170,8 @@ def _with_usual_values(body: str) -> str:
         if heading:
             table = re.sub(r"^pantographs\.\w+", "pantographs.*", heading[1])
         key = re.match(r"(\w+) =", line)
-        usual = TYPICAL.get(f"{table}.{key[1]}") if key else None
-        if usual is not None:
+        usual = USUAL.get(f"{table}.{key[1]}", Usual()).words if key else ""
+        if usual:
             lines.append(f"# usual: {usual}")
         lines.append(line)
     return "\n".join(lines) + "\n"

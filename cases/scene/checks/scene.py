@@ -329,14 +329,15 @@ def usual_faults(scene: Scene) -> Iterator[Fault]:
     if scene.case.accept_unusual:
         return
     plain = scene.model_dump(exclude_none=True)
-    for pattern in USUAL:
+    ranges = [key for key, usual in USUAL.items() if usual.least is not None]
+    for pattern in ranges:
         yield from _faults(plain, pattern.split("."), "", scene.origin)
 
 
 def _faults(value: Any, parts: list[str], key: str, origin: Origin) -> Iterator[Fault]:
     if parts and isinstance(value, list):
         for i, entry in enumerate(value):
-            yield from _faults(entry, parts, f"{key}.{i}", origin)
+            yield from _faults(entry, parts[1:], f"{key}.{i}", origin)
         return
     if parts:
         inner = value if isinstance(value, dict) else {}
