@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from program import MPIRUN, catenary
 from typer.testing import CliRunner
 
 from catenary.base.errors import InputError
@@ -200,6 +201,14 @@ def test_what_is_broken_is_told_with_a_remedy(monkeypatch: pytest.MonkeyPatch) -
     assert "no run is possible before these work: PETSc" in done.output
     monkeypatch.setattr(installation, "examined", lambda folder: iter(found[1:]))
     assert invoke("doctor").exit_code == 0
+
+
+@pytest.mark.process
+@pytest.mark.skipif(MPIRUN is None, reason="needs mpirun")
+def test_the_doctor_is_no_verb_of_several_ranks(tmp_path: Path) -> None:
+    done = catenary("doctor", cwd=tmp_path, ranks=2)
+    assert done.code == 2
+    assert done.sentences == ["catenary: doctor starts two ranks itself: call it without mpirun"]
 
 
 @pytest.mark.process
