@@ -90,8 +90,11 @@ def new(
 @console.serial
 def doctor() -> int:
     """Serial."""
+    from catenary.base.parallel import launched_by_mpirun
     from catenary.cases.process.installation import examined
 
+    if launched_by_mpirun():
+        raise InputError("doctor starts two ranks itself: call it without mpirun")
     prevented = []
     for finding in examined(Path.cwd()):
         console.say(finding.line())

@@ -58,7 +58,7 @@ def estimate_march(
 ) -> float:
     """Wall time of the time loop on one rank [s].
 
-    ``n_substeps`` are those of a step that pantographs with all their bodies take, all together;
+    ``n_substeps`` is the number of substeps of all pantographs with all bodies in a step;
     ``stations`` how many of the line's have each number of unknowns, all four by default;
     ``gusts`` whether wind changes with time.
     """

@@ -93,7 +93,7 @@ class Draft:
 
 
 def read_draft(case: str | Path) -> Draft:
-    """What a shipped case's name, a case file or its folder stands for, not checked.
+    """The scene of a shipped case's name, a case file or its folder, not checked.
 
     Raises
     ------

@@ -20,11 +20,7 @@ from catenary.cases.scene.scene import Scene
 from catenary.cases.scene.train.aerodynamics import uplift_of
 from catenary.cases.scene.train.head import strips_of, turning_of
 from catenary.cases.scene.train.laws import laws_of, regulation_of
-from catenary.cases.scene.train.pantograph import (
-    MultibodyTable,
-    PantographTable,
-    wanted_force,
-)
+from catenary.cases.scene.train.pantograph import MultibodyTable, PantographTable, wanted_force
 from catenary.cases.scene.train.train import vehicle_of
 from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.vehicle.base_motion import VehicleMotion

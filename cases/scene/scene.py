@@ -11,7 +11,8 @@ from typing import Any
 
 from pydantic import Field, PrivateAttr
 
-from catenary.cases.scene.input.faults import Origin
+from catenary.cases.scene.input.faults import Fault, Origin
+from catenary.cases.scene.keys.error_sentences import refusal
 from catenary.cases.scene.keys.table import Table
 from catenary.cases.scene.line.imperfections import Defect, IrregularitiesTable
 from catenary.cases.scene.line.line import LineTable
@@ -77,6 +78,19 @@ class Scene(Table):
     def origin(self) -> Origin:
         """Where the keys were written, for sentences about them."""
         return self._origin
+
+    def refused(self, key: str, value: object, why: str) -> Fault:
+        """The fault of a key: its value, where it was written, and why it cannot be."""
+        return refusal(self._origin, key, value, why)
+
+    def fault(self, key: str, says: str) -> Fault:
+        """The fault of a key whose sentence ``says`` goes on after its name and its place."""
+        return Fault(key, f"{key} {self._origin.of(key)} {says}")
+
+    def needs_effect(self, key: str, value: object, effect: str) -> Fault:
+        """The fault of a key that nothing reads without an effect, which is off by default."""
+        why = f"it acts only with effects.{effect} = true; write that, or false to leave it out"
+        return self.refused(key, value, why)
 
     def switches(self) -> dict[str, bool]:
         """Every effect of the registry and whether it is on, in the registry's order."""

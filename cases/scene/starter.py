@@ -14,7 +14,7 @@ from catenary.cases.scene.input.case_files import CASE_FILE, find_case
 from catenary.cases.scene.input.csv_files import span_table
 from catenary.cases.scene.input.plain_text import decode, plain, read_whole
 from catenary.cases.scene.input.toml_input import read_toml
-from catenary.cases.scene.keys.usual_values import TYPICAL
+from catenary.cases.scene.keys.usual_values import USUAL, Usual
 from catenary.cases.scene.load import load_scene
 
 
@@ -117,8 +117,8 @@ def starting_text(kind: str, name: str, spans: Sequence[float] = (), droppers: b
     ----------
     kind : a name of ``BEGINNINGS``, or a case: name of a shipped one, file or folder
     name : name of the new case, for its title
-    spans : lengths of all spans [m], which stand in ``spans.csv`` beside the case; those of the
-        case that it begins as if empty
+    spans : lengths of all spans [m], as ``spans.csv`` beside the case has them; if empty the
+        spans of the case that it begins as
     droppers : whether droppers stand in ``droppers.csv`` beside the case
 
     Raises
@@ -170,8 +170,8 @@ def _with_usual_values(body: str) -> str:
         if heading:
             table = re.sub(r"^pantographs\.\w+", "pantographs.*", heading[1])
         key = re.match(r"(\w+) =", line)
-        usual = TYPICAL.get(f"{table}.{key[1]}") if key else None
-        if usual is not None:
+        usual = USUAL.get(f"{table}.{key[1]}", Usual()).words if key else ""
+        if usual:
             lines.append(f"# usual: {usual}")
         lines.append(line)
     return "\n".join(lines) + "\n"

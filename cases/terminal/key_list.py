@@ -16,7 +16,7 @@ from pydantic_core import PydanticUndefined
 from catenary.base.errors import InputError
 from catenary.cases.scene.keys.keys import ANY, kind_of, tables_in
 from catenary.cases.scene.keys.units import unit_of
-from catenary.cases.scene.keys.usual_values import TYPICAL, usual_range
+from catenary.cases.scene.keys.usual_values import USUAL, Usual, usual_range
 from catenary.postproc.standards.en50367 import EDITIONS, SYSTEMS
 from catenary.solver.effects import all_effects as effects
 
@@ -146,8 +146,8 @@ def _details(key: Key) -> str:
     if key.kinds:
         facts.append(f"only of {', '.join(key.kinds)}")
     lines = [key.meaning, "; ".join(facts)]
-    if key.name in TYPICAL:
-        lines.append(f"typical: {TYPICAL[key.name]}")
+    if typical := USUAL.get(key.name, Usual()).words:
+        lines.append(f"typical: {typical}")
     elif usual_range(key.name) is not None:
         low, high = usual_range(key.name) or (0.0, 0.0)
         lines.append(f"usual: {low:.12g} to {high:.12g}")

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
+import pty
+import subprocess
+import sys
 import tomllib
 from pathlib import Path
 from typing import Any
 
 import pytest
+from program import MPIRUN, catenary
 from typer.testing import CliRunner
 
 from catenary.base.errors import InputError
@@ -90,6 +95,23 @@ def test_tables_of_a_planner_make_a_case(tmp_path: Path, kind: str, n: int) -> N
         "droppers.csv",
         "spans.csv",
     ]
+
+
+@pytest.mark.process
+def test_a_terminal_is_asked_for_the_kind_of_line(tmp_path: Path) -> None:
+    own, other = pty.openpty()
+    words = [sys.executable, "-c", "from catenary.cases.cli.main import main; main()", "new", "a"]
+    with subprocess.Popen(words, cwd=tmp_path, stdin=other, stdout=other, stderr=other) as asked:
+        os.close(other)
+        os.write(own, b"tramway\n")
+        said = b""
+        with contextlib.suppress(OSError):  # the end of a terminal that its program has left
+            while chunk := os.read(own, 4096):
+                said += chunk
+        assert asked.wait(60) == 0, said
+    os.close(own)
+    assert b"conductor_rail" in said and b"Which kind of line [simple]: " in said
+    assert load_scene(tmp_path / "a").line.topology == "single"
 
 
 def test_a_case_of_ones_own_may_be_a_beginning(tmp_path: Path) -> None:
@@ -179,6 +201,14 @@ def test_what_is_broken_is_told_with_a_remedy(monkeypatch: pytest.MonkeyPatch) -
     assert "no run is possible before these work: PETSc" in done.output
     monkeypatch.setattr(installation, "examined", lambda folder: iter(found[1:]))
     assert invoke("doctor").exit_code == 0
+
+
+@pytest.mark.process
+@pytest.mark.skipif(MPIRUN is None, reason="needs mpirun")
+def test_the_doctor_is_no_verb_of_several_ranks(tmp_path: Path) -> None:
+    done = catenary("doctor", cwd=tmp_path, ranks=2)
+    assert done.code == 2
+    assert done.sentences == ["catenary: doctor starts two ranks itself: call it without mpirun"]
 
 
 @pytest.mark.process

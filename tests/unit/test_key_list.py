@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 
 from catenary.base.errors import InputError
 from catenary.cases.cli.main import app
-from catenary.cases.scene.keys.usual_values import TYPICAL
+from catenary.cases.scene.keys.usual_values import USUAL
 from catenary.cases.scene.load import load_scene
 from catenary.cases.terminal.key_list import key_details, key_table, keys_of_a_scene
 
@@ -85,7 +85,7 @@ def test_the_words_that_are_told_are_those_that_are_accepted() -> None:
 
 def test_damping_and_bending_stiffness_have_typical_values() -> None:
     known = {key.name for key in keys_of_a_scene()}
-    assert set(TYPICAL) <= known
+    assert set(USUAL) <= known
     for key in ("line.damping.alpha_s", "line.damping.beta_per_s",
                 "line.contact_wire.bending_stiffness_N_m2"):  # fmt: skip
         assert "typical: " in key_details(key)
@@ -94,7 +94,11 @@ def test_damping_and_bending_stiffness_have_typical_values() -> None:
         for key in keys_of_a_scene()
         if key.default == "required" and key.name.startswith(("line.", "train.s"))
     }
-    without = {name for name in required - set(TYPICAL) if "per_component" not in name}
+    without = {
+        name
+        for name in required - {key for key, usual in USUAL.items() if usual.words}
+        if "per_component" not in name
+    }
     assert all(".patterns.*." in name for name in without)
 
 

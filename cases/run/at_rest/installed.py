@@ -26,10 +26,7 @@ def installed(line: Line, mesh: LineMesh, height: np.ndarray) -> dict[str, np.nd
     group = mesh.dropper_group
     ends = (
         ("upper", [own.upper for own in line.droppers]),
-        (
-            "lower",
-            [own.lower for own in line.droppers],
-        ),
+        ("lower", [own.lower for own in line.droppers]),
     )
     found = {f"line/dropper_{end}": np.array(names, dtype=str)[group] for end, names in ends}
     for wire in line.wires:

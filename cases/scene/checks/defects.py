@@ -1,4 +1,4 @@
-"""Whether irregularities, defects, fittings and incidents can be those of a line."""
+"""Whether a line can have the irregularities, defects and fittings of a scene."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from catenary.cases.scene.input.faults import Fault
-from catenary.cases.scene.keys.error_sentences import refusal
 from catenary.cases.scene.line.imperfections import (
     DropperDefectTable,
     HardSpotTable,
@@ -34,7 +33,7 @@ _TINY = 1e-6  # [m]
 
 
 def check_defects(scene: Scene, data: LineData) -> Iterator[Fault]:
-    """Those that cannot be; names of wires must be known."""
+    """Irregularities, fittings and defects that the line cannot have; its wires must be known."""
     line = line_of(scene)
     yield from _irregularities(scene, line)
     yield from _fittings(scene, line)
@@ -60,10 +59,10 @@ def check_defects(scene: Scene, data: LineData) -> Iterator[Fault]:
             yield from _place(scene, wire, f"{key}.at_m", table.at_m)
             if isinstance(table, KinkTable) and wire.role is not Role.CONTACT:
                 why = "strips run on contact wires only"
-                yield refusal(scene.origin, f"{key}.wire", table.wire, why)
+                yield scene.refused(f"{key}.wire", table.wire, why)
             elif isinstance(table, KinkTable) and not wire.bending_stiffness:
                 why = f"{wire.name} has no bending stiffness, and so keeps no bend under tension"
-                yield refusal(scene.origin, f"{key}.angle_deg", table.angle_deg, why)
+                yield scene.refused(f"{key}.angle_deg", table.angle_deg, why)
     yield from _broken_later(scene, seen)
 
 
@@ -76,24 +75,24 @@ def _irregularities(scene: Scene, line: Line) -> Iterator[Fault]:
         for i, (x, _) in enumerate(table.by_place or []):
             if not -_TINY <= x <= length + _TINY:
                 why = f"the line runs from 0 to {length:g} m"
-                yield refusal(scene.origin, f"{key}.by_place.{i}.0", x, why)
+                yield scene.refused(f"{key}.by_place.{i}.0", x, why)
         if table.standard_deviation_mm is None:
             continue
         start, end = stretch_of(table, line)
         for part, value in (("from_m", table.from_m), ("to_m", table.to_m)):
             if value is not None and value > length + _TINY:
                 why = f"the line ends at {length:g} m"
-                yield refusal(scene.origin, f"{key}.{part}", value, why)
+                yield scene.refused(f"{key}.{part}", value, why)
         if end <= start and table.to_m is not None:
             why = f"it must be greater than the {start:g} m where they begin"
-            yield refusal(scene.origin, f"{key}.to_m", table.to_m, why)
+            yield scene.refused(f"{key}.to_m", table.to_m, why)
         elif end - start < table.shortest_m:
             why = f"no wave of shortest_m = {table.shortest_m:g} m fits from {start:g} to {end:g} m"
             part = "shortest_m" if table.from_m is None else "from_m"
-            yield refusal(scene.origin, f"{key}.{part}", getattr(table, part), why)
+            yield scene.refused(f"{key}.{part}", getattr(table, part), why)
         if (end - start) / table.shortest_m > MOST_WAVES:
             why = f"it must be at least {(end - start) / MOST_WAVES:.3g} m on {end - start:g} m"
-            yield refusal(scene.origin, f"{key}.shortest_m", table.shortest_m, why)
+            yield scene.refused(f"{key}.shortest_m", table.shortest_m, why)
     lengths = scene.irregularities.dropper_lengths
     for i, (span, dropper, _) in enumerate((lengths and lengths.by_dropper) or []):
         entry = f"irregularities.dropper_lengths.by_dropper.{i}"
@@ -107,7 +106,7 @@ def _fittings(scene: Scene, line: Line) -> Iterator[Fault]:
         end = table.at_m + table.length_m
         if _is_at(wire, table.at_m) and not _is_at(wire, end):
             why = f"it would end at {end:g} m, where {wire.name} is not"
-            yield refusal(scene.origin, f"{key}.length_m", table.length_m, why)
+            yield scene.refused(f"{key}.length_m", table.length_m, why)
 
 
 def _place(scene: Scene, wire: Wire, key: str, x: float) -> Iterator[Fault]:
@@ -115,7 +114,7 @@ def _place(scene: Scene, wire: Wire, key: str, x: float) -> Iterator[Fault]:
         pieces = [f"{piece.x[0]:g} to {piece.x[-1]:g} m" for piece in wire.pieces]
         more = " and so on" if len(pieces) > 3 else ""
         why = f"{wire.name} runs from {', '.join(pieces[:3])}{more}"
-        yield refusal(scene.origin, key, x, why)
+        yield scene.refused(key, x, why)
 
 
 def _is_at(wire: Wire, x: float) -> bool:
@@ -132,12 +131,12 @@ def _dropper(
 ) -> Iterator[Fault]:
     if span > line.n_spans:
         why = f"the line has {counted(line.n_spans, 'span')}"
-        yield refusal(scene.origin, key + parts[0], span, why)
+        yield scene.refused(key + parts[0], span, why)
         return
     n = len(line.droppers_of_span(span - 1))
     if dropper > n:
         why = f"span {span} has {counted(n, 'dropper')}"
-        yield refusal(scene.origin, key + parts[1], dropper, why)
+        yield scene.refused(key + parts[1], dropper, why)
 
 
 def _twice(
@@ -149,7 +148,7 @@ def _twice(
     entry = key[0].rsplit(".", 1)[0]
     if what in seen:
         why = f"{seen[what]} has this already; take one of them away"
-        yield refusal(scene.origin, *key, why)
+        yield scene.refused(*key, why)
     seen.setdefault(what, entry)
 
 
@@ -159,7 +158,7 @@ def _worn_twice(scene: Scene, i: int, table: WornWireTable) -> Iterator[Fault]:
             continue
         if other.from_m < table.to_m and table.from_m < other.to_m:
             why = f"defects.{j} has a stretch of {table.wire} that reaches into this one"
-            yield refusal(scene.origin, f"defects.{i}.from_m", table.from_m, why)
+            yield scene.refused(f"defects.{i}.from_m", table.from_m, why)
 
 
 def _tension(scene: Scene, line: Line, wire: Wire, key: str, factor: float) -> Iterator[Fault]:
@@ -169,7 +168,7 @@ def _tension(scene: Scene, line: Line, wire: Wire, key: str, factor: float) -> I
             f"wires that are clamped to {wire.name} take {most:g} N of its {wire.tension:g} N: it "
             f"must be greater than {most / wire.tension:.3g}"
         )
-        yield refusal(scene.origin, key, factor, why)
+        yield scene.refused(key, factor, why)
     if wire.role is not Role.CONTACT or not scene.holds(Limit.WAVE_SPEED):
         return
     wave = 3.6 * slowest_wave_of(line, wire, factor)
@@ -178,7 +177,7 @@ def _tension(scene: Scene, line: Line, wire: Wire, key: str, factor: float) -> I
             f"the wave speed of {wire.name} would be {wave:.1f} km/h, not above train.speed_km_h = "
             f"{scene.train.speed_km_h:g}, which needs effects.supercritical_speed = true"
         )
-        yield refusal(scene.origin, key, factor, why)
+        yield scene.refused(key, factor, why)
 
 
 def _broken_later(scene: Scene, seen: dict[tuple[object, ...], str]) -> Iterator[Fault]:
@@ -187,4 +186,4 @@ def _broken_later(scene: Scene, seen: dict[tuple[object, ...], str]) -> Iterator
             entry = seen.get((incident.span, incident.dropper))
             if entry is not None:
                 why = f"{entry} lets this one carry nothing from the start"
-                yield refusal(scene.origin, f"incidents.{i}.dropper", incident.dropper, why)
+                yield scene.refused(f"incidents.{i}.dropper", incident.dropper, why)

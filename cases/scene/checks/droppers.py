@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from catenary.cases.scene.input.faults import Fault
-from catenary.cases.scene.keys.error_sentences import refusal
 from catenary.cases.scene.line.droppers import HangingTable, hung_in
 from catenary.cases.scene.line.line_data import numbered
 from catenary.meshgen.geometry import find_cuts
@@ -50,14 +49,14 @@ def droppers_inside(
             f"{table}.patterns.{numbers[beyond]}.spans",
             f"the line has {counted(scene.line.n_spans, 'span')}",
         )
-        yield refusal(scene.origin, key, beyond, why)
+        yield scene.refused(key, beyond, why)
         return
     if kind.positions_m is not None and len(set(spans.values())) > 1:
         key = f"{table}.positions_m"
         lengths = ", ".join(f"{span:g}" for span in sorted(set(spans.values()))[:_SOME])
-        yield Fault(
+        yield scene.fault(
             key,
-            f"{key} {scene.origin.of(key)} holds for one span length, but the spans are "
+            f"holds for one span length, but the spans are "
             f"{lengths} m long; give {table}.patterns or count and spacing_m",
         )
         return
@@ -70,11 +69,10 @@ def droppers_inside(
             continue
         if kind.count is not None and not outside:
             why = f"droppers must be at least {SHORTEST_GAP:g} m apart"
-            yield refusal(scene.origin, f"{table}.spacing_m", kind.spacing_m, why)
+            yield scene.refused(f"{table}.spacing_m", kind.spacing_m, why)
             return
         if kind.count is not None:
-            yield refusal(
-                scene.origin,
+            yield scene.refused(
                 f"{table}.count",
                 kind.count,
                 f"at a spacing of {kind.spacing_m:g} m these do not fit into a span of {span:g} m",
@@ -90,7 +88,7 @@ def droppers_inside(
             left, right = close[0]
             what = f"droppers{of} at {left:.10g} and {right:.10g} m; they must be at least "
             what += f"{SHORTEST_GAP:g} m apart"
-        yield Fault(key, f"{key} {scene.origin.of(key)} puts {what}")
+        yield scene.fault(key, f"puts {what}")
         return
 
 
@@ -141,8 +139,7 @@ def check_dropper_lengths(scene: Scene, line: LineData) -> Iterator[Fault]:
     span = int(np.argmin(shortest))
     below = "contact" if line.auxiliary_wire is None else "auxiliary"
     if shortest[span] <= 0:
-        yield refusal(
-            scene.origin,
+        yield scene.refused(
             "line.encumbrance_m",
             line.encumbrance,
             f"the messenger wire would hang {-shortest[span]:.2f} m below the {below} wire in span "

@@ -8,7 +8,6 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from catenary.cases.scene.input.faults import Fault, shown
-from catenary.cases.scene.keys.error_sentences import refusal
 from catenary.cases.scene.line.line_data import hanging_table
 from catenary.solver.effects import all_effects as effects
 from catenary.solver.effects.effect import Limit
@@ -18,9 +17,7 @@ if TYPE_CHECKING:
 
 
 # Effects that are off by default and need a value in the scene: the key that holds it.
-_DATA_OF = {
-    "residual_dropper_stiffness": "line.dropper.residual_stiffness_ratio",
-}
+_DATA_OF = {"residual_dropper_stiffness": "line.dropper.residual_stiffness_ratio"}
 
 
 def check_effect_names(scene: Scene) -> Iterator[Fault]:
@@ -33,11 +30,11 @@ def check_effect_names(scene: Scene) -> Iterator[Fault]:
             hint = f"did you mean effects.{near[0]}?" if near else f"known are {', '.join(known)}"
             yield Fault(key, f"{shown(key)[1:-1]} {scene.origin.of(key)} is unknown; {hint}")
         elif known[name].always and not on:
-            yield refusal(scene.origin, key, on, "it is part of every scene and cannot be left out")
+            yield scene.refused(key, on, "it is part of every scene and cannot be left out")
 
 
 def check_requirements_of_chosen(scene: Scene) -> Iterator[Fault]:
-    """Effects that the scene names without those that they require."""
+    """Effects that the scene switches on without the effects that they require."""
     for name in scene.effects:
         yield from _requirements(scene, name, "on", f"effects.{name}")
 
@@ -46,7 +43,7 @@ def check_chosen_act(scene: Scene) -> Iterator[Fault]:
     """Effects that the scene switches on without anything for them to act on.
 
     One that lifts a limit is a permission, of which a scene need not make use. In a calm, such as
-    one of the variants of a sweep, those of the wind may stay on.
+    a variant of a sweep, effects of the wind may stay on.
     """
     from catenary.cases.scene.problem import problem_of
 
@@ -60,7 +57,7 @@ def check_chosen_act(scene: Scene) -> Iterator[Fault]:
         if needs and not effect.applies(problem()):
             lacking = f"it acts only with {effect.data}; give that, or leave the effect out"
             why = effect.instead(problem()) or lacking
-            yield refusal(scene.origin, f"effects.{name}", True, why)
+            yield scene.refused(f"effects.{name}", True, why)
 
 
 def _calmed(scene: Scene) -> set[str]:
@@ -99,30 +96,18 @@ def _requirements(scene: Scene, name: str, how: str, key: str) -> Iterator[Fault
 def check_effect_data(scene: Scene) -> Iterator[Fault]:
     """Effects without the value that they need, and values without their effect."""
     hung = hanging_table(scene.line)
-    values = {
-        "residual_dropper_stiffness": 0.0 if hung is None else hung.residual_stiffness_ratio,
-    }
+    values = {"residual_dropper_stiffness": 0.0 if hung is None else hung.residual_stiffness_ratio}
     switches = scene.switches()
     for name, value in values.items():
         key = _DATA_OF[name]
         if switches.get(name) and value == 0:
-            yield refusal(
-                scene.origin, key, value, f"effects.{name} is on and needs a value greater than 0"
+            yield scene.refused(
+                key, value, f"effects.{name} is on and needs a value greater than 0"
             )
         if value > 0 and name not in scene.effects and switches.get(name) is False:
-            yield refusal(
-                scene.origin,
-                key,
-                value,
-                f"it acts only with effects.{name} = true; write that, or false to leave it out",
-            )
+            yield scene.needs_effect(key, value, name)
     n = len(scene.train.pantographs)
     if n > 1 and scene.holds(Limit.ONE_PANTOGRAPH):
         key = "effects.several_pantographs"
         why = f"train.pantographs has {n} entries; leave one or switch it on"
-        yield refusal(
-            scene.origin,
-            key,
-            False,
-            why,
-        )
+        yield scene.refused(key, False, why)

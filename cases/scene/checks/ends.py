@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from catenary.cases.scene.input.faults import Fault
-from catenary.cases.scene.keys.error_sentences import refusal
 from catenary.cases.scene.run.incidents import DropperBreakTable, TensionLossTable
 from catenary.meshgen.topologies.line_data import LineData
 
@@ -33,7 +32,7 @@ def _goes_on(scene: Scene, line: LineData, side: str) -> Iterator[Fault]:
     key = f"line.ends.{side}.kind"
 
     def refused(why: str) -> Fault:
-        return refusal(scene.origin, key, "periodic", why)
+        return scene.refused(key, "periodic", why)
 
     numerics, n = scene.numerics, line.n_spans
     if numerics.scheme == "ts_alpha2":
@@ -83,9 +82,7 @@ def _layers(scene: Scene, line: LineData) -> Iterator[Fault]:
             continue
         key = f"line.ends.{side}.spans"
         if end.spans >= n:
-            yield refusal(
-                scene.origin, key, end.spans, f"the line has {n} spans (line.n_spans) with it"
-            )
+            yield scene.refused(key, end.spans, f"the line has {n} spans (line.n_spans) with it")
             continue
         inner = float(masts[end.spans] if side == "start" else masts[n - end.spans])
         reaches = stretch.from_m < inner if side == "start" else stretch.to_m > inner
@@ -95,8 +92,7 @@ def _layers(scene: Scene, line: LineData) -> Iterator[Fault]:
                 if side == "start"
                 else f"evaluation.to_m = {stretch.to_m:g}"
             )
-            yield refusal(
-                scene.origin,
+            yield scene.refused(
                 key,
                 end.spans,
                 f"the absorbing layer reaches to {inner:g} m, into the evaluated stretch "

@@ -11,7 +11,6 @@ import numpy as np
 from catenary.base.errors import InputError
 from catenary.cases.scene.checks.droppers import droppers_inside
 from catenary.cases.scene.input.faults import Fault
-from catenary.cases.scene.keys.error_sentences import refusal
 from catenary.cases.scene.line.free import (
     FreeArmsTable,
     FreeClampsTable,
@@ -57,18 +56,16 @@ def check_free_tables(scene: Scene) -> Iterator[Fault]:
             yield Fault(f"line.{key}", f"line.{key} {scene.origin.of(f'line.{key}')} {why}")
     if scene.line.overlap is not None:
         key = "line.overlap"
-        yield Fault(
+        yield scene.fault(
             key,
-            f"{key} {scene.origin.of(key)} is no part of the topology free; leave it out, and give "
+            "is no part of the topology free; leave it out, and give "
             "the wires of both sections stretches_m in line.wires",
         )
     yield from _names(scene)
     wires = {wire.name: wire for wire in scene.line.wires or []}
     if not any(wire.role == "contact" for wire in wires.values()):
         key = "line.wires"
-        yield Fault(
-            key, f"{key} {scene.origin.of(key)} has no wire of the role contact to run under"
-        )
+        yield scene.fault(key, "has no wire of the role contact to run under")
     for i, wire in enumerate(scene.line.wires or []):
         yield from _wire(scene, f"line.wires.{i}", wire, wires)
     for i, link in enumerate(scene.line.links or []):
@@ -80,7 +77,7 @@ def check_free_tables(scene: Scene) -> Iterator[Fault]:
                 yield from _known(scene, f"{key}.{end}", name, wires)
         if isinstance(link, FreeDroppersTable | FreeClampsTable) and link.upper == link.lower:
             why = "a link joins two wires, and lower is this one too"
-            yield refusal(scene.origin, f"{key}.upper", link.upper, why)
+            yield scene.refused(f"{key}.upper", link.upper, why)
         yield from _numbers(scene, key, link)
     yield from _circles(scene)
     yield from _lifted(scene)
@@ -95,15 +92,15 @@ def _names(scene: Scene) -> Iterator[Fault]:
     for key, name in [*entries, *links]:
         if name in TAKEN and key.startswith("line.wires"):
             why = "this name means something else; take another one"
-            yield refusal(scene.origin, f"{key}.name", name, why)
+            yield scene.refused(f"{key}.name", name, why)
         if name in seen:
             why = f"{seen[name]} has this name too; each wire and each link needs one of its own"
-            yield refusal(scene.origin, f"{key}.name", name, why)
+            yield scene.refused(f"{key}.name", name, why)
         seen.setdefault(name, key)
     for _, name in entries:
         if f"{name}_clamps" in seen:
             why = f"the clamps at the ends of {name} have this name"
-            yield refusal(scene.origin, f"{seen[f'{name}_clamps']}.name", f"{name}_clamps", why)
+            yield scene.refused(f"{seen[f'{name}_clamps']}.name", f"{name}_clamps", why)
 
 
 def _known(scene: Scene, key: str, name: str, wires: Iterable[str]) -> Iterator[Fault]:
@@ -111,7 +108,7 @@ def _known(scene: Scene, key: str, name: str, wires: Iterable[str]) -> Iterator[
         near = difflib.get_close_matches(name, list(wires), n=1)
         meant = f"did you mean {near[0]}? " if near else ""
         why = f"{meant}line.wires has {', '.join(wires)}"
-        yield refusal(scene.origin, key, name, why)
+        yield scene.refused(key, name, why)
 
 
 def _wire(
@@ -130,23 +127,23 @@ def _wire(
     beyond = [number for number in table.supports or [] if number > n]
     if beyond:
         why = f"the line has the supports 0 to {n}"
-        yield refusal(scene.origin, f"{key}.supports", beyond[0], why)
+        yield scene.refused(f"{key}.supports", beyond[0], why)
         return
     which = "stretches_m" if table.stretches_m is not None else "from_supports_m"
     stretches = stretches_of(table, masts)
     if not stretches:
         why = "the line has no inner support"
-        yield refusal(scene.origin, f"{key}.{which}", table.from_supports_m, why)
+        yield scene.refused(f"{key}.{which}", table.from_supports_m, why)
         return
     if stretches[0][0] < -_TINY or stretches[-1][1] > length + _TINY:
         outside = stretches[0] if stretches[0][0] < -_TINY else stretches[-1]
         why = f"a piece would run from {outside[0]:g} to {outside[1]:g} m, and the line from 0 to"
-        yield refusal(scene.origin, f"{key}.{which}", given_of(table, which), f"{why} {length:g} m")
+        yield scene.refused(f"{key}.{which}", given_of(table, which), f"{why} {length:g} m")
         return
     for one, other in zip(stretches, stretches[1:], strict=False):
         if other[0] < one[1] + _TINY:
             why = f"pieces would overlap from {other[0]:g} to {one[1]:g} m"
-            yield refusal(scene.origin, f"{key}.{which}", given_of(table, which), why)
+            yield scene.refused(f"{key}.{which}", given_of(table, which), why)
             return
     for side in ("start", "end"):
         yield from _end(scene, f"{key}.{side}", table, getattr(table, side), wires)
@@ -161,7 +158,7 @@ def _wire(
 
 
 def given_of(table: FreeWireTable, key: str) -> object:
-    """What a table says under a key."""
+    """The value of a key of a table."""
     return getattr(table, key)
 
 
@@ -171,19 +168,19 @@ def _end(
     if given is None or given in (TENSIONER, FIXED):
         return
     if given == table.name:
-        yield refusal(scene.origin, key, given, "a wire cannot be clamped to itself")
+        yield scene.refused(key, given, "a wire cannot be clamped to itself")
     elif given not in wires:
         near = difflib.get_close_matches(given, [*wires, TENSIONER, FIXED], n=1)
         meant = f"did you mean {near[0]}? " if near else ""
         why = f"{meant}it must be {TENSIONER}, {FIXED} or a wire of {', '.join(wires)}"
-        yield refusal(scene.origin, key, given, why)
+        yield scene.refused(key, given, why)
     elif {table.start, table.end} <= wires.keys() and table.start != table.end:
         if key.endswith("end"):
             why = (
                 f"it starts on {table.start}: both ends must be clamped to one wire, or one be "
                 f"{TENSIONER} or {FIXED}, for it to be known whose tension the wire takes"
             )
-            yield refusal(scene.origin, key, given, why)
+            yield scene.refused(key, given, why)
 
 
 def _numbers(
@@ -196,8 +193,8 @@ def _numbers(
     for name, first, what in (("spans", 1, "spans"), ("supports", 0, "supports")):
         beyond = [number for number in getattr(link, name, None) or [] if number > n]
         if beyond:
-            yield refusal(
-                scene.origin, f"{key}.{name}", beyond[0], f"the line has the {what} {first} to {n}"
+            yield scene.refused(
+                f"{key}.{name}", beyond[0], f"the line has the {what} {first} to {n}"
             )
 
 
@@ -219,7 +216,7 @@ def _circles(scene: Scene) -> Iterator[Fault]:
         try:
             in_order(after.items())
         except InputError as circle:
-            yield Fault(key, f"{key} {scene.origin.of(key)} has wires {what} each other: {circle}")
+            yield scene.fault(key, f"has wires {what} each other: {circle}")
 
 
 def _lifted(scene: Scene) -> Iterator[Fault]:
@@ -240,7 +237,7 @@ def _lifted(scene: Scene) -> Iterator[Fault]:
                 f"no clamp joins it to {link.wire}, which the supports carry, and droppers are cut "
                 f"for its height: it must be one of {', '.join(sorted(moved))}"
             )
-            yield refusal(scene.origin, f"line.links.{i}.holds", link.holds, why)
+            yield scene.refused(f"line.links.{i}.holds", link.holds, why)
 
 
 def _slack(scene: Scene) -> Iterator[Fault]:
@@ -255,7 +252,7 @@ def _slack(scene: Scene) -> Iterator[Fault]:
             first = getattr(links[0][1], name)
             if getattr(link, name) != first:
                 why = f"it must be the {first} of line.links.{links[0][0]}, as for all droppers"
-                yield refusal(scene.origin, f"line.links.{i}.{name}", getattr(link, name), why)
+                yield scene.refused(f"line.links.{i}.{name}", getattr(link, name), why)
 
 
 def _many(scene: Scene) -> Iterator[Fault]:
@@ -358,7 +355,7 @@ def _on_wires(
             runs = ", ".join(f"{start:g} to {stop:g}" for start, stop in wire.stretches[:3])
             more = " and so on" if len(wire.stretches) > 3 else ""
             why = f"{wire.name} does not pass {out:g} m, only {runs} m{more}"
-            yield refusal(scene.origin, f"{key}.{end}", wire.name, why)
+            yield scene.refused(f"{key}.{end}", wire.name, why)
 
 
 def _clamped_on(
@@ -368,7 +365,7 @@ def _clamped_on(
         out = [] if not name else [s[end] for s in wire.stretches if not wires[name].passes(s[end])]
         if out:
             why = f"{name} does not pass {out[0]:g} m, where this wire would be clamped to it"
-            yield refusal(scene.origin, f"{key}.{('start', 'end')[end]}", name, why)
+            yield scene.refused(f"{key}.{('start', 'end')[end]}", name, why)
 
 
 def _heights(scene: Scene, key: str, wire: FreeWire, line: LineData) -> Iterator[Fault]:
@@ -404,7 +401,7 @@ def _twice(scene: Scene, line: LineData) -> Iterator[Fault]:
             j = seen.setdefault((link.lower, round(x / SHORTEST_GAP)), i)
             if j != i:
                 why = f"line.links.{j} has a dropper of {link.lower} at {x:g} m already"
-                yield refusal(scene.origin, f"line.links.{i}.lower", link.lower, why)
+                yield scene.refused(f"line.links.{i}.lower", link.lower, why)
                 return
 
 
@@ -421,12 +418,12 @@ def _carried(scene: Scene, key: str, wire: FreeWire, line: LineData) -> Iterator
                 f"it hangs on nothing from {a:g} to {b:g} m, and the longest span is {longest:g} "
                 "m: give it droppers, clamps or supports there"
             )
-            yield refusal(scene.origin, f"{key}.name", wire.name, why)
+            yield scene.refused(f"{key}.name", wire.name, why)
             return
 
 
 def _left(scene: Scene, key: str, wire: FreeWire, line: LineData) -> Iterator[Fault]:
-    """Wires whose tension is taken by those that are clamped to them."""
+    """Wires whose whole tension the wires clamped to them take."""
     assert line.wires is not None
     takers = [other for other in line.wires if wire.name in other.bearers]
     starts = sorted({s[0] for other in takers for s in other.stretches})
@@ -438,7 +435,7 @@ def _left(scene: Scene, key: str, wire: FreeWire, line: LineData) -> Iterator[Fa
                 f"it must be more than the {taken:g} N that {' and '.join(o.name for o in own)} "
                 f"take of it at {x:g} m"
             )
-            yield refusal(scene.origin, f"{key}.tension_N", wire.conductor.tension, why)
+            yield scene.refused(f"{key}.tension_N", wire.conductor.tension, why)
             return
 
 
@@ -458,5 +455,5 @@ def _crossing(scene: Scene, line: LineData) -> Iterator[Fault]:
                 f"{link.lower}, which hangs from it: raise its height_m or its tension_N, or let "
                 "the other wire hang lower"
             )
-            yield refusal(scene.origin, f"line.links.{i}.upper", link.upper, why)
+            yield scene.refused(f"line.links.{i}.upper", link.upper, why)
             return

@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from catenary.cases.scene.input.faults import Fault
-from catenary.cases.scene.keys.error_sentences import refusal
 from catenary.cases.scene.keys.table import TAKE_AWAY
 from catenary.cases.scene.line.droppers import FEWEST_SAGGING
 from catenary.cases.scene.line.line_data import arm_tables, dropper_tables
@@ -39,7 +38,7 @@ def _arms(scene: Scene) -> Iterator[Fault]:
     for key, arm in arm_tables(scene.line).items():
         if arm.mass_kg_per_m and not arm.length_m and scene.effects.get("arm_inertia") is not False:
             why = f"an arm of length 0 has no mass by it: give {key}.length_m, or clamp_kg alone"
-            yield refusal(scene.origin, f"{key}.mass_kg_per_m", arm.mass_kg_per_m, why + TAKE_AWAY)
+            yield scene.refused(f"{key}.mass_kg_per_m", arm.mass_kg_per_m, why + TAKE_AWAY)
 
 
 def _clamps(scene: Scene) -> Iterator[Fault]:
@@ -55,7 +54,7 @@ def _clamps(scene: Scene) -> Iterator[Fault]:
                     f"{wire.name} has no clamp: neither start nor end names a wire to which it is "
                     f"clamped{TAKE_AWAY}"
                 )
-                yield refusal(scene.origin, f"line.wires.{i}.{name}", getattr(wire, name), why)
+                yield scene.refused(f"line.wires.{i}.{name}", getattr(wire, name), why)
 
 
 def _lateral_places(scene: Scene) -> Iterator[Fault]:
@@ -84,7 +83,7 @@ def _lateral_places(scene: Scene) -> Iterator[Fault]:
             continue
         for name in set(idle) & wire.model_fields_set:
             given = getattr(wire, name)
-            yield refusal(scene.origin, f"line.wires.{i}.{name}", given, why + TAKE_AWAY)
+            yield scene.refused(f"line.wires.{i}.{name}", given, why + TAKE_AWAY)
 
 
 def _dropper_lengths(scene: Scene, line: LineData) -> Iterator[Fault]:
@@ -92,9 +91,9 @@ def _dropper_lengths(scene: Scene, line: LineData) -> Iterator[Fault]:
     given = scene.irregularities.dropper_lengths is not None
     if given and scene.effects.get(name) is not False and not make_line(line).droppers:
         key = f"irregularities.{name}"
-        yield Fault(
+        yield scene.fault(
             key,
-            f"{key} {scene.origin.of(key)} changes nothing: the line has no droppers; leave it "
+            f"changes nothing: the line has no droppers; leave it "
             f"out, or write effects.{name} = false",
         )
 
@@ -113,7 +112,7 @@ def _sagging(scene: Scene) -> Iterator[Fault]:
                 f"there is none: spans have {counted(most, 'dropper')}"
             )
             at = f"{key}.pre_sag_mid_mm"
-            yield refusal(scene.origin, at, table.pre_sag_mid_mm, why + TAKE_AWAY)
+            yield scene.refused(at, table.pre_sag_mid_mm, why + TAKE_AWAY)
 
 
 # What says how irregularities are drawn at random.
@@ -128,7 +127,7 @@ def _random(scene: Scene) -> Iterator[Fault]:
             if part in table.model_fields_set:
                 key = f"irregularities.{name}.{part}"
                 why = f"nothing is random without irregularities.{name}.standard_deviation_mm"
-                yield refusal(scene.origin, key, getattr(table, part), why + TAKE_AWAY)
+                yield scene.refused(key, getattr(table, part), why + TAKE_AWAY)
 
 
 def _further_overlaps(scene: Scene, line: LineData) -> Iterator[Fault]:
@@ -143,4 +142,4 @@ def _further_overlaps(scene: Scene, line: LineData) -> Iterator[Fault]:
             f"which one may begin is {last}"
         )
         key = "line.overlap.repeat_every_spans"
-        yield refusal(scene.origin, key, table.repeat_every_spans, why + TAKE_AWAY)
+        yield scene.refused(key, table.repeat_every_spans, why + TAKE_AWAY)

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 from catenary.cases.scene.checks.pantographs import reaches_below
 from catenary.cases.scene.input.faults import Fault
-from catenary.cases.scene.keys.error_sentences import refusal
 from catenary.cases.scene.problem import end_of
 from catenary.cases.scene.run.incidents import (
     DropperBreakTable,
@@ -51,7 +50,7 @@ def check_incidents(scene: Scene, line: LineData) -> Iterator[Fault]:
 
 
 def _what(scene: Scene, table: IncidentTable) -> tuple[str, tuple[object, ...]]:
-    """What cannot happen twice, after the key that would have to differ."""
+    """The key that would have to differ, and the event that cannot happen twice."""
     if isinstance(table, DropperBreakTable):
         return "dropper", ("dropper", table.span, table.dropper)
     if isinstance(table, TensionLossTable):
@@ -63,7 +62,7 @@ def _what(scene: Scene, table: IncidentTable) -> tuple[str, tuple[object, ...]]:
 def _tensions_fall(scene: Scene) -> Iterator[Fault]:
     """Losses of tension that would give a wire back some of it, or change nothing.
 
-    Shares are those of the first tension, which is easily taken for the one before.
+    Shares are of the tension at the start, which is easily taken for the tension before.
     """
     latest: dict[str, int] = {}
     losses = [
@@ -85,7 +84,7 @@ def _tensions_fall(scene: Scene) -> Iterator[Fault]:
 
 
 def _refusal(scene: Scene, i: int, key: str, value: object, why: str) -> Fault:
-    return refusal(scene.origin, f"incidents.{i}.{key}", value, why)
+    return scene.refused(f"incidents.{i}.{key}", value, why)
 
 
 def _time(scene: Scene, i: int, table: IncidentTable, duration: float) -> Iterator[Fault]:

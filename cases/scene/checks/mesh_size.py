@@ -45,7 +45,7 @@ class Size(NamedTuple):
     by_pieces: bool = False
 
     def sentence(self) -> str:
-        """What it is and what it takes, in one sentence."""
+        """Size, time of the start and memory in one sentence."""
         memory = estimate_memory(self.unknowns, by_pieces=self.by_pieces)
         start = estimate_start(self.nodes, 0.0 if self.by_pieces else self.kinds / self.spans)
         return (
@@ -122,8 +122,8 @@ def kinds_by_number(table: LineTable) -> int:
 
 
 def _sample(scene: Scene, lengths: tuple[float, ...]) -> tuple[Line, np.ndarray]:
-    """A line of the first span, of one span of each length, of those of each kind of overlap, and
-    of the last span; how often each of these is in the line of the scene.
+    """A line of the first span, one span of each length, the spans of each kind of overlap, and the
+    last span; how often each of these is in the line of the scene.
 
     Raises
     ------

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from catenary.cases.scene.input.faults import Fault
-from catenary.cases.scene.keys.error_sentences import refusal
 from catenary.cases.scene.keys.table import TAKE_AWAY
 from catenary.cases.scene.line.free import FreeWireTable
 from catenary.cases.scene.line.line import LineTable
@@ -43,10 +42,7 @@ def check_lateral(scene: Scene) -> Iterator[Fault]:
     }
     for key, value in given.items():
         if value is not None and _ACROSS not in scene.effects:
-            why = (
-                f"it acts only with effects.{_ACROSS} = true; write that, or false to leave it out"
-            )
-            yield refusal(scene.origin, key, value, why)
+            yield scene.needs_effect(key, value, _ACROSS)
 
 
 _ALONG = "axial_motion"
@@ -64,8 +60,7 @@ def check_along(scene: Scene, line: LineData) -> Iterator[Fault]:
     on = scene.switches()[_ALONG]
     if not on and _ALONG not in scene.effects:
         for key, value in _data_of_effect(scene).items():
-            why = f"it acts only with effects.{_ALONG} = true; write that, or false to leave it out"
-            yield refusal(scene.origin, key, value, why)
+            yield scene.needs_effect(key, value, _ALONG)
     yield from _mid_points(scene, line)
     yield from _weights(scene, line)
     if not scene.origin.recorded:
@@ -109,7 +104,7 @@ def _ends_of_free_wires(table: LineTable) -> list[str]:
 
 
 def _idle_tensioners(scene: Scene) -> Iterator[Fault]:
-    """What is said of tensioners on a line without any, and of a stop that nothing reaches."""
+    """Keys of tensioners on a line that has none, and of a stop without a travel."""
     table = scene.line
     said = table.tensioner.model_fields_set
     if not said or scene.effects.get("tensioners") is False:
@@ -118,16 +113,16 @@ def _idle_tensioners(scene: Scene) -> Iterator[Fault]:
     ends += [] if table.overlap is None else [table.overlap.along]
     if TENSIONER not in ends and not _ends_of_free_wires(table):
         key = "line.tensioner"
-        yield Fault(
+        yield scene.fault(
             key,
-            f"{key} {scene.origin.of(key)} has {', '.join(sorted(said))}, but no wire ends at a "
+            f"has {', '.join(sorted(said))}, but no wire ends at a "
             "tensioner: line.ends.start.along or line.ends.end.along must be tensioner"
             + (", or start or end of a wire of line.wires" if table.wires else ""),
         )
     elif "stop_stiffness_N_per_m" in said and table.tensioner.travel_m is None:
         key, value = "line.tensioner.stop_stiffness_N_per_m", table.tensioner.stop_stiffness_N_per_m
         why = "it acts only with line.tensioner.travel_m, where the stop stands"
-        yield refusal(scene.origin, key, value, why)
+        yield scene.refused(key, value, why)
 
 
 def _wires(scene: Scene) -> Iterator[Fault]:
@@ -148,8 +143,7 @@ def _arms(scene: Scene, line: LineData) -> Iterator[Fault]:
     keys = {getattr(table, "name", ""): key for key, table in arm_tables(scene.line).items()}
     for arms in made.steady_arms:
         if arms.kind.length == 0 and made.wire(arms.wire).radial_force(np.array(arms.x)).any():
-            yield refusal(
-                scene.origin,
+            yield scene.refused(
                 f"{keys.get(arms.name, _ARM)}.length_m",
                 0.0,
                 f"effects.{_ALONG} is on, and an arm that carries the radial force of its wire's "
@@ -169,8 +163,7 @@ def _held(scene: Scene, line: LineData) -> Iterator[Fault]:
     keys = [*["line.overlap.along"] * between, "line.ends.end.along"]
     for (start, end), both, key in zip(sections, pairwise(tensioned), keys, strict=True):
         if all(both) and not any(start < x < end for x in along.mid_points):
-            yield refusal(
-                scene.origin,
+            yield scene.refused(
                 key,
                 TENSIONER,
                 f"the wires from {start:g} to {end:g} m would have tensioners at both ends and "
@@ -196,7 +189,7 @@ def _held_free(scene: Scene, line: LineData) -> Iterator[Fault]:
                     "hold one end (fixed)"
                 )
                 key = f"line.wires.{i}.{'start' if wire.tensioned[0] else 'end'}"
-                yield refusal(scene.origin, key, TENSIONER, why)
+                yield scene.refused(key, TENSIONER, why)
                 break
 
 
@@ -206,7 +199,7 @@ def _mid_points(scene: Scene, line: LineData) -> Iterator[Fault]:
         if masts.size == 0 or np.abs(masts - x).min() > _AT_MAST:
             near = f", such as {masts[np.abs(masts - x).argmin()]:g} m" if masts.size else ""
             why = f"a mid-point anchor stands at a mast between two spans{near}"
-            yield refusal(scene.origin, f"line.mid_points_m.{i}", x, why)
+            yield scene.refused(f"line.mid_points_m.{i}", x, why)
 
 
 def _weights(scene: Scene, line: LineData) -> Iterator[Fault]:
@@ -220,19 +213,18 @@ def _weights(scene: Scene, line: LineData) -> Iterator[Fault]:
     for name, mass in tensioner.weights.items():
         key = f"line.tensioner.weights_kg.{name}"
         if name not in wires:
-            yield refusal(scene.origin, key, mass, f"the line has {', '.join(wires)}")
+            yield scene.refused(key, mass, f"the line has {', '.join(wires)}")
             continue
         if tensioned and name not in tensioned and not scene.origin.recorded:
             why = f"no end of this wire has a tensioner, only those of {', '.join(tensioned)}"
-            yield refusal(scene.origin, key, mass, why + TAKE_AWAY)
+            yield scene.refused(key, mass, why + TAKE_AWAY)
             continue
         tension = wires[name].tension
         low, high = tensioner.band(name, wires[name], _GRAVITY)
         if not low * (1 - _FITS) <= tension <= high * (1 + _FITS):
             fits = tension / (tensioner.ratio * _GRAVITY)
             holds = f"{low:g} N" if low == high else f"{low:g} to {high:g} N"
-            yield refusal(
-                scene.origin,
+            yield scene.refused(
                 key,
                 mass,
                 f"it would hold {holds} by line.tensioner.ratio and efficiency, but "
@@ -251,19 +243,17 @@ def _has_tensioner(wire: Wire, along: AlongTrack, line: LineData) -> bool:
 
 
 def _elsewhere(scene: Scene) -> Iterator[Fault]:
-    """What the motion along the track does not go with."""
+    """Ends and windows that exclude motion along the track."""
     for side, end in (("start", scene.line.ends.start), ("end", scene.line.ends.end)):
         if end.kind == "periodic":
-            yield refusal(
-                scene.origin,
+            yield scene.refused(
                 f"line.ends.{side}.kind",
                 "periodic",
                 f"with effects.{_ALONG} a line ends fixed or in an absorbing_layer: waves along "
                 "the track would go on beyond the end for ever",
             )
     if scene.window.mode == "bounded" and scene.window.tolerance is None:
-        yield refusal(
-            scene.origin,
+        yield scene.refused(
             "window.mode",
             "bounded",
             f"with effects.{_ALONG} waves along the track run far ahead of a window of some "

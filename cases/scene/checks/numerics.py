@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from catenary.cases.scene.input.faults import Fault
-from catenary.cases.scene.keys.error_sentences import refusal
 from catenary.cases.scene.keys.table import TAKE_AWAY
 from catenary.cases.scene.problem import problem_of
 from catenary.cases.scene.run.contact import HERTZ, WITH_RESTITUTION
@@ -19,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def check_contact(scene: Scene) -> Iterator[Fault]:
-    """What contradicts itself about contact."""
+    """Contradictions of contact law, effects and numerics."""
     yield from _damping(scene)
     yield from _loss(scene)
     yield from _kinematic(scene)
@@ -38,8 +37,7 @@ def _damping(scene: Scene) -> Iterator[Fault]:
         acts = value < 1
     else:
         if on:
-            yield refusal(
-                scene.origin,
+            yield scene.refused(
                 "effects.contact_damping",
                 True,
                 f"contact.law {law} has no damping; leave it out or take another law",
@@ -48,21 +46,14 @@ def _damping(scene: Scene) -> Iterator[Fault]:
     key = f"contact.{key}"
     if on and not acts:
         why = f"effects.contact_damping is on and needs a value {dissipates}"
-        yield refusal(scene.origin, key, value, why)
+        yield scene.refused(key, value, why)
     if acts and not on and not said:
-        yield refusal(
-            scene.origin,
-            key,
-            value,
-            "it acts only with effects.contact_damping = true; write that, or false to leave it "
-            "out",
-        )
+        yield scene.needs_effect(key, value, "contact_damping")
 
 
 def _loss(scene: Scene) -> Iterator[Fault]:
     if scene.contact.law in HERTZ and not scene.switches()["contact_loss"]:
-        yield refusal(
-            scene.origin,
+        yield scene.refused(
             "effects.contact_loss",
             False,
             f"contact.law {scene.contact.law} has no force that pulls; take law linear",
@@ -83,37 +74,32 @@ def _kinematic(scene: Scene) -> Iterator[Fault]:
         ("coupling", numerics.coupling or "implicit", "implicit"),
     ):
         if value != needed:
-            yield refusal(
-                scene.origin,
+            yield scene.refused(
                 f"numerics.{key}",
                 value,
                 f"contact.law kinematic has no force before the motion is known: take {needed}",
             )
     if numerics.adaptive_tolerance_N is not None:
-        yield refusal(
-            scene.origin,
+        yield scene.refused(
             "numerics.adaptive_tolerance_N",
             numerics.adaptive_tolerance_N,
             "contact.law kinematic has no stiffness to estimate an error with: take another law",
         )
     if scene.train.start_below_m:
-        yield refusal(
-            scene.origin,
+        yield scene.refused(
             "train.start_below_m",
             scene.train.start_below_m,
             "contact.law kinematic has no gap that a head could rise through: take another law",
         )
     if numerics.integrator != NEWMARK:
-        yield refusal(
-            scene.origin,
+        yield scene.refused(
             "numerics.integrator",
             numerics.integrator,
             "contact.law kinematic keeps line and pantographs together only if one method steps "
             f"both: take newmark, with numerics.newmark_gamma of at least {KINEMATIC_GAMMA:g}",
         )
     if numerics.newmark_gamma < KINEMATIC_GAMMA:
-        yield refusal(
-            scene.origin,
+        yield scene.refused(
             "numerics.newmark_gamma",
             numerics.newmark_gamma,
             f"contact.law kinematic needs at least {KINEMATIC_GAMMA:g}, with "
@@ -122,7 +108,7 @@ def _kinematic(scene: Scene) -> Iterator[Fault]:
 
 
 def check_scheme(scene: Scene) -> Iterator[Fault]:
-    """What a scene's scheme cannot simulate.
+    """Parts of a scene that its scheme cannot simulate.
 
     The names of its pantographs must be known.
     """
@@ -130,7 +116,7 @@ def check_scheme(scene: Scene) -> Iterator[Fault]:
         return
     knows = "numerics.scheme ts_alpha2 knows only"
     if scene.contact.law != "linear":
-        yield refusal(scene.origin, "contact.law", scene.contact.law, f"{knows} law linear")
+        yield scene.refused("contact.law", scene.contact.law, f"{knows} law linear")
     for key in ("twin", "overlap"):
         if getattr(scene.line, key) is not None:
             why = f"{knows} one contact wire: take one_solve or fixed_point"
@@ -139,18 +125,17 @@ def check_scheme(scene: Scene) -> Iterator[Fault]:
     for i, incident in enumerate(scene.incidents):
         if switches[incident.type]:
             why = f"{knows} lines and pantographs that stay what they are"
-            yield refusal(scene.origin, f"incidents.{i}.type", incident.type, why)
+            yield scene.refused(f"incidents.{i}.type", incident.type, why)
     for i, defect in enumerate(scene.defects):
         if defect.type == "kink" and switches["kink"]:
-            yield refusal(scene.origin, f"defects.{i}.type", defect.type, f"{knows} smooth wires")
+            yield scene.refused(f"defects.{i}.type", defect.type, f"{knows} smooth wires")
     if scene.irregularities.running_surface is not None and switches["running_surface"]:
         key = "irregularities.running_surface"
         why = f"{knows} smooth wires: write effects.running_surface = false"
-        yield Fault(key, f"{key} {scene.origin.of(key)} is not smooth; {why}")
+        yield scene.fault(key, f"is not smooth; {why}")
     for name in ("head_roll", "vehicle_motion"):
         if switches[name]:
-            yield refusal(
-                scene.origin,
+            yield scene.refused(
                 f"effects.{name}",
                 True,
                 f"{knows} heads and bases that move along a vertical: switch it off",
@@ -159,24 +144,21 @@ def check_scheme(scene: Scene) -> Iterator[Fault]:
         table = scene.pantographs[name]
         if not isinstance(table, LumpedTable):
             key = f"pantographs.{name}.type"
-            yield refusal(scene.origin, key, table.type, f"{knows} type lumped")
+            yield scene.refused(key, table.type, f"{knows} type lumped")
             continue
         switches_of = {"laws": "pantograph_laws", "regulation": "regulated_lift"}
         for part, effect in switches_of.items():
             if getattr(table, part) and switches[effect]:
                 key = f"pantographs.{name}.{part}"
                 why = f"{knows} linear pantographs: write effects.{effect} = false"
-                yield Fault(key, f"{key} {scene.origin.of(key)} is not linear; {why}")
+                yield scene.fault(key, f"is not linear; {why}")
         key = f"pantographs.{name}.strips"
         if table.strips.number != 1:
-            yield refusal(scene.origin, f"{key}.number", table.strips.number, f"{knows} one strip")
+            yield scene.refused(f"{key}.number", table.strips.number, f"{knows} one strip")
         if table.strips.stiffness_N_per_m is not None:
             value = table.strips.stiffness_N_per_m
-            yield refusal(
-                scene.origin,
-                f"{key}.stiffness_N_per_m",
-                value,
-                f"{knows} strips that are fixed to the head",
+            yield scene.refused(
+                f"{key}.stiffness_N_per_m", value, f"{knows} strips that are fixed to the head"
             )
 
 
@@ -206,9 +188,7 @@ def check_iterations(scene: Scene) -> Iterator[Fault]:
         if name in numerics.model_fields_set and not any(made[reader] for reader in readers):
             needed = " or ".join(f"numerics.{reader}" for reader in readers)
             why = f"nothing reads it with scheme {scheme}; take {needed}, or leave the key out"
-            yield refusal(
-                scene.origin, f"numerics.{name}", getattr(numerics, name), why + TAKE_AWAY
-            )
+            yield scene.refused(f"numerics.{name}", getattr(numerics, name), why + TAKE_AWAY)
 
 
 def check_window(scene: Scene) -> Iterator[Fault]:
@@ -217,4 +197,4 @@ def check_window(scene: Scene) -> Iterator[Fault]:
         return
     why = why_no_window(problem_of(scene))
     if why:
-        yield refusal(scene.origin, "window.mode", scene.window.mode, f"it must be off, as {why}")
+        yield scene.refused("window.mode", scene.window.mode, f"it must be off, as {why}")

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 from catenary.base.errors import InputError, RunBroken
 from catenary.cases.scene.input.faults import Fault, shown
-from catenary.cases.scene.keys.error_sentences import refusal
 from catenary.cases.scene.train.mechanism import ActuatorTable
 from catenary.cases.scene.train.pantograph import LumpedTable, MultibodyTable, wanted_force
 from catenary.mbs.frame import SPACE
@@ -58,8 +57,7 @@ def _heights(scene: Scene, line: LineData) -> Iterator[Fault]:
         for height in heights:
             if _reaches(data, working + height - table.nominal_height_m):
                 continue
-            yield refusal(
-                scene.origin,
+            yield scene.refused(
                 f"pantographs.{name}.nominal_height_m",
                 table.nominal_height_m,
                 f"the contact wire hangs at {lowest:.4g} to {line.contact_height:.4g} m, where its "
@@ -189,7 +187,7 @@ def _mechanism(scene: Scene, name: str, table: MultibodyTable) -> Iterator[Fault
         _standing(scene, name, table)
     except (InputError, RunBroken) as error:
         key = f"pantographs.{name}"
-        yield Fault(key, f"{key} {scene.origin.of(key)} cannot be built: {error}")
+        yield scene.fault(key, f"cannot be built: {error}")
 
 
 def _refusal(scene: Scene, key: str, says: str, hint: str = "") -> Fault:
@@ -205,25 +203,20 @@ def check_laws(scene: Scene) -> Iterator[Fault]:
         for number, law in enumerate(table.laws):
             if law.at_mass is not None and law.at_mass > n:
                 has = f"{n} masses" if lumped else "2, the head and the arm"
-                yield refusal(
-                    scene.origin,
-                    f"{key}.laws.{number}.at_mass",
-                    law.at_mass,
-                    f"the pantograph has {has}",
+                yield scene.refused(
+                    f"{key}.laws.{number}.at_mass", law.at_mass, f"the pantograph has {has}"
                 )
         whole = not isinstance(table, LumpedTable) and table.motion == "all_bodies"
         for part, given in (("laws", table.laws), ("regulation", table.regulation)):
             if whole and given:
-                yield refusal(
-                    scene.origin,
+                yield scene.refused(
                     f"{key}.motion",
                     "all_bodies",
                     f"{key}.{part} acts on mechanisms that are reduced to tables only",
                 )
         regulation = table.regulation
         if regulation is not None and regulation.sample_s < scene.numerics.dt_s:
-            yield refusal(
-                scene.origin,
+            yield scene.refused(
                 f"{key}.regulation.sample_s",
                 regulation.sample_s,
                 f"a sample takes at least a step, numerics.dt_s = {scene.numerics.dt_s:g}",

@@ -47,7 +47,7 @@ from catenary.cases.scene.checks.topology import check_names, check_parts, check
 from catenary.cases.scene.checks.twins import check_twins
 from catenary.cases.scene.checks.vehicle import check_vehicle
 from catenary.cases.scene.input.faults import Fault, Origin, SceneError, UnfitScene
-from catenary.cases.scene.keys.error_sentences import refusal, unknown_key
+from catenary.cases.scene.keys.error_sentences import unknown_key
 from catenary.cases.scene.keys.keys import is_known, known_keys
 from catenary.cases.scene.keys.units import unit_of
 from catenary.cases.scene.keys.usual_values import USUAL, unit_guess
@@ -75,22 +75,22 @@ def check(scene: Scene) -> None:
 def faults_of(scene: Scene) -> list[Fault]:
     """All in which a scene contradicts itself."""
     found = _Findings()
-    whole = found.nothing_by(check_topology, scene)
+    whole = found.collect(check_topology, scene)
     for of_tables in _OF_TABLES:
-        found.nothing_by(of_tables, scene)
-    if found.nothing_by(_pantograph_names, scene):
-        found.nothing_by(check_pantographs, scene)
-        found.nothing_by(check_scheme, scene)
-        found.nothing_by(check_laws, scene)
+        found.collect(of_tables, scene)
+    if found.collect(_pantograph_names, scene):
+        found.collect(check_pantographs, scene)
+        found.collect(check_scheme, scene)
+        found.collect(check_laws, scene)
     # What is too large is not made, and what follows from a wrong unit is not reported.
-    sound = not whole or found.nothing_by(size_faults, scene)
-    sound = sound and found.nothing_by(usual_faults, scene)
+    sound = not whole or found.collect(size_faults, scene)
+    sound = sound and found.collect(usual_faults, scene)
     line = _line(scene, found) if sound and whole else None
     if line is None:
         return found.faults
-    if not found.nothing_by(check_parts, scene, line):
+    if not found.collect(check_parts, scene, line):
         return found.faults
-    if not found.nothing_by(check_names, scene, line):
+    if not found.collect(check_names, scene, line):
         return found.faults
     of_lines = (
         check_dropper_lengths,
@@ -103,35 +103,35 @@ def faults_of(scene: Scene) -> list[Fault]:
         check_idle,
     )
     for of_line in of_lines:
-        found.nothing_by(of_line, scene, line)
-    if found.nothing_by(_running, scene, line) and found.nothing_by(_evaluation, scene):
-        found.nothing_by(_raising, scene)
-        found.nothing_by(check_ends, scene, line)
-        found.nothing_by(check_along, scene, line)
+        found.collect(of_line, scene, line)
+    if found.collect(_running, scene, line) and found.collect(_evaluation, scene):
+        found.collect(_raising, scene)
+        found.collect(check_ends, scene, line)
+        found.collect(check_along, scene, line)
     if found.faults:
         return found.faults
     # What may need multibody systems stands last: other faults are reported at once.
-    if found.nothing_by(check_mechanisms, scene, line):
-        found.nothing_by(check_uplift, scene)
-        found.nothing_by(check_requirements_of_defaults, scene)
-        found.nothing_by(check_vehicle, scene, line)
-        if found.nothing_by(check_incidents, scene, line):
-            found.nothing_by(check_window, scene)
+    if found.collect(check_mechanisms, scene, line):
+        found.collect(check_uplift, scene)
+        found.collect(check_requirements_of_defaults, scene)
+        found.collect(check_vehicle, scene, line)
+        if found.collect(check_incidents, scene, line):
+            found.collect(check_window, scene)
     if not found.faults:
         # They ask the problem, which is made of a sound scene only.
-        found.nothing_by(check_chosen_act, scene)
-        found.nothing_by(check_twins, scene)
+        found.collect(check_chosen_act, scene)
+        found.collect(check_twins, scene)
     return found.faults
 
 
 @dataclass
 class _Findings:
-    """What checks have found so far."""
+    """Faults that checks have found so far."""
 
     faults: list[Fault] = field(default_factory=list)
 
-    def nothing_by(self, check: Callable[..., Iterator[Fault]], *of: Any) -> bool:
-        """Take in what a check finds; returns whether that is nothing."""
+    def collect(self, check: Callable[..., Iterator[Fault]], *of: Any) -> bool:
+        """Collect the faults that a check finds; True if there are none."""
         before = len(self.faults)
         try:
             self.faults.extend(check(*of))
@@ -151,11 +151,7 @@ def _line(scene: Scene, found: _Findings) -> LineData | None:
         yield from check_droppers_inside_spans(scene, lines[0])
         yield from check_free_droppers(scene, lines[0])
 
-    return lines[0] if found.nothing_by(make) else None
-
-
-def _refusal(scene: Scene, key: str, value: object, why: str) -> Fault:
-    return refusal(scene.origin, key, value, why)
+    return lines[0] if found.collect(make) else None
 
 
 def _test_keys(scene: Scene) -> Iterator[Fault]:
@@ -175,10 +171,9 @@ def _pantograph_names(scene: Scene) -> Iterator[Fault]:
                 if near
                 else f"it must be one of {', '.join(scene.pantographs)}"
             )
-            yield _refusal(scene, f"train.pantographs.{i}.name", place.name, hint)
+            yield scene.refused(f"train.pantographs.{i}.name", place.name, hint)
         elif place.reversed and not has_front(scene.pantographs[place.name]):
-            yield _refusal(
-                scene,
+            yield scene.refused(
                 f"train.pantographs.{i}.reversed",
                 True,
                 f"{place.name} is a chain of lumped masses, with no front but what "
@@ -190,14 +185,13 @@ def _separations(scene: Scene) -> Iterator[Fault]:
     behind = [place.behind_m for place in scene.train.pantographs]
     if behind[0] != 0:
         key = "train.pantographs.0.behind_m"
-        yield _refusal(scene, key, behind[0], "the first pantograph leads, so it must be 0")
+        yield scene.refused(key, behind[0], "the first pantograph leads, so it must be 0")
     ahead = strips_ahead(scene)
     for i in range(1, len(behind)):
         strips = ahead[i - 1] + ahead[i]
         if behind[i] < behind[i - 1] + MIN_SEPARATION + strips - _TINY:
             because = f", because its strips and that one's take {strips:g} m" if strips else ""
-            yield _refusal(
-                scene,
+            yield scene.refused(
                 f"train.pantographs.{i}.behind_m",
                 behind[i],
                 f"it must be at least {MIN_SEPARATION + strips:g} m more than the "
@@ -216,8 +210,7 @@ def _speed(scene: Scene, line: LineData) -> Iterator[Fault]:
     of = f"tension_N = {wire.tension:g} and mass_kg_per_m = {wire.mass_per_length:g}"
     if bends(wave, wire.tension, wire.mass_per_length):
         of = f"bending_stiffness_N_m2 = {wire.bending_stiffness:g}, {of} between its supports"
-    yield _refusal(
-        scene,
+    yield scene.refused(
         "train.speed_km_h",
         speed,
         f"it must be below the wave speed of the contact wire ({3.6 * wave:.1f} km/h, which "
@@ -235,10 +228,9 @@ def _running(scene: Scene, line: LineData) -> Iterator[Fault]:
     if any(ahead):
         inside += ", strips included"
     if not first - _TINY <= start <= last + _TINY:
-        yield _refusal(scene, "train.start_m", start, f"it must lie inside the line: {inside}")
+        yield scene.refused("train.start_m", start, f"it must lie inside the line: {inside}")
     if start - rear < first - _TINY:
-        yield _refusal(
-            scene,
+        yield scene.refused(
             "train.start_m",
             start,
             f"the pantograph {rear:g} m behind would start at {start - rear:g} m, outside the "
@@ -246,18 +238,16 @@ def _running(scene: Scene, line: LineData) -> Iterator[Fault]:
         )
     given = scene.train.end_m
     if given is not None and given > last + _TINY:
-        yield _refusal(scene, "train.end_m", given, f"it must lie inside the line: {inside}")
+        yield scene.refused("train.end_m", given, f"it must lie inside the line: {inside}")
     if end <= start:
         if given is None:
-            yield _refusal(
-                scene, "train.start_m", start, f"it must lie before the end at {end:g} m"
-            )
-        yield _refusal(
-            scene, "train.end_m", given, f"it must be greater than train.start_m ({start:g} m)"
+            yield scene.refused("train.start_m", start, f"it must lie before the end at {end:g} m")
+        yield scene.refused(
+            "train.end_m", given, f"it must be greater than train.start_m ({start:g} m)"
         )
     if end - start < scene.train.speed_km_h / 3.6 * scene.numerics.dt_s:
-        yield _refusal(
-            scene, "numerics.dt_s", scene.numerics.dt_s, "the run would have no step at all"
+        yield scene.refused(
+            "numerics.dt_s", scene.numerics.dt_s, "the run would have no step at all"
         )
 
 
@@ -268,16 +258,15 @@ def _evaluation(scene: Scene) -> Iterator[Fault]:
         who = "the pantograph" if len(scene.train.pantographs) == 1 else f"pantograph {i + 1}"
         covers = f"{who} only runs from {start - place.behind_m:g} to {end - place.behind_m:g} m"
         if stretch.from_m < start - place.behind_m - _TINY:
-            yield _refusal(scene, "evaluation.from_m", stretch.from_m, covers)
+            yield scene.refused("evaluation.from_m", stretch.from_m, covers)
         if stretch.to_m > end - place.behind_m + _TINY:
-            yield _refusal(scene, "evaluation.to_m", stretch.to_m, covers)
+            yield scene.refused("evaluation.to_m", stretch.to_m, covers)
 
 
 def _raising(scene: Scene) -> Iterator[Fault]:
     run = (scene.evaluation.from_m - scene.train.start_m) / (scene.train.speed_km_h / 3.6)
     if scene.train.raise_time_s > run + _TINY:
-        yield _refusal(
-            scene,
+        yield scene.refused(
             "train.raise_time_s",
             scene.train.raise_time_s,
             f"the leading pantograph reaches evaluation.from_m after {run:.3g} s and must be "
@@ -293,7 +282,7 @@ def _standard(scene: Scene) -> Iterator[Fault]:
         ("evaluation.system", scene.evaluation.system, SYSTEMS),
     ):
         if value not in known:
-            yield _refusal(scene, key, value, f"it must be one of {', '.join(known)}")
+            yield scene.refused(key, value, f"it must be one of {', '.join(known)}")
 
 
 def _mesh_file(scene: Scene) -> Iterator[Fault]:
@@ -305,7 +294,7 @@ def _mesh_file(scene: Scene) -> Iterator[Fault]:
     except (OSError, ValueError):
         found = False
     if not found:
-        yield _refusal(scene, "mesh.file", str(path), "there is no such file")
+        yield scene.refused("mesh.file", str(path), "there is no such file")
 
 
 def check_output(scene: Scene) -> Iterator[Fault]:
@@ -315,7 +304,7 @@ def check_output(scene: Scene) -> Iterator[Fault]:
         spans = getattr(output, key)
         if spans is not None and spans[1] > n:
             why = f"the line has the spans 1 to {n}"
-            yield refusal(scene.origin, f"output.{key}", spans, why)
+            yield scene.refused(f"output.{key}", spans, why)
 
 
 def check_recorded_parts(scene: Scene, line: LineData) -> Iterator[Fault]:
@@ -326,7 +315,7 @@ def check_recorded_parts(scene: Scene, line: LineData) -> Iterator[Fault]:
     for part in scene.output.field_parts:
         if part not in parts:
             why = f"this line has {', '.join(parts)}"
-            yield refusal(scene.origin, "output.field_parts", part, why)
+            yield scene.refused("output.field_parts", part, why)
 
 
 _MEANT = ", or case.accept_unusual = true if it is meant"
@@ -340,14 +329,15 @@ def usual_faults(scene: Scene) -> Iterator[Fault]:
     if scene.case.accept_unusual:
         return
     plain = scene.model_dump(exclude_none=True)
-    for pattern in USUAL:
+    ranges = [key for key, usual in USUAL.items() if usual.least is not None]
+    for pattern in ranges:
         yield from _faults(plain, pattern.split("."), "", scene.origin)
 
 
 def _faults(value: Any, parts: list[str], key: str, origin: Origin) -> Iterator[Fault]:
     if parts and isinstance(value, list):
         for i, entry in enumerate(value):
-            yield from _faults(entry, parts, f"{key}.{i}", origin)
+            yield from _faults(entry, parts[1:], f"{key}.{i}", origin)
         return
     if parts:
         inner = value if isinstance(value, dict) else {}

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 from catenary.cases.scene.checks.free import check_free_places, check_free_tables
 from catenary.cases.scene.input.faults import Fault
-from catenary.cases.scene.keys.error_sentences import refusal
 from catenary.cases.scene.line.line import LineTable
 from catenary.cases.scene.run.incidents import TensionLossTable
 from catenary.meshgen.topologies.all_topologies import make_line, registered
@@ -29,7 +28,7 @@ def check_topology(scene: Scene) -> Iterator[Fault]:
     if table.topology not in known:
         near = difflib.get_close_matches(table.topology, known, n=1)
         hint = f"did you mean {near[0]}?" if near else f"it must be one of {', '.join(known)}"
-        yield refusal(scene.origin, "line.topology", table.topology, hint)
+        yield scene.refused("line.topology", table.topology, hint)
         return
     needed = _keys(known[table.topology].parts)
     for name in needed:
@@ -43,9 +42,9 @@ def check_topology(scene: Scene) -> Iterator[Fault]:
         if getattr(table, name) is not None:
             key = f"line.{name}"
             users = [one for one, keys in takes.items() if name in keys]
-            yield Fault(
+            yield scene.fault(
                 key,
-                f"{key} {scene.origin.of(key)} is no part of the topology {table.topology}; leave "
+                f"is no part of the topology {table.topology}; leave "
                 f"it out, or take line.topology = {' or '.join(users)}",
             )
     if table.topology == FREE and table.wires is not None and table.links is not None:
@@ -89,7 +88,7 @@ def _known(scene: Scene, key: str, name: str, known: tuple[str, ...]) -> Iterato
         near = difflib.get_close_matches(name, known, n=1)
         meant = f"did you mean {near[0]}? " if near else ""
         why = f"{meant}the line has {', '.join(known)}"
-        yield refusal(scene.origin, key, name, why)
+        yield scene.refused(key, name, why)
 
 
 def _stitch_wire(scene: Scene, line: LineData) -> Iterator[Fault]:
@@ -99,7 +98,7 @@ def _stitch_wire(scene: Scene, line: LineData) -> Iterator[Fault]:
     key, tension = "line.stitch_wire.length_m", stitch.conductor.tension
     if line.n_spans < 2:
         why = "a stitched line needs a support, that is two spans"
-        yield refusal(scene.origin, "line.n_spans", line.n_spans, why)
+        yield scene.refused("line.n_spans", line.n_spans, why)
         return
     yield from _length(scene, line, key, stitch.length)
     clamps = line.around_supports(stitch.length).ravel()
@@ -107,11 +106,11 @@ def _stitch_wire(scene: Scene, line: LineData) -> Iterator[Fault]:
     if apart.min() < SHORTEST_GAP:
         at = clamps[apart.min(axis=0).argmin()]
         why = f"its clamp at {at:g} m of the line would stand on a dropper"
-        yield refusal(scene.origin, key, stitch.length, why)
+        yield scene.refused(key, stitch.length, why)
     nearest = abs(line.dropper_x[:, None] - line.support_positions[1:-1]).min()
     if nearest > 0.5 * stitch.length:
         why = f"no dropper would hang from it: the nearest one is {nearest:g} m from a support"
-        yield refusal(scene.origin, key, stitch.length, why)
+        yield scene.refused(key, stitch.length, why)
     yield from _tension(scene, "stitch_wire", tension, "messenger_wire", messenger.tension)
 
 
@@ -126,14 +125,13 @@ def _length(scene: Scene, line: LineData, key: str, length: float) -> Iterator[F
     shortest = min(line.span_lengths)
     if length >= shortest:
         why = f"it must be less than the shortest span ({shortest:g} m)"
-        yield refusal(scene.origin, key, length, why)
+        yield scene.refused(key, length, why)
 
 
 def _tension(scene: Scene, wire: str, tension: float, bearer: str, whole: float) -> Iterator[Fault]:
     """A wire between clamps that would take all tension of the one that it is clamped to."""
     if tension >= whole:
-        yield refusal(
-            scene.origin,
+        yield scene.refused(
             f"line.{wire}.tension_N",
             tension,
             f"it must be less than line.{bearer}.tension_N ({whole:g} N), of which it takes its "
@@ -144,8 +142,7 @@ def _tension(scene: Scene, wire: str, tension: float, bearer: str, whole: float)
 def _auxiliary_wire(scene: Scene, line: LineData) -> Iterator[Fault]:
     auxiliary = line.auxiliary_wire
     if auxiliary is not None and auxiliary.height >= line.encumbrance:
-        yield refusal(
-            scene.origin,
+        yield scene.refused(
             "line.auxiliary_wire.height_m",
             auxiliary.height,
             f"it must be less than line.encumbrance_m ({line.encumbrance:g} m)",
@@ -164,20 +161,18 @@ def _overlap(scene: Scene, line: LineData) -> Iterator[Fault]:
                 f"from {first} to {last}" if first <= last else "none, as the line is too short"
             )
             key = "line.overlap.first_span" + (f".{i}" if len(table.first_span) > 1 else "")
-            yield refusal(scene.origin, key, number, f"{needs}: possible are {inside}")
+            yield scene.refused(key, number, f"{needs}: possible are {inside}")
         first = number + overlaps.n_spans + 1
     every = table.repeat_every_spans
     if every is not None and every <= overlaps.n_spans:
-        yield refusal(
-            scene.origin,
+        yield scene.refused(
             "line.overlap.repeat_every_spans",
             every,
             f"{needs}: it must be at least {overlaps.n_spans + 1}",
         )
     free = line.encumbrance - (line.auxiliary_wire.height if line.auxiliary_wire else 0.0)
     if line.messenger_wire is not None and overlaps.rise >= free:
-        yield refusal(
-            scene.origin,
+        yield scene.refused(
             "line.overlap.rise_m",
             overlaps.rise,
             f"it must be less than the {free:g} m that the messenger wire is above at the supports",

@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from catenary.cases.scene.input.faults import Fault
-from catenary.cases.scene.keys.error_sentences import refusal
 from catenary.meshgen.line import Line
 from catenary.solver.effects import all_effects as effects
 from catenary.solver.problem.contact_laws import KinematicLaw
@@ -64,11 +63,11 @@ def check_twins(scene: Scene) -> Iterator[Fault]:
     problem = problem_of(scene)
     why = _why_not(problem) if problem.line.twins else ""
     if why:
-        yield refusal(scene.origin, f"effects.{RELATIVE_MOTION}", False, why)
+        yield scene.refused(f"effects.{RELATIVE_MOTION}", False, why)
 
 
 def _why_not(problem: Problem) -> str:
-    """What moves twin wires relative to each other, "" if nothing does."""
+    """The part that moves twin wires relative to each other, "" if none does."""
     line = problem.line
     if not _hang_alike(line):
         return (

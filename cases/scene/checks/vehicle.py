@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from catenary.cases.scene.input.faults import Fault
-from catenary.cases.scene.keys.error_sentences import refusal
 from catenary.cases.scene.problem import end_of, pantograph_of, strips_ahead
 from catenary.cases.scene.train.pantograph import LumpedTable, MultibodyTable
 from catenary.cases.scene.train.train import MotionTable, vehicle_of
@@ -28,7 +27,7 @@ _TINY = 1e-6
 
 
 def check_vehicle(scene: Scene, line: LineData) -> Iterator[Fault]:
-    """What contradicts each other in vehicle, heads and line."""
+    """Contradictions between vehicle, heads and line."""
     yield from _vehicle_acts(scene)
     yield from _roll_acts(scene)
     yield from _multibody_strips(scene)
@@ -48,9 +47,9 @@ def _vehicle_acts(scene: Scene) -> Iterator[Fault]:
     acts = any(scene.switches()[name] for name in ("head_roll", "lateral_motion"))
     if on and scene.vehicle.lateral is not None and not acts:
         key = "vehicle.lateral"
-        yield Fault(
+        yield scene.fault(
             key,
-            f"{key} {scene.origin.of(key)} moves the wire along the strips, which acts only with "
+            "moves the wire along the strips, which acts only with "
             "effects.head_roll = true or effects.lateral_motion = true",
         )
 
@@ -73,14 +72,12 @@ def _roll_acts(scene: Scene) -> Iterator[Fault]:
             why = (
                 f"it needs pantographs.{name}.strips.length_m, the strip that the wire moves along"
             )
-            yield refusal(scene.origin, "effects.head_roll", True, why)
+            yield scene.refused("effects.head_roll", True, why)
 
 
 def _idle(scene: Scene, key: str, effect: str) -> Fault:
-    return Fault(
-        key,
-        f"{key} {scene.origin.of(key)} acts only with effects.{effect} = true; write that, or "
-        "false to leave it out",
+    return scene.fault(
+        key, f"acts only with effects.{effect} = true; write that, or false to leave it out"
     )
 
 
@@ -94,8 +91,7 @@ def _multibody_strips(scene: Scene) -> Iterator[Fault]:
         data = pantograph_of(name, kind, scene.train.speed_km_h)
         mass = stand(data).head.mass  # type: ignore[arg-type]
         if kind.strips.mass >= mass:
-            yield refusal(
-                scene.origin,
+            yield scene.refused(
                 f"pantographs.{name}.strips.mass_kg",
                 kind.strips.mass_kg,
                 f"strips are part of the head, which weighs {mass:.3g} kg",
@@ -122,9 +118,9 @@ def _tables_reach(scene: Scene) -> Iterator[Fault]:
             first, last = pairs[0][0], pairs[-1][0]
             if first > low + _TINY or last < high - _TINY:
                 key = f"vehicle.{direction}.{name}"
-                yield Fault(
+                yield scene.fault(
                     key,
-                    f"{key} {scene.origin.of(key)} holds from {first:g} to {last:g} {unit}, but "
+                    f"holds from {first:g} to {last:g} {unit}, but "
                     f"the run needs it from {low:g} to {high:.5g} {unit}",
                 )
 
@@ -135,8 +131,7 @@ def _waves(scene: Scene) -> Iterator[Fault]:
     step = scene.train.speed_km_h / 3.6 * scene.numerics.dt_s
     shortest = scene.vehicle.irregularity.shortest_m
     if shortest < STEPS_PER_WAVE * step:
-        yield refusal(
-            scene.origin,
+        yield scene.refused(
             "vehicle.irregularity.shortest_m",
             shortest,
             f"the train runs {step:.3g} m in a step of numerics.dt_s; a wave must take "
@@ -156,8 +151,7 @@ def _strip_lengths(scene: Scene, line: LineData) -> Iterator[Fault]:
             if scene.switches()["vehicle_motion"] and scene.vehicle is not None:
                 keys += " and vehicle"
             needed = math.ceil(2e3 * abs(far) - 1e-6) / 1e3
-            yield refusal(
-                scene.origin,
+            yield scene.refused(
                 f"pantographs.{place.name}.strips.length_m",
                 length,
                 f"at {x:.4g} m the wire is {abs(far):.3g} m beside the strips' middle ({keys}), so "

@@ -158,7 +158,7 @@ def dropper_table(
 
 
 def _patterns(path: Path, where: str, raw: dict[str, Any]) -> list[dict[str, Any]]:
-    """Droppers of all spans, those of like spans together; spans beyond the line are left out."""
+    """Droppers of all spans, like spans together; spans beyond the line are left out."""
     hung = dropper_table(path, where, DROPPER_COLUMNS)
     n = raw["line"].get("n_spans")
     most = n if isinstance(n, int) else max(hung)

@@ -93,7 +93,7 @@ class SceneError(InputError):
         return type(self), (self.faults, self.more)
 
     def lines(self) -> list[str]:
-        """One sentence for each fault, and one that counts those left out."""
+        """One sentence for each fault, and one that counts the rest."""
         told = [fault.sentence for fault in self.faults]
         return told + ([f"there are {self.more} more faults"] if self.more else [])
 
@@ -132,8 +132,7 @@ def _texts(value: Any, key: str, origin: Origin) -> Iterator[Fault]:
             below = f"{key}.{name}" if key else str(name)
             if any(steers(letter) for letter in str(name)):
                 yield Fault(
-                    below,
-                    f"{plain(below, 200)} {origin.of(key)} is a key with a control character",
+                    below, f"{plain(below, 200)} {origin.of(key)} is a key with a control character"
                 )
             else:
                 yield from _texts(inner, below, origin)

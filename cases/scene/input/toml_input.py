@@ -39,7 +39,7 @@ def read_toml(path: Path) -> dict[str, Any]:
 
 
 def _toml_words(error: ValueError) -> str:
-    """What the parser says, without Python's way to write keys; it also fails on long integers."""
+    """The parser's message with keys as TOML writes them; it also fails on long integers."""
     if not isinstance(error, tomllib.TOMLDecodeError):
         return "a number is too long"
     keys = re.compile(r"\((?:'[^']*'(?:, )?)+,?\)")

@@ -51,7 +51,7 @@ def known_keys(model: type[BaseModel], location: Sequence[int | str] = ()) -> li
 
 
 def kind_of(table: type[BaseModel]) -> str:
-    """What the ``type`` of a table says that is one of several kinds, "" without one."""
+    """The ``type`` of a table that is one of several kinds, "" if it has none."""
     field = table.model_fields.get("type")
     choices = typing.get_args(field.annotation) if field is not None else ()
     return str(choices[0]) if choices else ""

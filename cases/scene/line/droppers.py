@@ -124,7 +124,7 @@ class HangingTable(Table):
             lengths = [p.span_m for p in self.patterns if p.span_m is not None]
             ascending(lengths, "patterns by span_m")
             numbers = sorted(number for p in self.patterns for number in p.spans or ())
-            twice = [one for one, next in pairwise(numbers) if one == next]
+            twice = [one for one, other in pairwise(numbers) if one == other]
             if twice:
                 raise ValueError(f"must have one pattern for span {twice[0]}, not several")
         if self.positions_m is not None:
@@ -199,7 +199,7 @@ FEWEST_SAGGING = 3
 
 
 def dropper_kind(table: HangingTable, lower_clamp: float) -> DropperKind:
-    """What all droppers of a table share; ``lower_clamp`` [kg]."""
+    """Stiffness and masses of the droppers of a table; ``lower_clamp`` [kg]."""
     return DropperKind(
         stiffness=table.stiffness_N_per_m,
         axial_stiffness=table.axial_stiffness_N,

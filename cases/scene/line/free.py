@@ -170,7 +170,7 @@ class FreeClampsTable(Table):
 
 
 class _AtSupports(Table):
-    """What stands under one wire."""
+    """Keys of supports and of steady arms of one wire."""
 
     name: PartName = Field(description="name of the group")
     wire: str = Field(min_length=1, max_length=100, description="name of the wire")

@@ -84,7 +84,7 @@ class SurfaceTable(HeightTable):
 
 
 class LengthsTable(Table):
-    """Errors of the droppers' lengths, positive for those that are cut too long."""
+    """Errors of the droppers' lengths, positive for droppers that are cut too long."""
 
     standard_deviation_mm: float = Field(
         0.0, ge=0, le=200, description="of random errors, before they are cut off"
@@ -231,7 +231,7 @@ Defect = Annotated[
 
 
 def defects_of(tables: Sequence[Defect], line: Line) -> tuple[SolverDefect, ...]:
-    """What is wrong with a line."""
+    """Defects of a line."""
     return tuple(_defect(table, line) for table in tables)
 
 
@@ -257,7 +257,7 @@ def place_of(line: Line, span: int, dropper: int) -> float:
 
 
 def irregularities_of(table: IrregularitiesTable, line: Line) -> Irregularities:
-    """What is irregular about a line."""
+    """Irregularities of a line."""
     heights, surface = table.contact_wire_height, table.running_surface
     lengths = table.dropper_lengths
     return Irregularities(

@@ -9,12 +9,7 @@ import numpy as np
 
 from catenary.cases.scene.input.faults import Origin
 from catenary.cases.scene.keys.units import length_from_mm
-from catenary.cases.scene.line.droppers import (
-    DropperTable,
-    Hung,
-    dropper_kind,
-    hung_in,
-)
+from catenary.cases.scene.line.droppers import DropperTable, Hung, dropper_kind, hung_in
 from catenary.cases.scene.line.free import (
     FreeArmsTable,
     FreeClampsTable,
@@ -22,10 +17,7 @@ from catenary.cases.scene.line.free import (
     FreeSupportsTable,
     FreeWireTable,
 )
-from catenary.cases.scene.line.hardware import (
-    SteadyArmTable,
-    steady_arm,
-)
+from catenary.cases.scene.line.hardware import SteadyArmTable, steady_arm
 from catenary.cases.scene.line.line import LineTable
 from catenary.cases.scene.line.track import curve_of
 from catenary.cases.scene.line.wires import (
@@ -37,12 +29,7 @@ from catenary.cases.scene.line.wires import (
 )
 from catenary.meshgen.hardware import Clamps, SteadyArms, Supports
 from catenary.meshgen.topologies.free_data import Course, FreeDroppers, FreeLink, FreeWire
-from catenary.meshgen.topologies.line_data import (
-    AuxiliaryWire,
-    LineData,
-    Overlaps,
-    Twin,
-)
+from catenary.meshgen.topologies.line_data import AuxiliaryWire, LineData, Overlaps, Twin
 from catenary.meshgen.wires import Conductor, Role
 from catenary.solver.problem.along_track import AlongTrack, Tensioner
 
@@ -326,7 +313,7 @@ def _droppers(
 def overlaps_of(table: LineTable) -> Overlaps | None:
     """Where a line's tension sections overlap; None if it has one section.
 
-    Repeated ones are those that leave a running span behind them.
+    Overlaps are repeated as long as a running span is left behind them.
     """
     given = table.overlap
     if given is None:

@@ -7,14 +7,8 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import BeforeValidator, Field, model_validator
 
 from catenary.cases.scene.keys.table import TAKE_AWAY, Table
-from catenary.cases.scene.keys.units import (
-    area_from_mm2,
-    length_from_mm,
-    pressure_from_GPa,
-)
-from catenary.cases.scene.line.droppers import (
-    AuxiliaryDropperTable,
-)
+from catenary.cases.scene.keys.units import area_from_mm2, length_from_mm, pressure_from_GPa
+from catenary.cases.scene.line.droppers import AuxiliaryDropperTable
 from catenary.meshgen.topologies.line_data import Bridle, StitchWire
 from catenary.meshgen.wires import EXPANSION_OF_COPPER, Conductor
 

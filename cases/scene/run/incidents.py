@@ -21,7 +21,7 @@ LEAST_SHARE = 0.01
 
 
 class IncidentTable(Table):
-    """What all incidents have in common."""
+    """Keys of every incident."""
 
     at_s: float = Field(
         ge=0, le=1e5, description="time from the start of the run; rounded to the end of a step"
@@ -76,7 +76,7 @@ Incident = Annotated[
 def line_incidents(
     tables: Sequence[IncidentTable], line: Line, dt: float
 ) -> tuple[LineIncident, ...]:
-    """What happens to a line; times [s] at ends of steps of ``dt`` [s]."""
+    """Incidents of a line; times [s] at ends of steps of ``dt`` [s]."""
     found: list[LineIncident] = []
     for table in tables:
         time = at_step(table.at_s, dt)

@@ -233,10 +233,7 @@ class WindowTable(Table):
         "damping and speed if this, spans_behind and tolerance are absent",
     )
     spans_behind: float | None = Field(
-        None,
-        ge=2,
-        le=1e6,
-        description="mode bounded: spans that move behind the last pantograph",
+        None, ge=2, le=1e6, description="mode bounded: spans that move behind the last pantograph"
     )
 
     @model_validator(mode="after")

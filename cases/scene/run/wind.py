@@ -42,10 +42,7 @@ class GustsTable(Table):
         "davenport", description="along the mean wind; upward it is Panofsky's, across Kaimal's"
     )
     turbulence_intensity: float | None = Field(
-        None,
-        gt=0,
-        le=0.6,
-        description="standard deviation along it over the mean at height_m",
+        None, gt=0, le=0.6, description="standard deviation along it over the mean at height_m"
     )
     friction_velocity_m_per_s: float | None = Field(
         None,

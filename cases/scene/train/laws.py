@@ -201,7 +201,7 @@ def _points(pairs: Sequence[Sequence[float]]) -> tuple[tuple[float, ...], tuple[
 
 
 def regulation_of(table: RegulationTable | None) -> Regulation | None:
-    """What regulates a lift, None if nothing does."""
+    """The controller of a lift, None if there is none."""
     if table is None:
         return None
     return Regulation(

@@ -115,7 +115,7 @@ class LumpedTable(_Pressing):
     @model_validator(mode="before")
     @classmethod
     def _take_ready(cls, raw: Any) -> Any:
-        """The lists of a ready chain; those that stand beside its name must be the same."""
+        """The lists of a ready chain; lists beside its name must be the same."""
         model = raw.get("model") if isinstance(raw, dict) else None
         if not isinstance(model, str):
             return raw
