@@ -50,7 +50,7 @@ ROOMS = {
         "scene.input", "scene.tables", "scene.keys", "scene.scene", "scene.convert",
         "scene.cost_model", "scene.checks", "scene.load", "terminal", "process",
         "result_folder", "run",
-        "studies.sweep", "studies.pantograph", "studies.accuracy",
+        "studies.kept_rows", "studies.sweep", "studies.pantograph_response", "studies.accuracy",
         "studies.hard",
         "studies.scaling", "studies.stability", "studies.effect_cost", "studies.waves",
         "studies.case_study", "studies.paper",
