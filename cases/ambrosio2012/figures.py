@@ -98,8 +98,7 @@ def _forces(folders: Folders) -> StudyFigure:
 def _force_panel(axes: Axes, folder: Path, train: str, damping: str, columns: Columns) -> None:
     with Results(folder) as results:
         for number, (place, position, force) in enumerate(_filtered(results)):
-            colour = figures.colour(number)
-            axes.plot(position, force, color=colour, linewidth=0.8, label=place)
+            figures.curve(axes, position, force, number, place, width=0.8)
             name = f"{damping} {_label(train, place)}"
             columns[f"{name} position [m]"] = position
             columns[f"{name} force [N]"] = force
@@ -145,9 +144,8 @@ def _histograms(folders: Folders) -> StudyFigure:
                 edges, percent = histogram(force, _BIN)
                 middle = 0.5 * (edges[1:] + edges[:-1])
                 name = _label(train, place)
-                style = "--" if place == "trailing" else "-"
-                axes.plot(middle, percent, style, marker="o", ms=2.5, linewidth=1.1,
-                          color=figures.colour(number), label=name)  # fmt: skip
+                style = "--" if place == TRAILING else "-"
+                figures.curve(axes, middle, percent, number, name, f"o{style}", ms=2.5)
                 columns[f"{damping} {name} force [N]"] = middle
                 columns[f"{damping} {name} share [%]"] = percent
         figures.tidy(axes, "", "share of time [%]", _PANELS[damping])
@@ -232,8 +230,7 @@ def _by_separation(number: int, damping: str, rows: Rows) -> StudyFigure:
         shown = {row["train"]: row for row in own if row["place"] in (place, SINGLE)}
         for index, (name, value) in enumerate(_STATISTICS):
             values = [value(force) for force in shown.values()]
-            axes.plot(range(len(shown)), values, "o-", ms=4, linewidth=1.1,
-                      color=figures.colour(index), label=name)  # fmt: skip
+            figures.curve(axes, range(len(shown)), values, index, name, "o-")
             columns[f"{name} [N]"] += values
         columns["pantograph"] += [place] * len(shown)
         columns["train"] += list(shown)

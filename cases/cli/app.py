@@ -5,6 +5,7 @@ Backends are imported inside the verbs, so that --help stays quick.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
@@ -75,19 +76,6 @@ Shortened = Annotated[
 Force = Annotated[bool, typer.Option("--force", help="Overwrite existing results.")]
 
 
-def load(
-    case: str, assignments: list[str] | None, extras: list[str] | None, shortened: bool = False
-) -> Scene:
-    """The scene of a verb that takes no options for PETSc. Not collective."""
-    from catenary.cases.process.petsc_options import split_extras
-    from catenary.cases.scene.load import load_scene
-
-    more, options = split_extras(extras or [])
-    if options:
-        raise InputError(f"{options[0]} after -- is a PETSc option; only run takes those")
-    return load_scene(case, [*(assignments or []), *more], shortened)
-
-
 PetscOptions = Annotated[
     list[str] | None,
     typer.Argument(metavar="-- PETSC_OPTION", help="Options for PETSc, after --."),
@@ -100,6 +88,53 @@ MoreAndPetscOptions = Annotated[
         autocompletion=completion.assignments,
     ),
 ]
+
+
+@dataclass
+class SceneWords:
+    """The scene of a verb: a case, and how it is changed.
+
+    Attributes
+    ----------
+    case : name, file or folder
+    extras, assignments : ``key=value`` each, those of ``--set`` first
+    shortened : whether the case's ``[test]`` table is applied
+    """
+
+    case: Case
+    extras: MoreAssignments = None
+    assignments: Assignments = None
+    shortened: Shortened = False
+
+    def split(self) -> tuple[list[str], list[str]]:
+        """All assignments, and options for PETSc."""
+        from catenary.cases.process.petsc_options import split_extras
+
+        more, options = split_extras(self.extras or [])
+        return [*(self.assignments or []), *more], options
+
+    @property
+    def changes(self) -> list[str]:
+        """All assignments of a verb that takes no options for PETSc."""
+        changes, options = self.split()
+        if options:
+            raise InputError(f"{options[0]} after -- is a PETSc option; only run takes those")
+        return changes
+
+    def load(self, *further: str) -> Scene:
+        """The scene, with further assignments. Not collective."""
+        from catenary.cases.scene.load import load_scene
+
+        return load_scene(self.case, [*self.changes, *further], self.shortened)
+
+
+@dataclass
+class RunWords(SceneWords):
+    """The scene of a verb that runs it, and options for PETSc."""
+
+    extras: MoreAndPetscOptions = None
+
+
 Strict = Annotated[
     bool, typer.Option("--strict", help="Exit with 3 if an acceptance criterion fails.")
 ]

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from catenary.base.errors import InputError
-from catenary.cases.cli.app import Assignments, Case, Force, MoreAssignments, Shortened, app, load
+from catenary.cases.cli.app import Force, SceneWords, app
 from catenary.cases.terminal import console
 from catenary.postproc.evaluate.wording import counted
 
@@ -22,16 +22,13 @@ from catenary.postproc.evaluate.wording import counted
 @console.guarded
 @console.serial
 def check(
-    case: Case,
-    extras: MoreAssignments = None,
-    assignments: Assignments = None,
-    shortened: Shortened = False,
+    words: SceneWords,
 ) -> int:
     """Serial."""
     from catenary.cases.scene.input.faults import SceneError
 
     try:
-        scene = load(case, assignments, extras, shortened)
+        scene = words.load()
     except SceneError as error:
         for line in error.lines():
             console.complain(line)
@@ -54,7 +51,7 @@ def check(
 @console.guarded
 @console.serial
 def mesh(
-    case: Case,
+    words: SceneWords,
     out: Annotated[
         Path,
         typer.Option(
@@ -64,12 +61,10 @@ def mesh(
             "a cross-section.",
         ),
     ],
-    extras: MoreAssignments = None,
-    assignments: Assignments = None,
     force: Force = False,
 ) -> None:
     """Serial."""
-    scene = load(case, assignments, extras)
+    scene = words.load()
     from catenary.cases.run.scene_mesh import DRAWN, draw_scene, write_mesh_of
 
     if out.suffix in DRAWN:
@@ -88,9 +83,7 @@ def mesh(
 @console.guarded
 @console.serial
 def static(
-    case: Case,
-    extras: MoreAssignments = None,
-    assignments: Assignments = None,
+    words: SceneWords,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -127,9 +120,9 @@ def static(
         from catenary.cases.run.at_rest.temperatures import range_of, temperatures
 
         differences = range_of(over)
-        console.say(temperatures(load(case, assignments, extras), differences, out))
+        console.say(temperatures(words.load(), differences, out))
         return
-    scene = load(case, assignments, extras)
+    scene = words.load()
     from catenary.cases.run.at_rest.static_table import rest_text, static_table
     from catenary.cases.run.describe.defects import defect_facts
     from catenary.cases.scene.problem import problem_of
@@ -157,17 +150,14 @@ def static(
 @console.guarded
 @console.serial
 def prepare(
-    case: Case,
+    words: SceneWords,
     out: Annotated[Path, typer.Option("-o", "--out", help="File to write: *.line.")],
-    extras: MoreAssignments = None,
-    assignments: Assignments = None,
-    shortened: Shortened = False,
     force: Force = False,
 ) -> None:
     """Serial."""
     from catenary.cases.result_folder.output_files import new_file
 
-    scene = load(case, assignments, extras, shortened)
+    scene = words.load()
     new_file(out, (".line",), force)
     from catenary.cases.run.prepared import HEADER, LIBRARY, prepare_line
 

@@ -48,7 +48,7 @@ def list_cases(
     if wanted is not None:
         raise InputError(f"{wanted} filters keys: write `catenary list --keys {wanted}`")
     if pantographs:
-        from catenary.cases.terminal.pantograph_list import pantograph_table
+        from catenary.cases.terminal.terminal_text import pantograph_table
 
         console.say(pantograph_table())
         return

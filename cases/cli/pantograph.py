@@ -7,15 +7,7 @@ from typing import Annotated
 
 import typer
 
-from catenary.cases.cli.app import (
-    Assignments,
-    Case,
-    Force,
-    MoreAssignments,
-    app,
-    folder_option,
-    load,
-)
+from catenary.cases.cli.app import Force, SceneWords, app, folder_option
 from catenary.cases.terminal import console
 
 
@@ -28,8 +20,7 @@ from catenary.cases.terminal import console
 @console.guarded
 @console.serial
 def pantograph(
-    case: Case,
-    extras: MoreAssignments = None,
+    words: SceneWords,
     kind: Annotated[
         str | None,
         typer.Option(
@@ -62,17 +53,21 @@ def pantograph(
             help="Fit above this frequency: below it the raising decides, which no spring need be.",
         ),
     ] = 0.5,
-    assignments: Assignments = None,
     force: Force = False,
 ) -> None:
     """Serial."""
-    from catenary.cases.studies.pantograph.output import new_files, write_study
-    from catenary.cases.studies.pantograph.study import Range, study, study_text
+    from catenary.cases.studies.pantograph_response import (
+        Range,
+        new_files,
+        study,
+        study_text,
+        write_study,
+    )
 
     over = Range(low, high, points, fit_low).checked()
     if out is not None:
         new_files(out, force)
-    found = study(load(case, assignments, extras), kind, masses, over)
+    found = study(words.load(), kind, masses, over)
     console.say(study_text(found))
     if out is not None:
         console.say("\n" + "\n".join(str(path) for path in write_study(found, out)))

@@ -8,16 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from catenary.base.errors import InputError
-from catenary.cases.cli.app import (
-    Assignments,
-    Case,
-    Force,
-    MoreAssignments,
-    Shortened,
-    app,
-    folder_option,
-    load,
-)
+from catenary.cases.cli.app import Force, SceneWords, app, folder_option
 from catenary.cases.terminal import console
 
 if TYPE_CHECKING:
@@ -37,10 +28,7 @@ _MOST_ROUNDS = 1000
 @console.guarded
 @console.serial
 def plan(
-    case: Case,
-    extras: MoreAssignments = None,
-    assignments: Assignments = None,
-    shortened: Shortened = False,
+    words: SceneWords,
     cost: Annotated[
         bool,
         typer.Option(
@@ -77,16 +65,15 @@ def plan(
     force: Force = False,
 ) -> int:
     """Serial."""
-    given = [*(assignments or []), *(extras or [])]
     if cost:
         from catenary.cases.studies.accuracy.analysis import parse_target
         from catenary.cases.studies.effect_cost.study import Wish
 
         wanted = 0.01 if tolerance is None else parse_target(tolerance, "--tolerance") / 100
         wish = Wish(
-            case,
-            given,
-            shortened,
+            words.case,
+            words.changes,
+            words.shortened,
             200.0 if stretch is None else _within("--stretch-m", stretch, 1.0, 1e7),
             10 if rounds is None else int(_within("--rounds", rounds, 1, _MOST_ROUNDS)),
             wanted,
@@ -100,7 +87,7 @@ def plan(
     for option, value in belonging.items():
         if value is not None:
             raise InputError(f"{option} belongs to plan --cost; give both")
-    scene = load(case, assignments, extras, shortened)
+    scene = words.load()
     from catenary.cases.run.planning.plan import make_plan, plan_text
 
     console.say(plan_text(make_plan(scene)))
@@ -120,7 +107,7 @@ def _cost(wish: Wish, out: Path | None, as_json: bool, force: bool) -> int:
     from catenary.base.parallel import launched_by_mpirun
     from catenary.cases.process.petsc_options import as_arguments, start_petsc
     from catenary.cases.result_folder.folder_lock import held
-    from catenary.cases.result_folder.output_folder import refuse_impossible
+    from catenary.cases.result_folder.output_folder import refuse_impossible, refuse_table
     from catenary.cases.scene.load import load_scene
 
     if launched_by_mpirun() and console.world().size > 1:
@@ -145,7 +132,7 @@ def _cost(wish: Wish, out: Path | None, as_json: bool, force: bool) -> int:
         files: list[Path] = []
     else:
         with held(out, comm, f"catenary plan {wish.case} --cost"):
-            _refuse_other(out, output.RECORD, force)
+            refuse_table(out / output.RECORD, force)
             found = study.measure(wish, out / _RUNS, say, force)
             files = [] if found is None else output.write(found, out)
     if found is None:
@@ -154,14 +141,6 @@ def _cost(wish: Wish, out: Path | None, as_json: bool, force: bool) -> int:
         return console.BROKEN
     _print(found, files, as_json)
     return console.DONE
-
-
-def _refuse_other(out: Path, name: str, force: bool) -> None:
-    """Refuse to write over costs that were found before."""
-    if (out / name).exists() and not force:
-        raise InputError(
-            f"{out / name} is there already; name another folder with -o, or give --force"
-        )
 
 
 def _print(found: Costs, files: list[Path], as_json: bool) -> None:

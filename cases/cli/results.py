@@ -17,6 +17,15 @@ if TYPE_CHECKING:
     from catenary.postproc.read.records import Records
 
 
+Motion = Annotated[
+    float | None,
+    typer.Option("--motion", min=1, max=1e5, help="Factor by which motions are drawn larger."),
+]
+FromWhere = Annotated[
+    View, typer.Option(help="From the side, from above, or from behind the train.")
+]
+
+
 @app.command(
     "report",
     help="Write the report of a run again, from its result file alone.",
@@ -28,12 +37,9 @@ def report(
     folder: RunFolder,
 ) -> None:
     """Serial."""
-    from catenary.postproc.read.guard import examined
     from catenary.postproc.report.report import write_report
 
-    if not folder.is_dir():
-        raise InputError(f"{folder} is no folder; name the folder of a run")
-    written = write_report(folder, folder, examined(folder))
+    written = write_report(folder, folder, _records(folder))
     console.say("\n".join(str(path) for path in written.files))
 
 
@@ -81,28 +87,15 @@ def animate(
             "--width-m", min=5, max=2000, help="Line in the picture; some two spans if absent."
         ),
     ] = None,
-    motion: Annotated[
-        float | None,
-        typer.Option(
-            "--motion",
-            min=1,
-            max=1e5,
-            help="Factor by which motions are drawn larger than heights.",
-        ),
-    ] = None,
-    view: Annotated[
-        View, typer.Option(help="From the side, from above, or from behind the train.")
-    ] = View.SIDE,
+    motion: Motion = None,
+    view: FromWhere = View.SIDE,
 ) -> None:
     """Serial."""
     from catenary.postproc.film.animate import Wish
     from catenary.postproc.film.animate import animate as make_film
-    from catenary.postproc.read.guard import examined
 
-    if not folder.is_dir():
-        raise InputError(f"{folder} is no folder; name the folder of a run")
     wish = Wish(start, end, rate, width, motion, view)
-    records = examined(folder)
+    records = _records(folder)
     shapes = _shapes(folder, records)
     film = make_film(folder, wish, records, not console.is_quiet(), shapes)
     pace = (
@@ -124,13 +117,8 @@ def animate(
 @console.serial
 def paraview(
     folder: RunFolder,
-    motion: Annotated[
-        float | None,
-        typer.Option("--motion", min=1, max=1e5, help="Factor by which motions are drawn larger."),
-    ] = None,
-    view: Annotated[
-        View, typer.Option(help="From the side, from above, or from behind the train.")
-    ] = View.SIDE,
+    motion: Motion = None,
+    view: FromWhere = View.SIDE,
     state: Annotated[
         bool,
         typer.Option(help="Let ParaView write view.pvsm, which opens the same without Python."),
@@ -141,11 +129,8 @@ def paraview(
 
     from catenary.postproc.paraview.open_in_paraview import write_script
     from catenary.postproc.paraview.state import write_state
-    from catenary.postproc.read.guard import examined
 
-    if not folder.is_dir():
-        raise InputError(f"{folder} is no folder; name the folder of a run")
-    records = examined(folder)
+    records = _records(folder)
     script, *others = write_script(folder, records, motion, _shapes(folder, records), view)
     made, why = write_state(script) if state else (None, "")
     console.say("\n".join(map(str, (script, *others, *([made] if made else [])))))
@@ -154,6 +139,15 @@ def paraview(
     console.say(f"Open it with: paraview --script={script}")
     if shutil.which("paraview") is None:
         console.warn("paraview is not on this machine (Debian, Ubuntu: apt-get install paraview)")
+
+
+def _records(folder: Path) -> Records | None:
+    """What is in the result file of a folder, None if a quick look is enough."""
+    from catenary.postproc.read.guard import examined
+
+    if not folder.is_dir():
+        raise InputError(f"{folder} is no folder; name the folder of a run")
+    return examined(folder)
 
 
 def _shapes(folder: Path, records: Records | None) -> list[Shape] | None:

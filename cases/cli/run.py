@@ -10,14 +10,11 @@ import typer
 
 from catenary.base.errors import InputError
 from catenary.cases.cli.app import (
-    Assignments,
-    Case,
     Force,
-    MoreAndPetscOptions,
     Out,
     PetscOptions,
     RunFolder,
-    Shortened,
+    RunWords,
     Strict,
     Verbose,
     app,
@@ -39,11 +36,8 @@ if TYPE_CHECKING:
 )
 @console.guarded
 def run(
-    case: Case,
+    words: RunWords,
     out: Out,
-    extras: MoreAndPetscOptions = None,
-    assignments: Assignments = None,
-    shortened: Shortened = False,
     force: Force = False,
     strict: Strict = False,
     study: Annotated[
@@ -52,7 +46,6 @@ def run(
     verbose: Verbose = False,
 ) -> int:
     """Collective."""
-    from catenary.cases.process.petsc_options import split_extras
     from catenary.cases.scene.load import load_scene
 
     if study:
@@ -60,13 +53,12 @@ def run(
 
         if strict:
             raise InputError("a study is not judged as a whole: give --study without --strict")
-        words = (extras or [], assignments or [])
-        return run_study(case, out, *words, shortened, force, verbose)
+        return run_study(words, out, force, verbose)
 
     def read() -> tuple[Scene, list[str]]:
-        more, options = split_extras(extras or [])
+        changes, options = words.split()
         refuse_impossible(out)
-        return load_scene(case, [*(assignments or []), *more], shortened), options
+        return load_scene(words.case, changes, words.shortened), options
 
     comm, scene, arguments = begin(read, verbose, lambda scene: scene)
     from catenary.cases.run.describe.arrivals import arrival_warnings
@@ -190,11 +182,8 @@ def _end(result: RunOutcome, folder: Path, strict: bool) -> int:
 @console.guarded
 @console.serial
 def submit(
-    case: Case,
+    words: RunWords,
     out: Out,
-    extras: MoreAndPetscOptions = None,
-    assignments: Assignments = None,
-    shortened: Shortened = False,
     ranks: Annotated[int, typer.Option("--ranks", min=1, max=10**6, help="MPI ranks.")] = 1,
     nodes: Annotated[
         int, typer.Option("--nodes", min=1, max=10**5, help="Number of cluster nodes.")
@@ -224,21 +213,19 @@ def submit(
     import shutil
     import subprocess
 
-    from catenary.cases.process.petsc_options import split_extras
     from catenary.cases.run.planning.plan import make_plan
     from catenary.cases.run.planning.slurm_script import Job, slurm_script
     from catenary.cases.scene.load import load_scene
 
     refuse_impossible(out)
-    more, options = split_extras(extras or [])
-    chosen = [*(assignments or []), *more]
-    plan = make_plan(load_scene(case, chosen, shortened))
-    words = [str(Path(case).absolute()) if Path(case).exists() else case]
-    words += ["--short"] if shortened else []
+    chosen, options = words.split()
+    plan = make_plan(load_scene(words.case, chosen, words.shortened))
+    told = [str(Path(words.case).absolute()) if Path(words.case).exists() else words.case]
+    told += ["--short"] if words.shortened else []
     job = Job(ranks, nodes, minutes, chain, directives or [], before or [])
     # The folder comes last, so that nothing is taken for a further assignment.
     settings = [word for value in chosen for word in ("--set", value)]
-    script = slurm_script([*words, *settings], out, job, plan.march, plan.memory, options)
+    script = slurm_script([*told, *settings], out, job, plan.march, plan.memory, options)
     if only_print:
         console.print_as_is(script)
         return

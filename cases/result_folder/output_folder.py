@@ -93,6 +93,16 @@ def refuse_impossible(folder: Path) -> None:
         raise InputError(f"-o {folder} is a file; name a folder for the results")
 
 
+def refuse_table(path: Path, force: bool) -> None:
+    """Raise InputError if a file of an earlier study may not be replaced, or not be written.
+
+    Not collective.
+    """
+    refuse_impossible(path.parent)
+    if not force and path.exists():
+        raise InputError(f"{path} is there already; name another folder with -o, or give --force")
+
+
 def refuse_earlier(folder: Path, force: bool) -> None:
     """Raise InputError if a folder holds a run's results and ``force`` is not given."""
     result = folder / RUN_FILE

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import errno
 import functools
 import inspect
@@ -11,7 +12,7 @@ import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any, TextIO
+from typing import Annotated, Any, TextIO, get_type_hints
 
 import typer
 
@@ -173,9 +174,16 @@ def run_folder(text: str) -> Path:
 def guarded(command: Callable[..., int | None]) -> Callable[..., None]:
     """A command whose foreseen errors end in a sentence and an exit code, not in a traceback.
 
-    The command returns its exit code, None for 0; it gets the option ``--quiet``. Collective if the
+    The command returns its exit code, None for 0; it gets the option ``--quiet``. A parameter that
+    is a dataclass stands for the options and arguments that are its fields. Collective if the
     command is.
     """
+    signature = inspect.signature(command, eval_str=True)
+    groups: dict[str, Any] = {
+        name: one.annotation
+        for name, one in signature.parameters.items()
+        if dataclasses.is_dataclass(one.annotation)
+    }
 
     @functools.wraps(command)
     def wrapped(*args: Any, quiet: bool = False, **kwargs: Any) -> None:
@@ -184,6 +192,9 @@ def guarded(command: Callable[..., int | None]) -> Callable[..., None]:
         try:
             if quiet and kwargs.get("verbose"):
                 raise InputError("--quiet and --verbose exclude each other; give one of them")
+            for name, group in groups.items():
+                own = [field.name for field in dataclasses.fields(group)]
+                kwargs[name] = group(**{field: kwargs.pop(field) for field in own})
             code = command(*args, **kwargs)
             for tell in _last_words:
                 tell()
@@ -206,14 +217,35 @@ def guarded(command: Callable[..., int | None]) -> Callable[..., None]:
             raise typer.Exit(code)
 
     # The command line is made from signature and annotations.
-    signature = inspect.signature(command, eval_str=True)
-    option = inspect.Parameter(
-        "quiet", inspect.Parameter.KEYWORD_ONLY, default=False, annotation=Quiet
-    )
-    parameters = [*signature.parameters.values(), option]
+    parameters: list[inspect.Parameter] = []
+    for name, one in signature.parameters.items():
+        parameters += _fields_of(groups[name]) if name in groups else [_by_name(one)]
+    parameters.append(_parameter("quiet", Quiet, False))
     wrapped.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
     wrapped.__annotations__ = {one.name: one.annotation for one in parameters}
     return wrapped
+
+
+def _by_name(one: inspect.Parameter) -> inspect.Parameter:
+    return one.replace(kind=inspect.Parameter.KEYWORD_ONLY)
+
+
+def _parameter(name: str, annotation: Any, default: Any) -> inspect.Parameter:
+    kind = inspect.Parameter.KEYWORD_ONLY
+    return inspect.Parameter(name, kind, default=default, annotation=annotation)
+
+
+def _fields_of(group: Any) -> list[inspect.Parameter]:
+    """The fields of a dataclass as parameters."""
+    hints = get_type_hints(group, include_extras=True)
+    return [
+        _parameter(
+            one.name,
+            hints[one.name],
+            inspect.Parameter.empty if one.default is dataclasses.MISSING else one.default,
+        )
+        for one in dataclasses.fields(group)
+    ]
 
 
 def serial(command: Callable[..., int | None]) -> Callable[..., int | None]:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from catenary.cases.scene.input.case_files import CaseEntry
+from catenary.mbs.library import READY, ReadyPantograph
 from catenary.meshgen.line import Line
 from catenary.meshgen.wires import Role, Wire
 from catenary.postproc.evaluate.wording import counted, decimals_that_tell, fixed
@@ -211,4 +212,38 @@ def _wire_text(wire: Wire, lengths: np.ndarray | None) -> str:
         low, high = f"{lengths.min():.3f}", f"{lengths.max():.3f}"
         between = low if low == high else f"{low} to {high}"
         text += f"; {counted(lengths.size, 'piece')}, {between} m long from clamp to clamp"
+    return text
+
+
+def pantograph_table() -> str:
+    """Name, chain, forces and source of each ready pantograph, a few lines each."""
+    lines = []
+    for name, ready in READY.items():
+        chain = ready.chain
+        lines += [
+            name,
+            f"  {_numbers(chain.masses)} kg, head first; {_numbers(chain.stiffnesses)} N/m and "
+            f"{_numbers(chain.dampings)} N s/m below",
+            f"  {_force(ready)}",
+            f"  {ready.source}",
+        ]
+    return "\n".join(lines)
+
+
+def _numbers(values: Sequence[float]) -> str:
+    return ", ".join(f"{value:g}" for value in values)
+
+
+def _signed(value: float) -> str:
+    return f" {'-' if value < 0 else '+'} {abs(value):g}"
+
+
+def _force(ready: ReadyPantograph) -> str:
+    if ready.static_force is None:
+        return "no force of its own: static_force_N or static_force_by_speed is needed"
+    text = f"{ready.static_force:g} N"
+    if any(ready.uplift):
+        a, b, c = ready.uplift
+        terms = f"{a:g} v^2{_signed(b)} v{_signed(c)} N"
+        text += f" + {terms} for v in km/h, never below {ready.static_force:g} N"
     return text

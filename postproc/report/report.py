@@ -6,7 +6,7 @@ It reads the result file and nothing else, and works for unfinished runs as well
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -21,12 +21,26 @@ from catenary.postproc.read.records import Records
 from catenary.postproc.read.results import Results
 from catenary.postproc.report import csv_tables
 from catenary.postproc.report.page import page
-from catenary.postproc.report.sections.all_sections import SECTIONS
-from catenary.postproc.report.sections.section import EvaluatedRun, Picture, number
+from catenary.postproc.report.sections import acceptance as acceptance_section
+from catenary.postproc.report.sections import contact_force, line, run_facts
+from catenary.postproc.report.sections.section import EvaluatedRun, Picture, Section, number
 from catenary.postproc.report.summary import as_json, summarise
 from catenary.postproc.standards.en50367 import KMH
 
 logger = logging.getLogger("catenary.report")
+
+
+# The sections of a report in their order.
+SECTIONS: list[Callable[[EvaluatedRun], Section]] = [
+    acceptance_section.status,
+    acceptance_section.section,
+    contact_force.section,
+    line.in_motion,
+    line.at_rest,
+    line.from_above,
+    run_facts.effects,
+    run_facts.section,
+]
 
 
 @dataclass(frozen=True)

@@ -117,7 +117,8 @@ class StudyTable:
             [own[i] for i in used] if _is_done(row) else [*own[:2], *[""] * (len(used) - 2)]
             for row, own in zip(self.rows, cells, strict=True)
         ]
-        return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+        escaped = ([text.replace("|", "\\|") for text in line] for line in lines)
+        return "\n".join(f"| {' | '.join(line)} |" for line in escaped)
 
 
 def texts_table(

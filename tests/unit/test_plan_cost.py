@@ -25,14 +25,12 @@ from catenary.cases.studies.effect_cost.study import (
     Costs,
     Measured,
     Size,
+    Switch,
+    SwitchableEffects,
     Wish,
     jobs_of,
     measure,
     size_of,
-)
-from catenary.cases.studies.effect_cost.switches import (
-    Switch,
-    SwitchableEffects,
     switchable_effects,
 )
 from catenary.solver.effects import all_effects as effects

@@ -12,9 +12,8 @@ from typer.testing import CliRunner
 from catenary.base.errors import InputError
 from catenary.cases.cli.main import app
 from catenary.cases.scene.load import load_scene
-from catenary.cases.studies.scaling import messages, prediction
-from catenary.cases.studies.scaling.messages import Sizes, Wire
-from catenary.cases.studies.scaling.prediction import Work, as_text, predict
+from catenary.cases.studies import scaling
+from catenary.cases.studies.scaling import Sizes, Wire, Work, as_text, predict
 from catenary.solver.contact.line_response import Bounds, LineResponse
 from catenary.solver.contact_problem.force_exchange import Exchange
 
@@ -29,7 +28,7 @@ def test_a_step_on_many_ranks_is_the_line_shared_out_and_messages() -> None:
     assert found.neighbours == pytest.approx(2 * (2e-6 + 800e-10))
     assert found.tree == pytest.approx(6 * (4e-6 + 616e-10))
     assert found.step == pytest.approx(
-        found.line + found.neighbours + found.tree + 20e-6 + prediction._ONE_BY_ONE
+        found.line + found.neighbours + found.tree + 20e-6 + scaling._ONE_BY_ONE
     )
     alone = predict(WORK, WIRE, 1)
     assert alone.step == pytest.approx(WORK.step) and alone.messages == 0.0
@@ -39,7 +38,7 @@ def test_messages_are_as_long_as_those_of_a_march() -> None:
     """Of the exchange of a step with one contact and with two."""
     for n, more in ((1, ""), (2, ",{name='lumped',behind_m=30}")):
         words = [f"train.pantographs=[{{name='lumped'}}{more}]", "train.start_m=200"]
-        sizes = prediction.work_of(load_scene("ambrosio2012", words)).sizes
+        sizes = scaling.work_of(load_scene("ambrosio2012", words)).sizes
         bounds = Bounds(*LineResponse(n, 1).bounds)
         exchange = Exchange(MPI.COMM_SELF, n, False, bounds)
         assert sizes.share == exchange.share.summed.nbytes
@@ -47,8 +46,8 @@ def test_messages_are_as_long_as_those_of_a_march() -> None:
 
 
 def test_one_rank_exchanges_nothing_and_times_nothing() -> None:
-    assert messages.wire_between(MPI.COMM_SELF) is None
-    fastest, half = messages.time_of_exchange(MPI.COMM_SELF, WORK.sizes)
+    assert scaling.wire_between(MPI.COMM_SELF) is None
+    fastest, half = scaling.time_of_exchange(MPI.COMM_SELF, WORK.sizes)
     assert 0.0 < fastest <= half < 1e-3
     text = as_text(WORK, WIRE, [1, 64], False, None)
     assert "as given" in text and text.splitlines()[4].endswith(" 100") and "measured" not in text
@@ -72,9 +71,9 @@ def test_what_cannot_be_is_refused_in_a_sentence(words: list[str], says: str) ->
 
 @pytest.mark.parametrize("text", ["64", "1,4096"])
 def test_ranks_are_whole_numbers(text: str) -> None:
-    assert prediction.parse_ranks(text) == [int(part) for part in text.split(",")]
+    assert scaling.parse_ranks(text) == [int(part) for part in text.split(",")]
     with pytest.raises(InputError):
-        prediction.parse_ranks(text + ",")
+        scaling.parse_ranks(text + ",")
 
 
 @pytest.mark.process

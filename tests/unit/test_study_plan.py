@@ -168,6 +168,13 @@ def test_the_search_takes_each_option_in_the_place_of_the_best_readings(
         assert scene.train.pantographs[0].name == best.train.pantographs[0].name == "lumped"
 
 
+def test_a_table_without_trains_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "study.toml"
+    path.write_text(TABLE.read_text().replace("[[trains]]", "[[cars]]"))
+    with pytest.raises(InputError, match="study.toml has no trains; a study needs title, "):
+        PaperStudy.read(path)
+
+
 def test_the_users_kind_takes_the_place_of_the_cases() -> None:
     plan = make_plan("ambrosio2012", ["train.pantographs.0.name=lumped"], shortened=True)
     assert {one.name for job in plan.jobs for one in job.scene.train.pantographs} == {"lumped"}

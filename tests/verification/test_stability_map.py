@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,10 +12,11 @@ from mpi4py import MPI
 from scipy import linalg
 from small_lines import EN_PANTOGRAPH, HANGING, en50318_line, mesh_of, problem_of
 
+from catenary.cases.studies.kept_rows import KeptRows
 from catenary.cases.studies.stability import from_matrices as theory
+from catenary.cases.studies.stability import map as map_of_stability
 from catenary.cases.studies.stability.by_marching import COUPLINGS, Bench
-from catenary.cases.studies.stability.map import RESOLUTION, Grid, as_rows, find, make_map
-from catenary.cases.studies.stability.picture import draw
+from catenary.cases.studies.stability.map import RESOLUTION, Grid, as_rows, draw, find, make_map
 from catenary.mbs.lumped_data import LumpedData
 from catenary.solver.contact.contact_wire import ContactWires
 from catenary.solver.model.partition import distribute
@@ -167,11 +169,13 @@ def test_the_map_of_a_case_is_found_drawn_and_written() -> None:
         ("ac_simple_3d", 1),
     ],
 )
-def test_lines_of_other_topologies_have_maps(case: str, n_wires: int) -> None:
+def test_lines_of_other_topologies_have_maps(
+    case: str, n_wires: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """The head touches all wires above it: two of a twin line and of an overlap, which the rule for
     one wire would give steps that are too long by a sixth and more."""
     grid = Grid((1e6,), (2.0,), (1e6,), (2.0,))
-    found = make_map(case, [], True, MPI.COMM_SELF, grid)
+    found = make_map(case, [], True, MPI.COMM_SELF, grid, kept=KeptRows(tmp_path))
     for one in found.limits:
         print(f"{case} {one.coupling}: theory {one.theory:.4g}, marched {one.marched:.4g} s")
     assert found.n_wires == n_wires
@@ -179,3 +183,7 @@ def test_lines_of_other_topologies_have_maps(case: str, n_wires: int) -> None:
     explicit = found.of("explicit")[0]
     check("omega dt = 2", explicit.theory, explicit.closed_form, within=2e-3 * explicit.theory)
     assert ("2 contact wires meet" in draw(found).get_suptitle()) == (n_wires == 2)
+    if case == "re330_stitched":  # a map that was stopped takes what is there
+        monkeypatch.setattr(map_of_stability, "find", None)
+        again = make_map(case, [], True, MPI.COMM_SELF, grid, kept=KeptRows(tmp_path))
+        assert again.limits == found.limits

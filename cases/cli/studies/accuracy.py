@@ -8,17 +8,7 @@ import typer
 
 from catenary.base.errors import InputError
 from catenary.cases.cli import completion
-from catenary.cases.cli.app import (
-    Assignments,
-    Case,
-    Force,
-    Out,
-    PetscOptions,
-    Shortened,
-    Verbose,
-    app,
-    begin,
-)
+from catenary.cases.cli.app import Force, Out, RunWords, Verbose, app, begin
 from catenary.cases.result_folder.output_folder import refuse_impossible
 from catenary.cases.terminal import console
 
@@ -37,9 +27,8 @@ _MOST_REPEATS = 99
 )
 @console.guarded
 def accuracy(
-    case: Case,
+    words: RunWords,
     out: Out,
-    extras: PetscOptions = None,
     axes: Annotated[
         str | None,
         typer.Option(
@@ -62,13 +51,10 @@ def accuracy(
     repeats: Annotated[
         int, typer.Option("--repeats", metavar="N", help="How often short runs are timed.")
     ] = 3,
-    assignments: Assignments = None,
-    shortened: Shortened = False,
     force: Force = False,
     verbose: Verbose = False,
 ) -> int:
     """Collective."""
-    from catenary.cases.process.petsc_options import split_extras
     from catenary.cases.studies.accuracy.analysis import parse_target
     from catenary.cases.studies.accuracy.axes import parse_axes
     from catenary.cases.studies.accuracy.plan import make_plan
@@ -76,13 +62,14 @@ def accuracy(
     wanted = parse_target(target)
 
     def read() -> tuple[Plan, list[str]]:
-        more, options = split_extras(extras or [])
+        overrides, options = words.split()
         refuse_impossible(out)
         if not 1 <= repeats <= _MOST_REPEATS:
             raise InputError(f"--repeats {repeats} must be between 1 and {_MOST_REPEATS}")
-        overrides = [*(assignments or []), *more]
         chosen = parse_axes(axes)
-        plan = make_plan(case, chosen, overrides, shortened, quick=quick, repeats=repeats)
+        plan = make_plan(
+            words.case, chosen, overrides, words.shortened, quick=quick, repeats=repeats
+        )
         return plan, options
 
     comm, plan, arguments = begin(read, verbose, lambda made: made.jobs[0].scene)
@@ -93,7 +80,7 @@ def accuracy(
     from catenary.cases.studies.sweep.jobs import RunOptions
     from catenary.postproc.evaluate.wording import counted
 
-    with held(out, comm, f"catenary accuracy {case}"):
+    with held(out, comm, f"catenary accuracy {words.case}"):
         found, ended = study.run(plan, out, comm, RunOptions(force, arguments, console.say))
         if found is None:
             console.complain("the study was interrupted; the same command continues it")

@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from catenary.base.errors import InputError
 from catenary.cases.cli.app import Force, Verbose, app, begin, folder_option
-from catenary.cases.result_folder.output_folder import refuse_impossible
+from catenary.cases.result_folder.output_folder import refuse_table
 from catenary.cases.terminal import console
 
 if TYPE_CHECKING:
@@ -23,7 +22,7 @@ TABLES = ("hard.csv", "hard.md")
     "hard",
     help="Run the collection of hard cases and print which limits they keep: energy, bounds, "
     "refinement, schemes, and ranks under mpirun. Some five minutes; exits with 3 if a limit is "
-    "not kept.",
+    "not kept. With -o the same command continues one that was stopped.",
     epilog="Example: catenary hard -o results/hard",
 )
 @console.guarded
@@ -45,7 +44,8 @@ def hard(
     def read() -> list[HardCase]:
         from catenary.cases.studies.hard.cases import hard_cases
 
-        _refuse_to_write(out, force)
+        if out is not None:
+            refuse_table(out / TABLES[0], force)
         return hard_cases(names)
 
     comm, cases, _ = begin(lambda: (read(), []), verbose, lambda cases: cases[0].scene())
@@ -54,14 +54,16 @@ def hard(
     from catenary.base.parallel import on_root
     from catenary.cases.studies.hard import output
     from catenary.cases.studies.hard.checks import check_case
+    from catenary.cases.studies.kept_rows import KeptRows
     from catenary.postproc.files.disk import write_all
     from catenary.postproc.report.study_table import remark_lines
 
+    kept = KeptRows(out if comm.rank == 0 else None, force)
     found: list[Criterion] = []
     told: dict[str, dict[str, list[str]]] = {}
     for number, case in enumerate(cases, start=1):
         console.say(f"[{number}/{len(cases)}] {case.name}: {case.what}")
-        rows, remarks = check_case(case, comm, MPI.COMM_SELF, shortened)
+        rows, remarks = check_case(case, comm, MPI.COMM_SELF, shortened, kept)
         console.say("\n".join(output.line(row) for row in rows))
         found += rows
         told[case.name] = remarks
@@ -74,19 +76,10 @@ def hard(
         tables = output.criteria(found, told).csv(), output.page(cases, found, told)
         texts: dict[str, bytes | str] = dict(zip(TABLES, tables, strict=True))
         on_root(comm, lambda: write_all(folder, texts))
+        kept.forget()
         console.say("\n".join(str(folder / name) for name in TABLES))
     console.say(
         f"{len(cases)} hard cases on {comm.size} rank{'s' if comm.size > 1 else ''}: "
         f"{len(found) - len(failed)} of {len(found)} limits kept"
     )
     return console.NOT_ACCEPTED if failed else console.DONE
-
-
-def _refuse_to_write(out: Path | None, force: bool) -> None:
-    if out is None:
-        return
-    refuse_impossible(out)
-    if (out / TABLES[0]).exists() and not force:
-        raise InputError(
-            f"{out / TABLES[0]} is there already; name another folder with -o, or give --force"
-        )

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from catenary.base.errors import InputError
-from catenary.cases.cli.app import Assignments, Case, MoreAssignments, Shortened, app, load
+from catenary.cases.cli.app import SceneWords, app
 from catenary.cases.terminal import console
 
 
@@ -21,10 +21,7 @@ from catenary.cases.terminal import console
 )
 @console.guarded
 def scaling(
-    case: Case,
-    extras: MoreAssignments = None,
-    assignments: Assignments = None,
-    shortened: Shortened = False,
+    words: SceneWords,
     ranks: Annotated[
         str, typer.Option("--ranks", metavar="N,...", help="Numbers of ranks.")
     ] = "64,512,4096",
@@ -39,7 +36,7 @@ def scaling(
 ) -> int:
     """Collective."""
     from catenary.base.parallel import launched_by_mpirun, on_root
-    from catenary.cases.studies.scaling import messages, prediction
+    from catenary.cases.studies import scaling as study
 
     if (latency is None) != (bandwidth is None):
         raise InputError("--latency-us and --bandwidth-GB-per-s belong together; give both")
@@ -50,8 +47,8 @@ def scaling(
                 f"--latency-us {latency:g} must be above 0 and at most 1e6, --bandwidth-GB-per-s "
                 f"{bandwidth:g} between 1e-6 and 1e6"
             )
-        given = messages.Wire(1e-6 * latency, 1e-9 / bandwidth)
-    numbers = prediction.parse_ranks(ranks)
+        given = study.Wire(1e-6 * latency, 1e-9 / bandwidth)
+    numbers = study.parse_ranks(ranks)
     comm = console.world() if launched_by_mpirun() else None
     several = comm is not None and comm.size > 1
     if not several and given is None:
@@ -60,15 +57,15 @@ def scaling(
             "--latency-us and --bandwidth-GB-per-s"
         )
 
-    def work() -> prediction.Work:
-        return prediction.work_of(load(case, assignments, extras, shortened))
+    def work() -> study.Work:
+        return study.work_of(words.load())
 
     found = on_root(comm, work, takes_long=True) if comm is not None else work()
     wire, exchange = given, None
     if several:
         assert comm is not None
-        wire = given or messages.wire_between(comm)
-        exchange = (comm.size, *messages.time_of_exchange(comm, found.sizes))
+        wire = given or study.wire_between(comm)
+        exchange = (comm.size, *study.time_of_exchange(comm, found.sizes))
     assert wire is not None
-    console.say(prediction.as_text(found, wire, numbers, given is None, exchange))
+    console.say(study.as_text(found, wire, numbers, given is None, exchange))
     return console.DONE

@@ -6,9 +6,8 @@ from typing import Annotated
 
 import typer
 
-from catenary.base.errors import InputError
-from catenary.cases.cli.app import Assignments, Case, Force, MoreAssignments, Out, Shortened, app
-from catenary.cases.result_folder.output_folder import refuse_impossible
+from catenary.cases.cli.app import Force, Out, SceneWords, app
+from catenary.cases.result_folder.output_folder import refuse_table
 from catenary.cases.terminal import console
 
 TABLE, PICTURE = "stability_map.csv", "stability_map.png"
@@ -18,37 +17,32 @@ TABLE, PICTURE = "stability_map.csv", "stability_map.png"
     "stability-map",
     help="Find the largest stable step of every coupling against contact stiffness and head mass, "
     "from the matrices of a step and by marching, and draw it. Some three minutes; exits with 3 "
-    "if matrices and marches do not agree.",
+    "if matrices and marches do not agree. The same command continues one that was stopped.",
     epilog="Example: catenary stability-map en50318_2002 -o results/stability",
 )
 @console.guarded
 @console.serial
 def stability_map(
-    case: Case,
+    words: SceneWords,
     out: Out,
-    extras: MoreAssignments = None,
-    assignments: Assignments = None,
     quick: Annotated[bool, typer.Option("--quick", help="Few stiffnesses and masses.")] = False,
-    shortened: Shortened = False,
     force: Force = False,
 ) -> int:
     """Serial."""
+    from catenary.cases.studies.kept_rows import KeptRows
     from catenary.cases.studies.stability import map as study
-    from catenary.cases.studies.stability.picture import draw
+    from catenary.cases.studies.stability.map import draw
     from catenary.postproc.files.disk import write_all
     from catenary.postproc.report.pictures import figures
     from catenary.postproc.report.study_table import rows_csv
 
-    refuse_impossible(out)
-    if (out / TABLE).exists() and not force:
-        raise InputError(
-            f"{out / TABLE} is there already; name another folder with -o, or give --force"
-        )
-    given = [*(assignments or []), *(extras or [])]
+    refuse_table(out / TABLE, force)
     grid = study.QUICK if quick else study.Grid()
-    found = study.make_map(case, given, shortened, console.alone(), grid, console.say)
+    kept, scene = KeptRows(out, force), (words.case, words.changes, words.shortened)
+    found = study.make_map(*scene, console.alone(), grid, console.say, kept)
     content: dict[str, bytes | str] = {TABLE: rows_csv(study.as_rows(found))}
     content |= figures.painted(PICTURE, lambda: draw(found))
     files = write_all(out, content)
+    kept.forget()
     console.say("\n" + study.as_text(found) + "\n" + "\n".join(map(str, files)))
     return console.DONE if all(one.agrees for one in found.limits) else console.NOT_ACCEPTED

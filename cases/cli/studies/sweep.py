@@ -9,17 +9,7 @@ import typer
 
 from catenary.base.errors import InputError
 from catenary.cases.cli import completion
-from catenary.cases.cli.app import (
-    Assignments,
-    Case,
-    Force,
-    MoreAndPetscOptions,
-    Out,
-    Shortened,
-    Verbose,
-    app,
-    begin,
-)
+from catenary.cases.cli.app import Force, Out, RunWords, Verbose, app, begin
 from catenary.cases.result_folder.output_folder import refuse_impossible
 from catenary.cases.terminal import console
 
@@ -41,9 +31,8 @@ _SHOWN_BROKEN = 3
 )
 @console.guarded
 def sweep(
-    case: Case,
+    words: RunWords,
     out: Out,
-    extras: MoreAndPetscOptions = None,
     vary: Annotated[
         list[str] | None,
         typer.Option(
@@ -60,7 +49,6 @@ def sweep(
             help='TOML file of named variants, each a line name = ["key=value", ...].',
         ),
     ] = None,
-    assignments: Assignments = None,
     plotted: Annotated[
         str | None,
         typer.Option(
@@ -69,7 +57,6 @@ def sweep(
             help="Columns of sweep.csv to draw; mean_N,std_N,max_N,min_N,max_uplift_mm if absent.",
         ),
     ] = None,
-    shortened: Shortened = False,
     reports: Annotated[
         bool, typer.Option("--reports", help="Also write the report of each run.")
     ] = False,
@@ -77,13 +64,12 @@ def sweep(
     verbose: Verbose = False,
 ) -> int:
     """Collective."""
-    from catenary.cases.process.petsc_options import split_extras
     from catenary.cases.studies.sweep.jobs import RunOptions, check_statistics
     from catenary.cases.studies.sweep.sweep import run_sweep, sweep_of
     from catenary.cases.studies.sweep.variants import check_keys, parse_vary, product, read_named
 
     def read() -> tuple[Sweep, list[str]]:
-        more, options = split_extras(extras or [])
+        changes, options = words.split()
         if not vary and named is None:
             raise InputError("there is nothing to vary: give --vary key=v1,v2,... or --variants")
         check_statistics(_names(plotted))
@@ -92,15 +78,17 @@ def sweep(
         table = {} if named is None else read_named(named)
         check_keys(product([], table), f"in {named}")
         variants = product(varied, table)
-        words = [*(assignments or []), *more]
-        made = sweep_of(case, variants, out, words, shortened, full_report=reports, force=force)
+        case, short = words.case, words.shortened
+        made = sweep_of(case, variants, out, changes, short, full_report=reports, force=force)
         return made, options
 
     comm, made, arguments = begin(read, verbose, lambda made: made.jobs[0].scene)
     for one in made.refused:
         console.warn(f"variant {one.variant.name} is not run: {one.outcome}")
     options = RunOptions(force, arguments, console.say)
-    ended, files = run_sweep(made, out, comm, options, f"catenary sweep {case}", _names(plotted))
+    ended, files = run_sweep(
+        made, out, comm, options, f"catenary sweep {words.case}", _names(plotted)
+    )
     from catenary.cases.studies.sweep import output as sweep_output
 
     console.say("\n" + sweep_output.as_text(ended))
@@ -108,31 +96,24 @@ def sweep(
     return verdict(ended, "sweep")
 
 
-def run_study(
-    case: str,
-    out: Path,
-    extras: Sequence[str],
-    assignments: Sequence[str],
-    shortened: bool,
-    force: bool,
-    verbose: bool,
-) -> int:
+def run_study(words: RunWords, out: Path, force: bool, verbose: bool) -> int:
     """What ``catenary run CASE --study`` does; returns the exit code. Collective."""
-    from catenary.cases.process.petsc_options import split_extras
     from catenary.cases.studies.case_study import Plan, find_study, make_plan
 
     def read() -> tuple[Plan, list[str]]:
         refuse_impossible(out)
-        more, options = split_extras(extras)
-        console.say(f"--study runs the program {find_study(case)}, which may do all that you may")
-        return make_plan(case, [*assignments, *more], shortened), options
+        changes, options = words.split()
+        console.say(
+            f"--study runs the program {find_study(words.case)}, which may do all that you may"
+        )
+        return make_plan(words.case, changes, words.shortened), options
 
     comm, plan, arguments = begin(read, verbose, lambda made: made.jobs[0].scene)
     from catenary.cases.result_folder.folder_lock import held
     from catenary.cases.studies import case_study
     from catenary.cases.studies.sweep.jobs import RunOptions
 
-    with held(out, comm, f"catenary run {case} --study"):
+    with held(out, comm, f"catenary run {words.case} --study"):
         report, ended = case_study.run(plan, out, comm, RunOptions(force, arguments, console.say))
     if report is not None:
         console.say("\n" + report)

@@ -2,25 +2,56 @@
 
 from __future__ import annotations
 
+from dataclasses import astuple, dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from catenary.base.errors import InputError
-from catenary.cases.cli.app import (
-    Assignments,
-    Force,
-    MoreAssignments,
-    Shortened,
-    app,
-    folder_option,
-    load,
-)
-from catenary.cases.result_folder.output_folder import refuse_impossible
+from catenary.cases.cli.app import Force, SceneWords, app, folder_option
+from catenary.cases.result_folder.output_folder import refuse_impossible, refuse_table
 from catenary.cases.terminal import console
 
+if TYPE_CHECKING:
+    from catenary.cases.scene.scene import Scene
+
 EXCITATIONS = ("pantograph", "force", "pulse", "hammer")
+
+
+@dataclass
+class WaveWords(SceneWords):
+    """The scene whose waves are analysed, or the folder of a run in the place of its case."""
+
+    case: Annotated[
+        str,
+        typer.Argument(help="A case, which is run with a snapshot each 10 ms, or a run's folder."),
+    ]
+
+
+@dataclass
+class Excited:
+    """What moves or strikes the line in the place of a train, None for what is usual."""
+
+    force_n: Annotated[
+        float | None,
+        typer.Option("--force-N", help="Of a force or a pulse; the static force if absent."),
+    ] = None
+    frequency_hz: Annotated[
+        float | None,
+        typer.Option("--frequency-Hz", help="Of a force that moves; constant if absent."),
+    ] = None
+    at_m: Annotated[
+        float | None,
+        typer.Option("--at-m", help="Place of a pulse or hammer; mid-line if absent."),
+    ] = None
+    duration_s: Annotated[
+        float | None,
+        typer.Option("--duration-s", help="Of a pulse (0.1 if absent) or a hammer (0.02)."),
+    ] = None
+    impulse_ns: Annotated[
+        float | None, typer.Option("--impulse-Ns", help="Of a hammer; 10 if absent.")
+    ] = None
 
 
 @app.command(
@@ -35,40 +66,15 @@ EXCITATIONS = ("pantograph", "force", "pulse", "hammer")
 @console.guarded
 @console.serial
 def waves(
-    case: Annotated[
-        str,
-        typer.Argument(help="A case, which is run with a snapshot each 10 ms, or a run's folder."),
-    ],
-    extras: MoreAssignments = None,
-    out: Annotated[
-        Path | None,
-        folder_option("For a case."),
-    ] = None,
+    words: WaveWords,
+    excited: Excited,
+    out: Annotated[Path | None, folder_option("For a case.")] = None,
     excite: Annotated[
         str,
         typer.Option(
             metavar="|".join(EXCITATIONS), help="What sets the line of a case into motion."
         ),
     ] = EXCITATIONS[0],
-    force_n: Annotated[
-        float | None,
-        typer.Option("--force-N", help="Of a force or a pulse; the static force if absent."),
-    ] = None,
-    frequency_hz: Annotated[
-        float | None,
-        typer.Option("--frequency-Hz", help="Of a force that moves; constant if absent."),
-    ] = None,
-    at_m: Annotated[
-        float | None,
-        typer.Option("--at-m", help="Place of a pulse or hammer; mid-line if absent."),
-    ] = None,
-    duration_s: Annotated[
-        float | None,
-        typer.Option("--duration-s", help="Of a pulse (0.1 if absent) or a hammer (0.02)."),
-    ] = None,
-    impulse_ns: Annotated[
-        float | None, typer.Option("--impulse-Ns", help="Of a hammer; 10 if absent.")
-    ] = None,
     obstacles: Annotated[
         bool,
         typer.Option(
@@ -101,17 +107,14 @@ def waves(
             help="With --separations or --window-error: a curve for each value.",
         ),
     ] = None,
-    assignments: Assignments = None,
-    shortened: Shortened = False,
     force: Force = False,
 ) -> int:
     """Serial."""
+    from catenary.cases.process.petsc_options import start_petsc
     from catenary.cases.studies.waves import study
     from catenary.cases.studies.waves.excited import Asked
 
-    given = [*(assignments or []), *(extras or [])]
-    folder = console.run_folder(case)
-    asked = Asked(force_n, frequency_hz, at_m, duration_s, impulse_ns)
+    folder, asked = console.run_folder(words.case), Asked(*astuple(excited))
     if excite not in EXCITATIONS:
         raise InputError(f"--excite is {excite}, but must be one of {', '.join(EXCITATIONS)}")
     train = excite == EXCITATIONS[0]
@@ -137,47 +140,39 @@ def waves(
         if out is None:
             raise InputError("-o is missing; it names the folder of the runs")
     if separations is not None and out is not None:
-        return _separations(case, out, separations, vary or [], given, shortened, force)
+        return _separations(words, out, separations, vary or [], force)
     if window_error is not None and out is not None:
-        return _window_error(case, out, window_error, vary or [], given, shortened, force)
+        return _window_error(words, out, window_error, vary or [], force)
     if (folder / "run.h5").is_file():
         if obstacles:
             raise InputError(f"{folder} is a run; --obstacles is for cases")
-        if out is not None or given or shortened or not train:
+        if out is not None or words.changes or words.shortened or not train:
             raise InputError(f"{folder} is a run; -o, --set, --short and --excite are for cases")
         studied = study.study_waves(folder)
     else:
         if out is None:
             raise InputError("-o is missing; it names the folder of the run that shows the waves")
         refuse_impossible(out)
+        dense = f"output.field_every_s={study.SNAPSHOT_EVERY}"
+        chosen = any(key.startswith("output.field_every") for key in words.changes)
+        scene = words.load(*([] if chosen or not train or obstacles else [dense]))
+        start_petsc([])
         if obstacles:
-            from catenary.cases.process.petsc_options import start_petsc
-
-            start_petsc([])
-            text, files = study.study_obstacles(load(case, given, None, shortened), out, force)
+            text, files = study.study_obstacles(scene, out, force)
             console.say(text + "\n" + "\n".join(map(str, files)))
             return console.DONE
         if train:
-            dense = f"output.field_every_s={study.SNAPSHOT_EVERY}"
-            chosen = any(key.startswith("output.field_every") for key in given)
-            scene = load(case, given if chosen else [*given, dense], None, shortened)
             if not _run(scene, out, force):
                 return console.BROKEN
             studied = study.study_waves(out)
         else:
-            scene = load(case, given, None, shortened)
-            from catenary.cases.process.petsc_options import start_petsc
-
-            start_petsc([])
             studied = study.study_excited(scene, excite, asked, out, force)
     text = study.as_text(studied.theory, studied.measured, studied.remarks)
     console.say(text + "\n" + "\n".join(map(str, studied.files)))
     return console.DONE
 
 
-def _separations(
-    case: str, out: Path, text: str, vary: list[str], given: list[str], shortened: bool, force: bool
-) -> int:
+def _separations(words: WaveWords, out: Path, text: str, vary: list[str], force: bool) -> int:
     """What --separations does; returns the exit code."""
     from catenary.cases.cli.studies.sweep import verdict
     from catenary.cases.process.petsc_options import start_petsc
@@ -192,8 +187,8 @@ def _separations(
     values = separation.parse_separations(text)
     varied = [parse_vary(one) for one in vary]
     check_keys(product(varied, {}) if varied else [], "on the command line (--vary)")
-    scene = load(case, given, None, shortened)
-    jobs = separation.jobs_of(case, scene, values, varied, given, shortened)
+    scene, case = words.load(), words.case
+    jobs = separation.jobs_of(case, scene, values, varied, words.changes, words.shortened)
     comm = console.alone()
     start_petsc([])
     with held(out, comm, f"catenary waves {case} --separations {text}"):
@@ -206,25 +201,18 @@ def _separations(
     return verdict(ended, "curve")
 
 
-def _window_error(
-    case: str, out: Path, text: str, vary: list[str], given: list[str], shortened: bool, force: bool
-) -> int:
+def _window_error(words: WaveWords, out: Path, text: str, vary: list[str], force: bool) -> int:
     """What --window-error does; returns the exit code."""
     from catenary.cases.process.petsc_options import start_petsc
     from catenary.cases.studies.sweep.variants import check_keys, parse_vary, product
     from catenary.cases.studies.waves import window_error
-    from catenary.cases.studies.waves.study import refuse_table
 
-    refuse_impossible(out)
     refuse_table(out / window_error.TABLE, force)
     sizes = window_error.parse_sizes(text)
     variants = product([parse_vary(one) for one in vary], {}) if vary else []
     check_keys(variants, "on the command line (--vary)")
-    assigned = [(one.name, list(one.assignments)) for one in variants]
-    scenes = [
-        (name, load(case, [*given, *more], None, shortened))
-        for name, more in assigned or [("", [])]
-    ]
+    scenes = [(one.name, words.load(*one.assignments)) for one in variants]
+    scenes = scenes or [("", words.load())]
     start_petsc([])
     curves = [window_error.curve_of(name, scene, sizes) for name, scene in scenes]
     files = window_error.write(out, curves)
@@ -232,16 +220,11 @@ def _window_error(
     return console.DONE
 
 
-def _run(scene: object, out: Path, force: bool) -> bool:
+def _run(scene: Scene, out: Path, force: bool) -> bool:
     """Run the case; whether it came to its end."""
-    from catenary.cases.process.petsc_options import start_petsc
     from catenary.cases.run.runner import run_case
-    from catenary.cases.scene.scene import Scene
 
-    assert isinstance(scene, Scene)
-    comm = console.alone()
-    start_petsc([])
-    result = run_case(scene, out, comm, force=force, only_summary=True)
+    result = run_case(scene, out, console.alone(), force=force, only_summary=True)
     if result.outcome != "done":
         console.complain(result.outcome)
     return result.outcome == "done"

@@ -65,7 +65,7 @@ def temperatures(scene: Scene, differences: Sequence[float], picture: Path | Non
     rests = over_temperatures(problem, mesh, differences)
     if picture is not None:
         # Matplotlib takes long to import.
-        from catenary.postproc.report.pictures.temperature_picture import draw_temperatures
+        from catenary.postproc.report.pictures.line_pictures import draw_temperatures
 
         draw_temperatures(rests, picture)
     return temperature_text(rests, problem.along.tensioner.ratio)

@@ -93,8 +93,7 @@ def pantographs(scene: Scene) -> list[Level]:
 
 def _fitted(scene: Scene, kind: str, n_masses: int) -> Level:
     """All pantographs of the train as chains fitted to a kind, as the verb ``pantograph`` does."""
-    from catenary.cases.studies.pantograph.output import inline_table
-    from catenary.cases.studies.pantograph.study import Range, study
+    from catenary.cases.studies.pantograph_response import Range, inline_table, study
 
     found = study(scene, kind, n_masses, Range(0.1, 25.0, 2, _SMALLEST_FIT))
     name = f"fitted_{n_masses}"

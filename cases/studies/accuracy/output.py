@@ -250,25 +250,11 @@ def draw(found: Measured) -> Figure:
     fronts = []
     for number, axis in enumerate(_precise(found)):
         rows = [row for row in found.rows_of(axis.name) if row.done and row.percent[HISTORY] > 0]
-        colour = figures.colour(number)
-        axes.plot(
-            [row.cost for row in rows],
-            [row.percent[HISTORY] for row in rows],
-            "o",
-            ms=4,
-            color=colour,
-            alpha=0.5,
-            label=axis.title,
-        )
         front = [row for row in pareto(rows) if row.percent[HISTORY] > 0]
-        axes.plot(
-            [row.cost for row in front],
-            [row.percent[HISTORY] for row in front],
-            "-",
-            linewidth=1.4,
-            color=colour,
-            label="Pareto front",
-        )
+        for own, label, look in ((rows, axis.title, "o"), (front, "Pareto front", "-")):
+            cost, percent = ([row.cost for row in own], [row.percent[HISTORY] for row in own])
+            how = {"alpha": 0.5} if look == "o" else {}
+            figures.curve(axes, cost, percent, number, label, look, 1.4, **how)
         fronts += front
     figures.log_log(axes)
     axes.margins(x=_MARGIN)

@@ -8,15 +8,18 @@ Limits that are no answer of a single case's are derived here:
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from catenary.base.parallel import on_root
+from catenary.cases.scene.problem import resolved
 from catenary.cases.studies.hard import runs as hard_runs
 from catenary.cases.studies.hard.cases import HardCase
 from catenary.cases.studies.hard.energy import energy_that_left
 from catenary.cases.studies.hard.runs import Watched, cut_of, node_places, rest_height
+from catenary.cases.studies.kept_rows import KeptRows
 from catenary.solver.problem.incidents import in_steps
 from catenary.solver.statics.line_at_rest import LineAtRest
 
@@ -43,15 +46,31 @@ class Checked(NamedTuple):
     remarks: dict[str, list[str]]
 
 
-def check_case(case: HardCase, world: Any, alone: Any, short: bool = False) -> Checked:
-    """Run a hard case in all its forms and measure it. Collective on ``world``.
+def check_case(
+    case: HardCase, world: Any, alone: Any, short: bool = False, kept: KeptRows | None = None
+) -> Checked:
+    """Run a hard case in all its forms and measure it, or give what is kept. Collective on `world`.
 
     Parameters
     ----------
     world : all ranks; agreement of ranks is measured if there are several
     alone : a communicator of this process alone
     short : the case's short form; steps are halved once only then
+    kept : what an earlier call has found, None to keep nothing
     """
+    kept = KeptRows(None) if kept is None else kept
+    here = {"case": case.model_dump(), "scene": resolved(case.scene(short)), "short": short}
+    here["ranks"] = world.size
+    there = on_root(world, lambda: kept.get(here))
+    if there is not None:
+        found, remarks = there
+        return Checked([Criterion(*row) for row in found], remarks)
+    checked = _checked(case, world, alone, short)
+    on_root(world, lambda: kept.keep(here, checked))
+    return checked
+
+
+def _checked(case: HardCase, world: Any, alone: Any, short: bool) -> Checked:
     checked: Checked = on_root(world, lambda: _check_alone(case, alone, short), takes_long=True)
     if world.size > 1:
         checked.found.append(_ranks(case, world, alone, short))
@@ -147,32 +166,43 @@ def _correction(case: HardCase, base: Watched, other: Watched) -> Criterion:
     return _below(case, "fixed-point correction, head height [m]", apart, case.schemes_m)
 
 
+def _crossing(rest: LineAtRest, base: Watched) -> float:
+    step = int(np.argmax(base.position[:, 0] > cut_of(rest)))
+    return float(base.switches()[step - 1])
+
+
+def _on_nodes(rest: LineAtRest, base: Watched) -> float:
+    far = np.abs(base.position.reshape(-1, 1) - node_places(rest)).min(axis=1)
+    return float((far < 1e-9).sum())
+
+
+# By key of ``Needs``, what must reach its value, or true 1: a name, and how it is measured.
+_REACHED: dict[str, tuple[str, Callable[[LineAtRest, Watched], float]]] = {
+    "switches": ("switches of droppers", lambda rest, base: base.switches().sum()),
+    "passes": ("passes between wires", lambda rest, base: passes(base)),
+    "stopped": ("steps at an uplift stop", lambda rest, base: base.stops.any(axis=1).sum()),
+    "lost_m": ("way without contact [m]", lambda rest, base: lost_way(base)),
+    "on_nodes": ("steps on a node", _on_nodes),
+    "crossing": ("switches at the crossing", _crossing),
+    "touches_after_s": (
+        "first contact [s]",
+        lambda rest, base: base.time[np.argmax(base.force[:, 0] > 0.0)],
+    ),
+    "breaks": ("droppers that break", lambda rest, base: broken(rest, base).size),
+}
+
+
 def _needs(case: HardCase, rest: LineAtRest, base: Watched) -> list[Criterion]:
     """Whether the run was the hard one that the case is named after."""
-    needs, found = case.needs, []
-    if needs.switches:
-        found.append(_reaches(case, "switches of droppers", base.switches().sum(), needs.switches))
-    if needs.passes:
-        found.append(_reaches(case, "passes between wires", passes(base), needs.passes))
-    if needs.stopped:
-        stopped = np.count_nonzero(base.stops.any(axis=1))
-        found.append(_reaches(case, "steps at an uplift stop", stopped, needs.stopped))
-    if needs.lost_m:
-        found.append(_reaches(case, "way without contact [m]", lost_way(base), needs.lost_m))
+    needs = case.needs
+    found = [
+        _reaches(case, name, measure(rest, base), float(limit))
+        for key, (name, measure) in _REACHED.items()
+        if (limit := getattr(needs, key))
+    ]
     if needs.lost_share_below is not None:
         share = float((base.force[base.time.size // 2 :] == 0.0).mean())
         found.append(_below(case, "share without contact", share, needs.lost_share_below))
-    if needs.on_nodes:
-        far = np.abs(base.position.reshape(-1, 1) - node_places(rest)).min(axis=1)
-        found.append(_reaches(case, "steps on a node", (far < 1e-9).sum(), needs.on_nodes))
-    if needs.crossing:
-        step = int(np.argmax(base.position[:, 0] > cut_of(rest)))
-        found.append(_reaches(case, "switches at the crossing", base.switches()[step - 1], 1))
-    if needs.touches_after_s:
-        touched = base.time[np.argmax(base.force[:, 0] > 0.0)]
-        found.append(_reaches(case, "first contact [s]", touched, needs.touches_after_s))
-    if needs.breaks:
-        found.append(_reaches(case, "droppers that break", broken(rest, base).size, needs.breaks))
     if needs.breaks_at_cut:
         far = float(np.abs(broken(rest, base) - cut_of(rest)).min(initial=np.inf))
         longest = float(np.diff(node_places(rest)).max())

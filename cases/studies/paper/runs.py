@@ -21,6 +21,8 @@ from catenary.cases.studies.sweep.variants import Variant, check_keys, slug
 from catenary.postproc.report.study_table import Column
 
 VARIED, SEARCHED = "vary", "search"
+_TABLES = ("title", "lead", "always", "dampings", "trains", "readings", "statements", "ranking",
+           "variations", "search", "short")  # fmt: skip
 LEADING, TRAILING, SINGLE = "leading", "trailing", "single"
 _SUMMARY = ("mean_N", "std_N", "max_N", "min_N", "loss_percent", "std_0_5_N", "std_5_20_N")
 # Figures of a pantograph of a run, with which statements are judged and which tables show: forces
@@ -127,8 +129,10 @@ class PaperStudy:
 
     @classmethod
     def read(cls, path: Path, shortened: bool = False) -> PaperStudy:
-        """The study of a file. Raises InputError if it cannot be read."""
+        """The study of a file. Raises InputError if it cannot be read or lacks a table."""
         table = read_toml(path)
+        if lacks := [name for name in _TABLES if name not in table]:
+            raise InputError(f"{path} has no {lacks[0]}; a study needs {', '.join(_TABLES)}")
         if shortened:
             short = table["short"]
             for name in ("trains", "readings"):

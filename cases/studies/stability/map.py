@@ -7,16 +7,21 @@ marching (`stability_march`).
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from catenary.base.errors import InputError
 from catenary.cases.scene.load import load_scene
+from catenary.cases.scene.problem import resolved
 from catenary.cases.scene.run.numerics import MAX_DT
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.hard.runs import at_rest
+from catenary.cases.studies.kept_rows import KeptRows
 from catenary.cases.studies.stability import from_matrices as theory
 from catenary.cases.studies.stability.by_marching import (
     AGREED,
@@ -27,6 +32,7 @@ from catenary.cases.studies.stability.by_marching import (
     Bench,
 )
 from catenary.mbs.lumped_data import LumpedData
+from catenary.postproc.report.pictures import figures
 from catenary.solver.contact.contact_wire import ContactWires
 from catenary.solver.model.partition import distribute
 from catenary.solver.statics.elasticity import middle_span
@@ -166,8 +172,9 @@ def make_map(
     comm: Any,
     grid: Grid,
     tell: Callable[[str], None] = lambda line: None,
+    kept: KeptRows | None = None,
 ) -> StabilityMap:
-    """Find all limits. Not collective; ``comm`` is that of this process alone."""
+    """Find all limits but those that are ``kept``. Not collective; ``comm`` is this process's."""
     own = load_scene(case, list(assignments), shortened)
     scene = linear_scene(case, assignments, shortened)
     rest = at_rest(scene, comm)
@@ -177,9 +184,15 @@ def make_map(
     place = _place(rest, wires)
     line = theory.point_model(rest.model, theory.loads_at(wires, place, rest.model.n_dofs))
     bench = Bench(rest, data, place, comm)
-    pairs, limits = grid.pairs(), []
+    pairs, limits, config = grid.pairs(), [], resolved(scene)
+    kept = KeptRows(None) if kept is None else kept
     for number, (stiffness, mass) in enumerate(pairs, start=1):
-        found = [find(bench, line, coupling, stiffness, mass) for coupling in COUPLINGS]
+        here = {"scene": config, "stiffness": stiffness, "head_mass": mass}
+
+        def limits_here(k: float = stiffness, m: float = mass) -> list[Any]:
+            return [astuple(find(bench, line, coupling, k, m)) for coupling in COUPLINGS]
+
+        found = [Limit(*row) for row in kept.rows(here, limits_here)]
         limits += found
         told = ", ".join(f"{one.coupling} {in_ms(one.marched)}" for one in found)
         tell(f"[{number}/{len(pairs)}] {stiffness:g} N/m, {mass:g} kg: {told} ms")
@@ -282,3 +295,129 @@ def in_ms(dt: float) -> str:
 
 def _finite(dt: float) -> float | None:
     return dt if np.isfinite(dt) else None
+
+
+_MARKERS = {"explicit": "o", "iterated": "s", "fixed_point": "^"}
+_RAISED = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
+_STABLE, _ONLY_IMPLICIT = "#eef3e6", "#fbeee6"
+
+
+@figures.own_style()
+def draw(found: StabilityMap) -> Figure:
+    """Largest step over contact stiffness and over head mass, both logarithmic."""
+    figure = figures.new_figure(5.6)
+    left, right = figure.subplots(1, 2, sharey=True)
+    by_mass = {
+        f"head {mass:g} kg": _series(found, "stiffness", head_mass=mass)
+        for mass in found.grid.few_masses
+    }
+    by_stiffness = {
+        f"contact {_power(k)} N/m": _series(found, "head_mass", stiffness=k)
+        for k in found.grid.few_stiffnesses
+    }
+    _panel(left, by_mass, "stiffness")
+    _panel(right, by_stiffness, "head_mass", named=True)
+    figures.tidy(left, "contact stiffness [N/m]", "largest stable step [ms]")
+    figures.tidy(right, "head mass [kg]", "")
+    stiffness, mass, dt = found.own
+    if stiffness is not None:
+        left.plot(stiffness, 1e3 * dt, "*", ms=11, color="black", zorder=5)
+        left.annotate(
+            f"the case: {mass:g} kg",
+            (stiffness, 1e3 * dt),
+            textcoords="offset points",
+            xytext=(0, -15),
+            ha="center",
+            fontsize="small",
+        )
+    implicit = found.of("implicit")
+    everywhere = all(one.marched == np.inf and one.theory == np.inf for one in implicit)
+    word = "implicit: stable everywhere on this map" if everywhere else "implicit: see the table"
+    right.text(0.97, 0.97, word, transform=right.transAxes, ha="right", va="top", fontsize="small")
+    left.legend(
+        handles=[
+            Line2D([], [], color=figures.colour(i), label=name) for i, name in enumerate(by_mass)
+        ],
+        loc="upper right",
+        fontsize="small",
+        frameon=False,
+    )
+    word = "a coupling is stable below its line;\nabove both lines only the implicit one is"
+    left.text(0.03, 0.03, word, transform=left.transAxes, va="bottom", fontsize="small")
+    figure.suptitle(
+        f"{found.case}: stability of the couplings while contact lasts and droppers are taut (the "
+        f"linear system);\n{meets(found)} {found.wire_mass:.2g} kg",
+        x=0.01,
+        ha="left",
+        fontsize="medium",
+    )
+    figure.legend(handles=_key(), loc="outside lower center", ncols=3, fontsize="small",
+                  frameon=False)  # fmt: skip
+    return figure
+
+
+def _series(found: StabilityMap, along: str, **fixed: float) -> dict[str, list[Limit]]:
+    """Limits of each coupling that has any, in the order of what varies."""
+    return {
+        name: sorted(found.of(name, **fixed), key=lambda one: float(getattr(one, along)))
+        for name in _MARKERS
+    }
+
+
+def _panel(
+    axes: Axes, curves: dict[str, dict[str, list[Limit]]], along: str, named: bool = False
+) -> None:
+    """Curves of one panel and the regions below and above the lowest; ``named`` at their ends."""
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    axes.yaxis.set_major_formatter("{x:g}")
+    lowest: tuple[np.ndarray, np.ndarray] | None = None
+    for number, (label, series) in enumerate(curves.items()):
+        colour = figures.colour(number)
+        for name, limits in series.items():
+            x = np.array([getattr(one, along) for one in limits])
+            theory = 1e3 * np.array([one.theory for one in limits])
+            marched = 1e3 * np.array([one.marched for one in limits])
+            there = np.isfinite(marched)
+            axes.plot(x[there], marched[there], _MARKERS[name], color=colour, ms=5, mfc="none")
+            if name == "fixed_point":  # the line of iterated
+                continue
+            axes.plot(x, theory, "-" if name == "explicit" else "--", color=colour, linewidth=1.2)
+            if name == "explicit" and named:
+                end = int(np.argmax(x))
+                axes.annotate(
+                    label,
+                    (x[end], theory[end]),
+                    textcoords="offset points",
+                    xytext=(-4, -13),
+                    ha="right",
+                    fontsize="small",
+                    color=colour,
+                )
+            if name == "explicit" and (lowest is None or theory[0] < lowest[1][0]):
+                lowest = x, theory
+    top = 1.25e3 * MAX_DT
+    axes.set_ylim(None, top)
+    if lowest is not None:
+        bottom = axes.get_ylim()[0]
+        axes.fill_between(lowest[0], bottom, lowest[1], color=_STABLE, linewidth=0, zorder=0)
+        axes.fill_between(lowest[0], lowest[1], top, color=_ONLY_IMPLICIT, linewidth=0, zorder=0)
+        axes.set_ylim(bottom, top)
+
+
+def _key() -> list[Line2D]:
+    lines = (("-", "explicit, theory (ω dt = 2)"), ("--", "exchanges, theory"))
+    grey = figures.GREY
+    keys = [Line2D([], [], color=grey, lw=1.2, ls=style, label=name) for style, name in lines]
+    for name, marker in _MARKERS.items():
+        told = f"{name}, marched"
+        keys.append(Line2D([], [], color=grey, ls="", marker=marker, mfc="none", label=told))
+    return keys
+
+
+def _power(value: float) -> str:
+    """A number as a power of ten, without marks of mathematics, which pictures do not read."""
+    exponent = int(np.floor(np.log10(value)))
+    lead = value / 10**exponent
+    front = "" if np.isclose(lead, 1.0) else f"{lead:.2g} · "
+    return f"{front}10{str(exponent).translate(_RAISED)}"

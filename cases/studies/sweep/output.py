@@ -152,15 +152,7 @@ def draw(table: Sequence[Mapping[str, Any]], keys: Sequence[str], plotted: Seque
             x = [float(row[axis]) if key else places.index(cell(row[axis])) for row in own]
             y = [np.nan if row[name] is None else float(row[name]) for row in own]
             order = np.argsort(x, kind="stable")
-            axes.plot(
-                np.array(x)[order],
-                np.array(y)[order],
-                "o-",
-                ms=4,
-                linewidth=1.3,
-                color=figures.colour(number),
-                label=label,
-            )
+            figures.curve(axes, np.array(x)[order], np.array(y)[order], number, label, "o-")
         figures.tidy(axes, "", STATISTICS[name].meaning)
     if len(curves) <= _MOST_LABELS:
         figures.legend_above(panels[0], columns=min(len(curves), 3))

@@ -7,8 +7,10 @@ sweep that was killed goes on where it was; a variant that breaks does not stop 
 from __future__ import annotations
 
 import json
+import logging
 import time
-from collections.abc import Callable, Sequence
+import zlib
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -23,13 +25,67 @@ from catenary.cases.result_folder.output_folder import (
 from catenary.cases.run.planning.needs import Kept, total_size
 from catenary.cases.run.runner import RESULT, run_case
 from catenary.cases.scene.problem import resolved
-from catenary.cases.studies.sweep.done_before import read_record, read_summary, record_text
 from catenary.cases.studies.sweep.jobs import AS_USUAL, Ended, Job, RunOptions
 from catenary.postproc.evaluate.wording import fixed
 from catenary.postproc.files.disk import plain, write_all
 from catenary.postproc.files.own_files import VARIANT_FILE as RECORD
 from catenary.postproc.files.run_schema import DONE, INTERRUPTED
 from catenary.postproc.read.results import Results
+
+logger = logging.getLogger("catenary.sweep")
+
+_SUM, _SUM_OF_SUMMARY = "crc32", "summary_crc32"
+SUMMARY = "summary.json"
+
+
+def record_text(record: Mapping[str, Any], folder: Path) -> str:
+    """A variant's record as the text of its file, of a folder with the figures."""
+    content = json.loads(json.dumps(plain(record)))
+    content[_SUM_OF_SUMMARY] = zlib.crc32((folder / SUMMARY).read_bytes())
+    return json.dumps({**content, _SUM: _sum(content)}, indent=1) + "\n"
+
+
+def read_record(path: Path) -> dict[str, Any] | None:
+    """A variant's record, None if there is none or it is damaged, which is logged."""
+    content = _table(path)
+    if content is None:
+        return None
+    known = content.pop(_SUM, None)
+    return content if _is_whole(path, known == _sum(content)) else None
+
+
+def read_summary(path: Path, record: Mapping[str, Any]) -> dict[str, Any] | None:
+    """The figures of a record, None if there are none or they are damaged, which is logged."""
+    content = _table(path)
+    if content is None:
+        return None
+    same = record.get(_SUM_OF_SUMMARY) in (None, zlib.crc32(path.read_bytes()))  # None: older
+    return content if _is_whole(path, same) else None
+
+
+def _table(path: Path) -> dict[str, Any] | None:
+    """A JSON table, None if there is no file or no whole table in it, which is logged."""
+    if not path.is_file():  # a pipe would be waited for
+        return None
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except OSError:
+        return None
+    except (ValueError, RecursionError):
+        content = None
+    return content if _is_whole(path, isinstance(content, dict)) else None
+
+
+def _is_whole(path: Path, whole: bool) -> bool:
+    """Log that a file is damaged, if it is; returns whether it is not."""
+    if not whole:
+        logger.warning("%s is damaged: its variant is run again", path)
+    return whole
+
+
+def _sum(content: Mapping[str, Any]) -> int:
+    return zlib.crc32(json.dumps(content, sort_keys=True).encode())
+
 
 # What is taken from an open result file beside the summary: plain values by name.
 Measure = Callable[[Results], dict[str, Any]]
@@ -131,7 +187,7 @@ def _leave_record(job: Job, folder: Path, measure: Measure | None, wall: float) 
     }
     if not job.keep_results:
         (folder / RESULT).unlink()
-    write_all(folder, {RECORD: record_text(record)})
+    write_all(folder, {RECORD: record_text(record, folder)})
     return measured
 
 
@@ -162,7 +218,7 @@ def _found(job: Job, folder: Path, measured: bool) -> Ended | None:
             f"{folder} holds the results of {job.variant.name} with another configuration; name "
             "another folder with -o, or give --force to replace them"
         )
-    summary = read_summary(folder / "summary.json")
+    summary = read_summary(folder / SUMMARY, record)
     missing = job.keep_results and not (folder / RESULT).is_file()
     missing = missing or (job.full_report and not (folder / "report.html").is_file())
     if summary is None or missing or (measured and not record.get("measured")):

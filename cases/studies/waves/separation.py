@@ -251,16 +251,12 @@ def draw(curves: Sequence[Curve], period: Period) -> Figure:
     panels = figure.subplots(len(_SHOWN), 1, sharex=True, height_ratios=[2, 1, 1])
     for (key, label), axes in zip(_SHOWN, panels, strict=True):
         for number, curve in enumerate(curves):
-            colour, name = figures.COLOURS[number % len(figures.COLOURS)], curve.name
-            axes.plot(
-                curve.separation, curve.trailing[key], "o-", color=colour, ms=3.5, linewidth=1.4,
-                label=_joined("trailing", name),
-            )  # fmt: skip
-            axes.plot(
-                curve.separation, curve.leading[key], color=colour, linewidth=0.7,
-                label=_joined("leading", name),
-            )  # fmt: skip
-            axes.axhline(curve.alone[key], color=colour, linestyle="--", linewidth=0.9)
+            name, d = curve.name, curve.separation
+            figures.curve(axes, d, curve.trailing[key], number, _joined("trailing", name), "o-")
+            label = _joined("leading", name)
+            figures.curve(axes, d, curve.leading[key], number, label, width=0.7)
+            look = {"color": figures.colour(number), "linestyle": "--", "linewidth": 0.9}
+            axes.axhline(curve.alone[key], **look)
         far = max(float(curve.separation[-1]) for curve in curves)
         if np.isfinite(period.ringing).all():
             for n in range(1, int(far / period.ringing[0]) + 1):

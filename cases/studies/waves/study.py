@@ -10,8 +10,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from mpi4py import MPI
 
-from catenary.base.errors import InputError, RunBroken
-from catenary.cases.result_folder.output_folder import refuse_earlier
+from catenary.base.errors import RunBroken
+from catenary.cases.result_folder.output_folder import refuse_earlier, refuse_table
 from catenary.cases.run.excited_run import ExcitedRun
 from catenary.cases.run.runner import run_case
 from catenary.cases.run.scene_mesh import mesh_of
@@ -159,12 +159,6 @@ def theory_of(scene: Scene) -> tuple[WaveTheory, float]:
     problem = problem_of(scene)
     first, last = middle_span(problem.line)
     return wave_theory(problem, line_at_rest(problem, mesh_of(scene))), last - first
-
-
-def refuse_table(path: Path, force: bool) -> None:
-    """Raise InputError if there is a table of an earlier study that may not be replaced."""
-    if not force and path.exists():
-        raise InputError(f"{path} is there already; name another folder with -o, or give --force")
 
 
 def _numbers_in(data: FilmData, rest: LineAtRest) -> np.ndarray:

@@ -10,7 +10,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -24,7 +24,7 @@ from catenary.postproc.evaluate.filters import low_pass
 from catenary.postproc.files.disk import write_all
 from catenary.postproc.record.run_watch import RunWatch, watch_cadence, watched
 from catenary.postproc.report.pictures import figures
-from catenary.postproc.report.study_table import remark_lines, rows_csv
+from catenary.postproc.report.study_table import Column, StudyTable, remark_lines
 from catenary.solver.problem.window import WindowChoice
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest
 from catenary.solver.time_loop.march import March
@@ -142,20 +142,37 @@ def curve_of(name: str, scene: Scene, sizes: Sequence[int]) -> Curve:
     return Curve(name, tuple(errors), tuple(of_whole))
 
 
-def write(folder: Path, curves: Sequence[Curve]) -> list[Path]:
-    """Write table and picture; returns the files. Not collective."""
-    rows: list[dict[str, Any]] = [
+def table_of(curves: Sequence[Curve]) -> StudyTable:
+    """A row for each window."""
+    columns = [
+        Column("with", "with" if any(curve.name for curve in curves) else ""),
+        Column("spans_ahead", "spans ahead", "g"),
+        Column("spans_behind", "behind", "g"),
+        Column("history_percent_of_std", "history [% of sigma]", ".2g"),
+        Column("std_percent", "sigma [%]", "+.2g"),
+        Column("estimated_percent", "history, estimated", ".2g"),
+        Column("default"),
+        Column("chosen", " ", in_files=False),
+        Column("remarks"),
+    ]
+    rows = [
         {
             "with": curve.name, "spans_ahead": one.ahead, "spans_behind": one.behind,
             "history_percent_of_std": one.history, "std_percent": one.sigma,
             "estimated_percent": one.estimated,
             "default": int(one.is_default),
+            "chosen": "chosen by the program" if one.is_default else "",
             "remarks": [*(f"whole line: {text}" for text in curve.remarks), *one.remarks],
         }
         for curve in curves
         for one in curve.errors
     ]  # fmt: skip
-    content: dict[str, bytes | str] = {TABLE: rows_csv(rows)}
+    return StudyTable(columns, rows)
+
+
+def write(folder: Path, curves: Sequence[Curve]) -> list[Path]:
+    """Write table and picture; returns the files. Not collective."""
+    content: dict[str, bytes | str] = {TABLE: table_of(curves).csv()}
     content |= figures.painted(PICTURE, lambda: draw(curves))
     return write_all(folder, content)
 
@@ -166,22 +183,16 @@ def draw(curves: Sequence[Curve]) -> Figure:
     figure = figures.new_figure(4.6)
     axes = figure.add_subplot()
     for number, curve in enumerate(curves):
-        colour = figures.COLOURS[number % len(figures.COLOURS)]
         spans = [one.spans for one in curve.errors]
-        axes.plot(
-            spans, [one.history for one in curve.errors], "o-", color=colour, ms=3.5,
-            linewidth=1.4, label=f"history {curve.name}".strip(),
-        )  # fmt: skip
-        axes.plot(
-            spans, [abs(one.sigma) for one in curve.errors], "s--", color=colour, ms=3.0,
-            linewidth=0.8, label=f"sigma {curve.name}".strip(),
-        )  # fmt: skip
-        axes.plot(
-            spans, [one.estimated for one in curve.errors], ":", color=colour, linewidth=1.0
-        )  # fmt: skip
+        history = [one.history for one in curve.errors]
+        sigma = [one.sigma for one in curve.errors]
+        figures.curve(axes, spans, history, number, f"history {curve.name}".strip(), "o-")
+        label = f"sigma {curve.name}".strip()
+        figures.curve(axes, spans, np.abs(sigma), number, label, "s--", 0.8)
+        figures.curve(axes, spans, [one.estimated for one in curve.errors], number, None, ":", 1.0)
         for one in curve.errors:
             if one.is_default:
-                axes.plot(one.spans, one.history, "*", color=colour, ms=13.0)
+                figures.curve(axes, one.spans, one.history, number, None, "*", ms=13.0)
     axes.set_yscale("log")
     label = "spans that move (star: chosen by the program, dotted: its estimate)"
     figures.tidy(axes, label, "error of the force [% of sigma]")
@@ -190,20 +201,16 @@ def draw(curves: Sequence[Curve]) -> Figure:
 
 
 def as_text(curves: Sequence[Curve]) -> str:
-    """A line for each window, for a terminal, and the remarks on all marches."""
-    lines = []
-    told: list[tuple[str, tuple[str, ...]]] = []
-    for curve in curves:
-        told.append((f"{curve.name} whole line".strip(), curve.remarks))
-        for one in curve.errors:
-            chosen = ", chosen by the program" if one.is_default else ""
-            lines.append(
-                f"{curve.name} {one.ahead:g} spans ahead, {one.behind:g} behind{chosen}: history "
-                f"{one.history:.2g} % of sigma (estimated {one.estimated:.2g}), sigma "
-                f"{one.sigma:+.2g} %".strip()
-            )
-            told.append((f"{curve.name} {one.spans:g} spans".strip(), one.remarks))
-    return "\n".join([*lines, *remark_lines(told)])
+    """The table for a terminal, and the remarks on all marches."""
+    told = [
+        (f"{curve.name} {name}".strip(), remarks)
+        for curve in curves
+        for name, remarks in (
+            ("whole line", curve.remarks),
+            *((f"{one.spans:g} spans", one.remarks) for one in curve.errors),
+        )
+    ]
+    return "\n".join([table_of(curves).text(), *remark_lines(told)])
 
 
 class _Forces(Observer):

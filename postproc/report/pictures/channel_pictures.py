@@ -19,7 +19,7 @@ from catenary.postproc.report.pictures.figures import (
     stacked,
     tidy,
 )
-from catenary.postproc.report.pictures.marks import mark_line, still_marks, travelled
+from catenary.postproc.report.pictures.marks import mark_line, panels_along_track, still_marks
 from catenary.solver.time_loop.views.channels import (
     ARM,
     CHANNELS,
@@ -69,38 +69,20 @@ def _label(channel: Channel) -> str:
 @own_style()
 def _of_train(results: Results, channel: Channel) -> Figure:
     """A panel for each pantograph, a curve for each of its columns."""
-    names = results.pantograph_names()
-    labels = [[channel.name.replace("_", " ")]] * len(names)
-    columns = [range(p, p + 1) for p in range(len(names))]
+    word = channel.name.replace("_", " ")
+    shown = {p: [(word, p)] for p in range(results.n_pantographs)}
     if channel.per == STRIP:
-        columns = results.strip_columns()
-        labels = [
-            [f"strip {n + 1}" for n in range(len(own))] if len(own) > 1 else labels[0]
-            for own in columns
-        ]
+        for p, own in enumerate(results.strip_columns()):
+            words = [f"strip {n + 1}" for n in range(len(own))] if len(own) > 1 else [word]
+            shown[p] = list(zip(words, own, strict=True))
     elif channel.per == WIRE:
-        by_wire = results.wire_columns()
-        columns = [range(min(own.values()), max(own.values()) + 1) for own in by_wire]
-        labels = [list(own) for own in by_wire]
+        shown = {p: list(own.items()) for p, own in enumerate(results.wire_columns())}
     elif channel.per == CONTACT:
-        columns = [range(own.start, own.stop) for own in results.contact_columns()]
-        labels = [[word or labels[0][0] for word in own] for own in results.contact_names()]
-    start, end = travelled(results)
-    figure, panels = stacked(0.7 + 2.7 * len(names), len(names), shared=True)
-    for p, axes in enumerate(panels):
-        mark_line(axes, results, start, end)
-        position = results.column("contact_position", p)
-        for number, column in enumerate(columns[p]):
-            values = results.column(channel.name, column)
-            chosen = thinned(values)
-            several = len(columns[p]) > 1
-            own = colour(number if several else p)
-            label = labels[p][number]
-            axes.plot(position[chosen], values[chosen], color=own, linewidth=1.2, label=label)
-        tidy(axes, "", _label(channel), names[p].capitalize())
-        legend_above(axes)
-    panels[-1].set_xlabel("position along the track [m]")
-    return figure
+        columns = results.contact_columns()
+        for p, words in enumerate(results.contact_names()):
+            own = range(columns[p].start, columns[p].stop)
+            shown[p] = [(name or word, column) for name, column in zip(words, own, strict=True)]
+    return panels_along_track(results, channel.name, shown, _label(channel))[0]
 
 
 @own_style()

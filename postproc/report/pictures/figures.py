@@ -137,6 +137,21 @@ def colour(pantograph: int) -> str:
     return COLOURS[pantograph % len(COLOURS)]
 
 
+def curve(
+    axes: Axes,
+    x: Any,
+    y: Any,
+    number: int,
+    label: str | None = None,
+    look: str = "-",
+    width: float = 1.2,
+    **how: Any,
+) -> None:
+    """A curve with the colour of a number; ``look`` is Matplotlib's format of markers and line."""
+    usual: dict[str, Any] = {"color": colour(number), "linewidth": width, "ms": 3.5, "label": label}
+    axes.plot(x, y, look, **(usual | how))
+
+
 def tidy(axes: Axes, x_label: str, y_label: str, title: str = "") -> None:
     """Labels, light grid, few ticks and no box."""
     for axis, most in zip((axes.xaxis, axes.yaxis), _MOST_TICKS, strict=True):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 from typing import Any
 
 import numpy as np
@@ -22,7 +21,7 @@ from catenary.postproc.report.pictures.figures import (
     stacked,
     tidy,
 )
-from catenary.postproc.report.pictures.marks import mark_line, travelled
+from catenary.postproc.report.pictures.marks import mark_line, panels_along_track, travelled
 
 
 @own_style()
@@ -60,54 +59,24 @@ def contact_force(results: Results) -> Figure:
 def strip_forces(results: Results) -> Figure:
     """Share of each strip in the contact force along the track, 20 Hz low-pass, for pantographs
     with more than one."""
-    shown = [(p, own) for p, own in enumerate(results.strip_columns()) if len(own) > 1]
-    start, end = travelled(results)
-    figure, panels = stacked(0.7 + 2.7 * len(shown), len(shown), shared=True)
-    for axes, (p, columns) in zip(panels, shown, strict=True):
-        mark_line(axes, results, start, end)
-        for number, column in enumerate(columns):
-            force = results.column("strip_force", column)
-            with contextlib.suppress(InputError):  # sampled too slowly; the report says so
-                force = filters.low_pass(force, results.dt)
-            label = ("leading strip", "trailing strip")[number]
-            chosen = thinned(force)
-            force = force[chosen]
-            position = results.column("contact_position", p)[chosen]
-            axes.plot(position, force, color=colour(number), linewidth=1.2, label=label)
-        name = results.pantograph_names()[p]
-        tidy(axes, "", "force of a strip [N]", name.capitalize())
-        legend_above(axes)
-    panels[-1].set_xlabel("position of the pantograph along the track [m]")
-    return figure
+    shown = {
+        p: list(zip(("leading strip", "trailing strip"), own, strict=True))
+        for p, own in enumerate(results.strip_columns())
+        if len(own) > 1
+    }
+    label = "force of a strip [N]"
+    return panels_along_track(results, "strip_force", shown, label, low_pass=True)[0]
 
 
 @own_style()
 def wire_forces(results: Results) -> Figure:
     """Share of each contact wire in the contact force along the track, 20 Hz low-pass."""
-    names = results.pantograph_names()
-    start, end = travelled(results)
-    figure, panels = stacked(0.7 + 2.7 * len(names), len(names), shared=True)
-    for p, (axes, columns) in enumerate(zip(panels, results.wire_columns(), strict=True)):
-        mark_line(axes, results, start, end)
-        position = results.column("contact_position", p)
-        for number, (name, column) in enumerate(columns.items()):
-            force = results.column("contact_wire_force", column)
-            with contextlib.suppress(InputError):  # sampled too slowly; the report says so
-                force = filters.low_pass(force, results.dt)
-            # Two wires side by side may have the same force: the second is dashed.
-            style: dict[str, Any] = {"linewidth": 1.2, "linestyle": ("-", "--")[number % 2]}
-            chosen = thinned(force)
-            axes.plot(
-                position[chosen],
-                force[chosen],
-                color=colour(number),
-                label=name.replace("_", " "),
-                **style,
-            )
-        tidy(axes, "", "force on a contact wire [N]", names[p].capitalize())
-        legend_above(axes)
-    panels[-1].set_xlabel("position of the pantograph along the track [m]")
-    return figure
+    shown = {
+        p: [(name.replace("_", " "), column) for name, column in own.items()]
+        for p, own in enumerate(results.wire_columns())
+    }
+    channel, label = "contact_wire_force", "force on a contact wire [N]"
+    return panels_along_track(results, channel, shown, label, low_pass=True, dashed=True)[0]
 
 
 @own_style()
@@ -157,3 +126,27 @@ def force_histogram(results: Results, statistics: RunStatistics) -> Figure:
     tidy(axes, "contact force, 20 Hz [N]", "share of time [%]", title)
     legend_above(axes)
     return figure
+
+
+@own_style()
+def lateral_places(results: Results) -> Figure:
+    """Lateral place of each contact wire on each strip along the track, and where strips end."""
+    shown = {
+        p: [(word or "contact wire", column) for word, column in zip(words, own, strict=True)]
+        for p, (words, own) in enumerate(
+            zip(results.contact_names(), map(_all_of, results.contact_columns()), strict=True)
+        )
+    }
+    label = "place on the strip, to the left [m]"
+    figure, panels = panels_along_track(results, "lateral_place", shown, label)
+    for axes, half_length in zip(panels, results.facts_of("strip_half_length"), strict=True):
+        if np.isfinite(half_length):
+            for side, word in ((1.0, "end of the strips"), (-1.0, None)):
+                at = side * float(half_length)
+                axes.axhline(at, color="0.35", linestyle="--", linewidth=1.0, label=word)
+            legend_above(axes)
+    return figure
+
+
+def _all_of(columns: slice) -> range:
+    return range(columns.start, columns.stop)

@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -16,11 +21,17 @@ from catenary.postproc.report.pictures.figures import (
     LIMIT,
     colour,
     legend_above,
+    new_figure,
     own_style,
     stacked,
     tidy,
 )
 from catenary.postproc.report.pictures.marks import mark_line, mark_static, still_marks, with_margin
+from catenary.solver.statics.tension_along import LineAtTemperature
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 
 # Evaluated arms whose passage is drawn.
 _MOST_ARMS = 60
@@ -211,3 +222,82 @@ def energies(results: Results) -> Figure | None:
     tidy(axes, "time [s]", "energy [J]", "Energies of the line relative to equilibrium")
     legend_above(axes)
     return figure
+
+
+@own_style()
+def plan_view(results: Results) -> Figure | None:
+    """Where contact wires are laterally, and radial forces of arms; None where no wire moves so."""
+    registration = results.registration()
+    if registration is None or not results.has_static("contact_y"):
+        return None
+    figure, (plan, forces) = stacked(5.2, 2)
+    profiles = results.contact_profiles()
+    for number, (name, wire) in enumerate(profiles.items()):
+        assert wire.y is not None
+        label = "contact wire" if len(profiles) == 1 else name
+        plan.plot(*wire.drawn(wire.y), color=colour(number), linewidth=1.2, label=label)
+    plan.plot(registration.x, registration.stagger, "o", ms=3, color=GREY, label="steady arm")
+    plan.axhline(0.0, color=GREY, linewidth=0.6, linestyle="--")
+    tidy(plan, "position along the track [m]", "to the left [m]", "Contact wire from above")
+    legend_above(plan)
+    pushed = registration.pushed
+    for which, look, label in (
+        (~pushed, "o", "arm that pulls"),
+        (pushed, "v", "arm that its wire pushes"),
+    ):
+        if which.any():
+            tone = COLOURS[0] if look == "o" else COLOURS[1]
+            at, force = registration.x[which], registration.force[which, 0]
+            forces.plot(at, force, look, ms=4, color=tone, label=label)
+    forces.axhline(0.0, color=GREY, linewidth=0.8)
+    tidy(
+        forces,
+        "position along the track [m]",
+        "force to the left [N]",
+        "Radial forces of the steady arms",
+    )
+    legend_above(forces)
+    forces.set_xlim(plan.get_xlim())
+    return figure
+
+
+# Change of tension that is allowed [%].
+_ALLOWED = 10.0
+
+
+@own_style()
+def draw_temperatures(rests: Sequence[LineAtTemperature], path: Path) -> None:
+    """Write the picture as PNG or SVG, by the file's suffix. Not collective."""
+    found = [rest for rest in rests if not rest.why_not]
+    names = [wire.name for wire in found[0].wires if wire.ends] if found else []
+    figure = new_figure(2.6 * (len(names) + 1))
+    panels = figure.subplots(len(names) + 1, 1, squeeze=False)[:, 0]
+    warmth = matplotlib.colormaps["coolwarm"]
+    range_ = [rest.warmer for rest in found]
+    low, high = min(range_, default=0.0), max(range_, default=1.0)
+    for axes, name in zip(panels, names, strict=False):
+        for rest in found:
+            wire = next(own for own in rest.wires if own.name == name)
+            share = (rest.warmer - low) / max(high - low, 1e-12)
+            label = f"{rest.warmer:+g} K"
+            axes.plot(wire.x, 100 * wire.change, color=warmth(share), lw=1.3, label=label)
+        worst = max((np.abs(axes.get_ylim()).max(), 1.0))
+        if worst > 0.7 * _ALLOWED:
+            for side in (-_ALLOWED, _ALLOWED):
+                axes.axhline(side, color=LIMIT, lw=0.9, ls="--")
+        tidy(axes, "position along the track [m]", "change of tension [%]", name)
+        if name == names[0]:
+            axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False, fontsize=8)
+    ends = panels[-1]
+    for tone, name in zip(COLOURS, names, strict=False):
+        wires = [own for rest in found for own in rest.wires if own.name == name]
+        for i, end in enumerate(wires[0].ends):
+            moved = [1e3 * own.moved[i] for own in wires]
+            style = "-" if end.outwards > 0 else "--"
+            label = f"{name}, {'end' if end.outwards > 0 else 'start'}"
+            ends.plot(range_, moved, style, color=tone, marker="o", ms=3, lw=1.3, label=label)
+    ends.axhline(0.0, color=GREY, lw=0.6)
+    tidy(ends, "temperature above the installation [K]", "end outwards [mm]", "ends of the wires")
+    if names:
+        ends.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False, fontsize=8)
+    figure.savefig(path)

@@ -1,18 +1,78 @@
-"""Marks that pictures along the track share: supports, droppers, the evaluation stretch."""
+"""Pictures along the track: panels of pantographs, supports, droppers, the evaluation stretch."""
 
 from __future__ import annotations
 
+import contextlib
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
 
+from catenary.base.errors import InputError
+from catenary.postproc.evaluate import filters
 from catenary.postproc.read.results import Results
-from catenary.postproc.report.pictures.figures import COLOURS, GREY, LIGHT, SHADE
+from catenary.postproc.report.pictures.envelope import thinned
+from catenary.postproc.report.pictures.figures import (
+    COLOURS,
+    GREY,
+    LIGHT,
+    SHADE,
+    colour,
+    legend_above,
+    own_style,
+    stacked,
+    tidy,
+)
 
 # More supports or droppers than these are no marks but a grey ground: they are left out.
 _MOST_SUPPORTS, _MOST_DROPPERS = 200, 1000
+
+
+@own_style()
+def panels_along_track(
+    results: Results,
+    channel: str,
+    shown: Mapping[int, Sequence[tuple[str, int]]],
+    label: str,
+    *,
+    low_pass: bool = False,
+    dashed: bool = False,
+) -> tuple[Figure, list[Axes]]:
+    """A panel for each pantograph with curves of a channel over the pantograph's position.
+
+    Parameters
+    ----------
+    shown : by number of the pantograph, name and column of each curve
+    label : of the channel, with its unit
+    low_pass : take the part below 20 Hz, unless the record is sampled too slowly
+    dashed : dash the second of two curves, which may lie on each other
+    """
+    start, end = travelled(results)
+    figure, panels = stacked(0.7 + 2.7 * len(shown), len(shown), shared=True)
+    for axes, (p, curves) in zip(panels, shown.items(), strict=True):
+        mark_line(axes, results, start, end)
+        for number, (name, column) in enumerate(curves):
+            values = results.column(channel, column)
+            if low_pass:
+                with contextlib.suppress(InputError):  # the report says so
+                    values = filters.low_pass(values, results.dt)
+            chosen = thinned(values)
+            values = values[chosen]
+            axes.plot(
+                results.column("contact_position", p)[chosen],
+                values,
+                color=colour(number if len(curves) > 1 else p),
+                linewidth=1.2,
+                linestyle=("-", "--")[number % 2] if dashed else "-",
+                label=name,
+            )
+        tidy(axes, "", label, results.pantograph_names()[p].capitalize())
+        legend_above(axes)
+    panels[-1].set_xlabel("position of the pantograph along the track [m]")
+    return figure, panels
 
 
 def mark_line(axes: Axes, results: Results, start: float, end: float) -> None:

@@ -55,7 +55,7 @@ def _violations(results: Results) -> list[list[str]]:
 
 def _pictures(run: EvaluatedRun) -> Iterator[Picture]:
     from catenary.postproc.report.pictures import force_pictures as forces
-    from catenary.postproc.report.pictures.lateral_picture import lateral_places
+    from catenary.postproc.report.pictures.force_pictures import lateral_places
 
     results, statistics = run.results, run.statistics
     if results.n_rows("time") < 2:

@@ -92,7 +92,7 @@ def _droppers(results: Results, rows: Sequence[DropperRow], title: str = "") -> 
 
 def from_above(run: EvaluatedRun) -> Section:
     """Where the contact wires are laterally, and their steady arms."""
-    from catenary.postproc.report.pictures.plan_view import plan_view
+    from catenary.postproc.report.pictures.line_pictures import plan_view
 
     results = run.results
     text = "The line at rest from above, and its steady arms."

@@ -240,4 +240,4 @@ def test_the_check_finds_what_it_is_for() -> None:
 )
 def test_postproc_reads_no_keys_of_scenes(path: Path) -> None:
     """The report prints the scene as a whole; nothing else of postproc may open it."""
-    assert reads_scene(path.read_text(encoding="utf-8"), path.match("sections/run.py")) == []
+    assert reads_scene(path.read_text(encoding="utf-8"), path.match("sections/run_facts.py")) == []

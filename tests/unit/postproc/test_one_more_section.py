@@ -10,8 +10,7 @@ from matplotlib.figure import Figure
 from catenary.postproc.evaluate import statistics
 from catenary.postproc.read.results import Results
 from catenary.postproc.report.pictures import figures
-from catenary.postproc.report.report import drawings, write_report
-from catenary.postproc.report.sections.all_sections import SECTIONS
+from catenary.postproc.report.report import SECTIONS, drawings, write_report
 from catenary.postproc.report.sections.section import (
     EvaluatedRun,
     Folded,

@@ -1,1 +1,0 @@
-"""Frequency response and lumped model of a pantograph."""

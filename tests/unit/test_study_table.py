@@ -1,0 +1,119 @@
+"""Tables of studies for files and for people, and rows that a stopped study keeps."""
+
+from __future__ import annotations
+
+import csv
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from catenary.cases.studies.hard import checks
+from catenary.cases.studies.hard.cases import HardCase, hard_cases
+from catenary.cases.studies.hard.checks import Checked, Criterion
+from catenary.cases.studies.kept_rows import NAME, KeptRows
+from catenary.postproc.report.study_table import Column, StudyTable, rows_csv, texts_table
+
+COMM = MPI.COMM_SELF
+COLUMNS = [
+    Column("run", "run"),
+    Column("std_N", "std [N]", ".1f"),
+    Column("span_m"),
+    Column("none", "never", ".1f"),
+    Column("shown", "shown", ">", in_files=False),
+]
+ROWS = [
+    {"run": "[red] slow", "std_N": 0.1 + 0.2, "span_m": [50, 60], "none": None, "shown": "a | b"},
+    {"run": "\u5317", "std_N": -0.04, "span_m": None, "none": None, "shown": None},
+    {"run": "lost", "outcome": "it fell", "std_N": None, "span_m": None, "none": None},
+]
+TABLE = StudyTable(COLUMNS, ROWS)
+
+
+def test_files_have_all_digits_and_only_their_columns() -> None:
+    rows = list(csv.DictReader(TABLE.csv().splitlines()))
+    assert list(rows[0]) == ["run", "std_N", "span_m", "none"]
+    assert float(rows[0]["std_N"]) == 0.1 + 0.2 and rows[0]["span_m"] == "[50, 60]"
+    assert rows[1]["span_m"] == rows[2]["std_N"] == ""
+    assert TABLE.records()[0] == {key: ROWS[0][key] for key in rows[0]}
+    assert rows_csv([{"a": True, "b": ["x", "y"]}]) == "a,b\ntrue,x; y\n"
+
+
+def test_a_terminal_has_columns_that_stand_below_their_heads() -> None:
+    head, first, second, lost = TABLE.text().splitlines()
+    end = head.index("std [N]") + len("std [N]")
+    # Text is nobody's markup; a wide letter takes two columns; zero has no sign.
+    assert first.startswith("[red] slow") and first[:end].endswith(" 0.3")
+    assert second[: end - 1].endswith(" 0.0")
+    assert lost.startswith("lost ") and lost.endswith("BROKE: it fell")
+    assert not any(line.endswith(" ") for line in (head, first, second, lost))
+
+
+def test_a_page_has_no_column_that_is_empty() -> None:
+    assert TABLE.markdown().splitlines() == [
+        "| run | std [N] | shown |",
+        "| --- | --- | --- |",
+        "| [red] slow | 0.3 | a \\| b |",
+        "| \u5317 | 0.0 |  |",
+        "| lost | BROKE: it fell |  |",
+    ]
+
+
+def test_texts_stand_as_they_are_given() -> None:
+    table = texts_table(["", "N"], [["-", 1], ["b", "2.50"]], {1}, "Title", "Note")
+    assert table.texts() == [["-", "1"], ["b", "2.50"]]
+    assert [column.format for column in table.read] == ["", ">"]
+
+
+def test_rows_are_kept_until_they_are_forgotten(tmp_path: Path) -> None:
+    made: list[int] = []
+
+    def make(number: int) -> list[list[float]]:
+        made.append(number)
+        return [[float(number), math.inf, np.float64(0.1), np.bool_(True)]]
+
+    scene = {"train": {"speed_km_h": 250.0}}
+    first = KeptRows(tmp_path / "out")
+    for number in (1, 2):
+        first.rows([scene, number], lambda number=number: make(number))
+    again = KeptRows(tmp_path / "out")
+    assert again.rows([scene, 1], lambda: make(1)) == [[1.0, math.inf, 0.1, True]]
+    again.rows([{"train": {"speed_km_h": 251.0}}, 1], lambda: make(3))
+    assert made == [1, 2, 3]
+    assert KeptRows(tmp_path / "out", force=True).get([scene, 1]) is None
+    assert not (tmp_path / "out" / NAME).exists()
+
+
+@pytest.mark.parametrize(
+    "damage", [lambda text: text[:-9], lambda text: text.replace("2.0", "3.0")]
+)
+def test_rows_that_a_kill_or_disk_has_damaged_are_made_again(damage, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
+    kept = KeptRows(tmp_path)
+    kept.keep("a", [1.0])
+    kept.keep("b", [2.0])
+    path = tmp_path / NAME
+    path.write_text(damage(path.read_text()))
+    again = KeptRows(tmp_path)
+    assert again.get("a") == [1.0] and again.get("b") is None
+    again.keep("b", [4.0])
+    assert KeptRows(tmp_path).get("b") == [4.0]
+
+
+def test_a_hard_case_that_was_measured_is_not_measured_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (case,) = hard_cases(["undamped_line"])
+    calls: list[bool] = []
+
+    def measured(case: HardCase, world: object, alone: object, short: bool) -> Checked:
+        calls.append(short)
+        found = [Criterion(case.name, "drift", 1e-12, math.inf, True, "a note")]
+        return Checked(found, {case.name: ["stiff"]})
+
+    monkeypatch.setattr(checks, "_checked", measured)
+    for short in (True, True, False):
+        found = checks.check_case(case, COMM, COMM, short, KeptRows(tmp_path))
+        assert found == measured(case, COMM, COMM, short)
+    assert calls == [True, True, True, False, False]
