@@ -18,6 +18,9 @@ from mkdocs.structure.files import File, Files
 _EQUATION = re.compile(
     r'<(?P<tag>span|div) class="arithmatex">\\[(\[](?P<latex>.*?)\\[)\]]</(?P=tag)>', re.S
 )
+# Names of functions stand apart from their neighbours, which the converter leaves out.
+_FUNCTION = r"<mi>(?:sin|cos|tan|tanh|cosh|coth|log)</mi>"
+_SPACE = '<mspace width="0.167em" />'
 # What the converter leaves of a command, or of an alignment, that it does not know.
 _LEFT_OVER = re.compile(r"\\[A-Za-z]+|&")
 
@@ -45,7 +48,9 @@ def mathml(latex: str, display: bool) -> str:
         raise ValueError(f"{left[0]} is not understood: {latex}")
     if latex.replace(r"\{", "").count("{") != latex.replace(r"\}", "").count("}"):
         raise ValueError(f"braces are not understood: {latex}")
-    return made
+    made = re.sub(rf"(?<=</m[in]>)({_FUNCTION})", rf"{_SPACE}\1", made)
+    made = re.sub(rf"({_FUNCTION})(?=<m(?:[in]|sub|frac)>)", rf"\1{_SPACE}", made)
+    return made.replace("<mo>&#x0007C;</mo>", '<mo lspace="0" rspace="0">&#x0007C;</mo>')
 
 
 def on_files(files: Files, config: Any) -> Files:

@@ -149,13 +149,10 @@ def workshop(tmp_path_factory: pytest.TempPathFactory) -> Workshop:
     program.parent.mkdir()
     program.write_text(f'#!/bin/sh\nexec "{sys.executable}" -W error -c "{_ENTRY}" "$@"\n')
     program.chmod(0o755)
-    makers = {
-        out_of(command): command
-        for document in DOCUMENTS
-        for block in blocks_of(read(document))
-        if block.verb in ("run", "study")
-        for command in block.commands()
-    }
+    blocks = [block for document in DOCUMENTS for block in blocks_of(read(document))]
+    shown = [one.command for block in blocks if block.has_prompt for one in block.shown()]
+    run = [one for block in blocks if block.verb in ("run", "study") for one in block.commands()]
+    makers = {out_of(command): command for command in (*shown, *run)}
     return Workshop(folder, makers)
 
 
