@@ -36,7 +36,7 @@ endif
 # The targets share .venv and two cores: one after the other, also under make -j.
 .NOTPARALLEL:
 .PHONY: help setup setup-newest update-versions run check test test-studies test-unit \
-    test-verification test-regression test-mpi test-ranks bench long-runs fuzz test-paraview test-readers sanitize lint types mypy format clean
+    test-verification test-regression test-mpi test-ranks bench long-runs fuzz test-paraview test-readers docs sanitize lint types mypy links format clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 20
@@ -134,6 +134,11 @@ sanitize: setup ## tests with kernels that check memory and arithmetic; SANITIZE
 	    LD_PRELOAD="$$(g++ -print-file-name=libasan.so) $$(g++ -print-file-name=libstdc++.so)" \
 	    $(PYTEST) -p no:benchmark --capture=sys --timeout=3000 $(SANITIZED_TESTS)
 
+# Material for MkDocs warns of what a next major version of MkDocs will change; the bounds hold that off.
+docs: setup links ## the documentation as a site, build/site/index.html; warnings are errors
+	NO_MKDOCS_2_WARNING=1 $(PYTHON) -m mkdocs build --config-file .site/mkdocs.yml
+	@echo "documentation: $(CURDIR)/build/site/index.html"
+
 lint: setup ## ruff (lint and format), mypy, clang-format and the compiler's warnings
 	$(PYTHON) -m ruff check .
 	$(PYTHON) -m ruff format --check .
@@ -148,11 +153,14 @@ types:
 	    echo "types: not checked with this Python, for whose packages no versions are tested"; exit 0; fi; \
 	$(MAKE) --no-print-directory mypy
 
-mypy:
+# The package as it is installed, of links to its folders, for programs that read sources.
+links:
 	@mkdir -p build/typing/catenary
 	@find build/typing/catenary -type l -delete
 	@for part in $(PARTS) solver/base cases/api/*.py*; do \
 	    ln -sfn ../../../$$part build/typing/catenary/$$(basename $$part); done
+
+mypy: links
 	MYPYPATH=build/typing $(PYTHON) -m mypy --exclude '/(cases/api|solver/base)/' -p catenary
 
 format: setup ## bring all files into the format of ruff and clang-format

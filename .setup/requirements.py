@@ -20,15 +20,18 @@ def name_of(requirement: str) -> str:
 
 
 def main() -> None:
-    """Print one requirement a line, those of the build, of films and of the tests included."""
+    """Print one requirement a line: build, program, films, site and tests."""
     with open(sys.argv[1], "rb") as file:
         settings = tomllib.load(file)
     project = settings["project"]
     wanted = [
         *settings["build-system"]["requires"],
         *(r for r in project["dependencies"] if name_of(r) not in FROM_SYSTEM),
-        *project["optional-dependencies"]["film"],
-        *project["optional-dependencies"]["test"],
+        *(
+            one
+            for extra in ("film", "docs", "test")
+            for one in project["optional-dependencies"][extra]
+        ),
     ]
     print("\n".join(wanted))
 

@@ -14,7 +14,7 @@ from catenary.cases.terminal import console
 
 @app.command(
     "list",
-    help="List the shipped cases, all keys of a scene, or ready pantographs.",
+    help="List the shipped cases, keys of a scene, ready pantographs, or the schema of case.toml.",
     epilog="Example: catenary list --keys damping",
 )
 @console.guarded
@@ -27,6 +27,12 @@ def list_cases(
         bool,
         typer.Option("--pantographs", help="Ready pantographs, for pantographs.NAME.model."),
     ] = False,
+    schema: Annotated[
+        bool,
+        typer.Option(
+            "--schema", help="The JSON schema of case.toml, for editors that complete keys."
+        ),
+    ] = False,
     wanted: Annotated[
         str | None,
         typer.Argument(
@@ -38,8 +44,15 @@ def list_cases(
     ] = None,
 ) -> None:
     """Serial."""
-    if keys and pantographs:
-        raise InputError("list takes --keys or --pantographs, but both are given")
+    given = [
+        name
+        for name, on in (("--keys", keys), ("--pantographs", pantographs), ("--schema", schema))
+        if on
+    ]
+    if len(given) > 1:
+        raise InputError(
+            f"list takes one of --keys, --pantographs and --schema, not {' and '.join(given)}"
+        )
     if keys:
         from catenary.cases.terminal.key_list import key_details, key_table
 
@@ -47,6 +60,13 @@ def list_cases(
         return
     if wanted is not None:
         raise InputError(f"{wanted} filters keys: write `catenary list --keys {wanted}`")
+    if schema:
+        import json
+
+        from catenary.cases.terminal.json_schema import scene_schema
+
+        console.say(json.dumps(scene_schema(), indent=1))
+        return
     if pantographs:
         from catenary.cases.terminal.terminal_text import pantograph_table
 

@@ -142,7 +142,7 @@ def _details(key: Key) -> str:
     head = f"{key.name} {key.unit}".rstrip()
     default = {"required": "required", "-": "may be left out", "empty": "may be left out"}
     facts = [default.get(key.default, f"default {key.default}")]
-    facts += [text for text in (_allowed(key),) if text]
+    facts += [text for text in (allowed(key),) if text]
     if key.kinds:
         facts.append(f"only of {', '.join(key.kinds)}")
     lines = [key.meaning, "; ".join(facts)]
@@ -192,7 +192,7 @@ def _words_in(schema: dict[str, Any]) -> list[str]:
     return [str(word) for word in schema.get("enum", only)]
 
 
-def _allowed(key: Key) -> str:
+def allowed(key: Key) -> str:
     """Bounds and words that a key accepts."""
     words = words_of(key)
     if words:

@@ -7,7 +7,8 @@ compared:
     explicit   the law at what both sides extrapolate to (the paper's, section 4)
     iterated   the law at what both sides answer to the forces before, until these agree
 
-Both lose their stability where the contact is stiff beside what a step moves: see docs/theory.md.
+Both lose their stability where the contact is stiff for the mass that a step moves: see
+docs/theory/one_solve.md.
 """
 
 from __future__ import annotations

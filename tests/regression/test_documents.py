@@ -6,6 +6,7 @@ several need are made once. The notes before blocks are explained in ``tests/sup
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import json
 import os
@@ -44,7 +45,9 @@ DOCUMENTS = sorted(
     if path.name != "CHANGELOG.md"
 )
 LIMIT = 250.0  # for one command on a busy machine [s]
-RUNS = {"run", "after", "edit", "append"}
+RUNS = {"run", "after", "edit", "append", "words"}
+# Pages of Python that a test of their own runs, which looks at what they give.
+OWN_TEST = {Path("docs/python.md"), Path("docs/tutorials/python.md")}
 _ENTRY = "from catenary.cases.cli.main import main; main()"
 
 
@@ -53,10 +56,16 @@ def read(document: Path) -> str:
 
 
 def is_run(block: Block) -> bool:
-    return block.has_prompt or block.verb in RUNS
+    is_python = block.kind == "python" and not block.verb
+    return block.has_prompt or is_python or block.verb in RUNS
 
 
-RUN_DOCUMENTS = [path for path in DOCUMENTS if any(map(is_run, blocks_of(read(path))))]
+RUN_DOCUMENTS = [
+    path for path in DOCUMENTS if path not in OWN_TEST and any(map(is_run, blocks_of(read(path))))
+]
+STUDIES = [
+    (path, block) for path in DOCUMENTS for block in blocks_of(read(path)) if block.verb == "study"
+]
 
 
 def out_of(command: str) -> str:
@@ -90,7 +99,10 @@ class Workshop:
         )
 
     def make(self, command: str) -> None:
-        """Run a command unless the folder that it makes is there."""
+        """Run a command unless the folder that it makes is there; first those that it reads."""
+        for word in command.split():
+            if word in self.makers and word != out_of(command):
+                self.make(self.makers[word])
         if not out_of(command) or not (self.folder / out_of(command)).exists():
             done = self.call(command)
             assert done.returncode == 0, f"{command}\n{done.stderr}"
@@ -105,12 +117,12 @@ class Workshop:
             return ""
         return difference(shown.output, done.stderr if refused else done.stdout, with_numbers)
 
-    def work_on(self, block: Block) -> list[str]:
-        """Do what a block says and return what is wrong with it."""
+    def work_on(self, block: Block, names: dict[str, Any]) -> list[str]:
+        """Do what a block says and return what is wrong with it; Python has these names."""
         if block.verb == "after":
             for folder in block.rest.split():
                 self.make(self.makers[folder])
-        elif block.verb == "run":
+        elif block.verb in ("run", "study"):
             for command in block.commands():
                 self.make(command)
         elif block.verb in ("edit", "append"):
@@ -118,6 +130,9 @@ class Workshop:
             before = file.read_text()
             change = edited if block.verb == "edit" else (lambda text, more: f"{text}\n{more}")
             file.write_text(change(before, block.body))
+        if block.kind == "python":
+            with contextlib.chdir(self.folder):
+                exec(compile(block.body, f"block at line {block.line}", "exec"), names)
         wrong = []
         for shown in block.shown() if block.has_prompt else []:
             if found := self.compare(shown, block.verb != "words"):
@@ -134,26 +149,41 @@ def workshop(tmp_path_factory: pytest.TempPathFactory) -> Workshop:
     program.parent.mkdir()
     program.write_text(f'#!/bin/sh\nexec "{sys.executable}" -W error -c "{_ENTRY}" "$@"\n')
     program.chmod(0o755)
-    makers = {
-        out_of(command): command
-        for document in DOCUMENTS
-        for block in blocks_of(read(document))
-        if block.verb == "run"
-        for command in block.commands()
-    }
+    blocks = [block for document in DOCUMENTS for block in blocks_of(read(document))]
+    shown = [one.command for block in blocks if block.has_prompt for one in block.shown()]
+    run = [one for block in blocks if block.verb in ("run", "study") for one in block.commands()]
+    makers = {out_of(command): command for command in (*shown, *run)}
     return Workshop(folder, makers)
 
 
 @pytest.mark.timeout(600)
 @pytest.mark.parametrize("document", RUN_DOCUMENTS, ids=str)
 def test_what_is_shown_is_what_happens(document: Path, workshop: Workshop) -> None:
+    names: dict[str, Any] = {}
     wrong = [
         f"{document}:{block.line}\n{text}"
         for block in blocks_of(read(document))
         if is_run(block)
-        for text in workshop.work_on(block)
+        for text in workshop.work_on(block, names)
     ]
     assert not wrong, "\n\n".join(wrong)
+
+
+@pytest.mark.study
+@pytest.mark.timeout(3600)
+@pytest.mark.parametrize(
+    ("document", "block"), STUDIES, ids=[f"{path}:{block.line}" for path, block in STUDIES]
+)
+def test_what_takes_long_runs_too(document: Path, block: Block, workshop: Workshop) -> None:
+    assert not workshop.work_on(block, {})
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=str)
+def test_every_block_is_run_or_says_why_not(document: Path) -> None:
+    for block in blocks_of(read(document)):
+        said = block.verb == "study" or re.match(r"not run: .{10,}", block.note)
+        own = document in OWN_TEST and block.kind == "python"
+        assert not block.is_code or is_run(block) or said or own, f"{document}:{block.line}"
 
 
 def test_blocks_with_output_are_found() -> None:
@@ -169,7 +199,7 @@ def test_every_command_is_understood(document: Path) -> None:
     plain = [
         command
         for block in blocks_of(text)
-        if not block.has_prompt and not block.kind
+        if not block.has_prompt and not block.kind and block.verb != "run"
         for command in block.commands()
     ]
     for command in (*plain, *inline_commands(text)):
@@ -246,6 +276,31 @@ def test_the_table_of_en_50318(document: str, workshop: Workshop) -> None:
         for shown, summary in zip((cells[0], cells[2]), summaries, strict=True):
             value = summary[QUANTITIES[name]]
             assert numbers_agree(shown, f"{value:.6f}"), f"{name}: shown {shown}, is {value}"
+
+
+PUBLISHED = [
+    (row[0].strip("`"), row[1], row[2])
+    for row in rows_of_table(read(Path("docs/validation.md")), "command")
+]
+
+
+@pytest.mark.timeout(600)
+@pytest.mark.parametrize(
+    ("command", "mean", "sigma"),
+    [
+        pytest.param(*row, marks=() if number < 2 else pytest.mark.study)
+        for number, row in enumerate(PUBLISHED)
+    ],
+)
+def test_a_published_figure_is_what_its_command_gives(
+    command: str, mean: str, sigma: str, tmp_path: Path
+) -> None:
+    words = [*command.split()[1:], "-o", str(tmp_path / "run")]
+    assert catenary(*words, cwd=tmp_path).code == 0
+    summary = json.loads((tmp_path / "run/summary.json").read_text())
+    leading = summary["pantographs"][0]
+    for shown, value in ((mean, leading["mean_N"]), (sigma, leading["std_N"])):
+        assert numbers_agree(shown, f"{value:.6f}"), f"{command}: shown {shown}, is {value}"
 
 
 @pytest.mark.parametrize("document", TABLES)

@@ -9,6 +9,11 @@ printed digit, a whole number exactly. A comment before a block tells what the t
 ``<!-- test: edit FILE -->``      put the block's TOML keys into this file, in place of those there
 ``<!-- test: append FILE -->``    append the block to this file
 ``<!-- test: words -->``          compare words but no numbers, which depend on the machine
+``<!-- test: study -->``          run the block with the studies (``make test-studies``) only
+``<!-- test: not run: WHY -->``   it is not run, and the site says why
+
+Blocks of Python are run too, those of a document one after the other with the same names. Commands
+of ``make`` are not run: they set up, and run the tests themselves.
 """
 
 from __future__ import annotations
@@ -23,6 +28,7 @@ _BLOCK = re.compile(
 )
 _NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w]*\.\w)")
 _ELISION = "..."
+_PROGRAM = r"(?:\S*/)?(?:catenary|python|mpirun|paraview|pvpython|module|pip)\s"
 _OF_SHELLS = re.compile(r"[|&;<>()$`*?\[\]{}~!\"\\\n]")
 
 
@@ -57,6 +63,13 @@ class Block:
     def has_prompt(self) -> bool:
         """Whether commands are shown with their output."""
         return self.body.startswith("$ ")
+
+    @property
+    def is_code(self) -> bool:
+        """Whether there is something to run: Python, or a command that is not one of ``make``."""
+        lines = self.commands()
+        ours = any(re.match(_PROGRAM, line.removeprefix("$ ")) for line in lines)
+        return self.kind == "python" or (self.kind in ("", "sh", "bash") and ours)
 
     def commands(self) -> list[str]:
         """Commands of a block without prompts, lines that go on joined."""

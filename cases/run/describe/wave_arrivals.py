@@ -3,7 +3,7 @@
 Wires that droppers join carry long waves together, with c = sqrt(sum of tensions / sum of masses);
 a conductor rail carries them by bending.
 The start of the run sends such waves ahead of the train and behind it; the ends of the line, which
-are fixed, reflect them. docs/guide.md, "How long a line", compares what follows with marches.
+are fixed, reflect them. docs/guide/line_length.md compares what follows with marches.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import NamedTuple
 # Share of an amplitude below which a reflected wave counts as harmless [-].
 FELT = 1e-3
 # What the start of a run leaves in the contact force after a distance of D spans, on a line without
-# damping, is START_SHARE / D of the standard deviation; measured, see docs/guide.md.
+# damping, is START_SHARE / D of the standard deviation; measured, see docs/guide/line_length.md.
 START_SHARE = 0.8
 # Above this share of the standard deviation the run-in counts as short [-].
 SHORT_RUN_IN = 0.2

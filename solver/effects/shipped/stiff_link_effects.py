@@ -5,7 +5,7 @@ amplification factor goes to -1) and does the work (T_n + T_n+1) / 2 times the s
 link that slackens from a stretch a to a gap b thereby returns k a (a + b) / 2, though only
 k a^2 / 2 was stored, and a stiff link switches in every other step: the line gains energy. A damper
 alpha k in the link makes the factor (2 alpha - dt) / (2 alpha + dt): with alpha = dt it is 1/3, and
-a link that slackens returns less than it stored (docs/theory.md, section 6).
+a link that slackens returns less than it stored (docs/theory/droppers.md).
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ register(
         NAME,
         "numerical damping of droppers and stops that are stiff for the time step",
         "a damper alpha k in each link that acts one way, with alpha = dt",
-        "amplification factor of average acceleration for omega dt >> 1; docs/theory.md section 6",
+        "amplification factor of average acceleration for omega dt >> 1; docs/theory/droppers.md",
         default=True,
         applies=lambda p: bool(_added(p)),
         law=_damped,

@@ -246,7 +246,7 @@ register(
         "relative_motion",
         "motion of twin wires relative to each other",
         "unknowns of the second of two wires side by side, which has the first one's without it",
-        "sum and difference of two like wires; docs/theory.md section 1",
+        "sum and difference of two like wires; docs/theory/line.md",
         default=True,
         applies=lambda p: bool(p.line.twins),
         law=lambda laws, p: replace(laws, relative_motion=True),

@@ -11,7 +11,7 @@
 // Nor is the matrix one with riders: what a dropper does across it is whole while it is taut and
 // nothing while it is slack, whatever its tension, so that it jumps where that passes zero. If the
 // jump tightens the dropper that slackens, it is neither taut nor slack. The step then ends with
-// its tension at zero and riders that carry in part (docs/theory.md, section 16).
+// its tension at zero and riders that carry in part (docs/theory/lateral.md).
 #include "contact_problem/active_set.hpp"
 
 namespace catenary {

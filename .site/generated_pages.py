@@ -1,0 +1,84 @@
+"""Pages that are made from the program: keys of a scene, their JSON schema, verbs."""
+
+from __future__ import annotations
+
+import itertools
+import json
+from typing import Any
+
+import typer
+from mkdocs.structure.files import File, Files
+
+from catenary.cases.cli.main import app
+from catenary.cases.terminal.json_schema import scene_schema
+from catenary.cases.terminal.key_list import Key, allowed, keys_of_a_scene
+
+_KEYS = """# Keys of a scene
+
+All keys of `case.toml`, made from the schema that checks it. `*` stands for a number of a list or
+for a name that the scene chooses. `catenary list --keys FILTER` prints typical values too.
+
+Editors complete and check `case.toml` by the [JSON schema](case.schema.json):
+see [complete keys in an editor](../guide/scene_files.md#complete-keys-in-an-editor).
+"""
+_VERBS = """# Command line
+
+All verbs and their options, made from the program. Every verb has `--help`.
+[Results](../guide/results.md)
+explains output and exit codes. `-q` silences everything but errors.
+"""
+
+
+def on_files(files: Files, config: Any) -> Files:
+    """The files of the site with those made here; called by MkDocs."""
+    schema = json.dumps(scene_schema(), indent=1)
+    for name, text in (
+        ("reference/keys.md", keys_page()),
+        ("reference/command_line.md", verbs_page()),
+        ("reference/case.schema.json", schema),
+    ):
+        files.append(File.generated(config, name, content=text))
+    return files
+
+
+def keys_page() -> str:
+    """A section for each table of a scene, a row for each key."""
+    parts = [_KEYS]
+    for table, keys in itertools.groupby(keys_of_a_scene(), lambda key: key.name.partition(".")[0]):
+        parts += [
+            f"\n## {table}\n",
+            "| key | unit | default | allowed | meaning |",
+            "|---|---|---|---|---|",
+        ]
+        parts += map(_row, keys)
+    return "\n".join(parts) + "\n"
+
+
+def _row(key: Key) -> str:
+    only = f" (only of {', '.join(key.kinds)})" if key.kinds else ""
+    cells = (f"`{key.name}`", key.unit.strip("[]"), key.default, allowed(key), key.meaning + only)
+    return f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |"
+
+
+def verbs_page() -> str:
+    """A section for each verb with its usage, options and example."""
+    group: Any = typer.main.get_command(app)
+    parts = [_VERBS]
+    for name, verb in group.commands.items():
+        with verb.make_context(name, ["--help"], resilient_parsing=True) as context:
+            context.info_name = f"catenary {name}"
+            usage = verb.get_usage(context).removeprefix("Usage: ")
+            records = [one.get_help_record(context) for one in verb.get_params(context)]
+        parts += [f"\n## catenary {name}\n", verb.help, f"\n```text\n{usage}\n```\n"]
+        parts += ["| argument or option | meaning |", "|---|---|"]
+        parts += [
+            f"| `{names}` | {text} |".replace("||", "|") for names, text in filter(None, records)
+        ]
+        examples = (verb.epilog or "").removeprefix("Example: ").split("; ")
+        parts += [
+            "\nExample:" if len(examples) == 1 else "\nExamples:",
+            "\n```text",
+            *examples,
+            "```",
+        ]
+    return "\n".join(parts) + "\n"
