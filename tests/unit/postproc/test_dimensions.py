@@ -8,6 +8,13 @@ import h5py
 import numpy as np
 import pytest
 
+from catenary.postproc.files.run_schema import (
+    COMPLETE,
+    RunAttributes,
+    constant_tables,
+    fact_tables,
+    growing_tables,
+)
 from catenary.postproc.read.results import Results
 
 
@@ -44,6 +51,22 @@ def test_each_dimension_of_each_table_has_one_name(tables: dict[str, h5py.Datase
                 assert size == table.shape[axis], path
             scaled += 1
     assert scaled > 40
+
+
+def test_all_that_a_file_holds_is_declared(
+    run_folder: Path, tables: dict[str, h5py.Dataset]
+) -> None:
+    """In the schema, which its reader checks; states and extremes have checks of their own."""
+    with Results(run_folder) as results:
+        record, wires = results.line_record, results.wires()
+        attributes = set(results.attributes)
+    declared = {COMPLETE, *constant_tables(wires, ()), *fact_tables()}
+    declared |= set().union(*growing_tables(record))
+    found = {path for path in tables if not path.startswith(("checkpoint/", "extremes/"))}
+    assert {path for path in found - declared if "CLASS" not in tables[path].attrs} == set()
+    required = {path for path, own in constant_tables(wires, ()).items() if not own.optional}
+    assert required | set(fact_tables()) <= found
+    assert attributes - set(RunAttributes.model_fields) == {"format", "Conventions"}
 
 
 def test_states_to_continue_from_are_hidden(tables: dict[str, h5py.Dataset]) -> None:
