@@ -124,7 +124,11 @@ test-readers: setup ## what other programs read of a run: versions of VTK and xa
 # first are the one that replaces malloc, and the one whose exceptions it watches. A fault ends the tests,
 # with a report that pytest must not hold back.
 SANITIZED := $(CURDIR)/build/sanitized
-SANITIZED_TESTS ?= $(addprefix tests/unit/solver/,test_station_passes.py test_varying_stations.py test_repeated_blocks.py)
+SANITIZED_TESTS ?= $(addprefix tests/unit/solver/,test_station_passes.py test_varying_stations.py \
+    test_repeated_blocks.py test_inner_problem.py test_end_memory.py) \
+    $(addprefix tests/unit/mbs/,test_native_heads.py test_multibody_flat.py) \
+    tests/verification/test_partly_slack_droppers.py \
+    tests/regression/prepared_line/test_prepared_line.py::test_state_is_kept_and_restored_with_what_was_added
 
 sanitize: setup ## tests with kernels that check memory and arithmetic; SANITIZED_TESTS="FILE..."
 	rm -rf $(SANITIZED)/package

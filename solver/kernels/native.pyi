@@ -17,9 +17,6 @@ class Bound:
 
     def __call__(self, *later: Any) -> Any: ...
 
-# Whether kernels end the program where an index is out of bounds or a step leaves no number.
-CHECKS: bool
-
 spline_at: Kernel
 tables_at: Kernel
 sines_at: Kernel

@@ -8,20 +8,16 @@
 
 namespace catenary {
 
-#ifdef CATENARY_CHECKS
-inline constexpr bool kChecks = true;
-#else
-inline constexpr bool kChecks = false;
-#endif
-
 /// End the program, with a sentence, if one of these is no finite number.
-inline void check_numbers(std::span<const double> numbers, const char* of) {
-    if (!kChecks) return;
+inline void check_numbers([[maybe_unused]] std::span<const double> numbers,
+                          [[maybe_unused]] const char* of) {
+#ifdef CATENARY_CHECKS
     for (size_t i = 0; i < numbers.size(); ++i)
         if (!std::isfinite(numbers[i])) {
             std::fprintf(stderr, "catenary: number %zu of %s is %g\n", i, of, numbers[i]);
             std::abort();
         }
+#endif
 }
 
 }  // namespace catenary

@@ -1,6 +1,5 @@
 // The Python module catenary.solver.kernels.native, with what Python calls of arithmetic and
 // curves.
-#include "base/checks.hpp"
 #include "base/compiler.hpp"
 #include "base/curves.hpp"
 #include "base/flush_to_zero.hpp"
@@ -35,7 +34,6 @@ PYBIND11_MODULE(native, module) {
         .def("__call__", &Kernel::call)
         .def("bound", &Kernel::bound)
         .def("__repr__", [](const Kernel& kernel) { return kernel.name + ": " + kernel.does; });
-    module.attr("CHECKS") = kChecks;
     offer_base(module);
     offer_stations(module);
     offer_line(module);

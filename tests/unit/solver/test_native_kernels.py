@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import ast
+import os
+import shutil
+import signal
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -35,12 +37,38 @@ def test_the_module_refuses_compilers_that_are_too_old() -> None:
     assert '#include "base/compiler.hpp"' in module
 
 
+PROGRAM = """
+#include "base/checks.hpp"
+int main(int n, char**) {
+    double numbers[] = {1.0, INFINITY};
+    if (n == 1) catenary::check_numbers(numbers, "a motion");
+    return catenary::Array2<double>{numbers, 1, 1}(n - 1, 0) == 1.0 ? 0 : 3;
+}
+"""
+
+
 @pytest.mark.process
-@pytest.mark.skipif(not native.CHECKS, reason="make sanitize builds kernels that check numbers")
-def test_checked_kernels_end_the_program_at_the_step_that_leaves_no_number() -> None:
-    """Others go on until a link or a contact meets it, and then say so."""
-    words = ["-m", "pytest", "-p", "no:cacheprovider", "--capture=sys", "-k", "no_number"]
-    test = Path(__file__).with_name("test_march_endings.py")
-    done = subprocess.run([sys.executable, *words, test], capture_output=True, text=True)
-    assert done.returncode < 0
-    assert "of the line's motion is nan" in done.stderr
+def test_builds_that_look_for_faults_end_at_what_is_no_number_and_out_of_bounds(
+    tmp_path: Path,
+) -> None:
+    """With the flags of ``make sanitize``; without them the program reads what is there."""
+    compiler = os.environ.get("CXX", "g++")
+    if shutil.which(compiler) is None:
+        pytest.skip(f"there is no {compiler}")
+    (tmp_path / "a.cpp").write_text(PROGRAM)
+    flags = ["-D_GLIBCXX_ASSERTIONS", "-DCATENARY_CHECKS"]
+    for flag in flags:
+        assert flag in (KERNELS.parents[1] / "setup.py").read_text(encoding="utf-8")
+    for name, own in (("usual", []), ("checked", flags)):
+        words = ["-std=c++20", "-w", f"-I{KERNELS}", *own, str(tmp_path / "a.cpp")]
+        subprocess.run([compiler, *words, "-o", str(tmp_path / name)], check=True)
+
+    def ended(*words: str) -> tuple[int, str]:
+        done = subprocess.run([tmp_path / words[0], *words[1:]], capture_output=True, text=True)
+        return done.returncode, done.stderr
+
+    assert ended("usual") == (0, "") and ended("usual", "beyond") == (3, "")
+    aborted = -signal.SIGABRT
+    assert ended("checked") == (aborted, "catenary: number 1 of a motion is inf\n")
+    code, says = ended("checked", "beyond")
+    assert code == aborted and "Assertion" in says
