@@ -67,24 +67,25 @@ class StudyTable:
         return csv_text(heads, ([cell(row[name]) for name in heads] for row in self.rows))
 
     @property
-    def read(self) -> list[Column]:
+    def for_people(self) -> list[Column]:
         """The columns that people read."""
         return [column for column in self.columns if column.head]
 
     @property
     def head(self) -> list[str]:
         """What stands above the columns that people read."""
-        return [column.head for column in self.read]
+        return [column.head for column in self.for_people]
 
     def texts(self, unknown: str = "") -> list[list[str]]:
         """The cells that people read, row by row; an outcome stands in the second one."""
-        empty = [""] * (len(self.read) - 2)
-        return [
-            [column.shown(row.get(column.name), unknown) for column in self.read]
-            if _is_done(row)
-            else [self.read[0].shown(row[self.read[0].name], unknown), _outcome(row), *empty]
-            for row in self.rows
-        ]
+        people, rows = self.for_people, []
+        for row in self.rows:
+            if _is_done(row):
+                rows.append([column.shown(row.get(column.name), unknown) for column in people])
+            else:
+                first = people[0].shown(row[people[0].name], unknown)
+                rows.append([first, _outcome(row), *[""] * (len(people) - 2)])
+        return rows
 
     def text(self) -> str:
         """The table for a terminal."""
@@ -93,7 +94,7 @@ class StudyTable:
         from rich.text import Text
 
         table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="")
-        for column in self.read:
+        for column in self.for_people:
             justify: Any = "right" if column.format else "left"
             table.add_column(Text(column.head), justify=justify, no_wrap=True)
         table.add_column()
@@ -104,7 +105,7 @@ class StudyTable:
             table.add_row(*(Text(cell) for cell in padded))
         # Wide enough for any row: what is folded cannot be searched for.
         stream = io.StringIO()
-        Console(file=stream, width=10_000, color_system=None).print(table)
+        Console(file=stream, width=10_000, color_system=None, force_jupyter=False).print(table)
         return "\n".join(line.rstrip() for line in stream.getvalue().splitlines())
 
     def markdown(self) -> str:

@@ -64,7 +64,7 @@ def test_a_page_has_no_column_that_is_empty() -> None:
 def test_texts_stand_as_they_are_given() -> None:
     table = texts_table(["", "N"], [["-", 1], ["b", "2.50"]], {1}, "Title", "Note")
     assert table.texts() == [["-", "1"], ["b", "2.50"]]
-    assert [column.format for column in table.read] == ["", ">"]
+    assert [column.format for column in table.for_people] == ["", ">"]
 
 
 def test_rows_are_kept_until_they_are_forgotten(tmp_path: Path) -> None:

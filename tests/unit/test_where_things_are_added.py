@@ -1,4 +1,4 @@
-"""A link, an effect with laws and a verb, each added in one place, as CONTRIBUTING says.
+"""A link, an effect with laws, a verb and a study, each added in one place, as CONTRIBUTING says.
 
 A channel is added in `test_one_more_channel`, unknowns and a load in `test_lateral_effect`.
 """
@@ -15,11 +15,12 @@ from small_lines import HANGING, en50318_line, mesh_of, problem_of, train
 from typer.testing import CliRunner
 
 from catenary.base.errors import InputError
-from catenary.cases.cli.app import app
+from catenary.cases.cli.app import Force, RunWords, SceneWords, app
 from catenary.cases.scene.load import load_scene
 from catenary.cases.terminal import console
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
 from catenary.meshgen.wires import Profile
+from catenary.postproc.report.study_table import Column, StudyTable
 from catenary.solver.effects.build_model import build
 from catenary.solver.effects.effect import Effect, Limit, register, unregister
 from catenary.solver.model.builder import ModelBuilder
@@ -125,3 +126,43 @@ def test_a_verb_is_a_command_of_the_application() -> None:
     finally:
         app.registered_commands.pop()
     assert "hello" not in CliRunner().invoke(app, ["--help"]).stdout
+
+
+CASE, SPEED = "en50318_2002", "train.speed_km_h"
+
+
+def test_a_study_is_a_verb_with_a_scene_and_a_table() -> None:
+    """As CONTRIBUTING has it: options of the scene from one parameter, rows shown by a table."""
+
+    @app.command("speeds", help="Speeds of trains.")
+    @console.guarded
+    @console.serial
+    def speeds(words: SceneWords, force: Force = False) -> None:
+        scene = words.load("numerics.dt_s=0.002")
+        rows = [{"speed": scene.train.speed_km_h, "dt_s": scene.numerics.dt_s, "force": force}]
+        columns = [Column("speed", "v [km/h]", ".1f"), Column("dt_s", "dt", "g"), Column("force")]
+        console.say(StudyTable(columns, rows).text())
+
+    @app.command("split", help="Options for PETSc.")
+    @console.guarded
+    def split(words: RunWords) -> None:
+        console.say(f"{words.case} {words.split()} {words.shortened}")
+
+    def said(*words: str) -> list[str]:
+        return [line.split() for line in CliRunner().invoke(app, list(words)).stdout.splitlines()]
+
+    try:
+        told = said("speeds", CASE, f"{SPEED}=210", "--set", f"{SPEED}=200", "--force")
+        assert told == [["v", "[km/h]", "dt"], ["210.0", "0.002"]]
+        petsc = CliRunner().invoke(app, ["speeds", CASE, "--", "-log_view"])
+        assert petsc.exit_code == 2 and "only run takes those" in petsc.stderr
+        without = CliRunner().invoke(app, ["speeds"])
+        assert without.exit_code == 2 and "Missing argument" in without.stderr
+        (both,) = (
+            CliRunner()
+            .invoke(app, ["split", "x", "--short", "--set", "a.b=1", "c=2", "--", "-log_view"])
+            .stdout.splitlines()
+        )
+        assert both == "x (['a.b=1', 'c=2'], ['-log_view']) True"
+    finally:
+        del app.registered_commands[-2:]
