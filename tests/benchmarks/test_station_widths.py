@@ -33,19 +33,18 @@ N_STATIONS, PERIOD = 1126, 45
 STEPS = Steps(1e-3, 2.5e-7, 5e-4, 0.003, 2.5e-7, 5e-4, 0.0)
 ROUNDS, CALLS = 300, 20
 FLOOR = "floor"
-# Planes of a station, and the most that a step may take in terms of the floor. No kernels were
-# compiled for such stations, in which everything joins everything: theirs look at masks. Prototypes
-# in C, compiled for them, took 0.40, 1.4, 1.7, 3.3 and 3.6 times the floor for 4, 6, 8, 10 and 12
-# unknowns.
+# Planes of a station, and the most that a step may take in terms of the floor: 1.3 times what it
+# took. Prototypes in C, compiled for stations in which everything joins everything, took 0.40, 1.4,
+# 1.7, 3.3 and 3.6 times the floor for 4, 6, 8, 10 and 12 unknowns.
 MOST = {
-    (4,): 1.3 * 1.2,
-    (6,): 1.3 * 2.4,
-    (8,): 1.3 * 2.7,
-    (10,): 1.3 * 4.6,
-    (12,): 1.3 * 5.3,
-    (4, 4): 1.3 * 2.0,
-    (6, 4): 1.3 * 8.1,
-    (4, 2): 1.3 * 5.3,
+    (4,): 1.3 * 0.42,
+    (6,): 1.3 * 1.1,
+    (8,): 1.3 * 1.7,
+    (10,): 1.3 * 2.7,
+    (12,): 1.3 * 3.9,
+    (4, 4): 1.3 * 0.89,
+    (6, 4): 1.3 * 2.8,
+    (4, 2): 1.3 * 1.1,
 }
 # Stations of shipped lines, with kernels of their own, and the most that a step takes of them if
 # two unknowns more are joined, so that they have none.

@@ -27,14 +27,14 @@ from catenary.solver.statics.line_at_rest import line_at_rest
 STITCHED, COMPOUND = "line.stitch_wire=", "line.auxiliary_wire="
 SIMPLE = "line.topology=simple"
 LINES: dict[str, tuple[str, list[str], list[str], float]] = {
-    "stitched": ("re330_stitched", [], [SIMPLE, STITCHED], 2.9),
-    "compound": ("shinkansen_compound", [], [SIMPLE, COMPOUND], 4.3),
+    "stitched": ("re330_stitched", [], [SIMPLE, STITCHED], 2.6),
+    "compound": ("shinkansen_compound", [], [SIMPLE, COMPOUND], 3.3),
     "twin": ("dc_twin", [], [SIMPLE, "line.twin="], 1.4),
     "twin, relative motion": (
         "dc_twin",
         ["effects.relative_motion=true"],
         [SIMPLE, "line.twin="],
-        3.2,
+        2.9,
     ),
     "overlap": ("overlap", [], ["line.overlap="], 1.4),
 }

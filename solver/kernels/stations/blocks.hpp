@@ -19,8 +19,8 @@ struct KnownMasks {
     KnownMasks(const Layout&, const Layout&) {}
 };
 
-/// The same found at run time. Whether a product is there is asked before each: a processor knows
-/// the answer, which is that of the station before.
+/// The same found at run time. What a square has is asked before each: a processor knows the
+/// answer, which is that of the station before.
 struct GivenMasks {
     static constexpr bool is_known = false;
     int pitch;
@@ -168,12 +168,25 @@ struct Blocks : Masks {
     CATENARY_INLINE static void add_square(Sums<X>& sums, const double*& numbers, int kinds,
                                            const X& x) {
         V &one = sums.one.piece[I], &other = sums.other.piece[I];
-        if (kinds & 1) one += next(numbers) * x.piece[J];
-        if (kinds & 2) other += next(numbers) * x.piece[J];
-        if constexpr (has_crossed(I, J)) {
-            if (kinds & 4) one += next(numbers) * crossed(x.piece[J]);
-            if (kinds & 8) other += next(numbers) * crossed(x.piece[J]);
+        with_kinds<I, J>(kinds, [&](int there) CATENARY_HOT {
+            if (there & 1) one += next(numbers) * x.piece[J];
+            if (there & 2) other += next(numbers) * x.piece[J];
+            if constexpr (has_crossed(I, J)) {
+                if (there & 4) one += next(numbers) * crossed(x.piece[J]);
+                if (there & 8) other += next(numbers) * crossed(x.piece[J]);
+            }
+        });
+    }
+    /// Call a function with the kinds of products of a square. If masks are found at run time it
+    /// is compiled twice: for a square that has all of them, as most have, no more is asked.
+    template <int I, int J, class F>
+    CATENARY_INLINE static void with_kinds(int kinds, F&& function) {
+        constexpr int all = all_kinds(kPieces, I, J);
+        if constexpr (!Masks::is_known) {
+            if (kinds == all) return function(all);
+            if (!kinds) return;
         }
+        function(kinds);
     }
     /// Add a symmetric block times x: each square above the diagonal counts for two.
     CATENARY_INLINE void add_symmetric(Sums<X>& sums, const double* numbers, const X& x) const {
@@ -194,16 +207,17 @@ struct Blocks : Masks {
             add_square<i, i>(sums, numbers, mask[i][i], x);
             each<kN - 1 - i>([&](auto further) CATENARY_HOT {
                 constexpr int j = i + 1 + further;
-                const int kinds = mask[i][j];
                 const double* again = numbers;
-                add_square<i, j>(sums, numbers, kinds, x);
-                V& there = sums.one.piece[j];
-                if (kinds & 1) there += next(again) * x.piece[i];
-                if (kinds & 2) there += next(again) * turned_here;
-                if constexpr (has_crossed(i, j)) {
-                    if (kinds & 4) crossing.piece[j] += next(again) * x.piece[i];
-                    if (kinds & 8) crossing.piece[j] += next(again) * turned_here;
-                }
+                add_square<i, j>(sums, numbers, mask[i][j], x);
+                V& straight = sums.one.piece[j];
+                with_kinds<i, j>(mask[i][j], [&](int there) CATENARY_HOT {
+                    if (there & 1) straight += next(again) * x.piece[i];
+                    if (there & 2) straight += next(again) * turned_here;
+                    if constexpr (has_crossed(i, j)) {
+                        if (there & 4) crossing.piece[j] += next(again) * x.piece[i];
+                        if (there & 8) crossing.piece[j] += next(again) * turned_here;
+                    }
+                });
             });
         });
         each<kN>([&](auto j) CATENARY_HOT {
@@ -211,9 +225,7 @@ struct Blocks : Masks {
                 sums.one.piece[j] += crossed(crossing.piece[j]);
         });
     }
-    static constexpr bool has_crossed(int i, int j) {
-        return kVector == 4 && !kPieces.is_half(i) && !kPieces.is_half(j);
-    }
+    static constexpr bool has_crossed(int i, int j) { return all_kinds(kPieces, i, j) > 3; }
 };
 
 }  // namespace catenary::CATENARY_TARGET

@@ -54,6 +54,15 @@ constexpr Shipped kTensioned = [] {
     return of;
 }();
 
+/// Stations of which everything joins everything, plane by plane.
+constexpr Shipped dense(int unknowns, bool is_sparse, int plane = kMostUnknowns) {
+    Wires planes{};
+    for (int u = 0; u < kMostUnknowns; ++u) planes[u] = static_cast<int8_t>(u / plane);
+    Shipped of = shipped(unknowns, {}, is_sparse, plane, false, planes);
+    of.rows.own = of.factors.own;
+    return of;
+}
+
 constexpr Shipped kShipped[] = {
     shipped(2, {0, 1}, false),                   // one wire
     shipped(4, {0, 1}, false, 2),                // in two planes
@@ -81,13 +90,29 @@ constexpr Shipped kShipped[] = {
     by_mass(shipped(6, {}, true, 6, false, kStretching)),
     by_mass(kTensioned),
     kTensioned,
+    // Any lines of these widths.
+    dense(4, false),
+    dense(4, true),
+    dense(8, false, 4),
+    dense(8, true, 4),
+    dense(6, false),
+    dense(6, true),
+    dense(8, false),
+    dense(8, true),
+    dense(10, false),
+    dense(10, true),
+    dense(12, false),
+    dense(12, true),
 };
 
 /// The layout of the least products among those that kernels were compiled for which has all of a
-/// layout's: itself if there is none, or none of less than 1.5 times its products.
+/// layout's: stations without kernels of their own take twice as long as with some that make as
+/// many products. If there is none its own squares, of which general kernels make all at once.
 constexpr Layout fitting(const Layout& wanted) {
     Layout found = wanted;
-    int least = 3 * wanted.of_row() / 2;
+    found.own = in_squares(wanted.pieces(), wanted.own);
+    found.beside = in_squares(wanted.pieces(), wanted.beside);
+    int least = 3 * wanted.of_row();
     for (const Shipped& one : kShipped)
         for (const Layout& layout : {one.rows, one.factors})
             if (layout.holds(wanted) && layout.of_row() < least) {

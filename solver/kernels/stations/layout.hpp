@@ -36,6 +36,11 @@ struct Pieces {
     constexpr bool is_half(int piece) const { return lanes() - piece * vector() < vector(); }
 };
 
+/// Kinds of products that the square of two pieces may have.
+constexpr int all_kinds(const Pieces& pieces, int i, int j) {
+    return pieces.vector() == 2 || pieces.is_half(i) || pieces.is_half(j) ? 3 : 15;
+}
+
 /// What a lane of a product's numbers joins; -1 if there is none.
 struct Joint {
     int row = -1, column = -1;
@@ -43,7 +48,7 @@ struct Joint {
 constexpr Joint joint_of(const Pieces& pieces, int i, int j, int kind, int lane) {
     const int v = pieces.vector(), turned = lane ^ (kind & 1), crossed = lane ^ (kind & 2);
     const bool few_rows = pieces.is_half(i), few_columns = pieces.is_half(j);
-    if (crossed >= v || ((few_rows || few_columns) && kind >= 2)) return {};
+    if (!(all_kinds(pieces, i, j) >> kind & 1)) return {};
     if (few_rows && few_columns && lane >= 2) return {};
     const Joint found{v * i + (few_rows ? turned % 2 : turned),
                       v * j + (few_columns ? lane % 2 : crossed)};
@@ -61,6 +66,14 @@ constexpr Mask mask_of(const Pieces& pieces, const Joins& joins) {
                     const Joint at = joint_of(pieces, i, j, kind, lane);
                     if (at.row >= 0 && joins(at.row, at.column)) mask[i][j] |= 1 << kind;
                 }
+    return mask;
+}
+
+/// The same with all kinds in every square that has some.
+constexpr Mask in_squares(const Pieces& pieces, Mask mask) {
+    for (int i = 0; i < pieces.n(); ++i)
+        for (int j = 0; j < pieces.n(); ++j)
+            if (mask[i][j]) mask[i][j] = static_cast<uint8_t>(all_kinds(pieces, i, j));
     return mask;
 }
 
