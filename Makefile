@@ -157,12 +157,14 @@ types:
 	    echo "types: not checked with this Python, for whose packages no versions are tested"; exit 0; fi; \
 	$(MAKE) --no-print-directory mypy
 
-# The package as it is installed, of links to its folders, for programs that read sources.
+# The package as it is installed, of links to its folders, for programs that read sources. Links that
+# are right stay: lint and tests use them at the same time.
 links:
 	@mkdir -p build/typing/catenary
-	@find build/typing/catenary -type l -delete
+	@find build/typing/catenary -xtype l -delete
 	@for part in $(PARTS) solver/base cases/api/*.py*; do \
-	    ln -sfn ../../../$$part build/typing/catenary/$$(basename $$part); done
+	    link=build/typing/catenary/$$(basename $$part); \
+	    [ "$$(readlink $$link)" = ../../../$$part ] || ln -sfn ../../../$$part $$link; done
 
 mypy: links
 	MYPYPATH=build/typing $(PYTHON) -m mypy --exclude '/(cases/api|solver/base)/' -p catenary
