@@ -25,6 +25,7 @@ class Catenary(PythonPackage):
         depends_on("py-meshio@5.3:5")
         depends_on("py-pydantic@2.6:2.14")
         depends_on("py-typer@0.12:0.29")
+        depends_on("py-rich@13:15")
         depends_on("py-tqdm@4.64:4")
         depends_on("py-jinja2@3.1:3")
         depends_on("py-matplotlib@3.7:3.11")

@@ -120,14 +120,14 @@ def test_counts_are_those_of_the_model() -> None:
         switch = next(s for s in switchable_effects(scene).switches if s.name == SIDEWAYS.name)
         assert not switch.on
         wide = replace(problem, effects=problem.effects | {SIDEWAYS.name})
-        for one, planes in ((problem, (4,)), (wide, (4, 4))):
+        for one, planes in ((problem, (4,)), (wide, (4, 2, 2))):
             model = build(one, mesh, np.ones(mesh.droppers.shape[0]))
             with RepeatedMarch(MPI.COMM_SELF, line_at_rest(one, mesh), 10, 5) as march:
                 size = size_of(march)
                 assert march.step_cost() > 0.0
             assert size.n_unknowns == model.numbering.n_unknowns == sum(planes) // 2 * mesh.n_nodes
             assert size.planes == planes
-    assert output.width_text(size) == "4+4"
+    assert output.width_text(size) == "4+2+2"
 
 
 def test_a_march_goes_back_behind_an_incident() -> None:
