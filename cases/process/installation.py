@@ -75,7 +75,7 @@ def examined(folder: Path) -> Iterator[Finding]:
     yield _compiler()
     yield _film()
     yield _program(
-        "ParaView", ("paraview",), "install it from paraview.org to open runs with `report`"
+        "ParaView", ("paraview",), "install it, from paraview.org or as a package, to open runs"
     )
     yield _folder(folder)
     yield _memory()

@@ -19,7 +19,7 @@ from catenary.base.parallel import total
 from catenary.base.petsc import PETSc
 from catenary.solver.integrators.line_state import AlphaSteps, LineState, PredictedLineState, Steps
 from catenary.solver.integrators.loads.line_loads import LineLoads
-from catenary.solver.integrators.slow_path import LIBRARY, PARTS, SlowPath
+from catenary.solver.integrators.slow_path import GENERAL, LIBRARY, PARTS, SlowPath
 from catenary.solver.integrators.two_pass_step import StationPasses
 from catenary.solver.kernels import aligned_arrays, native
 from catenary.solver.linear.decay_length import reach
@@ -143,6 +143,12 @@ class LineIntegrator(ABC):
             self.slow_path = SlowPath(self.operators.why_not_by_stations(), LIBRARY)
             return
         self._passes = passes
+        general = passes is not None and not passes.are_compiled
+        if self._comm.allreduce(int(general), op=MPI.MAX):
+            self.slow_path = SlowPath(
+                "its cross-sections join their unknowns as in none that kernels are compiled for",
+                GENERAL,
+            )
         if passes is not None:
             passes.track_links(*self._links)
         motion.put(self.displacement, self.velocity, self.acceleration)

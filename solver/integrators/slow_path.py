@@ -15,6 +15,8 @@ logger = logging.getLogger(__name__)
 # Time of a step in terms of one in the compiled loop, as measured with the case ambrosio2012: part
 # by part with products and solves by stations, and with factors of PETSc.
 PARTS, LIBRARY = 5.5, 5.6
+# Free steps by kernels that look up what stations join (tests/benchmarks/test_station_widths.py).
+GENERAL = 2.5
 # A short function of NumPy, called for each step.
 CALLED = 1.5
 

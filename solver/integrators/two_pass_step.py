@@ -95,6 +95,7 @@ class StationPasses:
     Attributes
     ----------
     native : what takes a step, for loops that take steps themselves
+    are_compiled : whether kernels were compiled for what its stations join
     factors : as given
     known : what the motion keeps besides x, y and z, or nothing
     by_mass : whether right-hand sides are made by M, as where that is shorter than by K
@@ -127,6 +128,7 @@ class StationPasses:
         self._stretch = max(1, _STRETCH * (high - low) // max(1, int(self._starts[-1])))
         rows = [part.native for part in product.layout.parts]
         columns = [part.native for part in factors.layout.parts]
+        self.are_compiled = all(map(native.are_compiled, rows, columns))
         arrays = PassArrays(read, velocity, loads, answer, motion.read, known, predicted)
         stations = product.stations.make_ups, product.arrays, factors.arrays
         self.native = native.TwoPasses(rows, columns, PassParts(*stations, arrays, changes))

@@ -186,6 +186,10 @@ class Layout:
     def row_size(self) -> int:
         """Numbers of a packed row."""
 
+def are_compiled(rows: Layout, factors: Layout) -> bool:
+    """Whether kernels were compiled for stations of such rows and factors; others are stepped by
+    general ones, which ask what is joined."""
+
 class Products:
     """Products with rows of K, and C, of stations of each make-up."""
 

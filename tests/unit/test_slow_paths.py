@@ -7,6 +7,7 @@ import logging
 import numpy as np
 import pytest
 from measuring import start_march
+from mpi4py import MPI
 from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of, train
 
 from catenary.cases.run.planning.needs import needs_with_mesh
@@ -26,6 +27,8 @@ from catenary.solver.effects.build_model import numbering_of
 from catenary.solver.integrators import slow_path
 from catenary.solver.integrators.slow_path import PARTS, slow_path_of
 from catenary.solver.problem.problem import Damping
+from catenary.solver.statics.line_at_rest import line_at_rest
+from catenary.solver.time_loop.march import March
 
 HHT = 'numerics.integrator="hht"', "numerics.spectral_radius=0.8"
 BY_COMPONENT = "line.damping.per_component={contact_wire={alpha_s=0.01,beta_per_s=0.02}}"
@@ -64,6 +67,19 @@ def test_log_and_outcome_of_a_march_say_the_same(
         assert [record.message for record in caplog.records] == [outcome.slow_path] * slower
         told = slow_path_of(problem, numbering_of(problem, mesh_of(line, 3)))
         assert (str(told) if told else "") == outcome.slow_path
+
+
+@pytest.mark.parametrize(("damped", "general"), [((), False), ((BY_COMPONENT,), True)])
+def test_a_march_tells_that_no_kernels_are_compiled_for_its_line(
+    damped: tuple[str, ...], general: bool
+) -> None:
+    scene = load_scene("shinkansen_compound", ["effects.lateral_motion=true", *damped])
+    rest = line_at_rest(problem_of_scene(scene), mesh_of_scene(scene))
+    with March(MPI.COMM_SELF, *rest) as march:
+        told = march.slow_path
+    assert (told is not None) is general
+    if told:
+        assert told.factor == slow_path.GENERAL and "kernels are compiled for" in told.reason
 
 
 def test_estimates_know_the_unknowns_of_stations() -> None:

@@ -56,6 +56,12 @@ py::array_t<int64_t> places(const Layout& layout, const std::string& which) {
     return found;
 }
 
+/// Whether kernels were compiled for stations of such rows and factors, on the newer processors.
+bool are_compiled(const Layout& rows, const Layout& factors) {
+    return std::ranges::any_of(
+        kShipped, [&](const Shipped& one) { return one.rows == rows && one.factors == factors; });
+}
+
 using Layouts = std::vector<Layout>;
 using MakeUps = std::vector<std::vector<int>>;
 
@@ -196,6 +202,7 @@ void offer_stations(py::module_& m) {
     offer(m, "eliminate", eliminated,
           "Factors of stations eliminated from one end, their kinds, and which each station has.");
     offer(m, "join", join, "Fill in factors of stations where elimination from both ends meets.");
+    m.def("are_compiled", &are_compiled, py::arg("rows"), py::arg("factors"));
     py::class_<Layout>(m, "Layout")
         .def(py::init(&layout_of), py::arg("own"), py::arg("beside"), py::arg("damped"),
              py::arg("sparse"))
