@@ -42,6 +42,14 @@ struct GivenMasks {
           beside_size(f.size_of(beside)) {}
 };
 
+// Vectors up to which a kernel that finds masks at run time adds each block in its place. Where
+// processors differ much the oldest is spared the code: compiling it took a sixth of all the time.
+#if defined(CATENARY_GENERAL_ONLY)
+constexpr int kInPlace = 1;
+#else
+constexpr int kInPlace = 3;
+#endif
+
 /// Blocks of stations that take W lanes.
 template <int W, class Masks>
 struct Blocks : Masks {
@@ -149,7 +157,7 @@ struct Blocks : Masks {
     /// for all of their blocks: their code is long.
     CATENARY_INLINE static void add(Sums<X>& sums, const double* numbers, const Mask& mask,
                                     const X& x) {
-        if constexpr (Masks::is_known || kN < 4)
+        if constexpr (Masks::is_known || kN <= kInPlace)
             add_here(sums, numbers, mask, x);
         else
             add_apart(sums, numbers, mask, x);
@@ -190,7 +198,7 @@ struct Blocks : Masks {
     }
     /// Add a symmetric block times x: each square above the diagonal counts for two.
     CATENARY_INLINE void add_symmetric(Sums<X>& sums, const double* numbers, const X& x) const {
-        if constexpr (Masks::is_known || kN < 4)
+        if constexpr (Masks::is_known || kN <= kInPlace)
             add_symmetric_here(sums, numbers, this->whole, x);
         else
             add_symmetric_apart(sums, numbers, this->whole, x);
