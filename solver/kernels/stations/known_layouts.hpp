@@ -84,6 +84,7 @@ constexpr Shipped kShipped[] = {
     // Lines whose wires and droppers are damped each in its own way.
     shipped(2, {0, 1}, false, 2, true),
     shipped(4, {0, 1, 2}, false, 4, true),
+    shipped(4, {0, 1, 2, 3}, false, 4, true),  // and that go on behind an end
     shipped(4, {0, 1, 2}, true, 4, true),
     shipped(6, {0, 1, 2, 6}, false, 6, true),
     // Two wires that stretch, in their plane and in three.
