@@ -21,12 +21,12 @@ from catenary.solver.contact.contacts import (
 from catenary.solver.contact.followed_links import FollowedLinks, LinkCoupling
 from catenary.solver.contact.line_response import LineResponse
 from catenary.solver.integrators.line_integrator import LineIntegrator
+from catenary.solver.integrators.line_state import LineState
 from catenary.solver.kernels import native
 from catenary.solver.linear.pieces.column_pieces import columns_of
 from catenary.solver.linear.unit_responses import NO_COLUMNS, STRETCH, ShortColumns
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import Ownership
-from catenary.solver.model.switching_links import LinkTable
 from catenary.solver.statics.form_finding.equilibrium import Equilibrium
 
 
@@ -70,6 +70,48 @@ class WiresAcross:
             self._comm.Reduce(self._share, everything, op=MPI.SUM, root=0)
 
 
+class ForceColumns:
+    """Columns of A^-1 for forces on a line: of contacts, and of links that switch.
+
+    Collective to make. Trains that run on the same line share them.
+
+    Attributes
+    ----------
+    of_nodes : numbers of the columns of the contact wires' nodes, which know where theirs are
+    of_links : columns for unit compensations of all links
+    link_coupling : LinkCoupling, None if no link switches
+    reach : how far from a force the line moves within a step [m]
+    free : (n_local,) bool, whether an unknown is not held
+
+    Parameters
+    ----------
+    wires : the contact wires, whose nodes get columns for this line
+    links : the links of the line that are followed
+    range_of_run : stretch of the contact wires that pan heads will touch [m]
+    """
+
+    def __init__(
+        self,
+        comm: Any,
+        model: Model,
+        wires: ContactWires,
+        line: LineIntegrator,
+        links: FollowedLinks,
+        range_of_run: tuple[float, float],
+    ) -> None:
+        # A force on an unknown that is held, at an anchor, moves nothing.
+        free = np.ones(model.n_dofs, dtype=bool)
+        free[model.constrained] = False
+        self.free = free[line.ownership.first : line.ownership.last]
+        self.of_nodes, reach = _columns_of_nodes(wires, line, range_of_run, free)
+        self.of_links = NO_COLUMNS
+        self.link_coupling: LinkCoupling | None = None
+        if links.table.switches:
+            self.link_coupling = LinkCoupling(comm, links, line)
+            self.of_links = self.link_coupling.columns
+        self.reach = reach + float(links.table.half_length.max(initial=0.0))
+
+
 class ForcesOnLine:
     """Contacts and links of one rank. Collective to make.
 
@@ -82,14 +124,16 @@ class ForcesOnLine:
 
     Parameters
     ----------
-    wires : the contact wires, whose nodes get columns for this line
-    range_of_run : stretch of the contact wires that pan heads will touch [m]
+    wires : the contact wires, whose nodes have the ``columns``
+    line : whose motion forces read and change, unless another one is given
+    links : the links of the line that are followed
+    columns : of the line, for all places of the run
     candidates : pairs (n,) of strip and contact wire
     train_speed : V of the convective part of the gap rate [m/s]
     uses_rate : whether the contact law needs the gap rate
-    table : the links of the line that are followed
     work : of the contact forces; sums go on from those that it holds
     across : (3, n) what ``find_across`` fills in, without columns if wires do not move sideways
+    motion : of the line in one of several scenes
     """
 
     def __init__(
@@ -99,30 +143,21 @@ class ForcesOnLine:
         form: Equilibrium,
         wires: ContactWires,
         line: LineIntegrator,
-        range_of_run: tuple[float, float],
+        links: FollowedLinks,
+        columns: ForceColumns,
         candidates: Candidates,
         train_speed: float,
         uses_rate: bool,
-        table: LinkTable,
         across: np.ndarray,
         work: ContactWork,
+        motion: LineState | None = None,
     ) -> None:
+        motion = motion or line.motion
         self.line = line
-        self.wires = wires
-        self.links = FollowedLinks(table, line)
-        # A force on an unknown that is held, at an anchor, moves nothing.
-        free = np.ones(model.n_dofs, dtype=bool)
-        free[model.constrained] = False
-        self._free = free[line.ownership.first : line.ownership.last]
-        node_columns, reach = self._columns_of_nodes(range_of_run, free)
-        columns = NO_COLUMNS
-        self.link_coupling: LinkCoupling | None = None
-        if table.switches:
-            self.link_coupling = LinkCoupling(comm, self.links, line)
-            columns = self.link_coupling.columns
+        self.wires, self.links = wires, links
+        self._free = columns.free
+        self.link_coupling, self.reach = columns.link_coupling, columns.reach
         n, n_local = candidates.place.size, line.ownership.n_local
-        reach += table.half_length.max(initial=0.0)
-        self.reach = reach
         self._across = WiresAcross(comm, across)
         self._moves_across = across.size > 0
         sideways = no_sideways()
@@ -132,13 +167,13 @@ class ForcesOnLine:
             x=candidates.place,
             touches=wires.on_wires(candidates.wire, candidates.half_length),
             wires=wires.shapes,
-            columns=node_columns,
+            columns=columns.of_nodes,
             answers=Answers(np.zeros((n, n_local)), np.zeros((n, n_local if uses_rate else 0))),
-            gains=Gains(train_speed, line.position_factor, line.velocity_factor, reach),
-            motion=line.motion.read,
-            motion_gains=line.motion.gains,
+            gains=Gains(train_speed, line.position_factor, line.velocity_factor, columns.reach),
+            motion=motion.read,
+            motion_gains=motion.gains,
             followed=self.links.followed,
-            link_columns=columns,
+            link_columns=columns.of_links,
             work=work,
             sideways=sideways,
             across=self._across.share,
@@ -218,27 +253,28 @@ class ForcesOnLine:
         pushed = contact_force[:, None] * value * self._free[local]
         return [(local.ravel(), pushed.ravel()), *self.links.loads(compensation)]
 
-    def _columns_of_nodes(
-        self, range_of_run: tuple[float, float], free: np.ndarray
-    ) -> tuple[np.ndarray, float]:
-        """Columns of A^-1 for the nodes in a stretch of the wires, each with the place of its own,
-        and how far off a force on them is felt [m].
 
-        Collective; ``free`` (n_dofs,) is whether an unknown is not held.
-        """
-        # Places that are solved for together share their round-off. With the next ones, columns at
-        # the end of a run are to the last bit those of one that goes further.
-        begin, end = range_of_run[0], range_of_run[1] + STRETCH
-        ranges = (self.wires.nodes_between(begin, end, k) for k in range(self.wires.n_wires))
-        chosen = np.concatenate([np.arange(first, last) for first, last in ranges])
-        dofs, nodes = self.wires.dofs[chosen][:, :, None], self.wires.nodes
+def _columns_of_nodes(
+    wires: ContactWires, line: LineIntegrator, range_of_run: tuple[float, float], free: np.ndarray
+) -> tuple[np.ndarray, float]:
+    """Columns of A^-1 for the nodes in a stretch of the wires, each with the place of its own,
+    and how far off a force on them is felt [m].
 
-        def put(found: ShortColumns, which: np.ndarray) -> None:
-            """Let nodes know of the columns of some."""
-            mine = chosen[which]
-            nodes["begin"][mine], nodes["at"][mine] = found.start[which], found.at[which]
-            nodes["width"][mine] = found.width[which]
+    Collective; ``free`` (n_dofs,) is whether an unknown is not held.
+    """
+    # Places that are solved for together share their round-off. With the next ones, columns at the
+    # end of a run are to the last bit those of one that goes further.
+    begin, end = range_of_run[0], range_of_run[1] + STRETCH
+    ranges = (wires.nodes_between(begin, end, k) for k in range(wires.n_wires))
+    chosen = np.concatenate([np.arange(first, last) for first, last in ranges])
+    dofs, nodes = wires.dofs[chosen][:, :, None], wires.nodes
 
-        line, places = self.line, (dofs, free[dofs].astype(float), self.wires.x[chosen])
-        found = columns_of(line.responses, line.operators.in_pieces, places, put)
-        return found.data, found.reach
+    def put(found: ShortColumns, which: np.ndarray) -> None:
+        """Let nodes know of the columns of some."""
+        mine = chosen[which]
+        nodes["begin"][mine], nodes["at"][mine] = found.start[which], found.at[which]
+        nodes["width"][mine] = found.width[which]
+
+    places = dofs, free[dofs].astype(float), wires.x[chosen]
+    found = columns_of(line.responses, line.operators.in_pieces, places, put)
+    return found.data, found.reach

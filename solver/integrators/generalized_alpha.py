@@ -114,7 +114,7 @@ class GeneralizedAlphaLine(LineIntegrator):
             work,
             self._beta_share,
         )
-        operators, (shown, rate, _, _) = self.operators, self.motion.read
+        operators, (shown, rate, _) = self.operators, self.motion.read[:3]
         total = aligned_arrays.zeros(shown.size, 5)
         # What products with C read, if there are any.
         predicted = rate[:0] if self._proportional else operators.rate

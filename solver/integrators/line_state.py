@@ -18,12 +18,17 @@ from catenary.solver.kernels import native
 
 
 class Motion(NamedTuple):
-    """x, y and z (n_local,) each, and their shares (5,), as kernels read the motion."""
+    """x, y and z (n_local,) each, and their shares (5,), as kernels read the motion.
+
+    Numbers of an unknown are ``spacing`` behind those of the one before: more than one where scenes
+    stand in lanes.
+    """
 
     x: np.ndarray
     y: np.ndarray
     z: np.ndarray
     shares: np.ndarray
+    spacing: int = 1
 
 
 class Steps(NamedTuple):
@@ -66,6 +71,13 @@ class LineState:
         self.read = Motion(displacement, velocity, acceleration, shares)
         self.gains = np.array([*gains, 1.0])
 
+    @classmethod
+    def of(cls, read: Motion, gains: np.ndarray) -> LineState:
+        """A state that kernels read and change; Python shows none of it."""
+        state = cls.__new__(cls)
+        state.read, state.gains = read, gains
+        return state
+
     @property
     def displacement(self) -> np.ndarray:
         """At the end of the latest step (n_local,) [m]; the array itself."""
@@ -83,7 +95,7 @@ class LineState:
 
     def put(self, displacement: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray) -> None:
         """Take a state, (n_local,) each."""
-        x, y, z, _ = self.read
+        x, y, z = self.read[:3]
         x[:], y[:], z[:] = displacement, velocity, acceleration
 
     def carried(self) -> Mapping[str, np.ndarray]:
@@ -141,7 +153,7 @@ class PredictedLineState(LineState):
     def put(self, displacement: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray) -> None:
         """Take a state, (n_local,) each."""
         dt, c_position, c_velocity, c_work = self._steps[:4]
-        x, y, z, _ = self.read
+        x, y, z = self.read[:3]
         predicted = displacement + dt * velocity + c_position * acceleration
         z[:] = acceleration
         y[:] = velocity + c_velocity * acceleration
@@ -222,7 +234,7 @@ class AlphaAhead(PredictedLineState):
 
     def put(self, displacement: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray) -> None:
         """Take a state, (n_local,) each, after ``known``."""
-        x, y, z, _ = self.read
+        x, y, z = self.read[:3]
         of_balanced, of_known = self.balance
         total = of_balanced * acceleration + of_known * self.known
         x[:] = -(displacement + self._way * velocity + total)

@@ -46,7 +46,7 @@ class NewmarkLine(LineIntegrator):
         )
 
     def _ahead(self) -> tuple[PredictedLineState, Steps]:
-        operators, (shown, velocity, acceleration, _) = self.operators, self.motion.read
+        operators, (shown, velocity, acceleration) = self.operators, self.motion.read[:3]
         if not self._proportional:
             velocity = operators.rate  # which products with C read
         ahead = operators.factor, velocity, acceleration, shown

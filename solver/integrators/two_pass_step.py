@@ -96,6 +96,8 @@ class StationPasses:
     ----------
     native : what takes a step, for loops that take steps themselves
     are_compiled : whether kernels were compiled for what its stations join
+    rows, columns : layouts of each make-up, of rows and of factors, as kernels take them
+    parts : PassParts
     factors : as given
     known : what the motion keeps besides x, y and z, or nothing
     by_mass : whether right-hand sides are made by M, as where that is shorter than by K
@@ -126,12 +128,13 @@ class StationPasses:
             known, predicted = motion.known, motion.predicted
         self._starts = factors.starts[low : high + 1] - factors.starts[low]
         self._stretch = max(1, _STRETCH * (high - low) // max(1, int(self._starts[-1])))
-        rows = [part.native for part in product.layout.parts]
-        columns = [part.native for part in factors.layout.parts]
+        self.rows = rows = [part.native for part in product.layout.parts]
+        self.columns = columns = [part.native for part in factors.layout.parts]
         self.are_compiled = all(map(native.are_compiled, rows, columns))
         arrays = PassArrays(read, velocity, loads, answer, motion.read, known, predicted)
         stations = product.stations.make_ups, product.arrays, factors.arrays
-        self.native = native.TwoPasses(rows, columns, PassParts(*stations, arrays, changes))
+        self.parts = PassParts(*stations, arrays, changes)
+        self.native = native.TwoPasses(rows, columns, self.parts)
         self.known = known
         self.track_links(NO_LINKS, np.zeros(0))
 
@@ -140,11 +143,15 @@ class StationPasses:
 
         Links are looked at once the pass has left them behind, a stretch of stations at a time.
         """
+        self.native.track(self.tracked(links, reserve))
+
+    def tracked(self, links: LinkArrays, reserve: np.ndarray) -> TrackedLinks:
+        """What kernels need for that."""
         n_pairs = max(0, self._starts.size - 2) // 2
         n_stretches = -(-n_pairs // self._stretch)
         ranges = np.zeros((1 + max(1, n_stretches), 2), dtype=np.int64)
         native.left_behind(self._starts, self._stretch, links.unknowns, ranges)
-        self.native.track(TrackedLinks(links, reserve, ranges, self._stretch))
+        return TrackedLinks(links, reserve, ranges, self._stretch)
 
     def open(self, window: WindowArrays, links: LinkArrays, reserve: np.ndarray) -> None:
         """Take steps of the stations in a window only from now on; links as in ``track_links``."""

@@ -96,6 +96,11 @@ class KinematicLaw:
 ContactLaw = LinearLaw | HertzLaw | KinematicLaw
 
 
+def uses_rate(law: ContactLaw) -> bool:
+    """Whether steps with a law need rates: a kinematic contact ends depths through them."""
+    return law.dissipates or isinstance(law, KinematicLaw)
+
+
 def _gonthier(restitution: float) -> float:
     """The factor with which a body bounces off exactly as fast as ``restitution`` says.
 

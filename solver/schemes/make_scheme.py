@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from catenary.solver.contact.contact_wire import ContactWires
-from catenary.solver.contact.followed_links import no_links
-from catenary.solver.contact.forces_on_line import ForcesOnLine
+from catenary.solver.contact.followed_links import FollowedLinks, no_links
+from catenary.solver.contact.forces_on_line import ForceColumns, ForcesOnLine
 from catenary.solver.contact.train.pantographs import Pantographs
 from catenary.solver.contact_problem.coupling import make_coupling
 from catenary.solver.contact_problem.law_tangents import law_in_steps
@@ -20,7 +20,7 @@ from catenary.solver.integrators.make_line import make_line
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import Ownership
 from catenary.solver.model.switching_links import switching_links
-from catenary.solver.problem.contact_laws import KinematicLaw
+from catenary.solver.problem.contact_laws import uses_rate
 from catenary.solver.problem.problem import Placement, Problem
 from catenary.solver.schemes.one_solve import OneSolve
 from catenary.solver.schemes.scheme import Scheme
@@ -83,19 +83,24 @@ class SchemeFactory:
         line = make_line(comm, model, self.ownership, numerics, not in_parts, wanted)
         laws = model.simulated
         trailing = max(placement.behind for placement in train.placements)
-        # A kinematic contact ends depths through their rates.
-        uses_rate = laws.contact.dissipates or isinstance(laws.contact, KinematicLaw)
+        range_of_run = (
+            train.start - trailing - pantographs.reach[0],
+            train.end + pantographs.reach[1],
+        )
+        wires = wires or ContactWires(model, own.form, self.ownership)
+        links = FollowedLinks(switching_links(model, own.form.dropper_force), line)
+        columns = ForceColumns(comm, model, wires, line, links, range_of_run)
         interaction = ForcesOnLine(
             comm,
             model,
             own.form,
-            wires or ContactWires(model, own.form, self.ownership),
+            wires,
             line,
-            (train.start - trailing - pantographs.reach[0], train.end + pantographs.reach[1]),
+            links,
+            columns,
             pantographs.candidates,
             train.speed,
-            uses_rate,
-            switching_links(model, own.form.dropper_force),
+            uses_rate(laws.contact),
             pantographs.across,
             pantographs.work,
         )

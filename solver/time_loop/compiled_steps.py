@@ -63,12 +63,13 @@ class KeptMotions(NamedTuple):
 
 
 class StepParts(NamedTuple):
-    """What steps are made of; see `kernels/steps/steps.hpp`."""
+    """What steps are made of; see `kernels/steps/steps.hpp`. ``free`` is None where others take
+    free steps."""
 
     speed: float
     train: TrainPlaces
     contacts: Contacts
-    free: native.TwoPasses
+    free: native.TwoPasses | None
     loads: Sequence[LoadArguments]
     heads: Sequence[native.Head]
     strips: np.ndarray

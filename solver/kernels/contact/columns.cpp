@@ -52,6 +52,19 @@ void add_to_motion(double force, const double* __restrict answer, int64_t n, dou
     }
 }
 
+/// The same of one scene among others: its numbers stand apart.
+void add_to_lane(double force, const double* __restrict answer, int64_t n, int64_t spacing,
+                 double* __restrict x, double* __restrict y, double* __restrict z,
+                 const double* gains) {
+    const double to_x = gains[0], to_y = gains[1], to_z = gains[2];
+    for (int64_t j = 0, at = 0; j < n; ++j, at += spacing) {
+        const double change = force * answer[j];
+        z[at] += to_z * change;
+        x[at] += to_x * change;
+        y[at] += to_y * change;
+    }
+}
+
 }  // namespace
 
 void clear(std::span<double> answer, int64_t low, int64_t high) {
@@ -94,9 +107,16 @@ void put_columns(const Node* nodes, std::span<const double> data, const double (
 
 void add_answer(double force, std::span<const double> answer, int64_t begin, const Motion& motion,
                 std::span<const double> gains) {
-    const int64_t n = size(answer);
-    const auto of = [&](std::span<double> all) { return part(all, begin, begin + n).data(); };
-    add_to_motion(force, answer.data(), n, of(motion.x), of(motion.y), of(motion.z), gains.data());
+    const int64_t n = size(answer), spacing = motion.spacing;
+    if (n == 0) return;
+    const auto of = [&](std::span<double> all) {
+        return part(all, begin * spacing, (begin + n - 1) * spacing + 1).data();
+    };
+    double *const x = of(motion.x), *const y = of(motion.y), *const z = of(motion.z);
+    if (spacing == 1)
+        add_to_motion(force, answer.data(), n, x, y, z, gains.data());
+    else
+        add_to_lane(force, answer.data(), n, spacing, x, y, z, gains.data());
 }
 
 }  // namespace catenary

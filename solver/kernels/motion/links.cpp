@@ -18,8 +18,9 @@ void each_reserve(const Motion& motion, const Links& links, int64_t begin, int64
     const double *x = motion.x.data(), *y = motion.y.data(), *z = motion.z.data();
     const double s0 = motion.shares[0], s1 = motion.shares[1], s2 = motion.shares[2],
                  s3 = motion.shares[3], s4 = motion.shares[4];
+    const int64_t spacing = motion.spacing;
     for (int64_t link = begin; link < end; ++link) {
-        const int64_t i = links.unknowns(link, 0), j = links.unknowns(link, 1);
+        const int64_t i = links.unknowns(link, 0) * spacing, j = links.unknowns(link, 1) * spacing;
         const double u = links.weights(link, 0), v = links.weights(link, 1);
         const double of_x = u * x[i] + v * x[j], of_y = u * y[i] + v * y[j],
                      of_z = u * z[i] + v * z[j];

@@ -34,7 +34,7 @@ inline double reserve_of(int64_t link, const Links& links, const Motion& motion)
     const auto weights = links.weights[link];
     double x = 0.0, y = 0.0, z = 0.0;
     for (size_t k = 0; k < unknowns.size(); ++k) {
-        const int64_t at = unknowns[k];
+        const int64_t at = unknowns[k] * motion.spacing;
         x += weights[k] * motion.x[at];
         y += weights[k] * motion.y[at];
         z += weights[k] * motion.z[at];

@@ -6,19 +6,23 @@
 namespace catenary {
 
 /// Displacement d = s0 x + s1 y + s2 z and velocity v = s3 y + s4 z at the end of the latest step,
-/// with x, y and z (n_local,) that a step carries on, and five shares.
+/// with x, y and z (n_local,) that a step carries on, and five shares. Numbers of an unknown are
+/// `spacing` behind those of the one before: more than one where scenes stand in lanes.
 struct Motion {
     std::span<double> x, y, z;
     std::span<const double> shares;
-    CATENARY_RECORD(x, y, z, shares)
+    int64_t spacing = 1;
+    CATENARY_RECORD(x, y, z, shares, spacing)
 };
 
 inline double displacement_at(int64_t unknown, const Motion& motion) {
     const auto& s = motion.shares;
-    return s[0] * motion.x[unknown] + s[1] * motion.y[unknown] + s[2] * motion.z[unknown];
+    const int64_t at = unknown * motion.spacing;
+    return s[0] * motion.x[at] + s[1] * motion.y[at] + s[2] * motion.z[at];
 }
 inline double velocity_at(int64_t unknown, const Motion& motion) {
-    return motion.shares[3] * motion.y[unknown] + motion.shares[4] * motion.z[unknown];
+    const int64_t at = unknown * motion.spacing;
+    return motion.shares[3] * motion.y[at] + motion.shares[4] * motion.z[at];
 }
 
 /// Predictions of Newmark's method (eq. 2.5) in place; `work` becomes -(d + `c_work` v).

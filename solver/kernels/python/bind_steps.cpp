@@ -86,7 +86,8 @@ void offer_steps(py::module_& module) {
     py::class_<Taken>(module, "Taken")
         .def_readonly("begun", &Taken::begun)
         .def_readonly("is_full", &Taken::is_full);
-    py::class_<HeldSteps>(module, "Steps")
+    py::class_<Steps>(module, "StepsOnParts");
+    py::class_<HeldSteps, Steps>(module, "Steps")
         .def(py::init([](const py::object& parts, const py::object& block) {
             return std::make_unique<HeldSteps>(parts, block);
         }))

@@ -9,10 +9,17 @@
     namespace catenary::target {                                              \
     std::unique_ptr<Kernels> make(const Layout& rows, const Layout& factors); \
     }
+#define CATENARY_DECLARE_FOR_SCENES(target)                                              \
+    namespace catenary::target {                                                         \
+    std::unique_ptr<Kernels> make_for_scenes(const Layout& rows, const Layout& factors); \
+    }
 CATENARY_DECLARE(baseline)
 #if defined(__x86_64__) && !defined(__clang__)
 #define CATENARY_X86 1
 CATENARY_DECLARE(avx2)
+CATENARY_DECLARE_FOR_SCENES(avx2)
+#else
+CATENARY_DECLARE_FOR_SCENES(baseline)
 #endif
 
 namespace catenary {
@@ -23,6 +30,7 @@ using Make = std::unique_ptr<Kernels> (*)(const Layout&, const Layout&);
 struct Target {
     std::string name;
     Make make;
+    Make make_for_scenes;  ///< null where vectors are too short for it
 };
 
 /// What this processor can be told to be, the best last.
@@ -30,11 +38,12 @@ const std::vector<Target>& of_processor() {
     static const std::vector<Target> found = [] {
         std::vector<Target> targets;
 #ifdef CATENARY_X86
-        targets.push_back({"baseline", baseline::make});
+        targets.push_back({"baseline", baseline::make, nullptr});
         __builtin_cpu_init();
-        if (__builtin_cpu_supports("x86-64-v3")) targets.push_back({"avx2", avx2::make});
+        if (__builtin_cpu_supports("x86-64-v3"))
+            targets.push_back({"avx2", avx2::make, avx2::make_for_scenes});
 #else
-        targets.push_back({"baseline", baseline::make});
+        targets.push_back({"baseline", baseline::make, baseline::make_for_scenes});
 #endif
         return targets;
     }();
@@ -66,6 +75,11 @@ bool set_target(const std::string& name) {
 std::unique_ptr<Kernels> kernels_of(const Layout& rows, const Layout& factors) {
     if (rows.unknowns != factors.unknowns) return nullptr;
     return chosen()->make(rows, factors);
+}
+
+std::unique_ptr<Kernels> kernels_for_scenes(const Layout& rows, const Layout& factors) {
+    const Make make = chosen()->make_for_scenes;
+    return make ? make(rows, factors) : nullptr;
 }
 
 std::unique_ptr<Kernels> kernels_of_rows(const Layout& rows) {

@@ -20,6 +20,8 @@ struct Shipped {
     Layout rows, factors;
     /// Whether such stations stand in one line with others, so that chains often go one by one.
     bool is_mixed = false;
+    /// Whether kernels are compiled that step several scenes side by side.
+    bool is_for_scenes = true;
 };
 /// Rows that join within a station unknowns whose places differ by one of these numbers, in the
 /// sense of exclusive or: 1 a beam's deflection and slope, 2 the deflections of two wires. Unknowns
@@ -37,7 +39,9 @@ constexpr Shipped shipped(int unknowns, std::initializer_list<int> differences, 
     });
     const Mask whole = mask_of(pieces, [&](int i, int j) { return i / plane == j / plane; });
     return {{unknowns, own, beside, is_damped, false},
-            {unknowns, whole, is_sparse ? beside : Mask{}, false, is_sparse}};
+            {unknowns, whole, is_sparse ? beside : Mask{}, false, is_sparse},
+            false,
+            !is_damped};
 }
 constexpr Shipped mixed(Shipped of) {
     of.is_mixed = true;
@@ -60,6 +64,7 @@ constexpr Shipped dense(int unknowns, bool is_sparse, int plane = kMostUnknowns)
     for (int u = 0; u < kMostUnknowns; ++u) planes[u] = static_cast<int8_t>(u / plane);
     Shipped of = shipped(unknowns, {}, is_sparse, plane, false, planes);
     of.rows.own = of.factors.own;
+    of.is_for_scenes = false;
     return of;
 }
 

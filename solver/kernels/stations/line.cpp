@@ -5,8 +5,9 @@
 
 namespace catenary {
 
-Line::Line(std::vector<std::unique_ptr<Kernels>> kernels, std::vector<std::vector<int>> make_ups)
-    : kernels_(std::move(kernels)), make_ups_(std::move(make_ups)) {
+Line::Line(std::vector<std::unique_ptr<Kernels>> kernels, std::vector<std::vector<int>> make_ups,
+           int scenes)
+    : kernels_(std::move(kernels)), make_ups_(std::move(make_ups)), scenes_(scenes) {
     const size_t n = make_ups_.size();
     place_.assign(n * n * kMostUnknowns, -1);
     for (size_t from = 0; from < n; ++from)
@@ -26,7 +27,7 @@ void Line::set_runs(const Work& work, int64_t n, int64_t low) {
     const Places &solved = work.factored.places, &read = work.product.places;
     const int64_t first = work.product.first;
     if (!solved.make_up) {
-        const int64_t pitch = kernels_[0]->rows.unknowns;
+        const int64_t pitch = kernels_[0]->rows.unknowns * scenes_;
         // There is one station more to be read at both ends.
         runs_.push_back({-1, n + 1, pitch * first, 0, -pitch * low});
         return;
@@ -38,7 +39,8 @@ void Line::set_runs(const Work& work, int64_t n, int64_t low) {
         const int64_t before = kernels_[solved.make_up[begin]]->rows.unknowns * begin;
         const int64_t here = solved.starts[begin] - before;
         const int64_t by_read = read.starts ? read.starts[first + begin] - before : 0;
-        runs_.push_back({begin, end, by_read, here, here - solved.starts[low]});
+        const int64_t own = here - solved.starts[low];
+        runs_.push_back({begin, end, by_read * scenes_, here * scenes_, own * scenes_});
     }
 }
 
@@ -46,8 +48,10 @@ void Line::convert(int from, int to, Station& station) const {
     if (from == to) return;
     const Station given = station;
     const int8_t* place = &place_[(from * make_ups_.size() + to) * kMostUnknowns];
+    double* unknown = station.unknowns;
     for (size_t u = 0; u < make_ups_[to].size(); ++u)
-        station.unknowns[u] = place[u] < 0 ? 0.0 : given.unknowns[place[u]];
+        for (int s = 0; s < scenes_; ++s)
+            *unknown++ = place[u] < 0 ? 0.0 : given.unknowns[place[u] * scenes_ + s];
 }
 
 /// Fill in a station in the order of another make-up.
@@ -56,12 +60,14 @@ void Line::outside(const Work& work, int64_t station, int make_up, Outside& foun
     const int64_t at = product.first + station;
     const int8_t* place =
         &place_[(product.places.make_up[at] * make_ups_.size() + make_up) * kMostUnknowns];
-    const double* position = product.factor + product.places.starts[at];
-    const double* velocity = product.velocity + product.places.starts[at];
-    for (size_t u = 0; u < make_ups_[make_up].size(); ++u) {
-        found.position[u] = place[u] < 0 ? 0.0 : position[place[u]];
-        found.velocity[u] = place[u] < 0 ? 0.0 : velocity[place[u]];
-    }
+    const double* position = product.factor + product.places.starts[at] * scenes_;
+    const double* velocity = product.velocity + product.places.starts[at] * scenes_;
+    for (int u = 0, to = 0; u < static_cast<int>(make_ups_[make_up].size()); ++u)
+        for (int s = 0; s < scenes_; ++s, ++to) {
+            const int from = place[u] * scenes_ + s;
+            found.position[to] = place[u] < 0 ? 0.0 : position[from];
+            found.velocity[to] = place[u] < 0 ? 0.0 : velocity[from];
+        }
 }
 
 /// Find what products need of the stations beside a chain, where these are of other make-ups.

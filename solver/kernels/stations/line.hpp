@@ -86,13 +86,13 @@ struct Work {
     StationMotion motion;
 };
 
-/// Unknowns of a station in the order of its make-up.
+/// Unknowns of a station in the order of its make-up, each in all scenes.
 struct Station {
-    double unknowns[kMostUnknowns];
+    double unknowns[kMostNumbers];
 };
 /// Displacement and velocity of a station outside of a run, in the order of the run's make-up.
 struct Outside {
-    double position[kMostUnknowns], velocity[kMostUnknowns];
+    double position[kMostNumbers], velocity[kMostNumbers];
 };
 /// A chain of n stations of one run: from `first` on, towards the end of the line or its start.
 struct Chain {
@@ -125,6 +125,8 @@ class Kernels {
 /// Kernels of these layouts: those that were compiled for them, or general ones; null if there are
 /// more unknowns than these take.
 std::unique_ptr<Kernels> kernels_of(const Layout& rows, const Layout& factors);
+/// Kernels of `kScenes` scenes side by side, or null if none were compiled.
+std::unique_ptr<Kernels> kernels_for_scenes(const Layout& rows, const Layout& factors);
 /// Kernels that make products only, and kernels that solve only.
 std::unique_ptr<Kernels> kernels_of_rows(const Layout& rows);
 std::unique_ptr<Kernels> kernels_of_factors(const Layout& factors);
@@ -145,8 +147,10 @@ class Around {
 class Line {
   public:
     /// `make_ups`: places in a cross-section of the stations of each make-up, of which the first
-    /// `kernels.size()` have kernels; one that has all places if stations are alike.
-    Line(std::vector<std::unique_ptr<Kernels>> kernels, std::vector<std::vector<int>> make_ups);
+    /// `kernels.size()` have kernels; one that has all places if stations are alike. Numbers of
+    /// each unknown in `scenes` scenes follow each other.
+    Line(std::vector<std::unique_ptr<Kernels>> kernels, std::vector<std::vector<int>> make_ups,
+         int scenes = 1);
 
     /// Find the runs of stations that are solved for, n in all, of which motion begins at `low`.
     void set_runs(const Work&, int64_t n, int64_t low);
@@ -175,6 +179,7 @@ class Line {
 
     std::vector<std::unique_ptr<Kernels>> kernels_;
     std::vector<std::vector<int>> make_ups_;
+    int scenes_;
     std::vector<int8_t> place_;  ///< of each unknown of a make-up in another, -1 if it has none
     std::vector<Run> runs_;
     std::vector<int32_t> run_number_;

@@ -9,11 +9,11 @@ Taken Steps::take(int64_t first, int64_t end) {
     const KeptMotions& kept = block_.kept;
     const bool shows = block_.rows.rows > 0;
     for (int64_t number = first; number < end; ++number) {
-        begin(number);
-        const int64_t n_compensations = predict_heads(number) ? find_forces(number) : kLeft;
-        if (n_compensations < 0) return {number - first, true, false};
-        finish(n_compensations);
-        ++block_.counts[0].steps;
+        set_off(number);
+        parts_.free->step();
+        take_in(block_.now, parts_.shown.columns.ends);
+        take_in(block_.kept.moved, parts_.shown.columns.ends);
+        if (!arrive(number)) return {number - first, true, false};
         if (!shows) continue;
         show(number);
         const int64_t motion = kept.motion_of[number];
@@ -23,8 +23,16 @@ Taken Steps::take(int64_t first, int64_t end) {
     return {end - first, false, false};
 }
 
-/// Move the contacts, and take the line's step without forces there.
-void Steps::begin(int64_t number) {
+bool Steps::arrive(int64_t number) {
+    const int64_t n_compensations = predict_heads(number) ? find_forces(number) : kLeft;
+    if (n_compensations < 0) return false;
+    finish(n_compensations);
+    ++block_.counts[0].steps;
+    return true;
+}
+
+/// Move the contacts, and evaluate loads.
+void Steps::set_off(int64_t number) {
     const double time = block_.times[number];
     move_contacts(parts_.train, way(time));
     place(parts_.contacts);
@@ -33,9 +41,6 @@ void Steps::begin(int64_t number) {
         loads.clock[0] = time;
         evaluate(loads);
     }
-    parts_.free->step();
-    take_in(block_.now, parts_.shown.columns.ends);
-    take_in(block_.kept.moved, parts_.shown.columns.ends);
 }
 
 /// Take the heads' steps without contact; whether all are where their models reach.
@@ -87,14 +92,14 @@ void Steps::finish(int64_t n_compensations) {
 
 /// Look whether the step has left numbers, in builds that look for faults.
 void Steps::check() const {
-    const auto& [x, y, z, shares] = parts_.shown.motion;
+    const auto& [x, y, z, shares, spacing] = parts_.shown.motion;
     for (auto numbers : {x, y, z}) check_numbers(numbers, "the line's motion");
     for (const Head* head : parts_.heads) check_numbers(head->arrays().state, "a head's motion");
     check_numbers(parts_.train_outputs.contact_force, "contact forces");
     check_numbers(parts_.train_outputs.head_height, "heights of heads");
 }
 
-/// Fill in a row: what pantographs show, the line, and further channels.
+/// What pantographs show, the line, and further channels.
 void Steps::show(int64_t number) {
     std::span<double> row = block_.rows[number];
     auto next = [&row](size_t n) {

@@ -75,13 +75,18 @@ class Steps {
     /// Take the steps of the block from number `first` on up to before `end`.
     Taken take(int64_t first, int64_t end);
 
+    /// The parts of a step of which others take the free step: what comes before it, and after it;
+    /// whether forces were found.
+    void set_off(int64_t number);
+    bool arrive(int64_t number);
+    /// Fill in the row of a step that has been taken.
+    void show(int64_t number);
+
   private:
-    void begin(int64_t number);
     bool predict_heads(int64_t number);
     int64_t find_forces(int64_t number);
     void finish(int64_t n_compensations);
     void check() const;
-    void show(int64_t number);
 
     StepParts parts_;
     Block block_;

@@ -1,0 +1,227 @@
+"""Marches of scenes on a shared line: lanes are filled as scenes come to their ends."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from catenary.base.errors import CatenaryError
+from catenary.mbs.head.head_arrays import drive_width
+from catenary.solver.contact.followed_links import no_links
+from catenary.solver.contact.forces_on_line import ForcesOnLine
+from catenary.solver.contact.line_response import affine
+from catenary.solver.contact.train.pantographs import Pantographs, nominal_height_rule
+from catenary.solver.contact_problem.coupling import Implicit, make_coupling
+from catenary.solver.contact_problem.law_tangents import law_in_steps
+from catenary.solver.effects.all_effects import simulated
+from catenary.solver.ensemble.shared_line import N_LANES, SharedLine
+from catenary.solver.kernels import native
+from catenary.solver.kernels.flush_to_zero import flushed
+from catenary.solver.model.switching_links import NO_LINKS, Riders
+from catenary.solver.problem.contact_laws import uses_rate
+from catenary.solver.problem.problem import Problem, steps_of
+from catenary.solver.schemes.one_solve import OneSolve
+from catenary.solver.schemes.scheme import find_crossings
+from catenary.solver.time_loop.compiled_steps import Block, KeptMotions, StepParts
+from catenary.solver.time_loop.prepared_line import make_room
+from catenary.solver.time_loop.views.step_views import Shown
+from catenary.solver.window.moving_columns import Columns
+
+# Steps between two looks at signals.
+_MOST_STEPS = 4096
+
+
+class SceneHistory(NamedTuple):
+    """What is kept of a scene's march.
+
+    Attributes
+    ----------
+    number : of the scene
+    problem : of the scene
+    n_steps : that were taken
+    is_left : whether the forces of the step after them were not found
+    position, contact_force, head_height, wire_height : (n_steps + 1, n_pantographs), the first row
+        before the first step [m], [N]
+    uplift : (n_arms,) largest displacement of the wires at steady arms [m]
+    dropper_force : (2, n_droppers) smallest and largest force [N]
+    """
+
+    number: int
+    problem: Problem
+    n_steps: int
+    is_left: bool
+    position: np.ndarray
+    contact_force: np.ndarray
+    head_height: np.ndarray
+    wire_height: np.ndarray
+    uplift: np.ndarray
+    dropper_force: np.ndarray
+
+
+@dataclass
+class _OnItsWay:
+    """A scene in a lane."""
+
+    number: int
+    problem: Problem
+    n: int
+    rows: np.ndarray
+    n_steps: int
+    pantographs: Pantographs
+
+
+def march_side_by_side(
+    shared: SharedLine, problems: Iterable[tuple[int, Problem]]
+) -> Iterator[SceneHistory | tuple[int, CatenaryError]]:
+    """March scenes to their ends, in the order in which they come there. Not collective.
+
+    A scene whose train cannot be placed on the line gives its number and the error.
+
+    Parameters
+    ----------
+    shared : the line of all scenes
+    problems : numbers and problems of scenes on it
+    """
+    left = iter(problems)
+    lanes: list[_OnItsWay | None] = [None] * N_LANES
+    while True:
+        for lane in range(N_LANES):
+            while lanes[lane] is None:
+                number, problem = next(left, (0, None))
+                if problem is None:
+                    break
+                try:
+                    lanes[lane] = _begin(shared, lane, number, problem)
+                except CatenaryError as error:
+                    yield number, error
+        if not any(lanes):
+            return
+        with flushed():
+            shared.native.take(_MOST_STEPS)
+        for lane, march in enumerate(lanes):
+            if march is None:
+                continue
+            taken, is_left = shared.native.at(lane)
+            if is_left or taken == march.n_steps:
+                lanes[lane] = None
+                yield _ended(shared, lane, march, taken, is_left)
+
+
+def _begin(shared: SharedLine, lane: int, number: int, problem: Problem) -> _OnItsWay:
+    """Let a scene begin in a lane."""
+    model = replace(shared.at_rest.model, problem=problem, simulated=simulated(problem))
+    laws, train = model.simulated, problem.train
+    air_speed = train.speed if laws.meets_air else None
+    height = nominal_height_rule(shared.wires, shared.at_rest.lift, air_speed, problem.contact)
+    pantographs = Pantographs(shared.comm, problem, laws, shared.wires, height)
+    shared.clear(lane)
+    motion, links = shared.lanes[lane]
+    interaction = ForcesOnLine(
+        shared.comm,
+        model,
+        shared.at_rest.form,
+        shared.wires,
+        shared.line,
+        links,
+        shared.columns,
+        pantographs.candidates,
+        train.speed,
+        uses_rate(laws.contact),
+        pantographs.across,
+        pantographs.work,
+        motion,
+    )
+    coupled = interaction.link_coupling
+    law = law_in_steps(problem, laws, pantographs.n_contacts)
+    coupling = make_coupling(
+        law, no_links() if coupled is None else coupled.coupled, problem.numerics
+    )
+    scheme = OneSolve(shared.comm, interaction, pantographs, coupling)
+    make_room(scheme)
+    if pantographs.lateral:
+        interaction.locate()
+        find_crossings(interaction, pantographs, 0.0)
+    n_steps = steps_of(problem)
+    steps, rows = _steps(scheme, motion.read, n_steps, problem.numerics.dt)
+    shared.native.begin(lane, steps, n_steps)
+    return _OnItsWay(number, problem, pantographs.n, rows, n_steps, pantographs)
+
+
+def _steps(
+    scheme: OneSolve, motion: object, n_steps: int, dt: float
+) -> tuple[native.Steps, np.ndarray]:
+    """What takes the steps of a scheme, and the rows of outputs that they fill, the first one
+    before the first step."""
+    pantographs, coupling = scheme.pantographs, scheme.coupling
+    assert isinstance(coupling, Implicit)
+    n = pantographs.n_contacts
+    times = np.arange(1, n_steps + 1) * dt
+    drives = np.zeros((n_steps, pantographs.n, drive_width(pantographs.most_contacts)))
+    heads, _ = pantographs.heads_in_loop()
+    pantographs.fill_drives(times.tolist(), drives)
+    strips = np.zeros(2 * n * (1 + n))
+    problem = coupling.inner.problem(affine(strips, n), scheme.share)
+    rows = np.zeros((n_steps + 1, pantographs.outputs.size))
+    rows[0] = pantographs.outputs
+    parts = StepParts(
+        speed=float(pantographs.speed),
+        train=pantographs.places_along,
+        contacts=scheme.interaction.contacts,
+        free=None,
+        loads=[],
+        heads=heads,
+        strips=strips,
+        problem=problem,
+        law=coupling.law.in_loop(),
+        lateral_place=pantographs.lateral_place,
+        switched=np.zeros(problem.unknowns.right.size, dtype=np.int64),
+        train_outputs=pantographs,
+        outputs=pantographs.outputs,
+        shown=_nothing_of_line(motion),
+        channels=[],
+    )
+    nothing = np.zeros(0)
+    none = np.zeros(0, dtype=np.int64)
+    kept = KeptMotions(
+        none, nothing, np.zeros((0, 3), np.int64), none, none, [], np.zeros((0, 0))
+    )
+    block = Block(
+        times=times,
+        drives=drives,
+        rows=rows[1:],
+        now=np.array([0, 1]),
+        behind=np.tile(np.array([0, 1]), (n_steps, 1)),
+        kept=kept,
+        counts=np.zeros(1, dtype=native.COUNTS),
+    )
+    return native.Steps(parts, block), rows
+
+
+def _nothing_of_line(motion: object) -> Shown:
+    """What rows show of the line."""
+    no_riders = Riders(NO_LINKS, np.zeros(1, dtype=np.int64))
+    ends = np.array([0, 1])
+    columns = Columns(ends, ends, *np.zeros((2, 2, 3), dtype=np.int32))
+    none = np.zeros(0, dtype=np.int64)
+    links = NO_LINKS, NO_LINKS, no_riders, no_riders
+    return Shown(motion, none, *links, np.zeros(0), columns)
+
+
+def _ended(
+    shared: SharedLine, lane: int, march: _OnItsWay, taken: int, is_left: bool
+) -> SceneHistory:
+    """What is kept of a scene that is at its end, or left."""
+    n, rows = march.n, march.rows[: taken + 1]
+    extremes = shared.extremes
+    return SceneHistory(
+        march.number,
+        march.problem,
+        taken,
+        is_left,
+        *(rows[:, k * n : (k + 1) * n] for k in range(4)),
+        extremes.uplift[:, lane].copy(),
+        np.stack([extremes.least[:, lane], extremes.largest[:, lane]]),
+    )

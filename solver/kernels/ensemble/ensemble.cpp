@@ -1,0 +1,35 @@
+#include "ensemble/ensemble.hpp"
+
+#include <algorithm>
+
+#include "base/flush_to_zero.hpp"
+
+namespace catenary {
+
+void Ensemble::begin(int lane, Steps& steps, int64_t n) {
+    marches_.at(lane) = {&steps, 0, n, false};
+}
+
+void Ensemble::take(int64_t most) {
+    const uint64_t before = flush_subnormals();
+    for (int64_t k = 0; k < most; ++k) {
+        for (March& march : marches_)
+            if (goes_on(march)) march.steps->set_off(march.next);
+        passes_.step();
+        std::array<bool, kScenes> moves{};
+        bool all_go_on = true;
+        for (int lane = 0; lane < kScenes; ++lane) {
+            March& march = marches_[lane];
+            moves[lane] = goes_on(march);
+            if (!moves[lane]) continue;
+            march.is_left = !march.steps->arrive(march.next);
+            if (!march.is_left) march.steps->show(march.next++);
+            all_go_on &= goes_on(march);
+        }
+        passes_.take(extremes_, moves);
+        if (!all_go_on) break;
+    }
+    restore_subnormals(before);
+}
+
+}  // namespace catenary

@@ -1,0 +1,37 @@
+#pragma once
+// Marches of several scenes that share a line, side by side.
+#include "ensemble/scene_passes.hpp"
+#include "steps/steps.hpp"
+
+namespace catenary {
+
+/// A scene on its way: what takes its steps, and the steps of its block.
+struct March {
+    Steps* steps = nullptr;  ///< none where no scene is
+    int64_t next = 0, end = 0;
+    bool is_left = false;  ///< whether the forces of a step were not found, after which it stays
+};
+
+class Ensemble {
+  public:
+    /// `passes` are kept by reference.
+    Ensemble(ScenePasses& passes, LineExtremes extremes)
+        : passes_(passes), extremes_(std::move(extremes)) {}
+
+    /// Let a scene begin in a lane, whose line is at rest, with n steps of its block.
+    void begin(int lane, Steps& steps, int64_t n);
+    /// Take steps until a scene is at its end, or left, or until so many were taken.
+    void take(int64_t most);
+    const March& at(int lane) const { return marches_.at(lane); }
+
+  private:
+    bool goes_on(const March& march) const {
+        return march.steps && !march.is_left && march.next < march.end;
+    }
+
+    ScenePasses& passes_;
+    LineExtremes extremes_;
+    std::array<March, kScenes> marches_{};
+};
+
+}  // namespace catenary

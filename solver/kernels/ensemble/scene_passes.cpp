@@ -1,0 +1,155 @@
+// Free steps of several scenes, and what is looked at in all of them at once.
+#include "ensemble/scene_passes.hpp"
+
+#include <algorithm>
+#include <limits>
+#include <stdexcept>
+
+#include "base/targets.hpp"
+
+namespace catenary {
+
+namespace {
+
+Line line_of(const PassParts& parts) {
+    std::vector<std::unique_ptr<Kernels>> kernels;
+    for (const auto& [rows, factors] : parts.layouts) {
+        kernels.push_back(kernels_for_scenes(rows, factors));
+        if (!kernels.back())
+            throw std::invalid_argument("no kernels take several scenes of these layouts");
+    }
+    if (parts.make_ups.size() < kernels.size()) throw std::invalid_argument("a make-up is missing");
+    return Line(std::move(kernels), parts.make_ups, kScenes);
+}
+
+/// Numbers of all scenes, wherever they stand.
+typedef double Scenes __attribute__((vector_size(8 * kScenes), aligned(8), may_alias));
+
+const Scenes& at(const double* numbers) {
+    return *reinterpret_cast<const Scenes*>(numbers);
+}
+Scenes& at(double* numbers) {
+    return *reinterpret_cast<Scenes*>(numbers);
+}
+
+/// Fill in the reserve of each link from `begin` to `end` in all scenes.
+CATENARY_FOR_TARGETS
+void find_reserves(const Motion& motion, const Links& links, int64_t begin, int64_t end,
+                   double* result) {
+    const double *x = motion.x.data(), *y = motion.y.data(), *z = motion.z.data();
+    const double *s = motion.shares.data(), *weight = links.weights.data;
+    const int64_t* unknown = links.unknowns.data;
+    const int64_t m = links.unknowns.columns;
+    for (int64_t link = begin; link < end; ++link) {
+        Scenes of_x{}, of_y{}, of_z{};
+        for (int64_t k = m * link; k < m * (link + 1); ++k) {
+            const int64_t place = unknown[k] * kScenes;
+            of_x += weight[k] * at(x + place);
+            of_y += weight[k] * at(y + place);
+            of_z += weight[k] * at(z + place);
+        }
+        const Reserve& law = links.law[link];
+        const Scenes stretch = s[0] * of_x + s[1] * of_y + s[2] * of_z;
+        at(result + kScenes * link) =
+            law.rest + law.stiffness * stretch + law.damping * (s[3] * of_y + s[4] * of_z);
+    }
+}
+
+/// Take forces of links with these reserves into their extremes, of scenes with `none` = 0; that is
+/// infinite of others.
+CATENARY_FOR_TARGETS
+void take_forces(std::span<const Reserve> laws, const double* reserves, const double* none,
+                 double* least, double* largest) {
+    const Scenes left_out = at(none), nothing{};
+    for (int64_t link = 0; link < size(laws); ++link) {
+        const Reserve& law = laws[link];
+        const Scenes reserve = at(reserves + kScenes * link);
+        const Scenes whole = law.carried * reserve, part = whole - law.released * reserve;
+        const Scenes force = reserve < nothing ? part : whole;
+        Scenes &low = at(least + kScenes * link), &high = at(largest + kScenes * link);
+        const Scenes down = force + left_out, up = force - left_out;
+        low = down < low ? down : low;
+        high = up > high ? up : high;
+    }
+}
+
+/// Take displacements of unknowns into their largest ones, as `take_forces`.
+CATENARY_FOR_TARGETS
+void take_uplift(const Motion& motion, std::span<const int64_t> unknowns, const double* none,
+                 double* largest) {
+    const double *x = motion.x.data(), *y = motion.y.data(), *z = motion.z.data();
+    const double* s = motion.shares.data();
+    const Scenes left_out = at(none);
+    for (int64_t arm = 0; arm < size(unknowns); ++arm) {
+        const int64_t place = unknowns[arm] * kScenes;
+        const Scenes now = s[0] * at(x + place) + s[1] * at(y + place) + s[2] * at(z + place);
+        const Scenes up = now - left_out;
+        Scenes& high = at(largest + kScenes * arm);
+        high = up > high ? up : high;
+    }
+}
+
+}  // namespace
+
+ScenePasses::ScenePasses(PassParts parts) : parts_(std::move(parts)), line_(line_of(parts_)) {
+    const PassArrays& arrays = parts_.arrays;
+    if (!arrays.known.empty())
+        throw std::invalid_argument("scenes side by side take steps of Newmark's method only");
+    work_.product = parts_.rows.product();
+    work_.product.factor = arrays.factor.data();
+    work_.product.velocity = arrays.velocity.data();
+    work_.factored = parts_.factors.factored();
+    work_.loads = arrays.loads.empty() ? nullptr : arrays.loads.data();
+    work_.answer = arrays.answer.data();
+    const Motion& m = arrays.motion;
+    work_.motion = {m.x.data(), m.y.data(), m.z.data(), nullptr, parts_.changes};
+    line_.set_runs(work_, size(parts_.factors.kinds), parts_.factors.low);
+}
+
+void ScenePasses::track(const TrackedLinks& tracked, std::vector<std::span<double>> reserves) {
+    if (reserves.size() != kScenes) throw std::invalid_argument("a scene has no reserves");
+    tracked_ = tracked;
+    reserves_ = std::move(reserves);
+    found_.assign(tracked.links.law.size() * kScenes, 0.0);
+}
+
+void ScenePasses::step() {
+    line_.step(work_, parts_.factors.at(), std::max<int64_t>(1, tracked_.stretch), *this);
+}
+
+void ScenePasses::after_stretch() {
+    const auto before = tracked_.ranges[n_followed_], now = tracked_.ranges[n_followed_ + 1];
+    ++n_followed_;
+    find_reserves(now[0], before[0]);
+    find_reserves(before[1], now[1]);
+}
+
+void ScenePasses::find_reserves(int64_t begin, int64_t end) {
+    catenary::find_reserves(parts_.arrays.motion, tracked_.links, begin, end, found_.data());
+    for (int64_t link = begin; link < end; ++link)
+        for (int s = 0; s < kScenes; ++s) reserves_[s][link] = found_[kScenes * link + s];
+}
+
+void ScenePasses::take(const LineExtremes& extremes, const std::array<bool, kScenes>& moves) {
+    double none[kScenes];
+    for (int s = 0; s < kScenes; ++s)
+        none[s] = moves[s] ? 0.0 : std::numeric_limits<double>::infinity();
+    const Motion& motion = parts_.arrays.motion;
+    take_uplift(motion, extremes.arms, none, extremes.uplift.data);
+    const int64_t n = size(extremes.droppers.law);
+    found_.resize(std::max<size_t>(found_.size(), n * kScenes));
+    catenary::find_reserves(motion, extremes.droppers, 0, n, found_.data());
+    take_forces(extremes.droppers.law, found_.data(), none, extremes.least.data,
+                extremes.largest.data);
+}
+
+void ScenePasses::rest(int scene) const {
+    const PassArrays& arrays = parts_.arrays;
+    auto clear = [scene](std::span<double> numbers) {
+        for (size_t at = scene; at < numbers.size(); at += kScenes) numbers[at] = 0.0;
+    };
+    for (auto numbers : {arrays.factor, arrays.velocity, arrays.answer}) clear(numbers);
+    for (auto numbers : {arrays.motion.x, arrays.motion.y, arrays.motion.z}) clear(numbers);
+}
+
+}  // namespace catenary

@@ -1,0 +1,49 @@
+#pragma once
+// Free steps of a line in several scenes side by side, which share its matrices and factors.
+//
+// Numbers of an unknown in all scenes follow each other, so that a number of a matrix is read once
+// for `kScenes` of them: memory and broadcasts are what a step of one scene waits for.
+#include <array>
+
+#include "motion/two_passes.hpp"
+
+namespace catenary {
+
+/// Extremes of what a line shows in several scenes since each of them began.
+struct LineExtremes {
+    std::span<const int64_t> arms;  ///< unknowns of vertical displacement at steady arms
+    Links droppers;
+    Array2<double> uplift;          ///< (n_arms, kScenes) largest displacement [m]
+    Array2<double> least, largest;  ///< (n_droppers, kScenes) forces [N]
+    CATENARY_RECORD(arms, droppers, uplift, least, largest)
+};
+
+class ScenePasses : private Around {
+  public:
+    /// Arrays of `parts` are those of all scenes. Throws std::invalid_argument if no kernels were
+    /// compiled for a layout, or the method is not Newmark's.
+    explicit ScenePasses(PassParts parts);
+
+    /// Fill the reserves (n,) of links in each scene in a free step; `tracked` as for one scene.
+    void track(const TrackedLinks& tracked, std::vector<std::span<double>> reserves);
+    void step();
+    /// Take the present motion into extremes, of the scenes that `moves` says.
+    void take(const LineExtremes& extremes, const std::array<bool, kScenes>& moves);
+    /// Put a scene's line at rest.
+    void rest(int scene) const;
+
+  private:
+    void before() override { n_followed_ = 0; }
+    void after_stretch() override;
+    void find_reserves(int64_t begin, int64_t end);
+
+    PassParts parts_;
+    Line line_;
+    Work work_;
+    TrackedLinks tracked_{};
+    std::vector<std::span<double>> reserves_;
+    std::vector<double> found_;  ///< room for reserves in all scenes
+    int64_t n_followed_ = 0;
+};
+
+}  // namespace catenary

@@ -1,0 +1,160 @@
+#pragma once
+// Products of packed blocks with the unknowns of a station in several scenes, which share matrices
+// and factors. Unknown u of scene s stands at u L + s: a lane is a scene, and a number of a block
+// is multiplied with all of them. Sums are those of `Blocks`, in the same order.
+#include "stations/passes.hpp"
+
+namespace catenary::CATENARY_TARGET {
+
+/// Joints of the numbers of a packed block, N of them.
+template <int N>
+using Joints = std::array<Joint, N>;
+/// A joint, and whether its product is added to the second of two sums, see `Blocks`.
+template <int N>
+struct JointList {
+    Joints<N> joints{};
+    std::array<bool, N> is_other{}, is_off_diagonal{};
+};
+template <int N>
+constexpr JointList<N> joints_of(const Pieces& pieces, const Mask& mask) {
+    JointList<N> found;
+    int at = 0;
+    for (int i = 0; i < pieces.n(); ++i)
+        for (int j = 0; j < pieces.n(); ++j)
+            for (int kind = 0; kind < kKinds; ++kind) {
+                if (!(mask[i][j] >> kind & 1)) continue;
+                for (int lane = 0; lane < pieces.vector(); ++lane, ++at) {
+                    found.joints[at] = joint_of(pieces, i, j, kind, lane);
+                    found.is_other[at] = kind & 1;
+                    found.is_off_diagonal[at] = i != j;
+                }
+            }
+    return found;
+}
+
+/// Blocks of one of the shipped lines, for L scenes.
+template <int K, int L>
+struct SceneBlocks : KnownMasks<K> {
+    using Of = KnownMasks<K>;
+    static constexpr int W = Of::r.unknowns, pitch = W * L;
+    using V = Vector<L>;
+    using X = Lanes<W, L>;
+
+    using Of::Of;
+
+    CATENARY_INLINE static X load(const double* from) {
+        X x;
+        each<W>([&](auto u) CATENARY_HOT { x.piece[u] = read<L, L>(from + L * u); });
+        return x;
+    }
+    CATENARY_INLINE static X load_once(const double* from) { return load(from); }
+    CATENARY_INLINE static void store(double* to, const X& x) {
+        each<W>([&](auto u) CATENARY_HOT { write<L, L>(to + L * u, x.piece[u]); });
+    }
+    CATENARY_INLINE static X total_of(const Sums<X>& sums) {
+        X x;
+        each<W>([&](auto u) CATENARY_HOT { x.piece[u] = sums.one.piece[u] + sums.other.piece[u]; });
+        return x;
+    }
+
+    CATENARY_INLINE static void add_own(Sums<X>& sums, const double* numbers, const X& x) {
+        add<kOwn>(sums, numbers, x);
+    }
+    CATENARY_INLINE static void add_row_beside(Sums<X>& sums, const double* numbers, const X& x) {
+        add<kRowBeside>(sums, numbers, x);
+    }
+    CATENARY_INLINE static void add_beside(Sums<X>& sums, const double* numbers, const X& x) {
+        add<kBeside>(sums, numbers, x);
+    }
+    CATENARY_INLINE static void add_whole(Sums<X>& sums, const double* numbers, const X& x) {
+        add<kWhole>(sums, numbers, x);
+    }
+    CATENARY_INLINE static void add_inverse(Sums<X>& sums, const double* numbers, const X& x) {
+        if constexpr (Of::is_sparse)
+            add<kHalf, true>(sums, numbers, x);
+        else
+            add<kWhole>(sums, numbers, x);
+    }
+
+  private:
+    static constexpr Pieces kPieces{W};
+    template <int N>
+    static constexpr auto of(const Mask& mask) {
+        return joints_of<N>(kPieces, mask);
+    }
+    static constexpr Mask kHalfMask = upper(Of::whole);
+    static constexpr auto kOwn = of<Of::own_size>(Of::row_own);
+    static constexpr auto kRowBeside = of<Of::row_beside_size>(Of::row_beside);
+    static constexpr auto kWhole = of<Of::whole_size>(Of::whole);
+    static constexpr auto kBeside = of<Of::beside_size>(Of::beside);
+    static constexpr auto kHalf = of<Of::f.size_of(kHalfMask)>(kHalfMask);
+
+    template <const auto& List, bool IsSymmetric = false>
+    CATENARY_INLINE static void add(Sums<X>& sums, const double* numbers, const X& x) {
+        each<static_cast<int>(List.joints.size())>([&](auto p) CATENARY_HOT {
+            constexpr Joint joint = List.joints[p];
+            if constexpr (joint.row >= 0) {
+                const V number = numbers[p] - V{};
+                X& sum = List.is_other[p] ? sums.other : sums.one;
+                sum.piece[joint.row] += number * x.piece[joint.column];
+                if constexpr (IsSymmetric && List.is_off_diagonal[p])
+                    sum.piece[joint.column] += number * x.piece[joint.row];
+            }
+        });
+    }
+};
+
+/// Kernels of such blocks.
+template <class Blocks>
+class SceneKernels final : public Kernels {
+  public:
+    SceneKernels(const Layout& r, const Layout& f) : blocks_(r, f) {
+        rows = r;
+        factors = f;
+    }
+    void multiply(const Work& work, const Chain& chain, double* result) const override {
+        multiply_rows(blocks_, work, chain, result);
+    }
+    void forth(const Work& work, Chain& chain, int step) const override {
+        go_forth(blocks_, work, chain, step, IsProduct{});
+    }
+    void forth(const Work& work, Chain& from_start, Chain& from_end) const override {
+        forth(work, from_start, 1);
+        forth(work, from_end, -1);
+    }
+    void meet(const Work& work, const Run& run, int64_t middle, Station& from_end) const override {
+        const Chained<Blocks> one(blocks_, work, run);
+        const auto own = one.met(middle, blocks_.load(from_end.unknowns));
+        blocks_.store(from_end.unknowns, own);
+        one.go_on(middle, own, Newmark{});
+    }
+    void back(const Work& work, Chain& chain, int step) const override {
+        go_back(blocks_, work, chain, step, Newmark{});
+    }
+    void back(const Work& work, Chain& to_start, Chain& to_end) const override {
+        back(work, to_start, -1);
+        back(work, to_end, 1);
+    }
+
+  private:
+    Blocks blocks_;
+};
+
+/// Kernels of L scenes that were compiled for rows and factors, or null.
+template <int L, int K = 0>
+std::unique_ptr<Kernels> make_for_scenes(const Layout& rows, const Layout& factors) {
+    if constexpr (K < std::size(kShipped)) {
+        constexpr Shipped s = kShipped[K];
+        if constexpr (s.rows.unknowns * L <= kMostNumbers && s.is_for_scenes)
+            if (rows == s.rows && factors == s.factors)
+                return std::make_unique<SceneKernels<SceneBlocks<K, L>>>(rows, factors);
+        return make_for_scenes<L, K + 1>(rows, factors);
+    }
+    return nullptr;
+}
+
+std::unique_ptr<Kernels> make_for_scenes(const Layout& rows, const Layout& factors) {
+    return make_for_scenes<kScenes>(rows, factors);
+}
+
+}  // namespace catenary::CATENARY_TARGET
