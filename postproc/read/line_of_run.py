@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
 from catenary.meshgen.mesh import elements_of
 from catenary.meshgen.wires import Role
+from catenary.postproc.channels.line_record import LineRecord
+from catenary.postproc.read.records import Records
 from catenary.postproc.read.registration import Registration
-from catenary.postproc.read.validated_file import ValidatedFile
 
 
 class ContactProfile(NamedTuple):
@@ -32,15 +33,44 @@ class ContactProfile(NamedTuple):
         return x, np.insert(values, self.breaks, np.nan)
 
 
+class ResultTables(Protocol):
+    """The tables of a result file, which is open and valid, or of a march that wrote none; see
+    `ValidatedFile`."""
+
+    attrs: dict[str, Any]
+    facts: dict[str, np.ndarray]
+    sizes: dict[str, int]
+    record: LineRecord
+
+    @property
+    def records(self) -> Records: ...
+
+    @property
+    def damage(self) -> list[str]: ...
+
+    @property
+    def has_energies(self) -> bool: ...
+
+    def __contains__(self, path: str) -> bool: ...
+
+    def __getitem__(self, path: str) -> Any: ...
+
+    def extremes(self, n_steps: int) -> dict[str, np.ndarray] | None: ...
+
+    def state(self) -> Any: ...
+
+    def close(self) -> None: ...
+
+
 class LineOfRun:
     """Constants of a result file that is open. Not collective.
 
     Parameters
     ----------
-    file : ValidatedFile
+    file : ResultTables
     """
 
-    def __init__(self, file: ValidatedFile) -> None:
+    def __init__(self, file: ResultTables) -> None:
         self._file = file
 
     def line(self, name: str) -> np.ndarray:

@@ -16,6 +16,7 @@ from catenary.meshgen.wires import Role
 from catenary.postproc.channels.line_record import LineRecord
 from catenary.postproc.files.hdf5 import block_reading
 from catenary.postproc.files.run_schema import ALL_COLUMNS, DONE, LINE_TIME, PLACES, RUNNING
+from catenary.postproc.read.line_of_run import ResultTables
 from catenary.postproc.read.records import Records
 from catenary.postproc.read.train_of_run import TrainOfRun
 from catenary.postproc.read.validated_file import ValidatedFile
@@ -53,6 +54,14 @@ class Results(TrainOfRun):
         if image is None and not self.path.is_file():
             raise InputError(f"{self.path} does not exist: name a result file or its folder")
         super().__init__(ValidatedFile(self.path, records, image))
+
+    @classmethod
+    def of(cls, tables: ResultTables) -> Results:
+        """Results that are in memory and in no file."""
+        results = cls.__new__(cls)
+        results.path = Path()
+        TrainOfRun.__init__(results, tables)
+        return results
 
     def __enter__(self) -> Results:
         return self

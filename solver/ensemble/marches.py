@@ -185,9 +185,7 @@ def _steps(
     )
     nothing = np.zeros(0)
     none = np.zeros(0, dtype=np.int64)
-    kept = KeptMotions(
-        none, nothing, np.zeros((0, 3), np.int64), none, none, [], np.zeros((0, 0))
-    )
+    kept = KeptMotions(none, nothing, np.zeros((0, 3), np.int64), none, none, [], np.zeros((0, 0)))
     block = Block(
         times=times,
         drives=drives,

@@ -80,9 +80,7 @@ class SharedLine:
         self.wires = ContactWires(model, form, self.ownership)
         table = switching_links(model, form.dropper_force)
         links = [FollowedLinks(table, self.line) for _ in range(N_LANES)]
-        self.columns = ForceColumns(
-            self.comm, model, self.wires, self.line, links[0], range_of_run
-        )
+        self.columns = ForceColumns(self.comm, model, self.wires, self.line, links[0], range_of_run)
         passes = self.line.passes
         assert passes is not None
         arrays, motions = _in_lanes(passes, self.line.motion)

@@ -6,29 +6,34 @@
 
 namespace catenary::CATENARY_TARGET {
 
-/// Joints of the numbers of a packed block, N of them.
+/// What a number of a packed block joins, and where it stands.
+struct Numbered {
+    Joint joint;
+    int at = 0;
+    bool is_off_diagonal = false;
+};
+/// Those of a block of N numbers, column by column, so that an unknown is read once.
 template <int N>
-using Joints = std::array<Joint, N>;
-/// A joint, and whether its product is added to the second of two sums, see `Blocks`.
-template <int N>
-struct JointList {
-    Joints<N> joints{};
-    std::array<bool, N> is_other{}, is_off_diagonal{};
+struct Joints {
+    std::array<Numbered, N> of{};
+    int n = 0;
 };
 template <int N>
-constexpr JointList<N> joints_of(const Pieces& pieces, const Mask& mask) {
-    JointList<N> found;
-    int at = 0;
-    for (int i = 0; i < pieces.n(); ++i)
-        for (int j = 0; j < pieces.n(); ++j)
-            for (int kind = 0; kind < kKinds; ++kind) {
-                if (!(mask[i][j] >> kind & 1)) continue;
-                for (int lane = 0; lane < pieces.vector(); ++lane, ++at) {
-                    found.joints[at] = joint_of(pieces, i, j, kind, lane);
-                    found.is_other[at] = kind & 1;
-                    found.is_off_diagonal[at] = i != j;
+constexpr Joints<N> joints_of(const Pieces& pieces, const Mask& mask) {
+    Joints<N> found;
+    for (int column = 0; column < pieces.unknowns; ++column) {
+        int at = 0;
+        for (int i = 0; i < pieces.n(); ++i)
+            for (int j = 0; j < pieces.n(); ++j)
+                for (int kind = 0; kind < kKinds; ++kind) {
+                    if (!(mask[i][j] >> kind & 1)) continue;
+                    for (int lane = 0; lane < pieces.vector(); ++lane, ++at) {
+                        const Joint joint = joint_of(pieces, i, j, kind, lane);
+                        if (joint.row >= 0 && joint.column == column)
+                            found.of[found.n++] = {joint, at, i != j};
+                    }
                 }
-            }
+    }
     return found;
 }
 
@@ -52,9 +57,7 @@ struct SceneBlocks : KnownMasks<K> {
         each<W>([&](auto u) CATENARY_HOT { write<L, L>(to + L * u, x.piece[u]); });
     }
     CATENARY_INLINE static X total_of(const Sums<X>& sums) {
-        X x;
-        each<W>([&](auto u) CATENARY_HOT { x.piece[u] = sums.one.piece[u] + sums.other.piece[u]; });
-        return x;
+        return sums.one;
     }
 
     CATENARY_INLINE static void add_own(Sums<X>& sums, const double* numbers, const X& x) {
@@ -91,15 +94,12 @@ struct SceneBlocks : KnownMasks<K> {
 
     template <const auto& List, bool IsSymmetric = false>
     CATENARY_INLINE static void add(Sums<X>& sums, const double* numbers, const X& x) {
-        each<static_cast<int>(List.joints.size())>([&](auto p) CATENARY_HOT {
-            constexpr Joint joint = List.joints[p];
-            if constexpr (joint.row >= 0) {
-                const V number = numbers[p] - V{};
-                X& sum = List.is_other[p] ? sums.other : sums.one;
-                sum.piece[joint.row] += number * x.piece[joint.column];
-                if constexpr (IsSymmetric && List.is_off_diagonal[p])
-                    sum.piece[joint.column] += number * x.piece[joint.row];
-            }
+        each<List.n>([&](auto p) CATENARY_HOT {
+            constexpr Numbered own = List.of[p];
+            const V number = numbers[own.at] - V{};
+            sums.one.piece[own.joint.row] += number * x.piece[own.joint.column];
+            if constexpr (IsSymmetric && own.is_off_diagonal)
+                sums.one.piece[own.joint.column] += number * x.piece[own.joint.row];
         });
     }
 };
