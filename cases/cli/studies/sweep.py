@@ -9,7 +9,7 @@ import typer
 
 from catenary.base.errors import InputError
 from catenary.cases.cli import completion
-from catenary.cases.cli.app import Force, Out, RunWords, Verbose, app, begin
+from catenary.cases.cli.app import Force, Jobs, Out, RunWords, Verbose, app, begin
 from catenary.cases.result_folder.output_folder import refuse_impossible
 from catenary.cases.terminal import console
 
@@ -24,7 +24,7 @@ _SHOWN_BROKEN = 3
 
 @app.command(
     "sweep",
-    help="Run variants of a case one after the other and put their statistics side by side. The "
+    help="Run variants of a case and put their statistics side by side. The "
     "same command continues a sweep that was stopped.",
     epilog="Example: catenary sweep en50318_2002 -o results/speeds --vary "
     "train.speed_km_h=200,250,300 --vary contact.stiffness_N_per_m=2e4,5e4",
@@ -60,6 +60,7 @@ def sweep(
     reports: Annotated[
         bool, typer.Option("--reports", help="Also write the report of each run.")
     ] = False,
+    n_jobs: Jobs = 1,
     force: Force = False,
     verbose: Verbose = False,
 ) -> int:
@@ -85,7 +86,7 @@ def sweep(
     comm, made, arguments = begin(read, verbose, lambda made: made.jobs[0].scene)
     for one in made.refused:
         console.warn(f"variant {one.variant.name} is not run: {one.outcome}")
-    options = RunOptions(force, arguments, console.say)
+    options = RunOptions(force, arguments, console.say, n_jobs)
     ended, files = run_sweep(
         made, out, comm, options, f"catenary sweep {words.case}", _names(plotted)
     )
