@@ -97,7 +97,7 @@ def sweep(
     return verdict(ended, "sweep")
 
 
-def run_study(words: RunWords, out: Path, force: bool, verbose: bool) -> int:
+def run_study(words: RunWords, out: Path, n_jobs: int, force: bool, verbose: bool) -> int:
     """What ``catenary run CASE --study`` does; returns the exit code. Collective."""
     from catenary.cases.studies.case_study import Plan, find_study, make_plan
 
@@ -114,8 +114,9 @@ def run_study(words: RunWords, out: Path, force: bool, verbose: bool) -> int:
     from catenary.cases.studies import case_study
     from catenary.cases.studies.sweep.jobs import RunOptions
 
+    options = RunOptions(force, arguments, console.say, n_jobs)
     with held(out, comm, f"catenary run {words.case} --study"):
-        report, ended = case_study.run(plan, out, comm, RunOptions(force, arguments, console.say))
+        report, ended = case_study.run(plan, out, comm, options)
     if report is not None:
         console.say("\n" + report)
     return verdict(ended, "study")

@@ -8,7 +8,6 @@ not stop the others.
 from __future__ import annotations
 
 import json
-import logging
 import time
 import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -29,66 +28,25 @@ from catenary.cases.result_folder.output_folder import (
 from catenary.cases.run.planning.needs import Kept, total_size
 from catenary.cases.run.runner import RESULT, run_case
 from catenary.cases.scene.problem import resolved
+from catenary.cases.studies.records import is_whole, read_record, read_table, write_record
 from catenary.cases.studies.sweep.jobs import AS_USUAL, Ended, Job, RunOptions
 from catenary.postproc.evaluate.wording import fixed
-from catenary.postproc.files.disk import plain, write_all
+from catenary.postproc.files.disk import plain
 from catenary.postproc.files.own_files import VARIANT_FILE as RECORD
 from catenary.postproc.files.run_schema import DONE, INTERRUPTED
 from catenary.postproc.read.results import Results
 
-logger = logging.getLogger("catenary.sweep")
-
-_SUM, _SUM_OF_SUMMARY = "crc32", "summary_crc32"
+_SUM_OF_SUMMARY = "summary_crc32"
 SUMMARY = "summary.json"
-
-
-def record_text(record: Mapping[str, Any], folder: Path) -> str:
-    """A variant's record as the text of its file, of a folder with the figures."""
-    content = json.loads(json.dumps(plain(record)))
-    content[_SUM_OF_SUMMARY] = zlib.crc32((folder / SUMMARY).read_bytes())
-    return json.dumps({**content, _SUM: _sum(content)}, indent=1) + "\n"
-
-
-def read_record(path: Path) -> dict[str, Any] | None:
-    """A variant's record, None if there is none or it is damaged, which is logged."""
-    content = _table(path)
-    if content is None:
-        return None
-    known = content.pop(_SUM, None)
-    return content if _is_whole(path, known == _sum(content)) else None
 
 
 def read_summary(path: Path, record: Mapping[str, Any]) -> dict[str, Any] | None:
     """The figures of a record, None if there are none or they are damaged, which is logged."""
-    content = _table(path)
+    content = read_table(path)
     if content is None:
         return None
     same = record.get(_SUM_OF_SUMMARY) in (None, zlib.crc32(path.read_bytes()))  # None: older
-    return content if _is_whole(path, same) else None
-
-
-def _table(path: Path) -> dict[str, Any] | None:
-    """A JSON table, None if there is no file or no whole table in it, which is logged."""
-    if not path.is_file():  # a pipe would be waited for
-        return None
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except OSError:
-        return None
-    except (ValueError, RecursionError):
-        content = None
-    return content if _is_whole(path, isinstance(content, dict)) else None
-
-
-def _is_whole(path: Path, whole: bool) -> bool:
-    """Log that a file is damaged, if it is; returns whether it is not."""
-    if not whole:
-        logger.warning("%s is damaged: its variant is run again", path)
-    return whole
-
-
-def _sum(content: Mapping[str, Any]) -> int:
-    return zlib.crc32(json.dumps(content, sort_keys=True).encode())
+    return content if is_whole(path, same) else None
 
 
 # What is taken from an open result file beside the summary: plain values by name.
@@ -171,6 +129,12 @@ class _Work(NamedTuple):
         return _run(job, folder, comm, self.options, self.measure), idle_names()
 
 
+def as_json(table: Mapping[str, Any]) -> dict[str, Any]:
+    """A table as JSON gives it back."""
+    content: dict[str, Any] = json.loads(json.dumps(plain(table)))
+    return content
+
+
 def _silent(line: str) -> None:
     """Say nothing."""
 
@@ -227,10 +191,11 @@ def _leave_record(job: Job, folder: Path, measure: Measure | None, wall: float) 
         "config": resolved(job.scene),
         "wall_s": wall,
         "measured": measured,
+        _SUM_OF_SUMMARY: zlib.crc32((folder / SUMMARY).read_bytes()),
     }
     if not job.keep_results:
         (folder / RESULT).unlink()
-    write_all(folder, {RECORD: record_text(record, folder)})
+    write_record(folder / RECORD, as_json(record))
     return measured
 
 
@@ -252,7 +217,7 @@ def _check_room(jobs: Sequence[Job], out_dir: Path, force: bool, n_at_once: int)
 
 
 def _found(job: Job, folder: Path, measured: bool) -> Ended | None:
-    wanted = json.loads(json.dumps(plain(resolved(job.scene))))
+    wanted = as_json(resolved(job.scene))
     record = read_record(folder / RECORD)
     if record is None:
         _refuse_other_run(folder, wanted)
