@@ -107,6 +107,7 @@ def sweep(
     vary: Mapping[str, Sequence[Any]],
     out: str | Path | None = None,
     *,
+    jobs: int = 1,
     force: bool = False,
     progress: bool = False,
     comm: Any = None,
@@ -122,6 +123,9 @@ def sweep(
     out : str or Path, optional
         Folder into which all is written that ``catenary sweep -o`` writes: a folder for each
         variant, table and picture. What is done there already is not run again.
+    jobs : int
+        Runs at the same time, each in a process of its own; 0 for one on each core. Under mpirun
+        the number of processes: a run on each.
     force, progress, comm
         As for ``run``.
 
@@ -148,6 +152,8 @@ def sweep(
     """
     import pandas as pd
 
+    if not isinstance(jobs, int) or jobs < 0:
+        raise InputError(f"jobs is {jobs!r}; it is a number of runs, or 0 for one on each core")
     from catenary.cases.studies.sweep.jobs import RunOptions, interrupted
     from catenary.cases.studies.sweep.output import table_of
     from catenary.cases.studies.sweep.sweep import run_sweep, sweep_of
@@ -169,7 +175,7 @@ def sweep(
         made = sweep_of(draft, variants, folder, force=force)
         options = stack.enter_context(options_of(made.jobs[0].scene.petsc.given()))
         stack.enter_context(_shown(False, comm))
-        plan = RunOptions(force, options, say if comm.rank == 0 else _nothing)
+        plan = RunOptions(force, options, say if comm.rank == 0 else _nothing, jobs)
         ended, _ = run_sweep(made, folder, comm, plan, "a sweep of a Python program", ())
     if interrupted(ended):
         raise KeyboardInterrupt

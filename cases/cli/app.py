@@ -138,6 +138,18 @@ class RunWords(SceneWords):
 Strict = Annotated[
     bool, typer.Option("--strict", help="Exit with 3 if an acceptance criterion fails.")
 ]
+Jobs = Annotated[
+    int,
+    typer.Option(
+        "-j",
+        "--jobs",
+        metavar="N",
+        min=0,
+        max=10**4,
+        help="Runs at the same time, each in a process of its own; 0: one on each core. Under "
+        "mpirun the number of ranks: a run on each.",
+    ),
+]
 Verbose = Annotated[bool, typer.Option("-v", "--verbose", help="Print the time of each phase.")]
 
 

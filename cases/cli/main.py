@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import atexit
-import gc
 import logging
 import os
 import sys
@@ -13,7 +11,12 @@ import typer
 
 from catenary.cases.cli import app as application
 from catenary.cases.cli import run  # noqa: F401  (adds its verbs)
-from catenary.cases.process import interrupts, matplotlib_setup, memory_limit
+from catenary.cases.process import (
+    interrupts,
+    library_settings,
+    matplotlib_setup,
+    memory_limit,
+)
 from catenary.cases.terminal import console
 
 # Verbs of ``run``. They take no other file: a user waits for the first step of a run.
@@ -59,23 +62,7 @@ def main() -> None:
     from catenary.base.parallel import launched_by_mpirun
 
     console.open_closed_streams()
-    # Modules, tables and pictures make many objects and little garbage: a short run ends before the
-    # first collection, which takes 0.15 s of it otherwise. A long series of runs has some.
-    gc.set_threshold(500_000, 3, 10)
-    # The end of the process frees all memory at once: Python need not look through it for garbage
-    # several times before, which takes a fifth of a whole run.
-    atexit.register(gc.freeze)
-    # Functions of libraries are looked up when they are first called: of all that PETSc, MPI and
-    # SciPy have a run calls few.
-    sys.setdlopenflags(os.RTLD_LAZY)
-    # One thread a process unless the user says otherwise, before a library reads it: matrices are
-    # small here, and MPI is what runs in parallel.
-    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
-        os.environ.setdefault(name, "1")
-    # No package checks scenes but Pydantic itself: it need not look through all that are installed.
-    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
-    # A crash ends the process: Open MPI's handler, which prints a trace, may wait for ever.
-    os.environ.setdefault("OMPI_MCA_opal_signal", "")
+    library_settings.choose()
     logging.getLogger("catenary").addHandler(console.LogHandler())
     interrupts.install(several_ranks=launched_by_mpirun())
     matplotlib_setup.choose_folder()

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from catenary.base.errors import InputError
-from catenary.cases.cli.app import Force, SceneWords, app, folder_option
+from catenary.cases.cli.app import Force, Jobs, SceneWords, app, folder_option
 from catenary.cases.terminal import console
 
 if TYPE_CHECKING:
@@ -62,6 +62,7 @@ def plan(
     as_json: Annotated[
         bool, typer.Option("--json", help="With --cost: print JSON in place of the table.")
     ] = False,
+    n_jobs: Jobs = 1,
     force: Force = False,
 ) -> int:
     """Serial."""
@@ -79,10 +80,11 @@ def plan(
             wanted,
             [] if only is None else [name.strip() for name in only.split(",")],
         )
-        return _cost(wish, out, as_json, force)
+        return _cost(wish, out, as_json, n_jobs, force)
     belonging = {
         "--only": only, "--stretch-m": stretch, "--rounds": rounds, "--tolerance": tolerance,
         "-o": out, "--json": as_json or None, "--force": force or None,
+        "-j": None if n_jobs == 1 else n_jobs,
     }  # fmt: skip
     for option, value in belonging.items():
         if value is not None:
@@ -100,7 +102,7 @@ def _within(option: str, value: float, low: float, high: float) -> float:
     return value
 
 
-def _cost(wish: Wish, out: Path | None, as_json: bool, force: bool) -> int:
+def _cost(wish: Wish, out: Path | None, as_json: bool, n_jobs: int, force: bool) -> int:
     """What --cost does; returns the exit code."""
     import tempfile
 
@@ -128,12 +130,12 @@ def _cost(wish: Wish, out: Path | None, as_json: bool, force: bool) -> int:
 
     if out is None:
         with tempfile.TemporaryDirectory(prefix="catenary_cost_") as folder:
-            found = study.measure(wish, Path(folder), say)
+            found = study.measure(wish, Path(folder), say, n_jobs=n_jobs)
         files: list[Path] = []
     else:
         with held(out, comm, f"catenary plan {wish.case} --cost"):
             refuse_table(out / output.RECORD, force)
-            found = study.measure(wish, out / _RUNS, say, force)
+            found = study.measure(wish, out / _RUNS, say, force, n_jobs)
             files = [] if found is None else output.write(found, out)
     if found is None:
         again = "" if out is None else "; the same command continues it"

@@ -11,6 +11,7 @@ import typer
 from catenary.base.errors import InputError
 from catenary.cases.cli.app import (
     Force,
+    Jobs,
     Out,
     PetscOptions,
     RunFolder,
@@ -43,6 +44,7 @@ def run(
     study: Annotated[
         bool, typer.Option("--study", help="Run the case's study: variants, figures, verdicts.")
     ] = False,
+    n_jobs: Jobs = 1,
     verbose: Verbose = False,
 ) -> int:
     """Collective."""
@@ -53,7 +55,9 @@ def run(
 
         if strict:
             raise InputError("a study is not judged as a whole: give --study without --strict")
-        return run_study(words, out, force, verbose)
+        return run_study(words, out, n_jobs, force, verbose)
+    if n_jobs != 1:
+        raise InputError("-j belongs to --study; mpirun shares a single run among ranks")
 
     def read() -> tuple[Scene, list[str]]:
         changes, options = words.split()

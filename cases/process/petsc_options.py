@@ -105,28 +105,48 @@ def options_of(table: Mapping[str, Any]) -> Iterator[list[str]]:
                 PETSc.Options().setValue(name, before[name])
 
 
+def idle_names() -> set[str]:
+    """The options that PETSc holds and never looked up. Not collective.
+
+    petsc4py does not expose PetscOptionsUsed, which is public in ``petscoptions.h`` and is called
+    through ctypes.
+    """
+    from catenary.base.petsc import PETSc
+
+    library = ctypes.CDLL(PETSc.__file__)
+    names = set()
+    for name in PETSc.Options().getAll().keys() - _LOOKED_UP_LAST:
+        used = ctypes.c_int(0)  # a PetscBool: an int, or one byte in newer versions
+        library.PetscOptionsUsed(None, name.encode(), ctypes.byref(used))
+        if not used.value:
+            names.add(name)
+    return names
+
+
+def look_up_all_but(idle: Collection[str]) -> None:
+    """Let PETSc know as used what another process has used. Not collective."""
+    from catenary.base.petsc import PETSc
+
+    for name in PETSc.Options().getAll().keys() - set(idle):
+        PETSc.Options().hasName(name)
+
+
 def idle_options(of_scene: Collection[str]) -> list[str]:
     """A sentence for each option that PETSc holds and never looked up, such as a misspelt one.
 
-    Not collective. petsc4py does not expose PetscOptionsUsed, which is public in ``petscoptions.h``
-    and is called through ctypes.
+    Not collective.
 
     Parameters
     ----------
     of_scene : names of the scene's ``[petsc]`` table, which has correct names alone; no sentence
         is made of them
     """
-    from catenary.base.petsc import PETSc
     from catenary.cases.scene.run.petsc import PetscTable
 
-    library = ctypes.CDLL(PETSc.__file__)
     known = [*PetscTable.model_fields, *_OTHER_OPTIONS]
     sentences = []
-    for name in sorted(PETSc.Options().getAll().keys() - _LOOKED_UP_LAST - set(of_scene)):
-        used = ctypes.c_int(0)  # a PetscBool: an int, or one byte in newer versions
-        library.PetscOptionsUsed(None, name.encode(), ctypes.byref(used))
-        if not used.value:
-            near = None if name in known else nearest(name, known)
-            hint = f"; did you mean -{near}?" if near else ""
-            sentences.append(f"the option -{name} had no effect: PETSc never looked it up{hint}")
+    for name in sorted(idle_names() - set(of_scene)):
+        near = None if name in known else nearest(name, known)
+        hint = f"; did you mean -{near}?" if near else ""
+        sentences.append(f"the option -{name} had no effect: PETSc never looked it up{hint}")
     return sentences

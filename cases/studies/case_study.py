@@ -17,7 +17,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import ModuleType
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from catenary.base.errors import InputError
 from catenary.base.parallel import on_root
@@ -33,6 +33,9 @@ from catenary.cases.studies.sweep.jobs import (
     make_jobs,
 )
 from catenary.cases.studies.sweep.variants import Variant, slug
+
+if TYPE_CHECKING:
+    from catenary.postproc.read.results import Results
 
 STUDY_FILE = "study.py"
 RUNS = "runs"
@@ -127,11 +130,22 @@ def run(
 
     begin = time.perf_counter()
     module = _load(plan.path)
-    ended = run_jobs(plan.jobs, out_dir / RUNS, comm, options, measure=module.measure)
+    ended = run_jobs(plan.jobs, out_dir / RUNS, comm, options, measure=_Measure(plan.path))
     if interrupted(ended):
         return None, ended
     text = on_root(comm, lambda: _conclude(plan, module, out_dir, ended, begin), takes_long=True)
     return text, ended
+
+
+class _Measure(NamedTuple):
+    """``measure`` of a ``study.py``, which other processes load again: no package has it."""
+
+    path: Path
+
+    def __call__(self, results: Results) -> dict[str, Any]:
+        """Plain figures of a result file."""
+        measured: dict[str, Any] = _load(self.path).measure(results)
+        return measured
 
 
 def _conclude(

@@ -50,7 +50,7 @@ ROOMS = {
         "scene.problem", "scene.cost_model", "scene.checks", "scene.load", "scene.starter",
         "terminal", "process",
         "result_folder", "run",
-        "studies.kept_rows", "studies.sweep", "studies.pantograph_response", "studies.accuracy",
+        "studies.records", "studies.sweep", "studies.pantograph_response", "studies.accuracy",
         "studies.hard",
         "studies.scaling", "studies.stability", "studies.effect_cost", "studies.waves",
         "studies.case_study", "studies.paper",

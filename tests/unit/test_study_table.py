@@ -9,11 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from mpi4py import MPI
+from work_items import work
 
+from catenary.cases.process.workers import WorkerLost
 from catenary.cases.studies.hard import checks
 from catenary.cases.studies.hard.cases import HardCase, hard_cases
 from catenary.cases.studies.hard.checks import Checked, Criterion
-from catenary.cases.studies.kept_rows import NAME, KeptRows
+from catenary.cases.studies.records import FOLDER, KeptRows
 from catenary.postproc.report.study_table import Column, StudyTable, rows_csv, texts_table
 
 COMM = MPI.COMM_SELF
@@ -70,20 +72,24 @@ def test_texts_stand_as_they_are_given() -> None:
 def test_rows_are_kept_until_they_are_forgotten(tmp_path: Path) -> None:
     made: list[int] = []
 
-    def make(number: int) -> list[list[float]]:
+    def make(number: int, comm: object) -> list[list[float]]:
         made.append(number)
         return [[float(number), math.inf, np.float64(0.1), np.bool_(True)]]
 
-    scene = {"train": {"speed_km_h": 250.0}}
-    first = KeptRows(tmp_path / "out")
-    for number in (1, 2):
-        first.rows([scene, number], lambda number=number: make(number))
+    def rows(kept: KeptRows, speed: float, *numbers: int) -> list[object]:
+        scene = {"train": {"speed_km_h": speed}}
+        found = kept.each(make, numbers, lambda number: [scene, number], 1, COMM)
+        return [outcome.get() for outcome in found]
+
+    rows(KeptRows(tmp_path / "out"), 250.0, 1, 2)
     again = KeptRows(tmp_path / "out")
-    assert again.rows([scene, 1], lambda: make(1)) == [[1.0, math.inf, 0.1, True]]
-    again.rows([{"train": {"speed_km_h": 251.0}}, 1], lambda: make(3))
-    assert made == [1, 2, 3]
-    assert KeptRows(tmp_path / "out", force=True).get([scene, 1]) is None
-    assert not (tmp_path / "out" / NAME).exists()
+    assert rows(again, 250.0, 3, 2, 1) == [[[n, math.inf, 0.1, True]] for n in (3.0, 2.0, 1.0)]
+    rows(again, 251.0, 1)
+    assert made == [1, 2, 3, 1]
+    rows(KeptRows(tmp_path / "out", force=True), 250.0, 1)
+    assert made == [1, 2, 3, 1, 1]
+    again.forget()
+    assert not (tmp_path / "out" / FOLDER).exists()
 
 
 @pytest.mark.parametrize(
@@ -91,14 +97,22 @@ def test_rows_are_kept_until_they_are_forgotten(tmp_path: Path) -> None:
 )
 def test_rows_that_a_kill_or_disk_has_damaged_are_made_again(damage, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
     kept = KeptRows(tmp_path)
-    kept.keep("a", [1.0])
     kept.keep("b", [2.0])
-    path = tmp_path / NAME
+    (path,) = (tmp_path / FOLDER).iterdir()
+    kept.keep("a", [1.0])
     path.write_text(damage(path.read_text()))
-    again = KeptRows(tmp_path)
-    assert again.get("a") == [1.0] and again.get("b") is None
-    again.keep("b", [4.0])
-    assert KeptRows(tmp_path).get("b") == [4.0]
+    assert kept.get("a") == [1.0] and kept.get("b") is None
+    kept.keep("b", [4.0])
+    assert kept.get("b") == [4.0]
+
+
+@pytest.mark.process
+def test_rows_of_several_processes_are_kept_and_come_in_order(tmp_path: Path) -> None:
+    words = [1, "be killed", 3, 4]
+    found = list(KeptRows(tmp_path).each(work, words, str, 2, COMM))
+    assert [one.value for one in found] == [2, None, 6, 8]
+    assert isinstance(found[1].error, WorkerLost)
+    assert [KeptRows(tmp_path).get(str(word)) for word in words] == [2, None, 6, 8]
 
 
 def test_a_hard_case_that_was_measured_is_not_measured_again(
@@ -114,6 +128,6 @@ def test_a_hard_case_that_was_measured_is_not_measured_again(
 
     monkeypatch.setattr(checks, "_checked", measured)
     for short in (True, True, False):
-        found = checks.check_case(case, COMM, COMM, short, KeptRows(tmp_path))
+        (found,) = checks.check_cases([case], COMM, short, KeptRows(tmp_path))
         assert found == measured(case, COMM, COMM, short)
     assert calls == [True, True, True, False, False]

@@ -20,9 +20,10 @@ from catenary.cases.cli.main import app
 from catenary.cases.result_folder import output_folder
 from catenary.cases.run.planning.needs import needs_before_meshing
 from catenary.cases.run.runner import run_case
+from catenary.cases.studies.records import read_record
 from catenary.cases.studies.sweep.jobs import STATISTICS, Ended, Job, RunOptions, make_jobs
 from catenary.cases.studies.sweep.output import as_text, draw, key_in_words, table_of, write
-from catenary.cases.studies.sweep.run_jobs import read_record, read_summary, run_jobs
+from catenary.cases.studies.sweep.run_jobs import read_summary, run_jobs
 from catenary.cases.studies.sweep.sweep import refuse_other_sweep
 from catenary.cases.studies.sweep.variants import Variant, parse_vary, product
 from catenary.postproc.read.results import Results
@@ -128,7 +129,7 @@ def test_what_an_earlier_variant_left_damaged_is_told(
     with caplog.at_level("WARNING", "catenary.sweep"):
         assert read(file) is None
     (told,) = caplog.records
-    assert told.getMessage() == f"{file} is damaged: its variant is run again"
+    assert told.getMessage() == f"{file} is damaged: what it is of is done again"
 
 
 def test_what_is_done_is_not_run_again(swept: tuple[Path, str]) -> None:

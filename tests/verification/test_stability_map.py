@@ -12,7 +12,7 @@ from mpi4py import MPI
 from scipy import linalg
 from small_lines import EN_PANTOGRAPH, HANGING, en50318_line, mesh_of, problem_of
 
-from catenary.cases.studies.kept_rows import KeptRows
+from catenary.cases.studies.records import KeptRows
 from catenary.cases.studies.stability import from_matrices as theory
 from catenary.cases.studies.stability import map as map_of_stability
 from catenary.cases.studies.stability.by_marching import COUPLINGS, Bench

@@ -8,7 +8,7 @@ import typer
 
 from catenary.base.errors import InputError
 from catenary.cases.cli import completion
-from catenary.cases.cli.app import Force, Out, RunWords, Verbose, app, begin
+from catenary.cases.cli.app import Force, Jobs, Out, RunWords, Verbose, app, begin
 from catenary.cases.result_folder.output_folder import refuse_impossible
 from catenary.cases.terminal import console
 
@@ -51,6 +51,7 @@ def accuracy(
     repeats: Annotated[
         int, typer.Option("--repeats", metavar="N", help="How often short runs are timed.")
     ] = 3,
+    n_jobs: Jobs = 1,
     force: Force = False,
     verbose: Verbose = False,
 ) -> int:
@@ -81,7 +82,7 @@ def accuracy(
     from catenary.postproc.evaluate.wording import counted
 
     with held(out, comm, f"catenary accuracy {words.case}"):
-        found, ended = study.run(plan, out, comm, RunOptions(force, arguments, console.say))
+        found, ended = study.run(plan, out, comm, RunOptions(force, arguments, console.say, n_jobs))
         if found is None:
             console.complain("the study was interrupted; the same command continues it")
             return console.BROKEN

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from catenary.cases.cli.app import Force, Verbose, app, begin, folder_option
+from catenary.base.errors import InputError
+from catenary.cases.cli.app import Force, Jobs, Verbose, app, begin, folder_option
 from catenary.cases.result_folder.output_folder import refuse_table
 from catenary.cases.terminal import console
 
@@ -36,6 +38,7 @@ def hard(
     shortened: Annotated[
         bool, typer.Option("--short", help="Shorter runs, steps halved once only.")
     ] = False,
+    n_jobs: Jobs = 1,
     force: Force = False,
     verbose: Verbose = False,
 ) -> int:
@@ -48,22 +51,26 @@ def hard(
             refuse_table(out / TABLES[0], force)
         return hard_cases(names)
 
-    comm, cases, _ = begin(lambda: (read(), []), verbose, lambda cases: cases[0].scene())
-    from mpi4py import MPI
-
+    comm, cases, arguments = begin(lambda: (read(), []), verbose, lambda cases: cases[0].scene())
     from catenary.base.parallel import on_root
+    from catenary.cases.process.petsc_options import start_petsc
+    from catenary.cases.process.workers import at_once
     from catenary.cases.studies.hard import output
-    from catenary.cases.studies.hard.checks import check_case
-    from catenary.cases.studies.kept_rows import KeptRows
+    from catenary.cases.studies.hard.checks import check_cases
+    from catenary.cases.studies.records import KeptRows
     from catenary.postproc.files.disk import write_all
     from catenary.postproc.report.study_table import remark_lines
 
-    kept = KeptRows(out if comm.rank == 0 else None, force)
+    if comm.size > 1 and n_jobs != 1:
+        raise InputError(f"-j is {n_jobs} on {comm.size} ranks, of which each case is to take all")
+    kept = KeptRows(out, force and comm.rank == 0)
     found: list[Criterion] = []
     told: dict[str, dict[str, list[str]]] = {}
+    petsc = partial(start_petsc, arguments)
+    checked = check_cases(cases, comm, shortened, kept, at_once(n_jobs, comm), petsc)
     for number, case in enumerate(cases, start=1):
         console.say(f"[{number}/{len(cases)}] {case.name}: {case.what}")
-        rows, remarks = check_case(case, comm, MPI.COMM_SELF, shortened, kept)
+        rows, remarks = next(checked)
         console.say("\n".join(output.line(row) for row in rows))
         found += rows
         told[case.name] = remarks

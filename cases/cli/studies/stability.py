@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from catenary.cases.cli.app import Force, Out, SceneWords, app
+from catenary.cases.cli.app import Force, Jobs, Out, SceneWords, app
 from catenary.cases.result_folder.output_folder import refuse_table
 from catenary.cases.terminal import console
 
@@ -26,10 +26,12 @@ def stability_map(
     words: SceneWords,
     out: Out,
     quick: Annotated[bool, typer.Option("--quick", help="Few stiffnesses and masses.")] = False,
+    n_jobs: Jobs = 1,
     force: Force = False,
 ) -> int:
     """Serial."""
-    from catenary.cases.studies.kept_rows import KeptRows
+    from catenary.cases.process.workers import at_once
+    from catenary.cases.studies.records import KeptRows
     from catenary.cases.studies.stability import map as study
     from catenary.cases.studies.stability.map import draw
     from catenary.postproc.files.disk import write_all
@@ -39,7 +41,8 @@ def stability_map(
     refuse_table(out / TABLE, force)
     grid = study.QUICK if quick else study.Grid()
     kept, scene = KeptRows(out, force), (words.case, words.changes, words.shortened)
-    found = study.make_map(*scene, console.alone(), grid, console.say, kept)
+    comm = console.alone()
+    found = study.make_map(*scene, comm, grid, console.say, kept, at_once(n_jobs, comm))
     content: dict[str, bytes | str] = {TABLE: rows_csv(study.as_rows(found))}
     content |= figures.painted(PICTURE, lambda: draw(found))
     files = write_all(out, content)

@@ -9,7 +9,7 @@ import typer
 
 from catenary.base.errors import InputError
 from catenary.cases.cli import completion
-from catenary.cases.cli.app import Force, Out, RunWords, Verbose, app, begin
+from catenary.cases.cli.app import Force, Jobs, Out, RunWords, Verbose, app, begin
 from catenary.cases.result_folder.output_folder import refuse_impossible
 from catenary.cases.terminal import console
 
@@ -24,7 +24,7 @@ _SHOWN_BROKEN = 3
 
 @app.command(
     "sweep",
-    help="Run variants of a case one after the other and put their statistics side by side. The "
+    help="Run variants of a case and put their statistics side by side. The "
     "same command continues a sweep that was stopped.",
     epilog="Example: catenary sweep en50318_2002 -o results/speeds --vary "
     "train.speed_km_h=200,250,300 --vary contact.stiffness_N_per_m=2e4,5e4",
@@ -60,6 +60,7 @@ def sweep(
     reports: Annotated[
         bool, typer.Option("--reports", help="Also write the report of each run.")
     ] = False,
+    n_jobs: Jobs = 1,
     force: Force = False,
     verbose: Verbose = False,
 ) -> int:
@@ -85,7 +86,7 @@ def sweep(
     comm, made, arguments = begin(read, verbose, lambda made: made.jobs[0].scene)
     for one in made.refused:
         console.warn(f"variant {one.variant.name} is not run: {one.outcome}")
-    options = RunOptions(force, arguments, console.say)
+    options = RunOptions(force, arguments, console.say, n_jobs)
     ended, files = run_sweep(
         made, out, comm, options, f"catenary sweep {words.case}", _names(plotted)
     )
@@ -96,7 +97,7 @@ def sweep(
     return verdict(ended, "sweep")
 
 
-def run_study(words: RunWords, out: Path, force: bool, verbose: bool) -> int:
+def run_study(words: RunWords, out: Path, n_jobs: int, force: bool, verbose: bool) -> int:
     """What ``catenary run CASE --study`` does; returns the exit code. Collective."""
     from catenary.cases.studies.case_study import Plan, find_study, make_plan
 
@@ -113,8 +114,9 @@ def run_study(words: RunWords, out: Path, force: bool, verbose: bool) -> int:
     from catenary.cases.studies import case_study
     from catenary.cases.studies.sweep.jobs import RunOptions
 
+    options = RunOptions(force, arguments, console.say, n_jobs)
     with held(out, comm, f"catenary run {words.case} --study"):
-        report, ended = case_study.run(plan, out, comm, RunOptions(force, arguments, console.say))
+        report, ended = case_study.run(plan, out, comm, options)
     if report is not None:
         console.say("\n" + report)
     return verdict(ended, "study")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from catenary.base.errors import InputError
-from catenary.cases.cli.app import Force, SceneWords, app, folder_option
+from catenary.cases.cli.app import Force, Jobs, SceneWords, app, folder_option
 from catenary.cases.result_folder.output_folder import refuse_impossible, refuse_table
 from catenary.cases.terminal import console
 
@@ -107,6 +107,7 @@ def waves(
             help="With --separations or --window-error: a curve for each value.",
         ),
     ] = None,
+    n_jobs: Jobs = 1,
     force: Force = False,
 ) -> int:
     """Serial."""
@@ -130,6 +131,8 @@ def waves(
             "--vary belongs to --separations and --window-error; vary other runs with catenary "
             "sweep"
         )
+    if n_jobs != 1 and separations is None:
+        raise InputError("-j belongs to --separations; all else is one run")
     if separations is not None and window_error is not None:
         raise InputError("--separations and --window-error are two studies; give one")
     for option, text in (("--separations", separations), ("--window-error", window_error)):
@@ -140,7 +143,7 @@ def waves(
         if out is None:
             raise InputError("-o is missing; it names the folder of the runs")
     if separations is not None and out is not None:
-        return _separations(words, out, separations, vary or [], force)
+        return _separations(words, out, separations, vary or [], n_jobs, force)
     if window_error is not None and out is not None:
         return _window_error(words, out, window_error, vary or [], force)
     if (folder / "run.h5").is_file():
@@ -172,7 +175,9 @@ def waves(
     return console.DONE
 
 
-def _separations(words: WaveWords, out: Path, text: str, vary: list[str], force: bool) -> int:
+def _separations(
+    words: WaveWords, out: Path, text: str, vary: list[str], n_jobs: int, force: bool
+) -> int:
     """What --separations does; returns the exit code."""
     from catenary.cases.cli.studies.sweep import verdict
     from catenary.cases.process.petsc_options import start_petsc
@@ -192,7 +197,7 @@ def _separations(words: WaveWords, out: Path, text: str, vary: list[str], force:
     comm = console.alone()
     start_petsc([])
     with held(out, comm, f"catenary waves {case} --separations {text}"):
-        ended = separation.run(jobs, out, comm, RunOptions(force, (), console.say))
+        ended = separation.run(jobs, out, comm, RunOptions(force, (), console.say, n_jobs))
         theory, span = theory_of(scene)
         files = separation.write(out, ended, theory, span)
     said = separation.as_text(separation.curves_of(ended), theory, span)

@@ -6,6 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from heapq import nlargest
 from typing import NamedTuple
 
 import numpy as np
@@ -160,14 +161,15 @@ def run_size(needs: Needs) -> RunSize:
     return RunSize(needs.files.total, needs.march, needs.n_steps)
 
 
-def total_size(runs: Iterable[Kept]) -> RunSize:
-    """Size of several runs, one after the other. Not collective.
+def total_size(runs: Iterable[Kept], n_at_once: int = 1) -> RunSize:
+    """Size of several runs, of which so many are made at the same time. Not collective.
 
-    Result files that do not stay take the room of the largest one. Runs whose scenes bring their
-    own mesh, which is not read here, are not counted.
+    Result files that do not stay take the room of so many of the largest ones. Runs whose scenes
+    bring their own mesh, which is not read here, are not counted.
     """
-    left = largest = seconds = 0.0
+    left = seconds = 0.0
     n_steps = 0
+    passing = []
     for run in runs:
         needs = needs_before_meshing(run.scene)
         if needs is None:
@@ -175,10 +177,10 @@ def total_size(runs: Iterable[Kept]) -> RunSize:
         files = needs.files
         left += files.film + (files.report if run.report else 0.0)
         left += files.result if run.result else 0.0
-        largest = max(largest, 0.0 if run.result else files.result)
+        passing.append(0.0 if run.result else files.result)
         seconds += needs.march
         n_steps += needs.n_steps
-    return RunSize(left + largest, seconds, n_steps)
+    return RunSize(left + sum(nlargest(n_at_once, passing)), seconds, n_steps)
 
 
 def _substeps(problem: Problem) -> int:

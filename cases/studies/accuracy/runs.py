@@ -81,7 +81,9 @@ def run(
     """Run what is not done yet; returns what was found and all runs. Collective.
 
     Repeats go through all settings before any is timed again, so that a disturbance does not
-    fall on a single one. Nothing was found if the study was interrupted.
+    fall on a single one. They are made one at a time also where first runs are made several at a
+    time, whose times then count for long runs alone. Nothing was found if the study was
+    interrupted.
 
     Raises
     ------
@@ -96,11 +98,14 @@ def run(
     times = {one.variant.name: [_cost(one)] for one in ended if one.done}
     work = {one.variant.name: _work(one) for one in ended if one.done}
     short = [job for job in plan.jobs if work.get(job.variant.name, _LONG) < _LONG]
+    alone = options._replace(n_jobs=1)
+    if options.n_jobs != 1 and plan.repeats > 1:  # several runs at a time disturb each other
+        times |= {job.variant.name: [] for job in short}
     for number in range(2, plan.repeats + 1):
         round_of = f"no. {number} of {plan.repeats}"
         options.progress(f"again, for their time, {round_of}: {len(short)} short runs")
         short.reverse()  # whatever else the machine does now and then meets others
-        repeated = run_jobs([again(job, number) for job in short], folder, comm, options)
+        repeated = run_jobs([again(job, number) for job in short], folder, comm, alone)
         every += repeated
         if interrupted(repeated):
             return None, every

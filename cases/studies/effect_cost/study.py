@@ -287,7 +287,11 @@ def _job(name: str, scene: Scene) -> Job:
 
 
 def measure(
-    wish: Wish, folder: Path, say: Callable[[str], None], force: bool = False
+    wish: Wish,
+    folder: Path,
+    say: Callable[[str], None],
+    force: bool = False,
+    n_jobs: int = 1,
 ) -> Costs | None:
     """Run the scene with each effect switched and time its steps; None if a signal ended that.
 
@@ -298,6 +302,7 @@ def measure(
     folder : for the runs; what is done there already is not run again
     say : called with lines on the progress
     force : whether other runs there may be replaced
+    n_jobs : runs at the same time, 0 for one on each core; steps are timed when these are over
 
     Raises
     ------
@@ -306,7 +311,7 @@ def measure(
     """
     effects, jobs, refused = jobs_of(wish)
     comm = MPI.COMM_SELF
-    ended = run_jobs(jobs, folder, comm, RunOptions(force, (), say))
+    ended = run_jobs(jobs, folder, comm, RunOptions(force, (), say, n_jobs))
     if interrupted(ended):
         return None
     whole, *others = ended

@@ -8,18 +8,19 @@ Limits that are no answer of a single case's are derived here:
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from catenary.base.parallel import on_root
+from catenary.cases.process.workers import WorkerLost
 from catenary.cases.scene.problem import resolved
 from catenary.cases.studies.hard import runs as hard_runs
 from catenary.cases.studies.hard.cases import HardCase
 from catenary.cases.studies.hard.energy import energy_that_left
 from catenary.cases.studies.hard.runs import Watched, cut_of, node_places, rest_height
-from catenary.cases.studies.kept_rows import KeptRows
+from catenary.cases.studies.records import KeptRows
 from catenary.solver.problem.incidents import in_steps
 from catenary.solver.statics.line_at_rest import LineAtRest
 
@@ -46,28 +47,49 @@ class Checked(NamedTuple):
     remarks: dict[str, list[str]]
 
 
-def check_case(
-    case: HardCase, world: Any, alone: Any, short: bool = False, kept: KeptRows | None = None
-) -> Checked:
-    """Run a hard case in all its forms and measure it, or give what is kept. Collective on `world`.
+def check_cases(
+    cases: Sequence[HardCase],
+    comm: Any,
+    short: bool = False,
+    kept: KeptRows | None = None,
+    n_at_once: int = 1,
+    initialise: Callable[[], object] | None = None,
+) -> Iterator[Checked]:
+    """Run hard cases in all their forms and measure them, or give what is kept. Collective.
 
     Parameters
     ----------
-    world : all ranks; agreement of ranks is measured if there are several
-    alone : a communicator of this process alone
+    comm : agreement of its ranks is measured if there are several
     short : the case's short form; steps are halved once only then
     kept : what an earlier call has found, None to keep nothing
+    n_at_once : cases that are run at the same time, 1 on several ranks
+    initialise : called first in each further process
     """
+
+    def depends_on(case: HardCase) -> dict[str, Any]:
+        scene = resolved(case.scene(short))
+        return {"case": case.model_dump(), "scene": scene, "short": short, "ranks": comm.size}
+
     kept = KeptRows(None) if kept is None else kept
-    here = {"case": case.model_dump(), "scene": resolved(case.scene(short)), "short": short}
-    here["ranks"] = world.size
-    there = on_root(world, lambda: kept.get(here))
-    if there is not None:
-        found, remarks = there
-        return Checked([Criterion(*row) for row in found], remarks)
-    checked = _checked(case, world, alone, short)
-    on_root(world, lambda: kept.keep(here, checked))
-    return checked
+    outcomes = kept.each(_Check(short), cases, depends_on, n_at_once, comm, initialise)
+    for case, outcome in zip(cases, outcomes, strict=True):
+        if isinstance(outcome.error, WorkerLost):
+            yield Checked([_holds(case, "runs to its end", False, str(outcome.error))], {})
+        else:
+            found, remarks = outcome.get()
+            yield Checked([Criterion(*row) for row in found], remarks)
+
+
+class _Check(NamedTuple):
+    """Measures a hard case; goes to the processes that do so."""
+
+    short: bool
+
+    def __call__(self, case: HardCase, comm: Any) -> Checked:
+        """Collective."""
+        from mpi4py import MPI
+
+        return _checked(case, comm, MPI.COMM_SELF, self.short)
 
 
 def _checked(case: HardCase, world: Any, alone: Any, short: bool) -> Checked:

@@ -16,12 +16,13 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from catenary.base.errors import InputError
+from catenary.cases.process.workers import WorkerLost
 from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.problem import resolved
 from catenary.cases.scene.run.numerics import MAX_DT
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.hard.runs import at_rest
-from catenary.cases.studies.kept_rows import KeptRows
+from catenary.cases.studies.records import KeptRows
 from catenary.cases.studies.stability import from_matrices as theory
 from catenary.cases.studies.stability.by_marching import (
     AGREED,
@@ -173,40 +174,77 @@ def make_map(
     grid: Grid,
     tell: Callable[[str], None] = lambda line: None,
     kept: KeptRows | None = None,
+    n_at_once: int = 1,
 ) -> StabilityMap:
-    """Find all limits but those that are ``kept``. Not collective; ``comm`` is this process's."""
+    """Find all limits but those that are ``kept``. Not collective; ``comm`` is this process's.
+
+    ``n_at_once`` points of the map are tried at the same time, each in a process of its own.
+    """
     own = load_scene(case, list(assignments), shortened)
     scene = linear_scene(case, assignments, shortened)
-    rest = at_rest(scene, comm)
-    data = rest.problem.train.placements[0].data
-    assert isinstance(data, LumpedData)  # the scene was refused otherwise
-    wires = ContactWires(rest.model, rest.form, distribute(rest.model, 1, 0))
-    place = _place(rest, wires)
-    line = theory.point_model(rest.model, theory.loads_at(wires, place, rest.model.n_dofs))
-    bench = Bench(rest, data, place, comm)
+    find_all = _FindLimits(scene)
+    bench, line = find_all.bench(comm)
     pairs, limits, config = grid.pairs(), [], resolved(scene)
     kept = KeptRows(None) if kept is None else kept
-    for number, (stiffness, mass) in enumerate(pairs, start=1):
-        here = {"scene": config, "stiffness": stiffness, "head_mass": mass}
 
-        def limits_here(k: float = stiffness, m: float = mass) -> list[Any]:
-            return [astuple(find(bench, line, coupling, k, m)) for coupling in COUPLINGS]
+    def depends_on(pair: tuple[float, float]) -> dict[str, Any]:
+        return {"scene": config, "stiffness": pair[0], "head_mass": pair[1]}
 
-        found = [Limit(*row) for row in kept.rows(here, limits_here)]
+    lost: list[WorkerLost] = []
+    for outcome in kept.each(find_all, pairs, depends_on, n_at_once, comm):
+        if isinstance(outcome.error, WorkerLost):
+            lost.append(outcome.error)
+            continue
+        found = [Limit(*row) for row in outcome.get()]
         limits += found
         told = ", ".join(f"{one.coupling} {in_ms(one.marched)}" for one in found)
-        tell(f"[{number}/{len(pairs)}] {stiffness:g} N/m, {mass:g} kg: {told} ms")
+        stiffness, mass = pairs[outcome.number]
+        tell(f"[{outcome.number + 1}/{len(pairs)}] {stiffness:g} N/m, {mass:g} kg: {told} ms")
+    if lost:  # the others are kept
+        raise lost[0]
     linear = own.contact.law == "linear"
-    own_point = (own.contact.stiffness_N_per_m if linear else None, data.masses[0])
+    own_point = (own.contact.stiffness_N_per_m if linear else None, bench.data.masses[0])
     return StabilityMap(
         own.case.name,
         limits,
         grid,
-        place,
+        bench.x,
         line.mass,
         (*own_point, own.numerics.dt_s),
         line.load.shape[1],
     )
+
+
+class _FindLimits:
+    """Finds the limits of all couplings at a point of the map.
+
+    A process makes its line at rest once: another gets the scene alone.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self._scene = scene
+        self._bench: tuple[Bench, theory.PointModel] | None = None
+
+    def __reduce__(self) -> tuple[type[_FindLimits], tuple[Scene]]:
+        return type(self), (self._scene,)
+
+    def bench(self, comm: Any) -> tuple[Bench, theory.PointModel]:
+        """Where heads are tried, and the line as they meet it there."""
+        if self._bench is None:
+            rest = at_rest(self._scene, comm)
+            data = rest.problem.train.placements[0].data
+            assert isinstance(data, LumpedData)  # the scene was refused otherwise
+            wires = ContactWires(rest.model, rest.form, distribute(rest.model, 1, 0))
+            place = _place(rest, wires)
+            loads = theory.loads_at(wires, place, rest.model.n_dofs)
+            line = theory.point_model(rest.model, loads)
+            self._bench = Bench(rest, data, place, comm), line
+        return self._bench
+
+    def __call__(self, pair: tuple[float, float], comm: Any) -> list[Any]:
+        """Rows of ``Limit`` for a stiffness [N/m] and a head mass [kg]."""
+        bench, line = self.bench(comm)
+        return [astuple(find(bench, line, coupling, *pair)) for coupling in COUPLINGS]
 
 
 def _place(rest: LineAtRest, wires: ContactWires) -> float:

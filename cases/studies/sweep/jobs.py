@@ -69,11 +69,13 @@ class RunOptions(NamedTuple):
     force : run all anew, whatever is there, and however large the runs are
     petsc : the options that PETSc was started with, for the record
     progress : called with a line before and after each run
+    n_jobs : runs at the same time as the user wants them, 0 for as many as there are cores or ranks
     """
 
     force: bool = False
     petsc: Sequence[str] = ()
     progress: Callable[[str], None] = lambda line: None
+    n_jobs: int = 1
 
 
 AS_USUAL = RunOptions()
@@ -179,7 +181,7 @@ def in_order(
     """What ended and what was refused, in the order of the variants; an interruption comes last."""
     by_name = {one.variant.name: one for one in (*refused, *ended)}
     merged = [by_name[variant.name] for variant in variants if variant.name in by_name]
-    return merged[: merged.index(ended[-1]) + 1] if interrupted(ended) else merged
+    return sorted(merged, key=lambda one: one.outcome == "interrupted")
 
 
 def make_jobs(

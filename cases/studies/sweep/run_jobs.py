@@ -1,22 +1,25 @@
-"""Runs variants of a case one after the other in this process, each in a folder of its own.
+"""Runs variants of a case, each in a folder of its own: in this process, or some at the same time.
 
-Imports, compiled loops and MPI are started once. What is done already is not run again, so that a
-sweep that was killed goes on where it was; a variant that breaks does not stop the others.
+Imports and MPI are started once in each process. What is done already is not run again, so that a
+sweep that was killed goes on where it was; a variant that breaks, or whose process is killed, does
+not stop the others.
 """
 
 from __future__ import annotations
 
 import json
-import logging
 import time
 import zlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from catenary.base.errors import CatenaryError, InputError
 from catenary.base.parallel import on_root
 from catenary.cases.process.interrupts import Interrupted
+from catenary.cases.process.petsc_options import idle_names, look_up_all_but, start_petsc
+from catenary.cases.process.workers import Outcome, WorkerLost, at_once, each
 from catenary.cases.result_folder.output_folder import (
     check_room_of_runs,
     refuse_earlier,
@@ -25,66 +28,25 @@ from catenary.cases.result_folder.output_folder import (
 from catenary.cases.run.planning.needs import Kept, total_size
 from catenary.cases.run.runner import RESULT, run_case
 from catenary.cases.scene.problem import resolved
+from catenary.cases.studies.records import is_whole, read_record, read_table, write_record
 from catenary.cases.studies.sweep.jobs import AS_USUAL, Ended, Job, RunOptions
 from catenary.postproc.evaluate.wording import fixed
-from catenary.postproc.files.disk import plain, write_all
+from catenary.postproc.files.disk import plain
 from catenary.postproc.files.own_files import VARIANT_FILE as RECORD
 from catenary.postproc.files.run_schema import DONE, INTERRUPTED
 from catenary.postproc.read.results import Results
 
-logger = logging.getLogger("catenary.sweep")
-
-_SUM, _SUM_OF_SUMMARY = "crc32", "summary_crc32"
+_SUM_OF_SUMMARY = "summary_crc32"
 SUMMARY = "summary.json"
-
-
-def record_text(record: Mapping[str, Any], folder: Path) -> str:
-    """A variant's record as the text of its file, of a folder with the figures."""
-    content = json.loads(json.dumps(plain(record)))
-    content[_SUM_OF_SUMMARY] = zlib.crc32((folder / SUMMARY).read_bytes())
-    return json.dumps({**content, _SUM: _sum(content)}, indent=1) + "\n"
-
-
-def read_record(path: Path) -> dict[str, Any] | None:
-    """A variant's record, None if there is none or it is damaged, which is logged."""
-    content = _table(path)
-    if content is None:
-        return None
-    known = content.pop(_SUM, None)
-    return content if _is_whole(path, known == _sum(content)) else None
 
 
 def read_summary(path: Path, record: Mapping[str, Any]) -> dict[str, Any] | None:
     """The figures of a record, None if there are none or they are damaged, which is logged."""
-    content = _table(path)
+    content = read_table(path)
     if content is None:
         return None
     same = record.get(_SUM_OF_SUMMARY) in (None, zlib.crc32(path.read_bytes()))  # None: older
-    return content if _is_whole(path, same) else None
-
-
-def _table(path: Path) -> dict[str, Any] | None:
-    """A JSON table, None if there is no file or no whole table in it, which is logged."""
-    if not path.is_file():  # a pipe would be waited for
-        return None
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except OSError:
-        return None
-    except (ValueError, RecursionError):
-        content = None
-    return content if _is_whole(path, isinstance(content, dict)) else None
-
-
-def _is_whole(path: Path, whole: bool) -> bool:
-    """Log that a file is damaged, if it is; returns whether it is not."""
-    if not whole:
-        logger.warning("%s is damaged: its variant is run again", path)
-    return whole
-
-
-def _sum(content: Mapping[str, Any]) -> int:
-    return zlib.crc32(json.dumps(content, sort_keys=True).encode())
+    return content if is_whole(path, same) else None
 
 
 # What is taken from an open result file beside the summary: plain values by name.
@@ -101,43 +63,88 @@ def run_jobs(
 ) -> list[Ended]:
     """Run what is not done yet, each job in ``out_dir/<name>``. Collective.
 
-    An interruption ends the list early; its last entry says so.
+    An interruption leaves out those that it ended and those that had not begun; a last entry says
+    so.
 
     Parameters
     ----------
     jobs : the same on all ranks
-    measure : takes figures from each result file, on rank 0
+    measure : takes figures from each result file, on rank 0; to be pickled if ``options.n_jobs``
+        is not 1
 
     Raises
     ------
     InputError
         If ``out_dir`` cannot be written to, or if it or a job's folder holds other results and
-        ``options.force`` is not given, or if there is no room for all runs; nothing is run then.
+        ``options.force`` is not given, or if there is no room for all runs, or if so many runs at a
+        time and so many ranks do not fit together; nothing is run then.
     RunBroken
         If a record of what is done cannot be written.
     """
+    n_at_once = at_once(options.n_jobs, comm)
     earlier = on_root(comm, lambda: _earlier(jobs, out_dir, options.force, measure is not None))
-    left = [job for job, found in zip(jobs, earlier, strict=True) if found is None]
-    on_root(comm, lambda: _check_room(left, out_dir, options.force))
-    ended: list[Ended] = []
-    begin, n_left = time.perf_counter(), len(left)
-    n_run = 0
-    for number, (job, found) in enumerate(zip(jobs, earlier, strict=True), start=1):
-        place = f"[{number}/{len(jobs)}] {job.variant.name}"
-        if found is not None:
-            options.progress(f"{place}: done already")
-            ended.append(found)
-            continue
-        options.progress(place)
-        one = _run(job, out_dir / job.variant.name, comm, options, measure)
-        ended.append(one)
+    left = [number for number, found in enumerate(earlier) if found is None]
+    on_root(comm, lambda: _check_room([jobs[i] for i in left], out_dir, options.force, n_at_once))
+    ended = {number: found for number, found in enumerate(earlier) if found is not None}
+    places = [f"[{i}/{len(jobs)}] {job.variant.name}" for i, job in enumerate(jobs, start=1)]
+
+    def begun() -> Iterator[Job]:
+        for job, place, found in zip(jobs, places, earlier, strict=True):
+            if found is not None:
+                options.progress(f"{place}: done already")
+                continue
+            if n_at_once == 1:
+                options.progress(place)
+            yield job
+
+    work = _Work(out_dir, options._replace(progress=_silent), measure)
+    begin = time.perf_counter()
+    outcomes = each(work, begun(), n_at_once, comm, partial(start_petsc, list(options.petsc)))
+    for n_run, outcome in enumerate(outcomes, start=1):
+        number = left[outcome.number]
+        one = ended[number] = _ended(jobs[number], outcome)
         if one.outcome == INTERRUPTED:
-            break
-        n_run += 1
+            if n_at_once == 1:
+                break
+            continue
         spent = time.perf_counter() - begin
-        ahead = spent / n_run * (n_left - n_run)
-        left_of_it = f"{spent:.0f} s gone, about {ahead:.0f} s left"
-        options.progress(f"    {_figures(one)}; {left_of_it}")
+        ahead = spent / n_run * (len(left) - n_run)
+        place = "   " if n_at_once == 1 else f"{places[number]}:"
+        options.progress(f"{place} {_figures(one)}; {spent:.0f} s gone, about {ahead:.0f} s left")
+    came = {number: one for number, one in sorted(ended.items()) if one.outcome != INTERRUPTED}
+    missing = [job for number, job in enumerate(jobs) if number not in came]
+    return [*came.values(), *(Ended(job.variant, INTERRUPTED) for job in missing[:1])]
+
+
+class _Work(NamedTuple):
+    """Makes a run; goes to the processes that make some."""
+
+    out_dir: Path
+    options: RunOptions
+    measure: Measure | None
+
+    def __call__(self, job: Job, comm: Any) -> tuple[Ended, set[str]]:
+        """How the run ended, and options that PETSc never looked up. Collective."""
+        folder = self.out_dir / job.variant.name
+        return _run(job, folder, comm, self.options, self.measure), idle_names()
+
+
+def as_json(table: Mapping[str, Any]) -> dict[str, Any]:
+    """A table as JSON gives it back."""
+    content: dict[str, Any] = json.loads(json.dumps(plain(table)))
+    return content
+
+
+def _silent(line: str) -> None:
+    """Say nothing."""
+
+
+def _ended(job: Job, outcome: Outcome) -> Ended:
+    """How a run ended; raises what is not the run's alone, such as a full disk."""
+    if isinstance(outcome.error, WorkerLost):
+        return Ended(job.variant, str(outcome.error))
+    ended, idle = outcome.get()
+    look_up_all_but(idle)  # as its process did, whichever it was
     return ended
 
 
@@ -184,10 +191,11 @@ def _leave_record(job: Job, folder: Path, measure: Measure | None, wall: float) 
         "config": resolved(job.scene),
         "wall_s": wall,
         "measured": measured,
+        _SUM_OF_SUMMARY: zlib.crc32((folder / SUMMARY).read_bytes()),
     }
     if not job.keep_results:
         (folder / RESULT).unlink()
-    write_all(folder, {RECORD: record_text(record, folder)})
+    write_record(folder / RECORD, as_json(record))
     return measured
 
 
@@ -200,15 +208,16 @@ def _earlier(jobs: Sequence[Job], out_dir: Path, force: bool, measured: bool) ->
     return [_found(job, out_dir / job.variant.name, measured) for job in jobs]
 
 
-def _check_room(jobs: Sequence[Job], out_dir: Path, force: bool) -> None:
+def _check_room(jobs: Sequence[Job], out_dir: Path, force: bool, n_at_once: int) -> None:
     """Refuse jobs whose files have no room together."""
-    size = total_size(Kept(job.scene, job.keep_results, job.full_report) for job in jobs)
+    kept = [Kept(job.scene, job.keep_results, job.full_report) for job in jobs]
+    size = total_size(kept, n_at_once)
     folders = [out_dir / job.variant.name for job in jobs]
     check_room_of_runs(out_dir, folders, size, force)
 
 
 def _found(job: Job, folder: Path, measured: bool) -> Ended | None:
-    wanted = json.loads(json.dumps(plain(resolved(job.scene))))
+    wanted = as_json(resolved(job.scene))
     record = read_record(folder / RECORD)
     if record is None:
         _refuse_other_run(folder, wanted)

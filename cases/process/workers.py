@@ -1,0 +1,309 @@
+"""Independent items of work side by side: in processes of their own, or one on each rank of MPI.
+
+A process is a Python of its own and no fork, in which MPI and PETSc start as where no launcher has
+started one. The pool of ``concurrent.futures`` is given up when one of its processes dies, and
+knows no end in good order; here a process that dies costs the item that it had, and a signal to
+this process ends all others in good order.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import logging
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from multiprocessing import Pipe
+from multiprocessing.connection import wait
+from typing import Any, NamedTuple, TypeVar
+
+from catenary.base.errors import CatenaryError, InputError, RunBroken
+from catenary.base.parallel import launched_by_mpirun, wait_for_all
+from catenary.cases.process.interrupts import StopRequest
+
+T = TypeVar("T")
+
+# Wall time between two looks whether a signal came [s], and how long a process may take to end in
+# good order before it is killed [s]: a step, a flush, and what a library does without a look.
+_LOOK, _GRACE = 0.1, 30.0
+# Variables by which a launcher tells a process that it is a rank.
+_OF_LAUNCHERS = ("OMPI_", "PMI_", "PMIX_", "PRTE_", "HYDI_", "MPIR_")
+_PROGRAM = (
+    "import json, sys; sys.path[:] = json.loads(sys.argv[1]); "
+    "from catenary.cases.process.worker import serve; serve(*map(int, sys.argv[2:]))"
+)
+
+
+class WorkerLost(RunBroken):
+    """The process that had an item ended without a result, as by a signal or a crash."""
+
+
+class Outcome(NamedTuple):
+    """What became of an item.
+
+    Attributes
+    ----------
+    number : place of the item among all, from 0 on
+    value : result of the function, None if it raised an error
+    error : what it raised, or that its process was lost
+    """
+
+    number: int
+    value: Any = None
+    error: CatenaryError | None = None
+
+    def get(self) -> Any:
+        """The result; raises the error if there is one."""
+        if self.error is not None:
+            raise self.error
+        return self.value
+
+
+def cores() -> int:
+    """Number of cores that this process may use. Not collective."""
+    if hasattr(os, "sched_getaffinity"):  # not on macOS
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def at_once(wanted: int, comm: Any) -> int:
+    """Number of items that are worked on at the same time. Not collective.
+
+    Parameters
+    ----------
+    wanted : 0 for as many as there are cores or ranks
+    comm : mpi4py communicator
+
+    Raises
+    ------
+    InputError
+        If there are several ranks and ``wanted`` is neither 1 nor their number.
+    """
+    n_ranks = comm.size
+    if n_ranks == 1:
+        return wanted or cores()
+    if wanted not in (0, 1, n_ranks):
+        raise InputError(
+            f"-j is {wanted} on {n_ranks} ranks; give -j {n_ranks}, with which each rank makes "
+            "runs of its own, or no -j, with which all ranks share each run"
+        )
+    return wanted or n_ranks
+
+
+def each(
+    function: Callable[[T, Any], Any],
+    items: Iterable[T],
+    n_at_once: int,
+    comm: Any,
+    initialise: Callable[[], object] | None = None,
+) -> Iterator[Outcome]:
+    """What ``function(item, comm)`` gives for each item, as they come. Collective.
+
+    With ``n_at_once`` 1 the items are worked on here, by all ranks together. With more there are so
+    many processes, or, on as many ranks, each takes every so manieth item; ``comm`` is then of one
+    rank alone. Items are drawn when they begin, except on ranks. An error of the program and a lost
+    process are the outcome of their item. After a signal no further item begins, and those that
+    are under way are ended: there are fewer outcomes than items.
+
+    Parameters
+    ----------
+    function : to be pickled for other processes, once for each, so that it may keep in itself
+        what it needs for all items
+    items : to be pickled, and so are the results
+    n_at_once : of ``at_once``
+    comm : mpi4py communicator
+    initialise : called once in each further process, before MPI starts there
+
+    Raises
+    ------
+    RuntimeError
+        If ``function`` raised an error that is not foreseen; all processes are ended first.
+    """
+    if n_at_once == 1:
+        for number, item in enumerate(items):
+            yield _outcome(number, function, item, comm)
+    elif comm.size > 1:
+        yield from _on_ranks(function, list(items), comm)
+    else:
+        yield from _in_processes(function, items, n_at_once, initialise)
+
+
+def in_order(outcomes: Iterable[Outcome]) -> Iterator[Outcome]:
+    """Outcomes in the order of their items, each as soon as all before it are there."""
+    early: dict[int, Outcome] = {}
+    following = 0
+    for outcome in outcomes:
+        early[outcome.number] = outcome
+        while following in early:
+            yield early.pop(following)
+            following += 1
+    for number in sorted(early):  # behind those that a signal has ended
+        yield early[number]
+
+
+def _outcome(number: int, function: Callable[[T, Any], Any], item: T, comm: Any) -> Outcome:
+    try:
+        return Outcome(number, function(item, comm))
+    except CatenaryError as error:
+        return Outcome(number, error=error)
+
+
+def _on_ranks(
+    function: Callable[[T, Any], Any], items: Sequence[T], comm: Any
+) -> Iterator[Outcome]:
+    """Every rank its share, then all outcomes on all ranks. Collective."""
+    from mpi4py import MPI
+
+    own = []
+    with StopRequest() as stop:
+        for number in range(comm.rank, len(items), comm.size):
+            if stop():
+                break
+            own.append(_outcome(number, function, items[number], MPI.COMM_SELF))
+        wait_for_all(comm)
+        found = [one for those in comm.allgather(own) for one in those]
+    yield from sorted(found, key=lambda one: one.number)
+
+
+def _in_processes(
+    function: Callable[[T, Any], Any],
+    items: Iterable[T],
+    n_at_once: int,
+    initialise: Callable[[], object] | None,
+) -> Iterator[Outcome]:
+    left = enumerate(items)
+    idle: list[_Process] = []
+    busy: list[_Process] = []
+    gone: list[_Process] = []
+    more, stopped_at = True, 0.0
+    try:
+        with StopRequest() as stop:
+            while True:
+                while more and not stop() and len(busy) < n_at_once:
+                    number, item = next(left, (-1, None))
+                    more = number >= 0
+                    if more:
+                        idle = [one for one in idle if one.is_there()]
+                        one = idle.pop() if idle else _Process(initialise, function)
+                        busy.append(one)
+                        one.begin(number, item)
+                if not busy:
+                    return
+                if stop() and not stopped_at:
+                    stopped_at = time.monotonic()
+                    for one in busy:
+                        one.stop()
+                if stopped_at and time.monotonic() > stopped_at + _GRACE:
+                    return
+                ready = wait([one.connection for one in busy], _LOOK)
+                for one in [one for one in busy if one.connection in ready]:
+                    outcome = one.received()
+                    if outcome is None:  # a line of its log
+                        continue
+                    busy.remove(one)
+                    (idle if one.goes_on else gone).append(one)
+                    if not (stopped_at and isinstance(outcome.error, WorkerLost)):
+                        yield outcome
+    finally:
+        for one in busy:
+            one.stop()
+        for one in (*idle, *busy, *gone):
+            one.end()
+
+
+class _Process:
+    """A process that works on items, one after the other. Not collective.
+
+    It ends by itself when this process ends, whatever ended it.
+    """
+
+    def __init__(
+        self, initialise: Callable[[], object] | None, function: Callable[[Any, Any], Any]
+    ) -> None:
+        self._number = -1
+        self.goes_on = True
+        self.connection, theirs = Pipe()
+        alive, self._life = os.pipe()
+        words = [json.dumps(sys.path), str(theirs.fileno()), str(alive)]
+        self.process = subprocess.Popen(
+            [sys.executable, "-I", "-c", _PROGRAM, *words],
+            stdin=subprocess.DEVNULL,
+            pass_fds=(theirs.fileno(), alive),
+            env=_environment(),
+            start_new_session=True,  # Ctrl-C comes to this process alone, which ends the other once
+        )
+        theirs.close()
+        os.close(alive)
+        level = logging.getLogger("catenary").getEffectiveLevel()
+        self._send((level, initialise, function))
+
+    def is_there(self) -> bool:
+        """Whether it has not ended while it had nothing to do."""
+        return self.process.poll() is None
+
+    def begin(self, number: int, item: Any) -> None:
+        """Hand it an item."""
+        self._number = number
+        self._send(item)
+
+    def _send(self, message: Any) -> None:
+        with contextlib.suppress(ConnectionError):  # its end is found when its answer is read
+            self.connection.send(message)
+
+    def received(self) -> Outcome | None:
+        """The outcome of its item, None if a line of its log has come.
+
+        Raises
+        ------
+        RuntimeError
+            If an error came that is not foreseen.
+        """
+        try:
+            kind, what, self.goes_on = self.connection.recv()
+        except (EOFError, ConnectionError):
+            self.goes_on = False
+            self.process.wait()
+            return Outcome(self._number, error=WorkerLost(self._how_it_ended()))
+        if kind == "log":
+            logging.getLogger(what.name).handle(what)
+            return None
+        if kind == "bug":
+            raise RuntimeError(f"a process failed with item {self._number}:\n{what}")
+        return Outcome(self._number, **{kind: what})
+
+    def _how_it_ended(self) -> str:
+        code = self.process.returncode
+        if code >= 0:
+            return f"its process ended by itself with code {code}"
+        memory = ", as where no memory is left" if code == -signal.SIGKILL else ""
+        return f"its process was ended by {signal.Signals(-code).name}{memory}"
+
+    def stop(self) -> None:
+        """Let it end what it works on in good order."""
+        if self._life >= 0:
+            os.close(self._life)
+            self._life = -1
+
+    def end(self) -> None:
+        """Wait for its end, for so long; then kill it."""
+        self.connection.close()  # an idle one ends by that
+        try:
+            self.process.wait(_GRACE)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait()
+        self.stop()
+
+
+def _environment() -> dict[str, str]:
+    """Variables for a process that is no rank of a launcher that started this one."""
+    launched = launched_by_mpirun()
+    return {
+        name: value
+        for name, value in os.environ.items()
+        if not (launched and name.startswith(_OF_LAUNCHERS))
+    }

@@ -1,0 +1,164 @@
+"""What a study has done already, as files: the same command continues one that was stopped.
+
+A record is a JSON table with a checksum. It is left by whoever did the work, whichever process that
+is, and appears whole. Runs have theirs in their folders (``sweep/run_jobs.py``); what is no run has
+``KeptRows``.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import logging
+import shutil
+import zlib
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from catenary.base.parallel import on_root
+from catenary.cases.process.interrupts import Interrupted
+from catenary.cases.process.workers import Outcome, each, in_order
+from catenary.postproc.files.disk import plain, write_all
+
+logger = logging.getLogger("catenary.sweep")
+
+FOLDER = "rows_so_far"
+_SUM = "crc32"
+
+
+def write_record(path: Path, content: Mapping[str, Any]) -> None:
+    """Write a table of values of JSON with its checksum. Not collective.
+
+    Raises
+    ------
+    RunBroken
+        If the disk refuses.
+    """
+    text = json.dumps({**content, _SUM: _sum(content)}, indent=1)
+    write_all(path.parent, {path.name: text + "\n"})
+
+
+def read_record(path: Path) -> dict[str, Any] | None:
+    """A record, None if there is none or it is damaged, which is logged. Not collective."""
+    content = read_table(path)
+    if content is None:
+        return None
+    known = content.pop(_SUM, None)
+    return content if is_whole(path, known == _sum(content)) else None
+
+
+def read_table(path: Path) -> dict[str, Any] | None:
+    """A JSON table, None if there is no file or no whole table in it, which is logged."""
+    if not path.is_file():  # a pipe would be waited for
+        return None
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except OSError:
+        return None
+    except (ValueError, RecursionError):
+        content = None
+    return content if is_whole(path, isinstance(content, dict)) else None
+
+
+def is_whole(path: Path, whole: bool) -> bool:
+    """Log that a file is damaged, if it is; returns whether it is not."""
+    if not whole:
+        logger.warning("%s is damaged: what it is of is done again", path)
+    return whole
+
+
+def _sum(content: Mapping[str, Any]) -> int:
+    return zlib.crc32(json.dumps(content, sort_keys=True).encode())
+
+
+class KeptRows:
+    """Rows of a study that are no figures of runs, a record for each piece of work.
+
+    Parameters
+    ----------
+    folder : that of the study; None to keep nothing
+    force : forget what is there
+    """
+
+    def __init__(self, folder: Path | None, force: bool = False) -> None:
+        self._folder = None if folder is None else folder / FOLDER
+        if force:
+            self.forget()
+
+    def each(
+        self,
+        function: Callable[[Any, Any], Any],
+        items: Sequence[Any],
+        depends_on: Callable[[Any], Any],
+        n_at_once: int,
+        comm: Any,
+        initialise: Callable[[], object] | None = None,
+    ) -> Iterator[Outcome]:
+        """What ``function(item, comm)`` gave or gives, in the order of the items. Collective.
+
+        Lists of plain values and of NumPy's scalars, as JSON holds them if they were kept.
+
+        Parameters
+        ----------
+        function, n_at_once, comm, initialise : as of ``workers.each``
+        depends_on : plain values and scenes' keys for an item; with other ones rows are others
+
+        Raises
+        ------
+        Interrupted
+            If a signal ended work that had begun; the rows that are done come first.
+        """
+        all_of = [depends_on(item) for item in items]
+        there = on_root(comm, lambda: list(map(self.get, all_of)))
+        left = [number for number, rows in enumerate(there) if rows is None]
+
+        def come() -> Iterator[Outcome]:
+            yield from (Outcome(i, rows) for i, rows in enumerate(there) if rows is not None)
+            work = ((all_of[number], items[number]) for number in left)
+            for outcome in each(_Keeping(self, function), work, n_at_once, comm, initialise):
+                yield outcome._replace(number=left[outcome.number])
+
+        n_left = len(items)
+        for outcome in in_order(come()):
+            n_left -= 1
+            yield outcome
+        if n_left:
+            raise Interrupted("the study was interrupted; the same command continues it")
+
+    def get(self, depends_on: Any) -> Any:
+        """Rows that are there, None if none or they are damaged. Not collective."""
+        path = self._path(depends_on)
+        record = None if path is None else read_record(path)
+        return None if record is None else record["rows"]
+
+    def keep(self, depends_on: Any, rows: Any) -> None:
+        """Leave a record of rows. Not collective; RunBroken if the disk refuses."""
+        if (path := self._path(depends_on)) is not None:
+            rows = json.loads(json.dumps(rows, default=lambda value: value.item()))
+            write_record(path, {"rows": rows})
+
+    def _path(self, depends_on: Any) -> Path | None:
+        if self._folder is None:
+            return None
+        text = json.dumps(plain(depends_on), sort_keys=True)
+        return self._folder / f"{hashlib.sha256(text.encode()).hexdigest()}.json"
+
+    def forget(self) -> None:
+        """Remove all records, once the study's own table holds everything. Not collective."""
+        if self._folder is not None:
+            shutil.rmtree(self._folder, ignore_errors=True)
+
+
+class _Keeping:
+    """Work that leaves a record; goes to the processes that do some."""
+
+    def __init__(self, kept: KeptRows, function: Callable[[Any, Any], Any]) -> None:
+        self._kept, self._function = kept, function
+
+    def __call__(self, what: tuple[Any, Any], comm: Any) -> Any:
+        """Collective."""
+        depends_on, item = what
+        rows = self._function(item, comm)
+        on_root(comm, lambda: self._kept.keep(depends_on, rows))
+        return rows
