@@ -13,7 +13,10 @@ from catenary.cases.studies.sampling.tables import SamplingTable
 from catenary.cases.studies.sweep.output import RECORD, table_files
 from catenary.cases.studies.uncertainty import output
 from catenary.cases.studies.uncertainty.evaluation import Uncertainty, evaluate
-from catenary.cases.studies.uncertainty.run_table import read_sampling_beside, run_table
+from catenary.cases.studies.uncertainty.run_table import (
+    read_sampling_beside,
+    run_table,
+)
 from catenary.postproc.files.disk import write_all
 from catenary.postproc.report.study_table import Column, StudyTable
 
@@ -44,7 +47,7 @@ def merge(folders: Sequence[Path]) -> tuple[dict[str, Any], SamplingTable | None
             ("sampling", _endless(samplings[0]), _endless(other)),
         ):
             if one != two:
-                raise InputError(f"{folder} cannot join {folders[0]}: its {what} is another one")
+                raise InputError(f"{folder} cannot join {folders[0]}: they differ in the {what}")
     assignments: dict[str, tuple[Any, Path]] = {}
     rows: dict[str, tuple[list[dict[str, Any]], Path]] = {}
     for folder, record in zip(folders, records, strict=True):

@@ -112,13 +112,15 @@ def sweep(
         console.warn(f"{len(made.refused) - _SHOWN_REFUSED} more variants are not run")
     options = RunOptions(force, arguments, console.say)
     command = f"catenary sweep {words.case}"
-    ended, files = run_sweep(made, out, comm, options, command, _names(plotted))
+    drawn = _names(plotted)
+    lines = drawn if sampling is None else None  # samples are drawn as points
+    ended, files = run_sweep(made, out, comm, options, command, lines)
     from catenary.cases.studies.sweep import output as sweep_output
 
     if sampling is None:
         console.say("\n" + sweep_output.as_text(ended))
     else:
-        text, more = _evaluated(ended, sampling, out, comm, command)
+        text, more = _evaluated(ended, sampling, out, comm, command, drawn)
         files = [*files, *more]
         console.say("\n" + text)
     console.say("\n" + "\n".join(str(path) for path in files))
@@ -154,7 +156,12 @@ def _sampled(
 
 
 def _evaluated(
-    ended: Sequence[Ended], sampling: SamplingTable, out: Path, comm: Any, command: str
+    ended: Sequence[Ended],
+    sampling: SamplingTable,
+    out: Path,
+    comm: Any,
+    command: str,
+    plotted: Sequence[str],
 ) -> tuple[str, list[Path]]:
     """Evaluate the table of samples and write that; its text and the files. Collective."""
     from catenary.base.parallel import on_root
@@ -167,7 +174,7 @@ def _evaluated(
     def work() -> tuple[str, list[Path]]:
         table = run_table(table_of(ended).records(), sampling)
         found = evaluate(table)
-        return output.as_text(found), output.write(out, table, found)
+        return output.as_text(found), output.write(out, table, found, plotted)
 
     with held(out, comm, command):
         done: tuple[str, list[Path]] = on_root(comm, work, takes_long=True)

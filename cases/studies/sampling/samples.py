@@ -15,7 +15,6 @@ from catenary.cases.studies.sampling.distributions import (
     ChoicesTable,
     DistributionTable,
     SeedTable,
-    UniformTable,
     chosen,
     inverse,
     seeds,

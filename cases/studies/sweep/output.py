@@ -32,7 +32,7 @@ def table_of(ended: Sequence[Ended]) -> StudyTable:
 
     Columns: ``variant``, the varied keys with values of their own types, ``outcome``,
     ``pantograph``, ``STATISTICS``, ``passed`` (the standard's verdict, None if not judged),
-    ``failed`` and ``judged`` (the criteria that failed, and all that were judged), ``remarks`` (what
+    ``failed`` (the criteria that failed), ``judged`` (all that were judged), ``remarks`` (what
     decides the results), ``wall_s``.
     """
     keys = varied_keys(ended)
@@ -110,10 +110,12 @@ def remarks_of(ended: Sequence[Ended]) -> list[str]:
     return remark_lines((one.variant.name, one.remarks) for one in ended)
 
 
-def write(out_dir: Path, case: str, ended: Sequence[Ended], plotted: Sequence[str]) -> list[Path]:
+def write(
+    out_dir: Path, case: str, ended: Sequence[Ended], plotted: Sequence[str] | None
+) -> list[Path]:
     """Write table, record and picture of a sweep; returns the files. Not collective.
 
-    The picture is left out if fewer than two variants are done.
+    The picture is left out if fewer than two variants are done, or if ``plotted`` is None.
     """
     table = table_of(ended)
     record = {
@@ -126,8 +128,9 @@ def write(out_dir: Path, case: str, ended: Sequence[Ended], plotted: Sequence[st
         "rows": table.records(),
     }
     content = table_files(record, table)
-    if sum(one.done for one in ended) > 1:
-        content |= figures.painted(PICTURE, lambda: draw(table.rows, varied_keys(ended), plotted))
+    if plotted is not None and sum(one.done for one in ended) > 1:
+        keys = varied_keys(ended)
+        content |= figures.painted(PICTURE, lambda: draw(table.rows, keys, plotted))
     return write_all(out_dir, content)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -84,6 +83,6 @@ def share(hits: int, n: int) -> Bounded:
     return Bounded(hits / n, float(interval.low), float(interval.high))
 
 
-def named(name: str, one: Bounded) -> Mapping[str, Any]:
+def named(name: str, one: Bounded) -> dict[str, Any]:
     """An estimate as three cells of a row."""
     return {name: one.value, f"{name}_low": one.low, f"{name}_high": one.high}

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import functools
 import json
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from catenary.cases.studies.sweep.jobs import STATISTICS
 from catenary.cases.studies.uncertainty import pictures
@@ -28,15 +31,25 @@ _LOW, _HIGH = 0.05, 0.95
 _MOST_REMARKS = 5  # on a terminal; all are in the file
 
 
-def write(out: Path, table: RunTable, found: Uncertainty) -> list[Path]:
-    """Write an evaluation, its pictures and the sampling; returns the files. Not collective."""
+def write(
+    out: Path, table: RunTable, found: Uncertainty, plotted: Sequence[str] = ()
+) -> list[Path]:
+    """Write an evaluation, its pictures and the sampling; returns the files. Not collective.
+
+    Parameters
+    ----------
+    out : folder
+    table : the runs
+    found : their evaluation
+    plotted : statistics that are drawn; the usual ones if there are none
+    """
     content: dict[str, bytes | str] = {
         RECORD: json.dumps(plain(found.as_table()), indent=1, ensure_ascii=False) + "\n"
     }
     if table.sampling is not None:
         content[SAMPLING] = sampling_text(table.sampling)
     for name, draw in PICTURES.items():
-        content |= figures.painted(name, lambda draw=draw: draw(table))
+        content |= figures.painted(name, functools.partial(draw, table, plotted))
     return write_all(out, content)
 
 
@@ -53,10 +66,10 @@ def as_text(found: Uncertainty) -> str:
     shown = [row for row in found.sensitivity if "with" not in row and _is_shown(row)]
     if shown:
         parts.append(_first_letter(found.method) + "\n" + _indices(shown).text())
-    several = found.remarks[:_MOST_REMARKS]
-    parts += [f"REMARK      {one['n']} of {found.n_runs} runs: {one['remark']}" for one in several]
-    parts += [f"NOTE        {note}" for note in found.notes]
-    return "\n\n".join(parts)
+    told = found.remarks[:_MOST_REMARKS]
+    lines = [f"REMARK      {one['n']} of {found.n_runs} runs: {one['remark']}" for one in told]
+    lines += [f"NOTE        {note}" for note in found.notes]
+    return "\n\n".join([*parts, *(["\n".join(lines)] if lines else [])])
 
 
 def _is_shown(row: Row) -> bool:
@@ -119,7 +132,13 @@ def _indices(shown: list[Row]) -> StudyTable:
         *([Column("ST", "ST", ".2f"), Column("ST_conf", "+-", ".2f")] if total else []),
         *([] if total else [Column("rank_correlation", "rank corr.", ".2f")]),
     ]
-    return StudyTable(columns, shown)
+    rows = [{name: _known(value) for name, value in row.items()} for row in shown]
+    return StudyTable(columns, rows)
+
+
+def _known(value: Any) -> Any:
+    """A cell's value, None where it is no number."""
+    return None if value != value else value
 
 
 def _bounds(row: Row, name: str) -> str:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter
 
 from catenary.cases.studies.sweep.jobs import STATISTICS
 from catenary.cases.studies.sweep.output import PLOTTED, key_in_words
@@ -18,19 +21,20 @@ from catenary.postproc.report.pictures import figures
 # Panels, points and lines that a picture has room for; of more, evenly chosen ones are drawn.
 _MOST_KEYS, _MOST_STATISTICS, _MOST_POINTS, _MOST_LINES = 6, 5, 5000, 1000
 _UPPER = 0.95  # quantile that is drawn
+_MANY = 300  # points that are drawn small
 _STEPS = 25  # points of a curve of convergence
 
 
-def drawn_statistics(table: RunTable) -> list[str]:
-    """The statistics that are drawn: the usual ones, else the first."""
-    usual = [name for name in PLOTTED if name in table.statistics]
+def drawn_statistics(table: RunTable, wanted: Sequence[str] = ()) -> list[str]:
+    """The statistics that are drawn: the wanted ones, else the usual ones, else the first."""
+    usual = [name for name in wanted or PLOTTED if name in table.statistics]
     return usual or table.statistics[:_MOST_STATISTICS]
 
 
 @figures.own_style()
-def scatter(table: RunTable) -> Figure | None:
+def scatter(table: RunTable, wanted: Sequence[str] = ()) -> Figure | None:
     """Statistics over each input, a row of panels for each statistic; None without inputs."""
-    keys, statistics = ranked_inputs(table)[:_MOST_KEYS], drawn_statistics(table)
+    keys, statistics = ranked_inputs(table)[:_MOST_KEYS], drawn_statistics(table, wanted)
     if not keys or not statistics:
         return None
     figure = figures.new_figure(0.6 + 1.9 * len(statistics))
@@ -40,8 +44,8 @@ def scatter(table: RunTable) -> Figure | None:
             for number, (pantograph, rows) in enumerate(table.of(name).items()):
                 some = rows.iloc[:: -(-len(rows) // _MOST_POINTS)]
                 figures.curve(
-                    axes, some[key], some[name], number, pantograph or None, ".",
-                    ms=3.0, alpha=0.6, mew=0.0,
+                    axes, some[key], some[name], number, pantograph or None, "o",
+                    ms=4.0 if len(some) < _MANY else 1.5, alpha=0.6, mew=0.0,
                 )  # fmt: skip
             _panel(axes, "", _meaning(name) if key == keys[0] else "")
     for axes, key in zip(panels[-1], keys, strict=True):
@@ -52,12 +56,12 @@ def scatter(table: RunTable) -> Figure | None:
 
 
 @figures.own_style()
-def parallel_coordinates(table: RunTable) -> Figure | None:
+def parallel_coordinates(table: RunTable, wanted: Sequence[str] = ()) -> Figure | None:
     """A line for each run through its inputs and a statistic, by which it is coloured.
 
     Each axis runs from the least to the greatest value. None with fewer than two axes.
     """
-    keys, statistics = ranked_inputs(table), drawn_statistics(table)
+    keys, statistics = ranked_inputs(table), drawn_statistics(table, wanted)
     if not keys or not statistics:
         return None
     name = "std_N" if "std_N" in statistics else statistics[0]
@@ -97,13 +101,13 @@ def parallel_coordinates(table: RunTable) -> Figure | None:
 
 
 @figures.own_style()
-def convergence(table: RunTable) -> Figure | None:
+def convergence(table: RunTable, wanted: Sequence[str] = ()) -> Figure | None:
     """Mean and 95 % quantile with their bounds over the number of samples; None of fewer than 10.
 
     Samples are taken in their order, independent ones only.
     """
     table = independent_runs(table)
-    statistics = drawn_statistics(table)
+    statistics = drawn_statistics(table, wanted)
     if not statistics or len(table.done) < 10:
         return None
     figure = figures.new_figure(0.6 + 2.0 * len(statistics))
@@ -120,21 +124,23 @@ def convergence(table: RunTable) -> Figure | None:
             (("mean", means), (f"{100 * _UPPER:g} % quantile", uppers))
         ):
             figures.curve(axes, counts, found[:, 0], number, label, ".-")
-            axes.fill_between(
-                counts, found[:, 1], found[:, 2], color=figures.colour(number), alpha=0.15, lw=0
-            )
+            for bound in (found[:, 1], found[:, 2]):
+                figures.curve(axes, counts, bound, number, None, "--", 0.7)
         _panel(axes, "", _meaning(name), pantograph)
-    panels[-1].set_xlabel("number of samples; shaded: 95 % confidence")
+    panels[-1].set_xlabel("number of samples; dashed: 95 % confidence", fontsize="small")
     panels[-1].set_xscale("log")
+    panels[-1].xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    panels[-1].xaxis.set_major_formatter("{x:g}")
+    panels[-1].xaxis.set_minor_formatter(NullFormatter())
     figures.legend_above(panels[0])
     return figure
 
 
 @figures.own_style()
-def histograms(table: RunTable) -> Figure | None:
+def histograms(table: RunTable, wanted: Sequence[str] = ()) -> Figure | None:
     """Histogram of each statistic with its median and 95 % quantile; None without any."""
     table = independent_runs(table)
-    statistics = drawn_statistics(table)
+    statistics = drawn_statistics(table, wanted)
     if not statistics:
         return None
     figure = figures.new_figure(0.6 + 1.8 * len(statistics))

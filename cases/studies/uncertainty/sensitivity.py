@@ -57,13 +57,14 @@ def _sobol(table: RunTable, sampling: SamplingTable) -> tuple[list[dict[str, Any
                 notes[f"{lost} of {sampling.n} base samples are incomplete and left out"] = None
             if np.ptp(whole) == 0.0:
                 continue  # nothing varies
-            found = sobol.analyze(
-                problem_of(sampling.columns),
-                whole.ravel(),
-                calc_second_order=sampling.second_order,
-                conf_level=CONFIDENCE,
-                seed=_SEED,
-            )
+            with np.errstate(divide="ignore", invalid="ignore"):  # resamples without variance
+                found = sobol.analyze(
+                    problem_of(sampling.columns),
+                    whole.ravel(),
+                    calc_second_order=sampling.second_order,
+                    conf_level=CONFIDENCE,
+                    seed=_SEED,
+                )
             here = {"statistic": statistic, "pantograph": pantograph}
             for i, key in enumerate(sampling.columns):
                 row = {name: float(found[name][i]) for name in ("S1", "S1_conf", "ST", "ST_conf")}
