@@ -21,7 +21,7 @@ from catenary.cases.studies.sampling.distributions import (
     takes_mean,
 )
 from catenary.cases.studies.sampling.fields import fields_as_text
-from catenary.cases.studies.sampling.tables import SamplingTable, field_column
+from catenary.cases.studies.sampling.tables import SamplingTable, field_column, list_of
 from catenary.cases.studies.sweep.variants import Variant, text_of
 
 
@@ -48,13 +48,20 @@ def samples(sampling: SamplingTable, scene: Scene, file: str) -> list[Variant]:
     where = f"in {file}"
     own = resolved(scene)
     columns: dict[str, list[str]] = {}  # of the table
-    assigned: list[list[str]] = []  # a list of assignments for each input
+    assigned: list[list[str]] = []  # a list of assignments for each key of the scene
+    lists: dict[str, dict[int, list[str]]] = {}  # entries that vary, by the keys of their lists
     for key, table, column in zip(
         sampling.keys, sampling.keys.values(), cube.T[: len(sampling.keys)], strict=True
     ):
         texts = _texts(key, table, column, own, where)
         columns[key] = texts
-        assigned.append([f"{key}={text}" for text in texts])
+        above = list_of(key)
+        if above == key or not _is_plain_list(_own_value(above, own)):
+            assigned.append([f"{key}={text}" for text in texts])
+        else:
+            lists.setdefault(above, {})[int(key.rpartition(".")[2])] = texts
+    for key, entries in lists.items():
+        assigned.append(_assigned_lists(key, _own_value(key, own), entries, len(cube), where))
     for key, field, column in zip(
         sampling.fields, sampling.fields.values(), cube.T[len(sampling.keys) :], strict=True
     ):
@@ -89,14 +96,38 @@ def _texts(
     return [repr(value) for value in values.tolist()]
 
 
-def _own_number(key: str, own: dict[str, Any]) -> float:
-    """The scene's own value of a dotted key; ValueError if it has none, with a predicate."""
+def _assigned_lists(
+    key: str, own: list[Any], entries: dict[int, list[str]], n: int, where: str
+) -> list[str]:
+    """Assignments of a list some entries of which vary; the others are the scene's own."""
+    if max(entries) >= len(own):
+        raise InputError(
+            f"keys.{key}.{max(entries)} {where} is unknown: the list has {len(own)} entries, "
+            "numbered from 0"
+        )
+    texts = [entries.get(i, [text_of(value)] * n) for i, value in enumerate(own)]
+    return [f"{key}=[{', '.join(one)}]" for one in zip(*texts, strict=True)]
+
+
+def _is_plain_list(value: Any) -> bool:
+    """Whether a value is a list of numbers or texts."""
+    return isinstance(value, list) and not any(isinstance(one, dict | list) for one in value)
+
+
+def _own_value(key: str, own: dict[str, Any]) -> Any:
+    """The scene's own value of a dotted key, None if it has none."""
     here: Any = own
     for part in key.split("."):
         if isinstance(here, list) and part.isdigit() and int(part) < len(here):
             here = here[int(part)]
         else:
             here = here.get(part) if isinstance(here, dict) else None
+    return here
+
+
+def _own_number(key: str, own: dict[str, Any]) -> float:
+    """The scene's own value of a dotted key; ValueError if it has none, with a predicate."""
+    here = _own_value(key, own)
     if isinstance(here, list) and len(here) == 1:  # one number may be written for a list
         (here,) = here
     if isinstance(here, bool) or not isinstance(here, int | float):

@@ -168,6 +168,12 @@ class SamplingTable(Table):
         return self
 
 
+def list_of(key: str) -> str:
+    """The key of the list whose entry a key names by its number; the key itself if it is none."""
+    above, _, number = key.rpartition(".")
+    return above if above and number.isascii() and number.isdigit() else key
+
+
 def field_column(key: str) -> str:
     """The input, and the column of a sweep's table, that numbers the realisations of a field."""
     return f"field of {key}"
@@ -219,7 +225,7 @@ def sampling_of(raw: Mapping[str, Any], file: str) -> SamplingTable:
                 f"{key} in {file} cannot vary: PETSc takes its options once, when the program "
                 "starts"
             )
-        if not is_known(key, known):
+        if not is_known(key, known) and not is_known(list_of(key), known):
             raise InputError(unknown_key(key, f"in {file}", known))
         if key in table.keys and key in table.fields:
             raise InputError(f"{shown(key)[1:-1]} in {file} is in keys and in fields; keep one")
