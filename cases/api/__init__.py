@@ -18,6 +18,7 @@ if __name__ != "catenary":
 
 if TYPE_CHECKING:
     from catenary.base.errors import CatenaryError, Fault, InputError, RunBroken
+    from catenary.estimates import Uncertainty, uncertainty
     from catenary.line_tables import AtRest, Plan, check, plan, static
     from catenary.pictures import Pictures
     from catenary.results import Run, open
@@ -36,6 +37,7 @@ __all__ = [
     "RunBroken",
     "Scene",
     "Simulation",
+    "Uncertainty",
     "__version__",
     "check",
     "load",
@@ -44,9 +46,11 @@ __all__ = [
     "run",
     "static",
     "sweep",
+    "uncertainty",
 ]
 
 _FILES = {
+    "estimates": ("Uncertainty", "uncertainty"),
     "line_tables": ("AtRest", "Plan", "check", "plan", "static"),
     "pictures": ("Pictures",),
     "results": ("Run", "open"),

@@ -14,12 +14,20 @@ from catenary.base.errors import InputError, RunBroken
 from catenary.base.lone_process import alone, world
 from catenary.base.parallel import launched_by_mpirun, on_root
 from catenary.cases.process.petsc_options import options_of
-from catenary.cases.studies.sweep.variants import check_keys, product, text_of, varied_key
+from catenary.cases.studies.sweep.variants import (
+    Variant,
+    check_keys,
+    product,
+    text_of,
+    varied_key,
+)
+from catenary.estimates import sampling_like
 from catenary.scenes import SceneLike, checked, draft_of, plain_value
 
 if TYPE_CHECKING:
     import pandas as pd
 
+    from catenary.cases.studies.sampling.tables import SamplingTable
     from catenary.results import Run
 
 _PROGRESS = "catenary.progress"
@@ -104,25 +112,29 @@ def run(
 
 def sweep(
     scene: SceneLike,
-    vary: Mapping[str, Sequence[Any]],
+    vary: Mapping[str, Sequence[Any]] | None = None,
     out: str | Path | None = None,
     *,
+    sample: Mapping[str, Any] | str | Path | None = None,
     jobs: int = 1,
     force: bool = False,
     progress: bool = False,
     comm: Any = None,
 ) -> pd.DataFrame:
-    """Run all combinations of some values. Collective under mpirun, as ``run``.
+    """Run all combinations of some values, or samples. Collective under mpirun, as ``run``.
 
     Parameters
     ----------
     scene : Scene, str, Path or mapping
         What is varied.
-    vary : mapping
+    vary : mapping, optional
         Values by dotted keys, for instance ``{"train.speed_km_h": [250, 275]}``.
     out : str or Path, optional
         Folder into which all is written that ``catenary sweep -o`` writes: a folder for each
-        variant, table and picture. What is done there already is not run again.
+        variant, tables and pictures. What is done there already is not run again.
+    sample : mapping, str or Path, optional
+        In place of ``vary``: a sampling file, or its tables, with a distribution for each key.
+        ``catenary.uncertainty`` evaluates the table.
     jobs : int
         Runs at the same time, each in a process of its own; 0 for one on each core. Under mpirun
         the number of processes: a run on each.
@@ -139,7 +151,7 @@ def sweep(
     Raises
     ------
     InputError
-        If a key or a value is wrong, or if no variant can be run.
+        If a key, a value or a distribution is wrong, or if no variant can be run.
     KeyboardInterrupt
         If a signal ended it. With ``out`` the same call goes on.
 
@@ -158,6 +170,36 @@ def sweep(
     from catenary.cases.studies.sweep.output import table_of
     from catenary.cases.studies.sweep.sweep import run_sweep, sweep_of
 
+    draft, comm = draft_of(scene), _communicator(comm)
+    if sample is None:
+        variants, sampling = _listed(vary), None
+    elif vary is not None:
+        raise InputError("sample makes all variants itself: give vary or sample, not both")
+    else:
+        from catenary.cases.studies.sampling.samples import samples
+
+        sampling, where = sampling_like(sample)
+        variants = samples(sampling, draft.scene(), where)
+    say = _line if progress else _nothing
+    with ExitStack() as stack:
+        folder = Path(out) if out is not None else stack.enter_context(_temporary(comm, "sweep"))
+        made = sweep_of(draft, variants, folder, force=force)
+        options = stack.enter_context(options_of(made.jobs[0].scene.petsc.given()))
+        stack.enter_context(_shown(False, comm))
+        plan = RunOptions(force, options, say if comm.rank == 0 else _nothing, jobs)
+        program = "a sweep of a Python program"
+        ended, _ = run_sweep(made, folder, comm, plan, program, () if sampling is None else None)
+        # Times of a rank are its own.
+        rows = on_root(comm, lambda: table_of(ended).records())
+        if sampling is not None and out is not None:
+            _evaluate(rows, sampling, folder, comm, program)
+    if interrupted(ended):
+        raise KeyboardInterrupt
+    return pd.DataFrame(rows)
+
+
+def _listed(vary: Mapping[str, Sequence[Any]] | None) -> list[Variant]:
+    """The variants of lists of values."""
     if not vary or not all(len(values) for values in vary.values()):
         raise InputError("there is nothing to vary: give at least one key with a value")
     varied = [
@@ -168,20 +210,24 @@ def sweep(
     ]
     variants = product(varied, {})
     check_keys(variants, "in vary")
-    draft, comm = draft_of(scene), _communicator(comm)
-    say = _line if progress else _nothing
-    with ExitStack() as stack:
-        folder = Path(out) if out is not None else stack.enter_context(_temporary(comm, "sweep"))
-        made = sweep_of(draft, variants, folder, force=force)
-        options = stack.enter_context(options_of(made.jobs[0].scene.petsc.given()))
-        stack.enter_context(_shown(False, comm))
-        plan = RunOptions(force, options, say if comm.rank == 0 else _nothing, jobs)
-        ended, _ = run_sweep(made, folder, comm, plan, "a sweep of a Python program", ())
-    if interrupted(ended):
-        raise KeyboardInterrupt
-    return pd.DataFrame(
-        on_root(comm, lambda: table_of(ended).records())
-    )  # times of a rank are its own
+    return variants
+
+
+def _evaluate(
+    rows: list[dict[str, Any]], sampling: SamplingTable, folder: Path, comm: Any, program: str
+) -> None:
+    """Write what a table of samples says into the folder of the sweep. Collective."""
+    from catenary.cases.result_folder.folder_lock import held
+    from catenary.cases.studies.uncertainty import output
+    from catenary.cases.studies.uncertainty.evaluation import evaluate
+    from catenary.cases.studies.uncertainty.run_table import run_table
+
+    def work() -> None:
+        table = run_table(rows, sampling)
+        output.write(folder, table, evaluate(table))
+
+    with held(folder, comm, program):
+        on_root(comm, work, takes_long=True)
 
 
 def _communicator(comm: Any) -> Any:

@@ -66,6 +66,22 @@ class StudyTable:
         heads = [column.name for column in self.columns if column.in_files]
         return csv_text(heads, ([cell(row[name]) for name in heads] for row in self.rows))
 
+    def parquet(self) -> bytes | None:
+        """Parquet with all digits and types; None where the package pyarrow cannot be loaded."""
+        try:
+            import pyarrow
+            import pyarrow.parquet
+        except ImportError:
+            return None
+        columns = {
+            column.name: _of_one_type([row[column.name] for row in self.rows])
+            for column in self.columns
+            if column.in_files
+        }
+        stream = io.BytesIO()
+        pyarrow.parquet.write_table(pyarrow.table(columns), stream)
+        return stream.getvalue()
+
     @property
     def for_people(self) -> list[Column]:
         """The columns that people read."""
@@ -160,6 +176,16 @@ def remark_lines(runs: Iterable[tuple[str, Sequence[str]]]) -> list[str]:
 
 def _of(names: Sequence[str], n_runs: int) -> str:
     return f"all {n_runs} runs" if len(names) == n_runs > _NAMED else ", ".join(names)
+
+
+def _of_one_type(values: Sequence[Any]) -> Sequence[Any]:
+    """The values of a column of Parquet: cells of CSV where numbers, texts and lists are mixed."""
+    kinds = {type(value) for value in values if value is not None}
+    if kinds == {int, float}:
+        return [None if value is None else float(value) for value in values]
+    if len(kinds) <= 1 and not kinds & {dict}:
+        return values
+    return [None if value is None else str(cell(value)) for value in values]
 
 
 def _is_done(row: Row) -> bool:

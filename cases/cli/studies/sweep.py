@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -16,10 +16,12 @@ from catenary.cases.terminal import console
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from catenary.cases.studies.sampling.tables import SamplingTable
     from catenary.cases.studies.sweep.jobs import Ended
     from catenary.cases.studies.sweep.sweep import Sweep
+    from catenary.cases.studies.sweep.variants import Variant
 
-_SHOWN_BROKEN = 3
+_SHOWN_BROKEN, _SHOWN_REFUSED = 3, 20
 
 
 @app.command(
@@ -49,6 +51,22 @@ def sweep(
             help='TOML file of named variants, each a line name = ["key=value", ...].',
         ),
     ] = None,
+    sample: Annotated[
+        Path | None,
+        typer.Option(
+            "--sample",
+            help="TOML file of distributions by keys, with n, seed and method: samples are run, "
+            "and their table evaluated.",
+        ),
+    ] = None,
+    part: Annotated[
+        str | None,
+        typer.Option(
+            "--part",
+            metavar="K/N",
+            help="Run each N-th variant from the K-th on; `catenary merge` joins the parts.",
+        ),
+    ] = None,
     plotted: Annotated[
         str | None,
         typer.Option(
@@ -67,34 +85,101 @@ def sweep(
     """Collective."""
     from catenary.cases.studies.sweep.jobs import RunOptions, check_statistics
     from catenary.cases.studies.sweep.sweep import run_sweep, sweep_of
-    from catenary.cases.studies.sweep.variants import check_keys, parse_vary, product, read_named
 
-    def read() -> tuple[Sweep, list[str]]:
+    def read() -> tuple[tuple[Sweep, SamplingTable | None], list[str]]:
         changes, options = words.split()
-        if not vary and named is None:
-            raise InputError("there is nothing to vary: give --vary key=v1,v2,... or --variants")
         check_statistics(_names(plotted))
-        varied = [parse_vary(text) for text in vary or []]
-        check_keys(product(varied, {}), "on the command line (--vary)")
-        table = {} if named is None else read_named(named)
-        check_keys(product([], table), f"in {named}")
-        variants = product(varied, table)
+        sampling = None
+        if sample is None:
+            variants = _listed(vary or [], named)
+        elif vary or named is not None:
+            raise InputError(
+                "--sample makes all variants itself: give neither --vary nor --variants"
+            )
+        else:
+            variants, sampling = _sampled(words, changes, sample)
+        if part is not None:
+            from catenary.cases.studies.sampling.samples import part_of
+
+            variants = part_of(variants, part)
         case, short = words.case, words.shortened
         made = sweep_of(case, variants, out, changes, short, full_report=reports, force=force)
-        return made, options
+        return (made, sampling), options
 
-    comm, made, arguments = begin(read, verbose, lambda made: made.jobs[0].scene)
-    for one in made.refused:
+    comm, (made, sampling), arguments = begin(read, verbose, lambda made: made[0].jobs[0].scene)
+    for one in made.refused[:_SHOWN_REFUSED]:
         console.warn(f"variant {one.variant.name} is not run: {one.outcome}")
+    if len(made.refused) > _SHOWN_REFUSED:
+        console.warn(f"{len(made.refused) - _SHOWN_REFUSED} more variants are not run")
     options = RunOptions(force, arguments, console.say, n_jobs)
-    ended, files = run_sweep(
-        made, out, comm, options, f"catenary sweep {words.case}", _names(plotted)
-    )
+    command = f"catenary sweep {words.case}"
+    drawn = _names(plotted)
+    lines = drawn if sampling is None else None  # samples are drawn as points
+    ended, files = run_sweep(made, out, comm, options, command, lines)
     from catenary.cases.studies.sweep import output as sweep_output
 
-    console.say("\n" + sweep_output.as_text(ended))
+    if sampling is None:
+        console.say("\n" + sweep_output.as_text(ended))
+    else:
+        text, more = _evaluated(ended, sampling, out, comm, command, drawn)
+        files = [*files, *more]
+        console.say("\n" + text)
     console.say("\n" + "\n".join(str(path) for path in files))
     return verdict(ended, "sweep")
+
+
+def _listed(vary: list[str], named: Path | None) -> list[Variant]:
+    """The variants of --vary and --variants."""
+    from catenary.cases.studies.sweep.variants import check_keys, parse_vary, product, read_named
+
+    if not vary and named is None:
+        raise InputError(
+            "there is nothing to vary: give --vary key=v1,v2,..., --variants or --sample"
+        )
+    varied = [parse_vary(text) for text in vary]
+    check_keys(product(varied, {}), "on the command line (--vary)")
+    table = {} if named is None else read_named(named)
+    check_keys(product([], table), f"in {named}")
+    return product(varied, table)
+
+
+def _sampled(
+    words: RunWords, changes: list[str], file: Path
+) -> tuple[list[Variant], SamplingTable]:
+    """The variants of a sampling file, and its tables."""
+    from catenary.cases.scene.load import load_scene
+    from catenary.cases.studies.sampling.samples import samples
+    from catenary.cases.studies.sampling.tables import read_sampling
+
+    sampling = read_sampling(file)
+    scene = load_scene(words.case, changes, words.shortened)
+    return samples(sampling, scene, str(file)), sampling
+
+
+def _evaluated(
+    ended: Sequence[Ended],
+    sampling: SamplingTable,
+    out: Path,
+    comm: Any,
+    command: str,
+    plotted: Sequence[str],
+) -> tuple[str, list[Path]]:
+    """Evaluate the table of samples and write that; its text and the files. Collective."""
+    from catenary.base.parallel import on_root
+    from catenary.cases.result_folder.folder_lock import held
+    from catenary.cases.studies.sweep.output import table_of
+    from catenary.cases.studies.uncertainty import output
+    from catenary.cases.studies.uncertainty.evaluation import evaluate
+    from catenary.cases.studies.uncertainty.run_table import run_table
+
+    def work() -> tuple[str, list[Path]]:
+        table = run_table(table_of(ended).records(), sampling)
+        found = evaluate(table)
+        return output.as_text(found), output.write(out, table, found, plotted)
+
+    with held(out, comm, command):
+        done: tuple[str, list[Path]] = on_root(comm, work, takes_long=True)
+    return done
 
 
 def run_study(words: RunWords, out: Path, n_jobs: int, force: bool, verbose: bool) -> int:

@@ -21,6 +21,7 @@ from catenary.postproc.report.pictures import figures
 from catenary.postproc.report.study_table import Column, StudyTable, cell, remark_lines
 
 TABLE, RECORD, PICTURE = "sweep.csv", "sweep.json", "sweep.png"
+PARQUET = "sweep.parquet"
 PLOTTED = ("mean_N", "std_N", "max_N", "min_N", "max_uplift_mm")
 _MOST_LABELS = 10  # curves that a legend can name
 _LONGEST = 48  # a longer meaning of a key explains more than an axis has room for
@@ -31,7 +32,8 @@ def table_of(ended: Sequence[Ended]) -> StudyTable:
 
     Columns: ``variant``, the varied keys with values of their own types, ``outcome``,
     ``pantograph``, ``STATISTICS``, ``passed`` (the standard's verdict, None if not judged),
-    ``failed`` (the criteria that failed), ``remarks`` (what decides the results), ``wall_s``.
+    ``failed`` (the criteria that failed), ``judged`` (all that were judged), ``remarks`` (what
+    decides the results), ``wall_s``.
     """
     keys = varied_keys(ended)
     rows = []
@@ -40,6 +42,7 @@ def table_of(ended: Sequence[Ended]) -> StudyTable:
         head |= {key: _typed(key, one.variant.varied.get(key)) for key in keys}
         failed = failed_criteria(one.summary)
         head |= {"passed": one.summary.get("passed"), "failed": failed, "remarks": one.remarks}
+        head["judged"] = judged_criteria(one.summary)
         head |= {"wall_s": one.wall, "accepted": _verdict(one.summary.get("passed"), failed)}
         for pantograph in one.summary.get("pantographs", [{}]):
             row: dict[str, Any] = {**head, "pantograph": pantograph.get("name", "")}
@@ -52,7 +55,7 @@ def table_of(ended: Sequence[Ended]) -> StudyTable:
         Column("pantograph", "pantograph"),
         *STATISTICS.values(),
         Column("accepted", "accepted", in_files=False),
-        *(Column(name) for name in ("passed", "failed", "remarks", "wall_s")),
+        *(Column(name) for name in ("passed", "failed", "judged", "remarks", "wall_s")),
     ]
     return StudyTable(columns, rows)
 
@@ -69,6 +72,12 @@ def failed_criteria(summary: Mapping[str, Any]) -> list[str]:
     """Names of the acceptance criteria that a run failed, each once."""
     rows = summary.get("acceptance", [])
     return list(dict.fromkeys(row["criterion"] for row in rows if row["passed"] is False))
+
+
+def judged_criteria(summary: Mapping[str, Any]) -> list[str]:
+    """Names of the acceptance criteria that were judged in a run, each once."""
+    rows = summary.get("acceptance", [])
+    return list(dict.fromkeys(row["criterion"] for row in rows if row["passed"] is not None))
 
 
 def _verdict(passed: bool | None, failed: Sequence[str]) -> str:
@@ -101,10 +110,12 @@ def remarks_of(ended: Sequence[Ended]) -> list[str]:
     return remark_lines((one.variant.name, one.remarks) for one in ended)
 
 
-def write(out_dir: Path, case: str, ended: Sequence[Ended], plotted: Sequence[str]) -> list[Path]:
+def write(
+    out_dir: Path, case: str, ended: Sequence[Ended], plotted: Sequence[str] | None
+) -> list[Path]:
     """Write table, record and picture of a sweep; returns the files. Not collective.
 
-    The picture is left out if fewer than two variants are done.
+    The picture is left out if fewer than two variants are done, or if ``plotted`` is None.
     """
     table = table_of(ended)
     record = {
@@ -116,13 +127,21 @@ def write(out_dir: Path, case: str, ended: Sequence[Ended], plotted: Sequence[st
         ],
         "rows": table.records(),
     }
-    content: dict[str, bytes | str] = {
-        TABLE: table.csv(),
-        RECORD: json.dumps(plain(record), indent=1, ensure_ascii=False) + "\n",
-    }
-    if sum(one.done for one in ended) > 1:
-        content |= figures.painted(PICTURE, lambda: draw(table.rows, varied_keys(ended), plotted))
+    content = table_files(record, table)
+    if plotted is not None and sum(one.done for one in ended) > 1:
+        keys = varied_keys(ended)
+        content |= figures.painted(PICTURE, lambda: draw(table.rows, keys, plotted))
     return write_all(out_dir, content)
+
+
+def table_files(record: Mapping[str, Any], table: StudyTable) -> dict[str, bytes | str]:
+    """The table of a sweep as CSV, as JSON within its record, and as Parquet with pyarrow."""
+    files: dict[str, bytes | str] = {
+        TABLE: table.csv(),
+        RECORD: json.dumps(plain(dict(record)), indent=1, ensure_ascii=False) + "\n",
+    }
+    columns = table.parquet()
+    return files if columns is None else files | {PARQUET: columns}
 
 
 @figures.own_style()

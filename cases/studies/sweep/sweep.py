@@ -46,14 +46,19 @@ def sweep_of(
 
 
 def run_sweep(
-    sweep: Sweep, out: Path, comm: Any, options: RunOptions, command: str, plotted: Sequence[str]
+    sweep: Sweep,
+    out: Path,
+    comm: Any,
+    options: RunOptions,
+    command: str,
+    plotted: Sequence[str] | None,
 ) -> tuple[list[Ended], list[Path]]:
     """Run what is not done yet, and write table and picture. Collective.
 
     Parameters
     ----------
     command : what this process does, for others that want the folder
-    plotted : statistics that are drawn; the usual ones if there are none
+    plotted : statistics that are drawn; the usual ones if there are none, no picture of None
 
     Returns
     -------
@@ -64,7 +69,9 @@ def run_sweep(
     from catenary.cases.studies.sweep import output
     from catenary.cases.studies.sweep.run_jobs import run_jobs
 
-    name, show = sweep.jobs[0].scene.case.name, plotted or output.PLOTTED
+    name, show = sweep.jobs[0].scene.case.name, plotted
+    if show is not None:
+        show = show or output.PLOTTED
     with held(out, comm, command):
         ended = run_jobs(sweep.jobs, out, comm, options)
         ended = in_order(sweep.variants, ended, sweep.refused)

@@ -1,0 +1,156 @@
+"""Sweeps of one case that ran in several folders, as one table."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from catenary.base.errors import InputError
+from catenary.cases.studies.sampling.tables import SamplingTable
+from catenary.cases.studies.sweep.output import RECORD, table_files
+from catenary.cases.studies.uncertainty import output
+from catenary.cases.studies.uncertainty.evaluation import Uncertainty, evaluate
+from catenary.cases.studies.uncertainty.run_table import (
+    read_sampling_beside,
+    run_table,
+)
+from catenary.postproc.files.disk import write_all
+from catenary.postproc.report.study_table import Column, StudyTable
+
+_DONE = "done"
+# What differs between two runs of the same variant.
+_OWN = ("wall_s", "remarks")
+
+
+def merge(folders: Sequence[Path]) -> tuple[dict[str, Any], SamplingTable | None]:
+    """The record of a sweep that has the variants of several ones, and their sampling.
+
+    Variants may be disjoint or in several folders. A variant that broke in one folder and was run
+    to its end in another is taken as done. Not collective.
+
+    Raises
+    ------
+    InputError
+        If a folder holds no sweep, or if two contradict each other: other cases, other samplings,
+        or a variant with other assignments or other figures.
+    """
+    records = [_record(folder) for folder in folders]
+    samplings = [read_sampling_beside(folder) for folder in folders]
+    first, sampling = records[0], _longest(samplings)
+    for folder, record, other in zip(folders[1:], records[1:], samplings[1:], strict=True):
+        for what, one, two in (
+            ("case", first["case"], record["case"]),
+            ("varied keys", first["varied"], record["varied"]),
+            ("sampling", _endless(samplings[0]), _endless(other)),
+        ):
+            if one != two:
+                raise InputError(f"{folder} cannot join {folders[0]}: they differ in the {what}")
+    assignments: dict[str, tuple[Any, Path]] = {}
+    rows: dict[str, tuple[list[dict[str, Any]], Path]] = {}
+    for folder, record in zip(folders, records, strict=True):
+        for variant in record["variants"]:
+            name, own = variant["name"], variant["assignments"]
+            known, of = assignments.setdefault(name, (own, folder))
+            if known != own:
+                raise InputError(
+                    f"{folder} cannot join {of}: variant {name} has other assignments there"
+                )
+        for name, found in _by_variant(record["rows"]).items():
+            known, of = rows.get(name, ([], folder))
+            if not known or (_done(found) and not _done(known)):
+                rows[name] = found, folder
+            elif _done(found) and _done(known) and not _agree(found, known):
+                raise InputError(f"{folder} cannot join {of}: variant {name} has other figures")
+    # Samples by their numbers, so that all orders of the folders give one table.
+    order = sorted(rows) if sampling is not None else list(rows)
+    merged = {
+        "case": first["case"],
+        "varied": first["varied"],
+        "wall_s": sum(record["wall_s"] for record in records),
+        "variants": [
+            {"name": name, "assignments": assignments[name][0]}
+            for name in order
+            if name in assignments
+        ],
+        "rows": [row for name in order for row in rows[name][0]],
+    }
+    return merged, sampling
+
+
+def write(
+    out: Path, record: dict[str, Any], sampling: SamplingTable | None
+) -> tuple[list[Path], Uncertainty | None]:
+    """Write the table of merged sweeps, of samples with their evaluation. Not collective."""
+    rows = record["rows"]
+    table = StudyTable([Column(name) for name in rows[0]], rows)
+    files = write_all(out, table_files(record, table))
+    if sampling is None:
+        return files, None
+    runs = run_table(rows, sampling)
+    found = evaluate(runs)
+    return [*files, *output.write(out, runs, found)], found
+
+
+def _longest(samplings: Sequence[SamplingTable | None]) -> SamplingTable | None:
+    """The sampling with the most samples."""
+    return max(samplings, key=lambda one: 0 if one is None else one.n)
+
+
+def _endless(sampling: SamplingTable | None) -> SamplingTable | None:
+    """A sampling without its number of samples, where that does not change the first ones."""
+    extends = sampling is not None and sampling.method in ("sobol", "random")
+    return sampling.model_copy(update={"n": 2}) if sampling is not None and extends else sampling
+
+
+def _record(folder: Path) -> dict[str, Any]:
+    """The record of a sweep's folder, checked to be one."""
+    path = folder / RECORD
+    try:
+        record = json.loads(path.read_text(encoding="utf-8"))
+        whole = (
+            isinstance(record["case"], str)
+            and isinstance(record["varied"], list)
+            and all(isinstance(one["name"], str) for one in record["variants"])
+            and all("assignments" in one for one in record["variants"])
+            and all(isinstance(row["variant"], str) for row in record["rows"])
+            and {frozenset(row) for row in record["rows"]} == {frozenset(record["rows"][0])}
+            and isinstance(record["wall_s"], int | float)
+        )
+    except OSError as error:
+        raise InputError(f"{folder} holds no sweep: {path} cannot be read") from error
+    except (ValueError, KeyError, TypeError, IndexError, RecursionError) as error:
+        raise InputError(f"{path} is damaged; the sweep's command writes it again") from error
+    if not whole:
+        raise InputError(f"{path} is damaged; the sweep's command writes it again")
+    return dict(record)
+
+
+def _by_variant(rows: Sequence[dict[str, Any]]) -> dict[str, list[dict[str, Any]]]:
+    found: dict[str, list[dict[str, Any]]] = {}
+    for row in rows:
+        found.setdefault(row["variant"], []).append(row)
+    return found
+
+
+def _done(rows: Sequence[dict[str, Any]]) -> bool:
+    return all(row.get("outcome") == _DONE for row in rows)
+
+
+def _agree(one: Sequence[dict[str, Any]], two: Sequence[dict[str, Any]]) -> bool:
+    """Whether two runs of one variant have the same figures but for rounding and wall times."""
+    return len(one) == len(two) and all(
+        _same(value, own[name])
+        for row, own in zip(one, two, strict=True)
+        for name, value in row.items()
+        if name not in _OWN
+    )
+
+
+def _same(one: Any, two: Any) -> bool:
+    if isinstance(one, float) and isinstance(two, float):
+        # Processors round in other ways; switching contacts let that grow.
+        return math.isclose(one, two, rel_tol=1e-6, abs_tol=1e-6)
+    return bool(one == two)

@@ -1,0 +1,1 @@
+"""Samples of a case with uncertain keys: distributions, correlations, and fields along the line."""

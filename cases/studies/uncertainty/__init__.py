@@ -1,0 +1,1 @@
+"""Uncertainty from a table of runs: quantiles, probabilities of failing, sensitivity indices."""

@@ -1,0 +1,146 @@
+"""What a table of runs says of a line with uncertain keys."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import pandas as pd
+
+from catenary.cases.studies.sampling.samples import sample_name
+from catenary.cases.studies.sampling.tables import SALTELLI, SamplingTable
+from catenary.cases.studies.uncertainty.estimates import (
+    QUANTILES,
+    moments,
+    named,
+    quantile,
+    share,
+)
+from catenary.cases.studies.uncertainty.run_table import DONE, RunTable
+from catenary.cases.studies.uncertainty.sensitivity import indices
+from catenary.postproc.evaluate.wording import counted
+
+ANY_CRITERION = "any of them"
+Row = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Uncertainty:
+    """Estimates from the runs of a table.
+
+    Attributes
+    ----------
+    n_runs, n_done : runs of the table, and those that came to their end
+    statistics : mean and standard deviation of each statistic with bounds, its extremes
+    quantiles : of each statistic with bounds
+    probabilities : that acceptance criteria fail, with bounds
+    method : of the sensitivity indices
+    sensitivity : rows of ``sensitivity.indices``
+    remarks : remarks on runs, and the number of runs with each, the most frequent first
+    notes : sentences on what is left out
+    """
+
+    n_runs: int
+    n_done: int
+    statistics: list[Row]
+    quantiles: list[Row]
+    probabilities: list[Row]
+    method: str
+    sensitivity: list[Row]
+    remarks: list[Row]
+    notes: list[str]
+
+    def as_table(self) -> dict[str, Any]:
+        """All of it for JSON."""
+        return dict(vars(self))
+
+
+def evaluate(table: RunTable) -> Uncertainty:
+    """Estimates from a table of runs. Not collective.
+
+    Of Saltelli's samples only the two base samples are independent: they alone give quantiles and
+    probabilities.
+    """
+    independent = independent_runs(table)
+    statistics, quantiles = [], []
+    for name in table.statistics:
+        for pantograph, rows in independent.of(name).items():
+            x = rows[name].dropna().to_numpy(float)
+            if len(x) < 2:
+                continue
+            here = {"statistic": name, "pantograph": pantograph, "n": len(x)}
+            mean, deviation = moments(x)
+            ends = {"minimum": float(x.min()), "maximum": float(x.max())}
+            estimated = named("mean", mean) | named("standard_deviation", deviation) | ends
+            statistics.append({**here, **estimated})
+            quantiles += [
+                {**here, "probability": p, **named("value", quantile(x, p))} for p in QUANTILES
+            ]
+    runs = table.runs
+    n_done = int((runs["outcome"] == DONE).sum())
+    method, sensitivity, notes = indices(table)
+    if n_done < len(runs):
+        broken = counted(len(runs) - n_done, "run")
+        notes.insert(0, f"{broken} of {len(runs)} did not end; estimates are of the others")
+    probabilities = failing(independent)
+    return Uncertainty(
+        len(runs), n_done, statistics, quantiles, probabilities, method, sensitivity,
+        _remarks(runs), notes,
+    )  # fmt: skip
+
+
+def _remarks(runs: pd.DataFrame) -> list[Row]:
+    if "remarks" not in runs:
+        return []
+    counts = runs["remarks"].explode().dropna().value_counts()
+    return [{"remark": str(text), "n": int(n)} for text, n in counts.items()]
+
+
+def independent_runs(table: RunTable) -> RunTable:
+    """The rows whose inputs are independent samples of their distributions."""
+    sampling = table.sampling
+    if sampling is None or sampling.method != SALTELLI:
+        return table
+    kept = table.frame["variant"].isin(base_samples(sampling))
+    return table._replace(frame=table.frame[kept])
+
+
+def base_samples(sampling: SamplingTable) -> set[str]:
+    """Names of the samples of Saltelli's two base matrices: first and last of each block."""
+    block = sampling.block
+    return {sample_name(block * i + place) for i in range(sampling.n) for place in (1, block)}
+
+
+def failing(table: RunTable) -> list[Row]:
+    """Probability that each acceptance criterion fails, and that any does.
+
+    A run counts for a criterion that was judged in it. Without a column ``judged`` every criterion
+    that fails in some run is taken as judged in all runs with a verdict.
+    """
+    done = table.done.drop_duplicates("variant")
+    if "failed" not in done:
+        return []
+    failed = [list(one) for one in done["failed"]]
+    if "judged" in done:
+        judged = [
+            list(dict.fromkeys([*own, *more]))
+            for own, more in zip(done["judged"], failed, strict=True)
+        ]
+    else:
+        every = list(dict.fromkeys(name for own in failed for name in own))
+        known = done["passed"].notna() if "passed" in done else [True] * len(done)
+        judged = [every if one else [] for one in known]
+    runs = list(zip(judged, failed, strict=True))
+    rows = []
+    for name in dict.fromkeys(name for own in judged for name in own):
+        hits = [name in lost for own, lost in runs if name in own]
+        rows.append(_probability(name, sum(hits), len(hits)))
+    if rows:
+        hits = [bool(lost) for own, lost in runs if own]
+        rows.append(_probability(ANY_CRITERION, sum(hits), len(hits)))
+    return rows
+
+
+def _probability(criterion: str, failed: int, n: int) -> Row:
+    head = {"criterion": criterion, "n": n, "failed": failed}
+    return {**head, **named("probability", share(failed, n))}
