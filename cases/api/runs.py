@@ -116,6 +116,7 @@ def sweep(
     out: str | Path | None = None,
     *,
     sample: Mapping[str, Any] | str | Path | None = None,
+    only_statistics: bool = False,
     jobs: int = 1,
     force: bool = False,
     progress: bool = False,
@@ -135,6 +136,9 @@ def sweep(
     sample : mapping, str or Path, optional
         In place of ``vary``: a sampling file, or its tables, with a distribution for each key.
         ``catenary.uncertainty`` evaluates the table.
+    only_statistics : bool
+        Whether nothing but the table is kept, and no result file of a variant: for thousands of
+        them. Variants that share a line march side by side.
     jobs : int
         Runs at the same time, each in a process of its own; 0 for one on each core. Under mpirun
         the number of processes: a run on each.
@@ -183,8 +187,8 @@ def sweep(
     say = _line if progress else _nothing
     with ExitStack() as stack:
         folder = Path(out) if out is not None else stack.enter_context(_temporary(comm, "sweep"))
-        made = sweep_of(draft, variants, folder, force=force)
-        options = stack.enter_context(options_of(made.jobs[0].scene.petsc.given()))
+        made = sweep_of(draft, variants, folder, only_statistics=only_statistics, force=force)
+        options = stack.enter_context(options_of(made.first.petsc.given()))
         stack.enter_context(_shown(False, comm))
         plan = RunOptions(force, options, say if comm.rank == 0 else _nothing, jobs)
         program = "a sweep of a Python program"

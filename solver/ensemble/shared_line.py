@@ -60,6 +60,7 @@ class SharedLine:
     Attributes
     ----------
     at_rest : LineAtRest
+    steps_together : whether kernels step it in several scenes; there is nothing else if not
     wires, columns, line : as a ``March`` has them
     lanes : one for each scene
     extremes : LineExtremes
@@ -67,7 +68,7 @@ class SharedLine:
 
     Parameters
     ----------
-    at_rest : line at rest, of a problem without loads, incidents and window
+    at_rest : line at rest, of a problem for which ``why_alone`` has no reason
     range_of_run : stretch of the contact wires that pan heads of all scenes touch [m]
     """
 
@@ -77,12 +78,18 @@ class SharedLine:
         model, form = at_rest.model, at_rest.form
         self.ownership = distribute(model, 1, 0)
         self.line = make_line(self.comm, model, self.ownership, at_rest.problem.numerics)
+        passes = self.line.passes
+        self.steps_together = (
+            passes is not None
+            and not model.loads
+            and all(map(native.are_compiled_for_scenes, passes.rows, passes.columns))
+        )
+        if passes is None or not self.steps_together:
+            return
         self.wires = ContactWires(model, form, self.ownership)
         table = switching_links(model, form.dropper_force)
         links = [FollowedLinks(table, self.line) for _ in range(N_LANES)]
         self.columns = ForceColumns(self.comm, model, self.wires, self.line, links[0], range_of_run)
-        passes = self.line.passes
-        assert passes is not None
         arrays, motions = _in_lanes(passes, self.line.motion)
         parts = passes.parts._replace(arrays=arrays)
         self.lanes = [Lane(*pair) for pair in zip(motions, links, strict=True)]

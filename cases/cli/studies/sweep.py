@@ -78,6 +78,14 @@ def sweep(
     reports: Annotated[
         bool, typer.Option("--reports", help="Also write the report of each run.")
     ] = False,
+    only_statistics: Annotated[
+        bool,
+        typer.Option(
+            "--only-statistics",
+            help="Keep the table alone and no result file of a variant: for thousands of them. "
+            "Variants that share a line march side by side.",
+        ),
+    ] = False,
     n_jobs: Jobs = 1,
     force: Force = False,
     verbose: Verbose = False,
@@ -103,10 +111,21 @@ def sweep(
 
             variants = part_of(variants, part)
         case, short = words.case, words.shortened
-        made = sweep_of(case, variants, out, changes, short, full_report=reports, force=force)
+        if reports and only_statistics:
+            raise InputError("--only-statistics leaves nothing that --reports could draw")
+        made = sweep_of(
+            case,
+            variants,
+            out,
+            changes,
+            short,
+            full_report=reports,
+            only_statistics=only_statistics,
+            force=force,
+        )
         return (made, sampling), options
 
-    comm, (made, sampling), arguments = begin(read, verbose, lambda made: made[0].jobs[0].scene)
+    comm, (made, sampling), arguments = begin(read, verbose, lambda made: made[0].first)
     for one in made.refused[:_SHOWN_REFUSED]:
         console.warn(f"variant {one.variant.name} is not run: {one.outcome}")
     if len(made.refused) > _SHOWN_REFUSED:

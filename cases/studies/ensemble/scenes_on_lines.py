@@ -41,7 +41,7 @@ from catenary.solver.time_loop.march import March
 
 # Tables of a scene that its line, and how that is stepped, do not depend on.
 _OF_THE_TRAIN = ("case", "train", "pantographs", "contact", "evaluation", "output", "test")
-# How far columns of a shared line reach beyond a run [m]: trains that come later may be longer.
+# How far columns of a shared line reach beyond runs [m]: trains that come later may be longer.
 _BEYOND = 60.0
 
 
@@ -54,18 +54,68 @@ class Marched(NamedTuple):
     summary: dict[str, Any]
 
 
-def march_scenes(scenes: Sequence[Scene]) -> Iterator[Marched]:
-    """March scenes, as they come to their ends. Not collective: in this process alone.
+class Marches:
+    """Marches scenes in this process alone; keeps the line of the latest for those to come."""
 
-    Parameters
-    ----------
-    scenes : checked ones, of any lines
-    """
-    groups: dict[str, list[tuple[int, Scene]]] = {}
-    for number, scene in enumerate(scenes):
-        groups.setdefault(_key_of_line(scene), []).append((number, scene))
-    for members in groups.values():
-        yield from _march_on_a_line(members)
+    def __init__(self) -> None:
+        self._key, self._line = "", None
+
+    def of(self, scenes: Sequence[Scene]) -> Iterator[Marched]:
+        """March scenes, as they come to their ends. Not collective.
+
+        Parameters
+        ----------
+        scenes : checked ones, of any lines
+        """
+        groups: dict[str, list[tuple[int, Scene]]] = {}
+        for number, scene in enumerate(scenes):
+            groups.setdefault(_key_of_line(scene), []).append((number, scene))
+        for key, members in groups.items():
+            yield from self._on_a_line(key, dict(members))
+
+    def destroy(self) -> None:
+        """Give the line back."""
+        if self._line is not None:
+            self._line.destroy()
+        self._key, self._line = "", None
+
+    def _on_a_line(self, key: str, scenes: dict[int, Scene]) -> Iterator[Marched]:
+        """March scenes that share a line."""
+        problems: dict[int, Problem] = {}
+        for number, scene in scenes.items():
+            try:
+                problems[number] = problem_of(scene)
+            except CatenaryError as error:
+                yield Marched(number, str(error), {})
+        if not problems:
+            return
+        try:
+            line = self._line_for(key, scenes, problems)
+        except CatenaryError as error:
+            yield from (Marched(number, str(error), {}) for number in problems)
+            return
+        left = dict(problems)
+        if line.shared is not None:
+            for ended in march_side_by_side(line.shared, problems.items()):
+                # A march by itself says why a step has no forces, or a train no place.
+                if isinstance(ended, SceneHistory) and not ended.is_left:
+                    del left[ended.number]
+                    head = line.header(scenes[ended.number], problems[ended.number])
+                    yield Marched(ended.number, DONE, _summary(head, *_tables(ended), DONE))
+        for number, problem in left.items():
+            yield _alone(line, number, scenes[number], problem)
+
+    def _line_for(self, key: str, scenes: dict[int, Scene], problems: dict[int, Problem]) -> _Line:
+        first = next(iter(problems))
+        together = not why_alone(problems[first]) and (key == self._key or len(problems) > 1)
+        begin = min(map(_begin_of, problems.values()))
+        end = max(problem.train.end for problem in problems.values())
+        if self._line is None or key != self._key or not self._line.serves(begin, end, together):
+            self.destroy()
+            range_of_run = (begin - _BEYOND, end + _BEYOND) if together else None
+            self._line = _Line(scenes[first], problems[first], range_of_run)
+            self._key = key
+        return self._line
 
 
 def _key_of_line(scene: Scene) -> str:
@@ -100,7 +150,25 @@ class _Line:
             "line/node_points": points,
         }
         self._header = replace(head, datasets={**head.datasets, **places})
-        self.shared = None if range_of_run is None else SharedLine(at_rest, range_of_run)
+        self._range = range_of_run
+        self.shared: SharedLine | None = None
+        if range_of_run is not None:
+            shared = SharedLine(at_rest, range_of_run)
+            if shared.steps_together:
+                self.shared = shared
+            else:
+                shared.destroy()
+
+    def serves(self, begin: float, end: float, together: bool) -> bool:
+        """Whether trains may run from ``begin`` to ``end`` [m], side by side if that is wanted."""
+        if self._range is None:
+            return not together
+        return self._range[0] <= begin and end <= self._range[1]
+
+    def destroy(self) -> None:
+        """Free all PETSc objects."""
+        if self.shared is not None:
+            self.shared.destroy()
 
     def header(self, scene: Scene, problem: Problem) -> Header:
         """The head of a scene's results."""
@@ -131,50 +199,10 @@ def _of_train(problem: Problem) -> dict[str, Any]:
     return {name: getattr(problem, name) for name in names}
 
 
-def _march_on_a_line(members: Sequence[tuple[int, Scene]]) -> Iterator[Marched]:
-    """March scenes that share a line."""
-    problems: dict[int, Problem] = {}
-    scenes = dict(members)
-    for number, scene in members:
-        try:
-            problems[number] = problem_of(scene)
-        except CatenaryError as error:
-            yield Marched(number, str(error), {})
-    if not problems:
-        return
-    first = next(iter(problems))
-    together = len(problems) > 1 and not why_alone(problems[first])
-    range_of_run = None
-    if together:
-        range_of_run = (
-            min(_begin_of(problem) for problem in problems.values()),
-            max(problem.train.end for problem in problems.values()) + _BEYOND,
-        )
-    try:
-        line = _Line(scenes[first], problems[first], range_of_run)
-    except CatenaryError as error:
-        yield from (Marched(number, str(error), {}) for number in problems)
-        return
-    try:
-        left = dict(problems)
-        if line.shared is not None:
-            for ended in march_side_by_side(line.shared, problems.items()):
-                if isinstance(ended, SceneHistory) and not ended.is_left:
-                    del left[ended.number]
-                    head = line.header(scenes[ended.number], problems[ended.number])
-                    yield Marched(ended.number, DONE, _summary(head, *_tables(ended), DONE))
-        # Alone a march says why a step has no forces.
-        for number, problem in left.items():
-            yield _alone(line, number, scenes[number], problem)
-    finally:
-        if line.shared is not None:
-            line.shared.destroy()
-
-
 def _begin_of(problem: Problem) -> float:
     """Where the last strip starts [m], or before."""
     train = problem.train
-    return float(train.start - max(place.behind for place in train.placements) - _BEYOND)
+    return float(train.start - max(place.behind for place in train.placements))
 
 
 def _tables(history: SceneHistory) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:

@@ -163,7 +163,7 @@ def jobs_and_refused(
     several = len(variants) > 1
     for variant in variants:
         try:
-            scene = _scene(case, variant, overrides, shortened, several)
+            scene = scene_of(case, variant, overrides, shortened, several=several)
             jobs.append(Job(variant, scene, full_report))
         except UnfitScene as error:
             refused.append(Ended(variant, str(error)))
@@ -207,10 +207,23 @@ def make_jobs(
     return jobs
 
 
-def _scene(
-    case: str | Draft, variant: Variant, overrides: Sequence[str], shortened: bool, several: bool
+def scene_of(
+    case: str | Draft,
+    variant: Variant,
+    overrides: Sequence[str],
+    shortened: bool = False,
+    *,
+    several: bool,
 ) -> Scene:
-    """The scene of a variant; InputError names it if it is one of ``several``."""
+    """The checked scene of a variant. Not collective.
+
+    Raises
+    ------
+    UnfitScene
+        If its values do not fit together or are implausible.
+    InputError
+        If a value is out of bounds; it names the variant if that is one of ``several``.
+    """
     _refuse_petsc(variant)
     try:
         return load_scene(case, overrides, shortened, _assigned(variant))

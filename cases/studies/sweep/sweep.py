@@ -5,21 +5,32 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from catenary.base.errors import InputError
-from catenary.cases.result_folder.output_folder import refuse_impossible
+from catenary.cases.result_folder.output_folder import refuse_earlier, refuse_impossible
 from catenary.cases.scene.load import Draft
 from catenary.cases.studies.sweep.jobs import Ended, Job, RunOptions, in_order, jobs_and_refused
 from catenary.cases.studies.sweep.variants import Variant
 
+if TYPE_CHECKING:
+    from catenary.cases.scene.scene import Scene
+    from catenary.cases.studies.ensemble.sweep import Ensemble
+
 
 class Sweep(NamedTuple):
-    """Variants of a case, the jobs of those that can be run, and how the others ended."""
+    """Variants of a case, the jobs of those that can be run, and how the others ended; or, of a
+    sweep that keeps statistics alone, an ``ensemble``."""
 
     variants: Sequence[Variant]
     jobs: list[Job]
     refused: list[Ended]
+    ensemble: Ensemble | None = None
+
+    @property
+    def first(self) -> Scene:
+        """The scene of the first variant that can be run."""
+        return self.jobs[0].scene if self.ensemble is None else self.ensemble.first
 
 
 def sweep_of(
@@ -30,9 +41,13 @@ def sweep_of(
     shortened: bool = False,
     *,
     full_report: bool = False,
+    only_statistics: bool = False,
     force: bool = False,
 ) -> Sweep:
     """A sweep into a folder, all scenes checked. Not collective.
+
+    With ``only_statistics`` there is no run of a variant on the disk, and scenes are checked when
+    it is their turn.
 
     Raises
     ------
@@ -40,6 +55,12 @@ def sweep_of(
         As ``jobs_and_refused``, or if the folder has the table of a sweep with variants that this
         one has not, and ``force`` is not given.
     """
+    if only_statistics:
+        from catenary.cases.studies.ensemble.sweep import ensemble_of
+
+        ensemble = ensemble_of(case, variants, overrides, shortened)
+        refuse_other_sweep(out, variants, force)
+        return Sweep(variants, [], [], ensemble)
     jobs, refused = jobs_and_refused(case, variants, overrides, shortened, full_report=full_report)
     refuse_other_sweep(out, variants, force)
     return Sweep(variants, jobs, refused)
@@ -69,12 +90,18 @@ def run_sweep(
     from catenary.cases.studies.sweep import output
     from catenary.cases.studies.sweep.run_jobs import run_jobs
 
-    name, show = sweep.jobs[0].scene.case.name, plotted
+    name, show = sweep.first.case.name, plotted
     if show is not None:
         show = show or output.PLOTTED
     with held(out, comm, command):
-        ended = run_jobs(sweep.jobs, out, comm, options)
-        ended = in_order(sweep.variants, ended, sweep.refused)
+        if sweep.ensemble is None:
+            ended = run_jobs(sweep.jobs, out, comm, options)
+            ended = in_order(sweep.variants, ended, sweep.refused)
+        else:
+            from catenary.cases.studies.ensemble.sweep import run_ensemble
+
+            on_root(comm, lambda: refuse_earlier(out, options.force))
+            ended = run_ensemble(sweep.ensemble, out, comm, options)
         files = on_root(comm, lambda: output.write(out, name, ended, show), takes_long=True)
     return ended, files
 

@@ -1,0 +1,158 @@
+"""A sweep of which statistics alone are kept: variants march together, in pieces of work."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import time
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from catenary.base.errors import CatenaryError, InputError
+from catenary.cases.process.interrupts import Interrupted
+from catenary.cases.process.petsc_options import start_petsc
+from catenary.cases.process.workers import WorkerLost, at_once
+from catenary.cases.scene.input.faults import UnfitScene
+from catenary.cases.scene.load import Draft, read_draft
+from catenary.cases.scene.scene import Scene
+from catenary.cases.studies.records import KeptRows
+from catenary.cases.studies.sweep.jobs import Ended, RunOptions, scene_of
+from catenary.cases.studies.sweep.variants import Variant
+from catenary.postproc.files.run_schema import DONE, INTERRUPTED
+
+# Variants of a piece of work at most: some seconds, that a stop may cost. Of few variants pieces
+# are smaller, so that all cores have some; they do not depend on the number of cores, as a sweep
+# that was stopped may go on with more.
+_MOST, _LEAST, _PIECES = 64, 4, 16
+# What a sweep's table needs of a summary.
+_KEPT = ("pantographs", "droppers", "acceptance", "not_judged", "passed", "remarks")
+
+
+class Ensemble(NamedTuple):
+    """Variants of a case.
+
+    Attributes
+    ----------
+    draft : the case, with its own values for short runs if these are wanted
+    overrides : assignments for all variants
+    variants : in their order
+    first : the scene of the first variant that can be run
+    """
+
+    draft: Draft
+    overrides: Sequence[str]
+    variants: Sequence[Variant]
+    first: Scene
+
+
+def ensemble_of(
+    case: str | Path | Draft,
+    variants: Sequence[Variant],
+    overrides: Sequence[str] = (),
+    shortened: bool = False,
+) -> Ensemble:
+    """An ensemble of which one variant at least can be run; others are looked at when it is their
+    turn. Not collective.
+
+    Raises
+    ------
+    InputError
+        If no variant can be run, or if a value of one that comes before the first such is out of
+        bounds.
+    """
+    draft = case if isinstance(case, Draft) else read_draft(case)
+    if shortened:
+        draft = draft.shortened()
+    refused: CatenaryError | None = None
+    for variant in variants:
+        try:
+            scene = scene_of(draft, variant, overrides, several=len(variants) > 1)
+        except UnfitScene as error:
+            refused = refused or error
+            continue
+        return Ensemble(draft, overrides, variants, scene)
+    assert refused is not None
+    raise InputError(f"variant {variants[0].name}: {refused}") from refused
+
+
+def run_ensemble(ensemble: Ensemble, out: Path, comm: Any, options: RunOptions) -> list[Ended]:
+    """March what is not done yet, and say how all variants ended, in their order. Collective.
+
+    An interruption ends the list early; its last entry says so. A variant that cannot be run, or
+    breaks, stops no other.
+
+    Parameters
+    ----------
+    out : folder in which pieces of work are kept until the sweep has its table
+    """
+    size = max(_LEAST, min(_MOST, -(-len(ensemble.variants) // _PIECES)))
+    pieces = [ensemble.variants[at : at + size] for at in range(0, len(ensemble.variants), size)]
+    kept = KeptRows(out, options.force)
+    told = json.dumps(ensemble.draft.table(), sort_keys=True, default=str)
+    case = hashlib.sha256(told.encode()).hexdigest()
+
+    def depends_on(piece: Sequence[Variant]) -> list[Any]:
+        assignments = [[variant.name, *variant.assignments] for variant in piece]
+        return [case, *ensemble.overrides, assignments]
+
+    march = _March(ensemble.draft, list(ensemble.overrides))
+    begin, ended = time.perf_counter(), list[Ended]()
+    outcomes = kept.each(
+        march,
+        pieces,
+        depends_on,
+        at_once(options.n_jobs, comm),
+        comm,
+        partial(start_petsc, list(options.petsc)),
+    )
+    try:
+        for outcome in outcomes:
+            piece = pieces[outcome.number]
+            if isinstance(outcome.error, WorkerLost):
+                ended += [Ended(variant, str(outcome.error)) for variant in piece]
+            else:
+                rows = outcome.get()
+                ended += [Ended(v, *row) for v, row in zip(piece, rows, strict=True)]
+            spent, n_left = time.perf_counter() - begin, len(ensemble.variants) - len(ended)
+            options.progress(
+                f"[{len(ended)}/{len(ensemble.variants)}] {spent:.0f} s gone, about "
+                f"{spent / len(ended) * n_left:.0f} s left"
+            )
+    except Interrupted:
+        ended.append(Ended(ensemble.variants[len(ended)], INTERRUPTED))
+    return ended
+
+
+class _March:
+    """Marches a piece of variants; goes to the processes that do so."""
+
+    def __init__(self, draft: Draft, overrides: list[str]) -> None:
+        self._draft, self._overrides = draft, overrides
+        self._marches: Any = None
+
+    def __call__(self, piece: Sequence[Variant], comm: Any) -> list[list[Any]]:
+        """Outcome and what is kept of the summary of each. Not collective."""
+        from catenary.cases.studies.ensemble.scenes_on_lines import Marches
+
+        rows: list[list[Any]] = [[] for _ in piece]
+        scenes, numbers = [], []
+        for number, variant in enumerate(piece):
+            try:
+                scenes.append(scene_of(self._draft, variant, self._overrides, several=True))
+                numbers.append(number)
+            except InputError as error:
+                rows[number] = [str(error), {}]
+        if self._marches is None:
+            self._marches = Marches()
+        for marched in self._marches.of(scenes):
+            kept = {name: marched.summary[name] for name in _KEPT if name in marched.summary}
+            if marched.outcome == DONE:
+                uplift = marched.summary["supports"]["max_uplift_mm"]
+                kept["supports"] = {"max_uplift_mm": uplift}
+            rows[numbers[marched.number]] = [marched.outcome, kept]
+        return rows
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "_marches": None}
