@@ -23,6 +23,7 @@ def build(
     gap: np.ndarray | None = None,
     before: Model | None = None,
     apart: bool = False,
+    cut_lengths: np.ndarray | None = None,
 ) -> Model:
     """The model of a problem on a mesh, for given dropper lengths [m]. Not collective.
 
@@ -31,7 +32,7 @@ def build(
     given. ``form`` is the shape at rest, where it is known: before it is found wires are straight
     and droppers upright. ``before`` is a model of the same problem and mesh, made with the same
     ``form``, whose numbers and wires are taken over. ``apart`` gives wires that move together
-    unknowns of their own.
+    unknowns of their own. ``cut_lengths`` are those that were wanted, if droppers have errors.
 
     Raises
     ------
@@ -53,6 +54,7 @@ def build(
         numbering,
         row_of_node,
         dropper_lengths,
+        dropper_lengths if cut_lengths is None else cut_lengths,
     )
     model.form = form
     model.hanging_at_arms = np.zeros(mesh.steady_arms.size)
@@ -90,4 +92,5 @@ def with_wires_apart(model: Model) -> Model:
         model.form,
         model.dropper_gap,
         apart=True,
+        cut_lengths=model.cut_lengths,
     )

@@ -98,6 +98,8 @@ class Model:
     blocks : element blocks; their sums are M and K
     constrained : (n,) int, unknowns held at zero, and numbers that are no node's
     dropper_lengths : (n_droppers,) unstretched [m]
+    cut_lengths : (n_droppers,) those that were wanted, by which droppers weigh [m]: errors of
+        millimetres change a mass by some grams, and lines with other errors have the same matrices
     dropper_stiffness, dropper_damping : (n_droppers,) [N/m], [N s/m], of the taut dropper, about
         its tension in ``form``
     released_damping : (n_droppers,) the part of ``dropper_damping`` that goes slack with the spring
@@ -122,6 +124,7 @@ class Model:
     numbering: Unknowns
     row_of_node: np.ndarray
     dropper_lengths: np.ndarray
+    cut_lengths: np.ndarray
     blocks: list[Block] = field(default_factory=list)
     links: list[Links] = field(default_factory=list)
     droppers: Links | None = None

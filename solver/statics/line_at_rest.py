@@ -90,10 +90,12 @@ def line_at_rest_on_all(
     if comm.size == 1:
         return on_root(comm, alone(lambda: line_at_rest(problem, mesh)), takes_long=True)
 
-    def work() -> tuple[np.ndarray, np.ndarray, Equilibrium, Elasticity]:
+    def work() -> tuple[tuple[np.ndarray, ...], Equilibrium, Elasticity]:
         rest = line_at_rest(problem, mesh)
-        return rest.model.dropper_lengths, rest.model.dropper_gap, rest.form, rest.lift
+        own = rest.model
+        return (own.dropper_lengths, own.dropper_gap, own.cut_lengths), rest.form, rest.lift
 
-    lengths, gap, form, lift = on_root(comm, alone(work), takes_long=True)
+    (lengths, gap, cut), form, lift = on_root(comm, alone(work), takes_long=True)
     hung = with_defects(problem)
-    return LineAtRest(hung, build(hung, mesh, lengths, form=form, gap=gap), form, lift)
+    model = build(hung, mesh, lengths, form=form, gap=gap, cut_lengths=cut)
+    return LineAtRest(hung, model, form, lift)

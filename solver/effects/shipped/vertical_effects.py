@@ -51,7 +51,7 @@ def _dropper_mass(builder: ModelBuilder) -> None:
     mesh = builder.mesh
     for number, droppers in enumerate(builder.problem.line.droppers):
         mine = mesh.dropper_group == number
-        half = 0.5 * droppers.kind.mass_per_length * builder.model.dropper_lengths[mine]
+        half = 0.5 * droppers.kind.mass_per_length * builder.model.cut_lengths[mine]
         half[builder.model.missing[mine]] = 0.0
         for side in (0, 1):
             builder.add_masses(droppers.name, mesh.droppers[mine, side], half)

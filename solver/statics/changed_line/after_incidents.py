@@ -102,7 +102,8 @@ def changed_line(first: Model, form: Equilibrium, incidents: Sequence[LineIncide
         else:
             shares[incident.wire] = incident.share
     after = replace(problem, line=problem.line.with_shares(shares))
-    model = build(after, mesh, first.dropper_lengths, broken, form, first.dropper_gap)
+    lengths, gap, cut = first.dropper_lengths, first.dropper_gap, first.cut_lengths
+    model = build(after, mesh, lengths, broken, form, gap, cut_lengths=cut)
     load, energy = np.zeros(model.n_dofs), 0.0
     for wire, now in zip(problem.line.wires, after.line.wires, strict=True):
         pairs = mesh.elements(wire.name)
@@ -150,8 +151,10 @@ def _about_rest(
         ends, along = [end.node for end in tensioned_ends(first)], about.along.copy()
         along[ends] = form.along[ends] if form.along.size else 0.0
         about = replace(about, along=along)
-    lengths, gap = first.dropper_lengths, first.dropper_gap
-    model = build(changed.problem, changed.mesh, lengths, changed.broken, about, gap)
+    lengths, gap, cut = first.dropper_lengths, first.dropper_gap, first.cut_lengths
+    model = build(
+        changed.problem, changed.mesh, lengths, changed.broken, about, gap, cut_lengths=cut
+    )
     assert model.droppers is not None
     unknowns, weights = model.droppers.direction
     k, moved = model.dropper_stiffness, rest.moved

@@ -143,8 +143,14 @@ class RestNearby:
             about = model
             if self._bends:
                 shape = replace(form, dropper_force=carried)
-                lengths = model.dropper_lengths
-                about = build(model.problem, model.mesh, lengths, model.broken, shape)
+                about = build(
+                    model.problem,
+                    model.mesh,
+                    model.dropper_lengths,
+                    model.broken,
+                    shape,
+                    cut_lengths=model.cut_lengths,
+                )
                 about.constrained = constrained
             step = self._solved(about, self._softening(about, form, slack), lacks)
             change = float(np.abs(step).max())

@@ -38,11 +38,13 @@ def hang(problem: Problem, cut: Model, form: Equilibrium) -> tuple[Model, Equili
             f"{mesh.x(mesh.droppers[number, 1]):g} m a length of {length[number]:.3f} m: "
             "take smaller errors"
         )
-    model = build(problem, mesh, length, form=form)
+    wanted = cut.dropper_lengths
+    model = build(problem, mesh, length, form=form, cut_lengths=wanted)
     potential = Potential(cut, model, form, form.dropper_length + errors)
     rest = RestNearby(potential, dead_loads(model) - dead_loads(cut)).find()
     _refuse_slack_wires(model, rest.form)
-    return build(problem, mesh, length, form=rest.form, gap=rest.gap), rest.form
+    hung = build(problem, mesh, length, form=rest.form, gap=rest.gap, cut_lengths=wanted)
+    return hung, rest.form
 
 
 def errors_of_length(problem: Problem, cut: Model) -> np.ndarray:
