@@ -53,7 +53,8 @@ class FollowedLinks:
         self.table = table
         mine = line.ownership.owned(table.arrays.unknowns[:, 0])
         self._mine = mine
-        self.local = table.arrays._replace(unknowns=table.arrays.unknowns - line.ownership.first)
+        unknowns, weights, law = table.arrays
+        self.local = LinkArrays(unknowns - line.ownership.first, weights, law.copy())
         self.numbers = np.flatnonzero(mine & ~table.broken & ~table.rides)
         self.links = self.local.of(self.numbers)
         self.riding = np.flatnonzero(mine & ~table.broken & table.rides)
@@ -66,6 +67,12 @@ class FollowedLinks:
         self.moving = np.array([0, self.numbers.size], dtype=np.int64)
         self._line = line
         line.track_links(self.links, self.reserve)
+
+    def take_law(self, law: np.ndarray) -> None:
+        """Take the laws (n,) of the links of the whole line, which are the same but for reserves at
+        rest. Not collective."""
+        self.local.law[:] = law
+        self.links.law[:], self.riders.links.law[:] = law[self.numbers], law[self.riding]
 
     @property
     def followed(self) -> Followed:

@@ -17,14 +17,15 @@ from catenary.solver.contact.train.pantographs import Pantographs, nominal_heigh
 from catenary.solver.contact_problem.coupling import Implicit, make_coupling
 from catenary.solver.contact_problem.law_tangents import law_in_steps
 from catenary.solver.effects.all_effects import simulated
-from catenary.solver.ensemble.shared_line import N_LANES, SharedLine
+from catenary.solver.ensemble.shared_line import N_LANES, Lane, SharedLine
 from catenary.solver.kernels import native
 from catenary.solver.kernels.flush_to_zero import flushed
 from catenary.solver.model.switching_links import NO_LINKS, Riders
 from catenary.solver.problem.contact_laws import uses_rate
-from catenary.solver.problem.problem import Problem, steps_of
+from catenary.solver.problem.problem import steps_of
 from catenary.solver.schemes.one_solve import OneSolve
 from catenary.solver.schemes.scheme import find_crossings
+from catenary.solver.statics.line_at_rest import LineAtRest
 from catenary.solver.time_loop.compiled_steps import Block, KeptMotions, StepParts
 from catenary.solver.time_loop.prepared_line import make_room
 from catenary.solver.time_loop.views.step_views import Shown
@@ -40,7 +41,7 @@ class SceneHistory(NamedTuple):
     Attributes
     ----------
     number : of the scene
-    problem : of the scene
+    at_rest : the line at rest of the scene, with its problem
     n_steps : that were taken
     is_left : whether the forces of the step after them were not found
     position, contact_force, head_height, wire_height : (n_steps + 1, n_pantographs), the first row
@@ -50,7 +51,7 @@ class SceneHistory(NamedTuple):
     """
 
     number: int
-    problem: Problem
+    at_rest: LineAtRest
     n_steps: int
     is_left: bool
     position: np.ndarray
@@ -66,15 +67,14 @@ class _OnItsWay:
     """A scene in a lane."""
 
     number: int
-    problem: Problem
+    at_rest: LineAtRest
     n: int
     rows: np.ndarray
     n_steps: int
-    pantographs: Pantographs
 
 
 def march_side_by_side(
-    shared: SharedLine, problems: Iterable[tuple[int, Problem]]
+    shared: SharedLine, scenes: Iterable[tuple[int, LineAtRest]]
 ) -> Iterator[SceneHistory | tuple[int, CatenaryError]]:
     """March scenes to their ends, in the order in which they come there. Not collective.
 
@@ -83,56 +83,56 @@ def march_side_by_side(
     Parameters
     ----------
     shared : the line of all scenes
-    problems : numbers and problems of scenes on it
+    scenes : their numbers, problems and lines at rest, which have the matrices of the shared one
     """
-    left = iter(problems)
-    lanes: list[_OnItsWay | None] = [None] * N_LANES
+    left = iter(scenes)
+    marches: list[_OnItsWay | None] = [None] * N_LANES
     while True:
-        for lane in range(N_LANES):
-            while lanes[lane] is None:
-                number, problem = next(left, (0, None))
-                if problem is None:
+        for lane in shared.lanes:
+            while marches[lane.number] is None:
+                number, at_rest = next(left, (0, None))
+                if at_rest is None:
                     break
                 try:
-                    lanes[lane] = _begin(shared, lane, number, problem)
+                    marches[lane.number] = _begin(shared, lane, number, at_rest)
                 except CatenaryError as error:
                     yield number, error
-        if not any(lanes):
+        if not any(marches):
             return
         with flushed():
             shared.native.take(_MOST_STEPS)
-        for lane, march in enumerate(lanes):
+        for lane, march in enumerate(marches):
             if march is None:
                 continue
             taken, is_left = shared.native.at(lane)
             if is_left or taken == march.n_steps:
-                lanes[lane] = None
+                marches[lane] = None
                 yield _ended(shared, lane, march, taken, is_left)
 
 
-def _begin(shared: SharedLine, lane: int, number: int, problem: Problem) -> _OnItsWay:
+def _begin(shared: SharedLine, lane: Lane, number: int, at_rest: LineAtRest) -> _OnItsWay:
     """Let a scene begin in a lane."""
-    model = replace(shared.at_rest.model, problem=problem, simulated=simulated(problem))
+    problem, model, form, lift = at_rest
+    model = replace(model, problem=problem, simulated=simulated(problem))
     laws, train = model.simulated, problem.train
     air_speed = train.speed if laws.meets_air else None
-    height = nominal_height_rule(shared.wires, shared.at_rest.lift, air_speed, problem.contact)
-    pantographs = Pantographs(shared.comm, problem, laws, shared.wires, height)
-    shared.clear(lane)
-    motion, links = shared.lanes[lane]
+    shared.hang(lane, at_rest)
+    height = nominal_height_rule(lane.wires, lift, air_speed, problem.contact)
+    pantographs = Pantographs(shared.comm, problem, laws, lane.wires, height)
     interaction = ForcesOnLine(
         shared.comm,
         model,
-        shared.at_rest.form,
-        shared.wires,
+        form,
+        lane.wires,
         shared.line,
-        links,
+        lane.links,
         shared.columns,
         pantographs.candidates,
         train.speed,
         uses_rate(laws.contact),
         pantographs.across,
         pantographs.work,
-        motion,
+        lane.motion,
     )
     coupled = interaction.link_coupling
     law = law_in_steps(problem, laws, pantographs.n_contacts)
@@ -145,9 +145,9 @@ def _begin(shared: SharedLine, lane: int, number: int, problem: Problem) -> _OnI
         interaction.locate()
         find_crossings(interaction, pantographs, 0.0)
     n_steps = steps_of(problem)
-    steps, rows = _steps(scheme, motion.read, n_steps, problem.numerics.dt)
-    shared.native.begin(lane, steps, n_steps)
-    return _OnItsWay(number, problem, pantographs.n, rows, n_steps, pantographs)
+    steps, rows = _steps(scheme, lane.motion.read, n_steps, problem.numerics.dt)
+    shared.native.begin(lane.number, steps, n_steps)
+    return _OnItsWay(number, at_rest, pantographs.n, rows, n_steps)
 
 
 def _steps(
@@ -216,7 +216,7 @@ def _ended(
     extremes = shared.extremes
     return SceneHistory(
         march.number,
-        march.problem,
+        march.at_rest,
         taken,
         is_left,
         *(rows[:, k * n : (k + 1) * n] for k in range(4)),

@@ -1,8 +1,10 @@
 """A line that several scenes share: matrices, factors, columns and the motion in each of them.
 
 Scenes that differ in their trains, pantographs and contact laws alone have the same line at rest,
-the same factors and the same answers to unit forces. Their motions stand in lanes: the numbers of
-an unknown in all scenes follow each other, so that a step reads each number of a factor once.
+the same factors and the same answers to unit forces; those that differ in errors of the droppers'
+lengths, too, rest otherwise but have the same factors and answers. Their motions stand in lanes:
+the numbers of an unknown in all scenes follow each other, so that a step reads each number of a
+factor once.
 """
 
 from __future__ import annotations
@@ -19,10 +21,11 @@ from catenary.solver.contact.followed_links import FollowedLinks
 from catenary.solver.contact.forces_on_line import ForceColumns
 from catenary.solver.integrators.line_state import LineState, Motion
 from catenary.solver.integrators.make_line import make_line
-from catenary.solver.integrators.two_pass_step import StationPasses
+from catenary.solver.integrators.two_pass_step import PassArrays, StationPasses
 from catenary.solver.kernels import aligned_arrays, native
+from catenary.solver.model.model import Model
 from catenary.solver.model.partition import distribute
-from catenary.solver.model.switching_links import LinkArrays, switching_links
+from catenary.solver.model.switching_links import LinkArrays, LinkTable, switching_links
 from catenary.solver.problem.problem import Problem
 from catenary.solver.statics.line_at_rest import LineAtRest
 
@@ -36,22 +39,35 @@ class LineExtremes(NamedTuple):
     ----------
     arms : (n_arms,) unknowns of vertical displacement at steady arms
     droppers : LinkArrays
+    rest : (n_droppers, N_LANES) their reserves at rest [N]
     uplift : (n_arms, N_LANES) largest displacement [m]
     least, largest : (n_droppers, N_LANES) forces of droppers [N]
     """
 
     arms: np.ndarray
     droppers: LinkArrays
+    rest: np.ndarray
     uplift: np.ndarray
     least: np.ndarray
     largest: np.ndarray
 
 
-class Lane(NamedTuple):
-    """A scene's part of a shared line: its motion, and the links that are followed in it."""
+class Lane:
+    """A scene's part of a shared line.
 
-    motion: LineState
-    links: FollowedLinks
+    Attributes
+    ----------
+    number : of the lane
+    motion : of the line in this scene
+    links : those that are followed in it
+    at_rest, wires : the line at rest in the scene that is there, and its contact wires
+    """
+
+    at_rest: LineAtRest
+    wires: ContactWires
+
+    def __init__(self, number: int, motion: LineState, links: FollowedLinks) -> None:
+        self.number, self.motion, self.links = number, motion, links
 
 
 class SharedLine:
@@ -59,9 +75,9 @@ class SharedLine:
 
     Attributes
     ----------
-    at_rest : LineAtRest
+    at_rest : LineAtRest, of one of the scenes
     steps_together : whether kernels step it in several scenes; there is nothing else if not
-    wires, columns, line : as a ``March`` has them
+    columns, line : as a ``March`` has them
     lanes : one for each scene
     extremes : LineExtremes
     native : what takes steps, ``native.Ensemble``
@@ -86,38 +102,56 @@ class SharedLine:
         )
         if passes is None or not self.steps_together:
             return
-        self.wires = ContactWires(model, form, self.ownership)
-        table = switching_links(model, form.dropper_force)
-        links = [FollowedLinks(table, self.line) for _ in range(N_LANES)]
-        self.columns = ForceColumns(self.comm, model, self.wires, self.line, links[0], range_of_run)
+        self._wires = ContactWires(model, form, self.ownership)
+        self._table = switching_links(model, form.dropper_force)
+        links = [FollowedLinks(self._table, self.line) for _ in range(N_LANES)]
+        self.columns = ForceColumns(
+            self.comm, model, self._wires, self.line, links[0], range_of_run
+        )
         arrays, motions = _in_lanes(passes, self.line.motion)
         parts = passes.parts._replace(arrays=arrays)
-        self.lanes = [Lane(*pair) for pair in zip(motions, links, strict=True)]
-        numbers, droppers, _ = links[0].shown(DROPPERS)
-        arms = model.dofs(model.mesh.steady_arms).astype(np.int64)
-        self.extremes = LineExtremes(
-            arms,
-            droppers,
-            np.zeros((arms.size, N_LANES)),
-            *np.zeros((2, numbers.size, N_LANES)),
-        )
-        self._at_rest_force = droppers.law["rest"] * droppers.law["carried"]
+        self.lanes = [Lane(*own) for own in zip(range(N_LANES), motions, links, strict=True)]
+        _, droppers, _ = links[0].shown(DROPPERS)
+        n, arms = droppers.law.size, model.dofs(model.mesh.steady_arms).astype(np.int64)
+        self._rest = np.zeros((links[0].numbers.size, N_LANES))
+        forces = np.zeros((3, n, N_LANES))
+        self.extremes = LineExtremes(arms, droppers, forces[0], np.zeros((arms.size, N_LANES)),
+                                     *forces[1:])  # fmt: skip
         self.native = native.Ensemble(passes.rows, passes.columns, parts, self.extremes)
         followed = passes.tracked(links[0].links, links[0].reserve)
-        self.native.track(followed, [own.reserve for own in links])
+        self.native.track(followed, self._rest, [own.reserve for own in links])
+        for lane in self.lanes:
+            self.hang(lane, at_rest)
 
-    def clear(self, lane: int) -> None:
-        """Put the line of a lane at rest."""
-        self.native.rest(lane)
-        self.extremes.uplift[:, lane] = 0.0
-        self.extremes.least[:, lane] = self.extremes.largest[:, lane] = self._at_rest_force
+    def takes(self, at_rest: LineAtRest) -> bool:
+        """Whether the matrices of a line are these, and the links that are followed."""
+        table = switching_links(at_rest.model, at_rest.form.dropper_force)
+        return _same_matrices(self.at_rest.model, at_rest.model) and _same_links(self._table, table)
+
+    def hang(self, lane: Lane, at_rest: LineAtRest) -> None:
+        """Put the line of a lane at rest: that of a scene whose matrices are these."""
+        self.native.rest(lane.number)
+        links, extremes, number = lane.links, self.extremes, lane.number
+        if getattr(lane, "at_rest", None) is not at_rest:
+            lane.at_rest = at_rest
+            model, form = at_rest.model, at_rest.form
+            lane.wires = ContactWires(model, form, self.ownership)
+            for name in ("begin", "at", "width"):
+                lane.wires.nodes[name] = self._wires.nodes[name]
+            table = switching_links(model, form.dropper_force)
+            links.take_law(table.arrays.law)
+            self._rest[:, number] = links.links.law["rest"]
+            extremes.rest[:, number] = links.shown(DROPPERS)[1].law["rest"]
+        force = extremes.rest[:, number] * extremes.droppers.law["carried"]
+        extremes.uplift[:, number] = 0.0
+        extremes.least[:, number] = extremes.largest[:, number] = force
 
     def destroy(self) -> None:
         """Free all PETSc objects."""
         self.line.destroy()
 
 
-def _in_lanes(passes: StationPasses, motion: LineState) -> tuple[Any, Sequence[LineState]]:
+def _in_lanes(passes: StationPasses, motion: LineState) -> tuple[PassArrays, Sequence[LineState]]:
     """Arrays of passes over all lanes, and the motion in each of them."""
     given = passes.parts.arrays
     x, n = given.motion.x, given.motion.x.size
@@ -128,23 +162,55 @@ def _in_lanes(passes: StationPasses, motion: LineState) -> tuple[Any, Sequence[L
     rates = np.shares_memory(given.velocity, given.motion.y)
     velocity = aligned_arrays.zeros(given.factor.size * N_LANES, 2)
     assert np.shares_memory(x, given.factor) and np.shares_memory(given.answer, given.motion.z)
+    whole = Motion(factor[own], velocity[own], answer, given.motion.shares, N_LANES)
     arrays = given._replace(
-        factor=factor,
-        velocity=velocity if rates else factor,
-        answer=answer,
-        motion=Motion(factor[own], velocity[own], answer, given.motion.shares, N_LANES),
+        factor=factor, velocity=velocity if rates else factor, answer=answer, motion=whole
     )
     motions = []
     for lane in range(N_LANES):
-        read = Motion(
-            factor[own][lane:],
-            velocity[own][lane:],
-            answer[lane:],
-            given.motion.shares,
-            N_LANES,
-        )
+        numbers = (array[lane:] for array in (whole.x, whole.y, whole.z))
+        read = Motion(*numbers, given.motion.shares, N_LANES)
         motions.append(LineState.of(read, motion.gains))
     return arrays, motions
+
+
+def _same_matrices(one: Model, other: Model) -> bool:
+    """Whether M, C and K of two models on the same mesh are the same, number by number."""
+    if len(one.blocks) != len(other.blocks) or len(one.links) != len(other.links):
+        return False
+    pairs = zip(one.blocks, other.blocks, strict=True)
+    return (
+        all(
+            np.array_equal(a.kind, b.kind)
+            and np.array_equal(a.stiffness, b.stiffness)
+            and np.array_equal(a.mass, b.mass)
+            and np.array_equal(a.damping, b.damping)
+            for a, b in pairs
+        )
+        and all(
+            np.array_equal(a.law, b.law) and all(map(np.array_equal, a.direction, b.direction))
+            for a, b in zip(one.links, other.links, strict=True)
+        )
+        and np.array_equal(one.constrained, other.constrained)
+    )
+
+
+def _same_links(one: LinkTable, other: LinkTable) -> bool:
+    """Whether links are the same but for their reserves at rest."""
+    if one.arrays.law.size != other.arrays.law.size:
+        return False
+    return (
+        np.array_equal(one.arrays.unknowns, other.arrays.unknowns)
+        and np.array_equal(one.arrays.weights, other.arrays.weights)
+        and all(
+            np.array_equal(one.arrays.law[name], other.arrays.law[name])
+            for name in one.arrays.law.dtype.names or ()
+            if name != "rest"
+        )
+        and np.array_equal(one.broken, other.broken)
+        and np.array_equal(one.master, other.master)
+        and np.array_equal(one.bent, other.bent)
+    )
 
 
 def why_alone(problem: Problem) -> str:

@@ -41,7 +41,9 @@ class LineAtRest(NamedTuple):
         return self.model.mesh
 
 
-def stable_form(problem: Problem, mesh: LineMesh) -> tuple[Model, Equilibrium]:
+def stable_form(
+    problem: Problem, mesh: LineMesh, sound: tuple[Model, Equilibrium] | None = None
+) -> tuple[Model, Equilibrium]:
     """``find_form``, of a rest that is stable. Not collective.
 
     Raises
@@ -49,20 +51,24 @@ def stable_form(problem: Problem, mesh: LineMesh) -> tuple[Model, Equilibrium]:
     InputError
         As ``find_form``, and if the rest is unstable.
     """
-    model, form = find_form(problem, mesh)
+    model, form = find_form(problem, mesh, sound)
     refuse_unstable(model)
     return model, form
 
 
-def line_at_rest(problem: Problem, mesh: LineMesh) -> LineAtRest:
+def line_at_rest(
+    problem: Problem, mesh: LineMesh, sound: tuple[Model, Equilibrium] | None = None
+) -> LineAtRest:
     """The line of a problem at rest, found by this process. Not collective.
+
+    ``sound`` is as for ``find_form``.
 
     Raises
     ------
     InputError
         If there is no equilibrium with all droppers taut, or if it is unstable.
     """
-    model, form = stable_form(problem, mesh)
+    model, form = stable_form(problem, mesh, sound)
     give_back()
     return LineAtRest(model.problem, model, form, elasticity(model, *middle_span(problem.line)))
 

@@ -33,7 +33,11 @@ class Keeper(Observer):
                 kept = self._extremes.setdefault(name, np.stack([low, high]))
                 np.minimum(kept[0], low, out=kept[0])
                 np.maximum(kept[1], high, out=kept[1])
-            elif name in channels.CHANNELS and not channels.CHANNELS[name].of_line:
+            elif (
+                values.shape[1]
+                and name in channels.CHANNELS
+                and not channels.CHANNELS[name].of_line
+            ):
                 self._rows.setdefault(f"channels/{name}", []).append(values.copy())
 
     def tables(self) -> dict[str, np.ndarray]:

@@ -17,6 +17,7 @@ import numpy as np
 from catenary.base.errors import CatenaryError
 from catenary.base.lone_process import alone
 from catenary.cases.run.describe.arrivals import arrival_facts
+from catenary.cases.run.describe.defects import defect_facts
 from catenary.cases.run.describe.pantographs import header_words
 from catenary.cases.run.header import header_of
 from catenary.cases.run.scene_mesh import mesh_of
@@ -24,7 +25,7 @@ from catenary.cases.scene.problem import problem_of, resolved
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.ensemble.keeper import Keeper
 from catenary.postproc.channels.facts import facts_of
-from catenary.postproc.channels.header import Header
+from catenary.postproc.channels.header import Header, static_datasets
 from catenary.postproc.evaluate import statistics as stats
 from catenary.postproc.files.run_schema import DONE
 from catenary.postproc.read.marched_results import MarchedFile
@@ -35,12 +36,16 @@ from catenary.postproc.report.summary import summarise
 from catenary.solver.ensemble.marches import SceneHistory, march_side_by_side
 from catenary.solver.ensemble.shared_line import SharedLine, why_alone
 from catenary.solver.problem.problem import Problem
+from catenary.solver.statics.changed_line.rest_with_defects import errors_of_length
+from catenary.solver.statics.form_finding.equilibrium import sound_form
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest
 from catenary.solver.statics.stability_of_rest import refuse_lost_wire
 from catenary.solver.time_loop.march import March
 
 # Tables of a scene that its line, and how that is stepped, do not depend on.
 _OF_THE_TRAIN = ("case", "train", "pantographs", "contact", "evaluation", "output", "test")
+# What changes the line at rest, but not how it moves about that.
+_OF_THE_REST = "dropper_lengths"
 # How far columns of a shared line reach beyond runs [m]: trains that come later may be longer.
 _BEYOND = 60.0
 
@@ -94,16 +99,31 @@ class Marches:
         except CatenaryError as error:
             yield from (Marched(number, str(error), {}) for number in problems)
             return
-        left = dict(problems)
+        left = dict.fromkeys(problems)
+        refused: list[Marched] = []
+
+        def together() -> Iterator[tuple[int, LineAtRest]]:
+            """Those whose lines have the same matrices."""
+            for number, problem in problems.items():
+                try:
+                    at_rest = line.rest_of(problem)
+                except CatenaryError as error:
+                    del left[number]
+                    refused.append(Marched(number, str(error), {}))
+                    continue
+                if line.moves_alike(at_rest):
+                    yield number, at_rest
+
         if line.shared is not None:
-            for ended in march_side_by_side(line.shared, problems.items()):
+            for ended in march_side_by_side(line.shared, together()):
                 # A march by itself says why a step has no forces, or a train no place.
                 if isinstance(ended, SceneHistory) and not ended.is_left:
                     del left[ended.number]
-                    head = line.header(scenes[ended.number], problems[ended.number])
+                    head = line.header(scenes[ended.number], ended.at_rest)
                     yield Marched(ended.number, DONE, _summary(head, *_tables(ended), DONE))
-        for number, problem in left.items():
-            yield _alone(line, number, scenes[number], problem)
+        yield from refused
+        for number in left:
+            yield _alone(line, number, scenes[number], problems[number])
 
     def _line_for(self, key: str, scenes: dict[int, Scene], problems: dict[int, Problem]) -> _Line:
         first = next(iter(problems))
@@ -119,37 +139,38 @@ class Marches:
 
 
 def _key_of_line(scene: Scene) -> str:
-    """What the line of a scene depends on, as text."""
+    """What the line of a scene depends on but for errors of the droppers' lengths, as text."""
     tables = {name: own for name, own in resolved(scene).items() if name not in _OF_THE_TRAIN}
+    if _OF_THE_REST in tables.get("irregularities", {}):
+        tables["irregularities"] = {**tables["irregularities"], _OF_THE_REST: "some"}
     return json.dumps(tables, sort_keys=True)
 
 
 class _Line:
-    """A line that scenes share, at rest, and the head of their results.
+    """A line that scenes share, and the head of their results.
+
+    Attributes
+    ----------
+    shared : SharedLine, None if its scenes march by themselves
 
     Parameters
     ----------
     scene, problem : of one of the scenes
-    range_of_run : what contact wires their trains touch [m]
+    range_of_run : what contact wires their trains touch [m], None if they march by themselves
     """
 
     def __init__(
         self, scene: Scene, problem: Problem, range_of_run: tuple[float, float] | None
     ) -> None:
-        at_rest = line_at_rest(problem, mesh_of(scene))
-        refuse_lost_wire(at_rest.model, at_rest.form)
-        self.at_rest = at_rest
-        head, mesh = header_of(scene, problem, at_rest, ()), at_rest.mesh
-        points, lateral = mesh.points.copy(), at_rest.form.lateral
-        points[:, 2] = at_rest.form.height
-        if lateral is not None:
-            points[:, 1] = lateral.y
-        places = {
-            "line/arm_x": mesh.x(mesh.steady_arms),
-            "line/dropper_x": mesh.x(mesh.droppers[:, 1]),
-            "line/node_points": points,
-        }
-        self._header = replace(head, datasets={**head.datasets, **places})
+        self._mesh = mesh_of(scene)
+        self._errors = problem.irregularities.lengths
+        self._sound = None if self._errors is None else sound_form(problem, self._mesh)
+        self._rest: LineAtRest | None = None
+        at_rest = self.rest_of(problem)
+        self._header = header_of(scene, problem, at_rest, ())
+        # Errors of length are known without the lengths that are wrong.
+        lengths = self._header.datasets["static/dropper_length"]
+        self._cut = lengths - errors_of_length(problem, at_rest.model)
         self._range = range_of_run
         self.shared: SharedLine | None = None
         if range_of_run is not None:
@@ -165,33 +186,61 @@ class _Line:
             return not together
         return self._range[0] <= begin and end <= self._range[1]
 
+    def moves_alike(self, at_rest: LineAtRest) -> bool:
+        """Whether a line at rest has the matrices of the shared one."""
+        assert self.shared is not None
+        return at_rest.model is self.shared.at_rest.model or self.shared.takes(at_rest)
+
     def destroy(self) -> None:
         """Free all PETSc objects."""
         if self.shared is not None:
             self.shared.destroy()
 
-    def header(self, scene: Scene, problem: Problem) -> Header:
+    def rest_of(self, problem: Problem) -> LineAtRest:
+        """The line at rest in a scene.
+
+        Raises
+        ------
+        InputError
+            If there is none.
+        """
+        if self._rest is None or problem.irregularities.lengths != self._errors:
+            at_rest = line_at_rest(problem, self._mesh, self._sound)
+            refuse_lost_wire(at_rest.model, at_rest.form)
+            self._errors, self._rest = problem.irregularities.lengths, at_rest
+        hung = self._rest.problem
+        return self._rest._replace(problem=replace(hung, **_of_train(problem)))
+
+    def header(self, scene: Scene, at_rest: LineAtRest) -> Header:
         """The head of a scene's results."""
-        words = header_words(scene, problem)
+        problem, mesh, form = problem_of(scene), at_rest.mesh, at_rest.form
+        points = mesh.points.copy()
+        points[:, 2] = form.height
+        if form.lateral is not None:
+            points[:, 1] = form.lateral.y
         of_scene = {
             "case": scene.case.name,
             "title": scene.case.title,
             "system": scene.evaluation.system,
             "edition": scene.evaluation.edition,
-            "pantographs": words,
+            "pantographs": header_words(scene, problem),
             "arrivals": arrival_facts(scene, problem),
+            "defects": defect_facts(scene, problem),
             "config": {},
         }
-        range_path = "line/evaluation_range"
+        lengths = self._cut + errors_of_length(problem, at_rest.model)
+        own = {
+            "line/evaluation_range": np.array(problem.evaluation),
+            "line/arm_x": mesh.x(mesh.steady_arms),
+            "line/dropper_x": mesh.x(mesh.droppers[:, 1]),
+            "line/node_points": points,
+            **static_datasets(problem.line, mesh, form, at_rest.lift, lengths),
+        }
         return Header(
             {**self._header.attributes, **of_scene},
-            {**self._header.datasets, range_path: np.array(problem.evaluation)},
-            facts_of(problem, self.at_rest.mesh, self.at_rest.model.dropper_lengths),
+            {**self._header.datasets, **own},
+            facts_of(problem, mesh, at_rest.model.dropper_lengths),
         )
-
-    def rest_of(self, problem: Problem) -> LineAtRest:
-        """The line at rest for a march of a scene by itself."""
-        return self.at_rest._replace(problem=replace(self.at_rest.problem, **_of_train(problem)))
 
 
 def _of_train(problem: Problem) -> dict[str, Any]:
@@ -207,7 +256,7 @@ def _begin_of(problem: Problem) -> float:
 
 def _tables(history: SceneHistory) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
     """Tables and extremes of a march side by side."""
-    dt = history.problem.numerics.dt
+    dt = history.at_rest.problem.numerics.dt
     tables = {
         "time": np.arange(history.n_steps + 1) * dt,
         "channels/contact_position": history.position,
@@ -221,9 +270,9 @@ def _tables(history: SceneHistory) -> tuple[dict[str, np.ndarray], dict[str, np.
 
 def _alone(line: _Line, number: int, scene: Scene, problem: Problem) -> Marched:
     """March a scene by itself."""
-    rest = line.rest_of(problem)
     keeper, dt = Keeper(), problem.numerics.dt
     try:
+        rest = line.rest_of(problem)
         with March(alone(), *rest) as march:
             watch = RunWatch(alone(), watched(rest, True), watch_cadence(dt))
             outcome = march.run([watch, keeper])
@@ -231,7 +280,7 @@ def _alone(line: _Line, number: int, scene: Scene, problem: Problem) -> Marched:
         return Marched(number, str(error), {})
     if outcome.outcome != DONE:
         return Marched(number, outcome.outcome, {})
-    head = line.header(scene, problem)
+    head = line.header(scene, rest)
     head = replace(head, attributes={**head.attributes, "watched": watch.facts()})
     summary = _summary(head, keeper.tables(), keeper.extremes(), outcome.outcome)
     return Marched(number, outcome.outcome, summary)

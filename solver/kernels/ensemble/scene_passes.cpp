@@ -32,10 +32,10 @@ Scenes& at(double* numbers) {
     return *reinterpret_cast<Scenes*>(numbers);
 }
 
-/// Fill in the reserve of each link from `begin` to `end` in all scenes.
+/// Fill in the reserve of each link from `begin` to `end` in all scenes, from those at rest.
 CATENARY_FOR_TARGETS
-void find_reserves(const Motion& motion, const Links& links, int64_t begin, int64_t end,
-                   double* result) {
+void find_reserves(const Motion& motion, const Links& links, const double* rest, int64_t begin,
+                   int64_t end, double* result) {
     const double *x = motion.x.data(), *y = motion.y.data(), *z = motion.z.data();
     const double *s = motion.shares.data(), *weight = links.weights.data;
     const int64_t* unknown = links.unknowns.data;
@@ -50,8 +50,8 @@ void find_reserves(const Motion& motion, const Links& links, int64_t begin, int6
         }
         const Reserve& law = links.law[link];
         const Scenes stretch = s[0] * of_x + s[1] * of_y + s[2] * of_z;
-        at(result + kScenes * link) =
-            law.rest + law.stiffness * stretch + law.damping * (s[3] * of_y + s[4] * of_z);
+        at(result + kScenes * link) = at(rest + kScenes * link) + law.stiffness * stretch +
+                                      law.damping * (s[3] * of_y + s[4] * of_z);
     }
 }
 
@@ -106,9 +106,12 @@ ScenePasses::ScenePasses(PassParts parts) : parts_(std::move(parts)), line_(line
     line_.set_runs(work_, size(parts_.factors.kinds), parts_.factors.low);
 }
 
-void ScenePasses::track(const TrackedLinks& tracked, std::vector<std::span<double>> reserves) {
-    if (reserves.size() != kScenes) throw std::invalid_argument("a scene has no reserves");
+void ScenePasses::track(const TrackedLinks& tracked, Array2<const double> rest,
+                        std::vector<std::span<double>> reserves) {
+    if (reserves.size() != kScenes || rest.columns != kScenes)
+        throw std::invalid_argument("a scene has no reserves");
     tracked_ = tracked;
+    rest_ = rest;
     reserves_ = std::move(reserves);
     found_.assign(tracked.links.law.size() * kScenes, 0.0);
 }
@@ -125,7 +128,8 @@ void ScenePasses::after_stretch() {
 }
 
 void ScenePasses::find_reserves(int64_t begin, int64_t end) {
-    catenary::find_reserves(parts_.arrays.motion, tracked_.links, begin, end, found_.data());
+    catenary::find_reserves(parts_.arrays.motion, tracked_.links, rest_.data, begin, end,
+                            found_.data());
     for (int64_t link = begin; link < end; ++link)
         for (int s = 0; s < kScenes; ++s) reserves_[s][link] = found_[kScenes * link + s];
 }
@@ -138,7 +142,7 @@ void ScenePasses::take(const LineExtremes& extremes, const std::array<bool, kSce
     take_uplift(motion, extremes.arms, none, extremes.uplift.data);
     const int64_t n = size(extremes.droppers.law);
     found_.resize(std::max<size_t>(found_.size(), n * kScenes));
-    catenary::find_reserves(motion, extremes.droppers, 0, n, found_.data());
+    catenary::find_reserves(motion, extremes.droppers, extremes.rest.data, 0, n, found_.data());
     take_forces(extremes.droppers.law, found_.data(), none, extremes.least.data,
                 extremes.largest.data);
 }

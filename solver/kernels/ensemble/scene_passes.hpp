@@ -13,9 +13,10 @@ namespace catenary {
 struct LineExtremes {
     std::span<const int64_t> arms;  ///< unknowns of vertical displacement at steady arms
     Links droppers;
+    Array2<const double> rest;      ///< (n_droppers, kScenes) their reserves at rest [N]
     Array2<double> uplift;          ///< (n_arms, kScenes) largest displacement [m]
     Array2<double> least, largest;  ///< (n_droppers, kScenes) forces [N]
-    CATENARY_RECORD(arms, droppers, uplift, least, largest)
+    CATENARY_RECORD(arms, droppers, rest, uplift, least, largest)
 };
 
 class ScenePasses : private Around {
@@ -24,8 +25,10 @@ class ScenePasses : private Around {
     /// compiled for a layout, or the method is not Newmark's.
     explicit ScenePasses(PassParts parts);
 
-    /// Fill the reserves (n,) of links in each scene in a free step; `tracked` as for one scene.
-    void track(const TrackedLinks& tracked, std::vector<std::span<double>> reserves);
+    /// Fill the reserves (n,) of links in each scene in a free step; `tracked` as for one scene,
+    /// but that links have other reserves at rest (n, kScenes) [N].
+    void track(const TrackedLinks& tracked, Array2<const double> rest,
+               std::vector<std::span<double>> reserves);
     void step();
     /// Take the present motion into extremes, of the scenes that `moves` says.
     void take(const LineExtremes& extremes, const std::array<bool, kScenes>& moves);
@@ -41,6 +44,7 @@ class ScenePasses : private Around {
     Line line_;
     Work work_;
     TrackedLinks tracked_{};
+    Array2<const double> rest_{};
     std::vector<std::span<double>> reserves_;
     std::vector<double> found_;  ///< room for reserves in all scenes
     int64_t n_followed_ = 0;

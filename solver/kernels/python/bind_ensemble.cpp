@@ -29,9 +29,10 @@ class HeldEnsemble {
         : passes_(parts_of(rows, factors, parts, kept_)),
           own_(passes_, From<LineExtremes>::convert(extremes, "extremes", kept_)) {}
 
-    void track(const py::object& tracked, const py::object& reserves) {
+    void track(const py::object& tracked, const py::object& rest, const py::object& reserves) {
         Kept kept;
         passes_.track(From<TrackedLinks>::convert(tracked, "links", kept),
+                      From<Array2<const double>>::convert(rest, "rest", kept),
                       From<std::vector<std::span<double>>>::convert(reserves, "reserves", kept));
         of_links_ = std::move(kept);
     }

@@ -46,11 +46,17 @@ _MAX_PASSES = 30
 _FORCE_TOLERANCE = 2e-11
 
 
-def find_form(problem: Problem, mesh: LineMesh) -> tuple[Model, Equilibrium]:
+def find_form(
+    problem: Problem, mesh: LineMesh, sound: tuple[Model, Equilibrium] | None = None
+) -> tuple[Model, Equilibrium]:
     """The model of a line and its equilibrium under its own weight. Not collective.
 
     Droppers are cut for the sound line, or for irregular heights of the contact wire; with all that
     is wrong besides the line then hangs on them. ``problem`` of the model has the wires that hang.
+
+    Parameters
+    ----------
+    sound : what ``sound_form`` gave for a problem that differs in errors of length alone
 
     Raises
     ------
@@ -58,13 +64,18 @@ def find_form(problem: Problem, mesh: LineMesh) -> tuple[Model, Equilibrium]:
         If a dropper of the sound line would be slack at rest or would have no length, or if lengths
         do not settle.
     """
-    befallen = effects.after_cutting(problem)
-    if not befallen:
+    if not effects.after_cutting(problem):
         return about(*_cut(problem, mesh))
+    return hang(effects.with_defects(problem), *(sound or sound_form(problem, mesh)))
+
+
+def sound_form(problem: Problem, mesh: LineMesh) -> tuple[Model, Equilibrium]:
+    """The line for which droppers are cut, before it hangs on them with all that is wrong. Not
+    collective; raises as ``find_form``."""
     sound = _cut(effects.as_cut(problem), mesh)
     if _cut_for(problem):
         sound = _cut(_as_installed(problem), mesh, pushing=True)
-    return hang(effects.with_defects(problem), *about(*sound))
+    return about(*sound)
 
 
 def lengths_to_cut(problem: Problem, mesh: LineMesh) -> np.ndarray:
