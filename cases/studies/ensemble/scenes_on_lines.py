@@ -20,6 +20,7 @@ from catenary.cases.run.describe.arrivals import arrival_facts
 from catenary.cases.run.describe.defects import defect_facts
 from catenary.cases.run.describe.pantographs import header_words
 from catenary.cases.run.header import header_of
+from catenary.cases.run.planning.plan import effect_rows
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.problem import problem_of, resolved
 from catenary.cases.scene.scene import Scene
@@ -218,6 +219,7 @@ class _Line:
         points[:, 2] = form.height
         if form.lateral is not None:
             points[:, 1] = form.lateral.y
+        on, off = effect_rows(scene, problem)
         of_scene = {
             "case": scene.case.name,
             "title": scene.case.title,
@@ -227,6 +229,8 @@ class _Line:
             "arrivals": arrival_facts(scene, problem),
             "defects": defect_facts(scene, problem),
             "config": {},
+            "effects_on": [tuple(row) for row in on],
+            "effects_off": [tuple(row) for row in off],
         }
         lengths = self._cut + errors_of_length(problem, at_rest.model)
         own = {

@@ -1,0 +1,159 @@
+"""Scenes that share a line march side by side, and give what their own runs give.
+
+A lane takes the sums of a scene's own kernels in another order, which round-off tells apart:
+1e-10 N of forces of some hundred. Summaries are compared within 1e-8.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import pytest
+
+import catenary
+from catenary.cases.scene.input.toml_input import REMOVED
+from catenary.cases.scene.load import read_draft
+from catenary.cases.scene.scene import Scene
+from catenary.cases.studies.ensemble.scenes_on_lines import Marched, Marches
+from catenary.postproc.files.disk import plain
+from catenary.solver.ensemble.shared_line import N_LANES
+from catenary.solver.kernels import native
+
+# What an own run times and counts, and a watch of its energies, which lanes do without.
+LEFT_OUT = {
+    "march_wall_s", "march_cpu_s", "phase_wall_s", "records_wall_s", "inner_iterations",
+    "real_time_factor", "real_time_factor_with_records", "watched",
+}  # fmt: skip
+
+
+def scenes_of(case: str, changes: Sequence[Mapping[str, Any]]) -> list[Scene]:
+    draft = read_draft(case).shortened()
+    return [
+        draft.assigned([(key, value, "") for key, value in own.items()]).scene() for own in changes
+    ]
+
+
+def marched(scenes: Sequence[Scene]) -> tuple[list[Marched], bool]:
+    """How scenes ended, and whether they marched side by side."""
+    marches = Marches()
+    try:
+        found = sorted(marches.of(scenes))
+        line = marches._line
+        return found, line is not None and line.shared is not None
+    finally:
+        marches.destroy()
+
+
+def own_run(case: str, change: Mapping[str, Any]) -> dict[str, Any]:
+    tables: dict[str, Any] = {}
+    for key, value in change.items():
+        *path, name = key.split(".")
+        here = tables
+        for part in path:
+            here = here.setdefault(part, {})
+        here[name] = value
+    return catenary.run(catenary.load(case, short=True).replace(**tables)).summary
+
+
+def differences(one: Any, other: Any, path: str = "") -> list[str]:
+    if isinstance(one, dict) and isinstance(other, dict):
+        names = (set(one) | set(other)) - LEFT_OUT
+        return [
+            text
+            for name in sorted(names)
+            for text in differences(one.get(name), other.get(name), f"{path}/{name}")
+        ]
+    if isinstance(one, list) and isinstance(other, list) and len(one) == len(other):
+        pairs = enumerate(zip(one, other, strict=True))
+        return [t for i, (a, b) in pairs for t in differences(a, b, f"{path}/{i}")]
+    if isinstance(one, float) and isinstance(other, float):
+        return [] if abs(one - other) < 1e-8 else [f"{path}: {one} {other}"]
+    return [] if one == other else [f"{path}: {one!r} {other!r}"]
+
+
+# A line of each kind of stations, and trains of one and of two pantographs.
+@pytest.mark.parametrize(
+    "case", ["en50318_2002", "re330_stitched", "overlap", "dc_twin", "shinkansen_compound"]
+)
+def test_scenes_side_by_side_give_what_their_own_runs_give(case: str) -> None:
+    speed = read_draft(case).shortened().scene().train.speed_km_h
+    changes = [{"train.speed_km_h": share * speed} for share in (1.0, 0.98, 0.96)]
+    found, together = marched(scenes_of(case, changes))
+    assert together and [one.outcome for one in found] == ["done"] * 3
+    assert differences(plain(found[1].summary), own_run(case, changes[1])) == []
+
+
+def test_lanes_are_filled_again_with_trains_of_other_lengths() -> None:
+    """More scenes than lanes, of which some end sooner, with one and two pantographs."""
+    pair = [{"name": "moving_frame"}, {"name": "moving_frame", "behind_m": 60.0}]
+    name = read_draft("en50318_2002").scene().train.pantographs[0].name
+    pair = [{**place, "name": name} for place in pair]
+    changes: list[dict[str, Any]] = [{"train.speed_km_h": 200.0 + 10.0 * k} for k in range(6)]
+    changes.insert(2, {"train.speed_km_h": 250.0, "train.pantographs": pair})
+    assert len(changes) > N_LANES
+    found, together = marched(scenes_of("en50318_2002", changes))
+    assert together
+    for number in (2, 6):
+        assert (
+            differences(plain(found[number].summary), own_run("en50318_2002", changes[number]))
+            == []
+        )
+
+
+def test_lines_with_other_errors_of_dropper_lengths_share_matrices() -> None:
+    key = "irregularities.dropper_lengths"
+    changes = [
+        {f"{key}.standard_deviation_mm": 2.0, f"{key}.seed": seed, "train.speed_km_h": 240.0 + seed}
+        for seed in range(1, 6)
+    ]
+    found, together = marched(scenes_of("en50318_2002", changes))
+    assert together
+    deviations = [one.summary["pantographs"][0]["std_N"] for one in found]
+    assert len(set(deviations)) == len(changes)
+    for number in (0, 4):
+        assert (
+            differences(plain(found[number].summary), own_run("en50318_2002", changes[number]))
+            == []
+        )
+
+
+def test_scenes_with_loads_march_one_by_one() -> None:
+    speed = read_draft("windy_viaduct").shortened().scene().train.speed_km_h
+    changes = [{"train.speed_km_h": speed}, {"train.speed_km_h": 0.98 * speed}]
+    found, together = marched(scenes_of("windy_viaduct", changes))
+    assert not together
+    assert differences(plain(found[1].summary), own_run("windy_viaduct", changes[1])) == []
+
+
+def test_where_no_kernels_take_several_scenes_they_march_one_by_one() -> None:
+    changes = [{"train.speed_km_h": 240.0}, {"train.speed_km_h": 250.0}]
+    best = native.targets()[-1]
+    if best == "baseline":
+        pytest.skip("this processor has no other kernels")
+    together, was = marched(scenes_of("en50318_2002", changes))
+    native.set_target("baseline")
+    try:
+        alone, is_now = marched(scenes_of("en50318_2002", changes))
+    finally:
+        native.set_target(best)
+    assert was and not is_now
+    for one, other in zip(together, alone, strict=True):
+        assert differences(plain(one.summary), plain(other.summary)) == []
+
+
+def test_a_scene_that_breaks_stops_no_other() -> None:
+    """A kinematic contact breaks where its force would pull: its own march tells why, and those in
+    other lanes go on."""
+    damped = {"numerics.newmark_gamma": 0.55, "numerics.newmark_beta": 0.28}
+    kinematic = {"contact.law": "kinematic", "contact.stiffness_N_per_m": REMOVED}
+    changes: list[dict[str, Any]] = [
+        {**damped, "train.speed_km_h": 240.0},
+        {**damped, **kinematic, "train.speed_km_h": 330.0},
+        {**damped, "train.speed_km_h": 250.0},
+    ]
+    found, together = marched(scenes_of("en50318_2002", changes))
+    assert together
+    assert [one.outcome == "done" for one in found] == [True, False, True]
+    assert "would have to pull" in found[1].outcome
+    assert differences(plain(found[2].summary), own_run("en50318_2002", changes[2])) == []
