@@ -9,9 +9,8 @@ import numpy as np
 CONFIDENCE = 0.95
 QUANTILES = (0.01, 0.05, 0.5, 0.95, 0.99)
 _RESAMPLES = 2000
-# Up to so many samples bounds are corrected for bias and skewness, which needs n^2 numbers.
-_MOST_CORRECTED = 1000
-_BATCH_NUMBERS = 5_000_000
+# Resamples of fewer values are too few different ones; of more they need n^2 numbers.
+_FEWEST_RESAMPLED, _MOST_RESAMPLED = 10, 1000
 
 
 class Bounded(NamedTuple):
@@ -22,8 +21,8 @@ class Bounded(NamedTuple):
     high: float
 
 
-def moments(x: np.ndarray) -> tuple[Bounded, Bounded]:
-    """Mean and standard deviation (n - 1) with bootstrap bounds (Efron and Tibshirani 1993).
+def mean(x: np.ndarray) -> Bounded:
+    """Mean with the bounds of Student's distribution.
 
     Parameters
     ----------
@@ -31,23 +30,42 @@ def moments(x: np.ndarray) -> tuple[Bounded, Bounded]:
     """
     from scipy import stats
 
-    values = float(np.mean(x)), float(np.std(x, ddof=1))
+    n, value = len(x), float(np.mean(x))
+    half = float(stats.t.ppf(0.5 + 0.5 * CONFIDENCE, n - 1)) * float(np.std(x, ddof=1)) / np.sqrt(n)
+    return Bounded(value, value - half, value + half)
+
+
+def deviation(x: np.ndarray) -> Bounded:
+    """Standard deviation s with n - 1 degrees of freedom, and its bounds.
+
+    Up to ``_MOST_RESAMPLED`` values by the bootstrap, corrected for bias and skewness (BCa, Efron
+    1987); of more by the normal limit, var(s) = s^2 (kurtosis - 1)/(4 n) (Cramer 1946, sec. 27.7).
+    Below ``_FEWEST_RESAMPLED`` there are none.
+
+    Parameters
+    ----------
+    x : independent values, shape (n,), n >= 2
+    """
+    from scipy import stats
+
+    n, value = len(x), float(np.std(x, ddof=1))
     if np.ptp(x) == 0.0:
-        return Bounded(values[0], *[values[0]] * 2), Bounded(0.0, 0.0, 0.0)
-    mean_bounds = stats.t.interval(CONFIDENCE, len(x) - 1, values[0], values[1] / np.sqrt(len(x)))
-    if len(x) < 10:  # resamples of so few are too few different ones
-        return Bounded(values[0], *map(float, mean_bounds)), Bounded(values[1], np.nan, np.nan)
+        return Bounded(0.0, 0.0, 0.0)
+    if n < _FEWEST_RESAMPLED:
+        return Bounded(value, np.nan, np.nan)
+    if n > _MOST_RESAMPLED:
+        error = value * np.sqrt((stats.kurtosis(x, fisher=False) - 1.0) / (4.0 * n))
+        half = float(stats.norm.ppf(0.5 + 0.5 * CONFIDENCE) * error)
+        return Bounded(value, value - half, value + half)
     found = stats.bootstrap(
         (x,),
         lambda sample, axis: np.std(sample, ddof=1, axis=axis),
         n_resamples=_RESAMPLES,
-        batch=max(1, _BATCH_NUMBERS // len(x)),
         confidence_level=CONFIDENCE,
-        method="BCa" if len(x) <= _MOST_CORRECTED else "percentile",
+        method="BCa",
         random_state=np.random.default_rng(1),
     ).confidence_interval
-    mean = Bounded(values[0], *map(float, mean_bounds))
-    return mean, Bounded(values[1], float(found.low), float(found.high))
+    return Bounded(value, float(found.low), float(found.high))
 
 
 def quantile(x: np.ndarray, probability: float) -> Bounded:

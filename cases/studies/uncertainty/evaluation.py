@@ -11,7 +11,8 @@ from catenary.cases.studies.sampling.samples import sample_name
 from catenary.cases.studies.sampling.tables import SALTELLI, SamplingTable
 from catenary.cases.studies.uncertainty.estimates import (
     QUANTILES,
-    moments,
+    deviation,
+    mean,
     named,
     quantile,
     share,
@@ -69,9 +70,8 @@ def evaluate(table: RunTable) -> Uncertainty:
             if len(x) < 2:
                 continue
             here = {"statistic": name, "pantograph": pantograph, "n": len(x)}
-            mean, deviation = moments(x)
             ends = {"minimum": float(x.min()), "maximum": float(x.max())}
-            estimated = named("mean", mean) | named("standard_deviation", deviation) | ends
+            estimated = named("mean", mean(x)) | named("standard_deviation", deviation(x)) | ends
             statistics.append({**here, **estimated})
             quantiles += [
                 {**here, "probability": p, **named("value", quantile(x, p))} for p in QUANTILES

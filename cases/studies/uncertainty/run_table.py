@@ -126,7 +126,9 @@ def read_run_table(path: Path) -> RunTable:
         if file.suffix == ".parquet":
             frame = pd.read_parquet(file)
         else:
-            frame = pd.read_csv(file, keep_default_na=False, na_values=[""])
+            frame = pd.read_csv(
+                file, keep_default_na=False, na_values=[""], float_precision="round_trip"
+            )
     except InputError:
         raise
     except ImportError as error:
@@ -172,5 +174,5 @@ def _file_of(path: Path) -> Path:
 def _words(cell: Any) -> list[str]:
     """The words of a cell, as a list of Python or Arrow, or as CSV joins them."""
     if isinstance(cell, str):
-        return cell.split(_JOINT)
+        return cell.split(_JOINT) if cell else []
     return [str(one) for one in cell] if hasattr(cell, "__len__") else []

@@ -23,6 +23,8 @@ _SEED = 1  # of resamples
 # Fewer runs leave no harmonics to tell from noise, in half of which bounds are estimated.
 _FEWEST, _MANY = 100, 500
 _HARMONICS = 4, 10
+# Resamples for bounds, of up to _MOST runs and of more: those have small bounds, at a greater cost.
+_RESAMPLES, _MOST = (100, 25), 5000
 
 
 def indices(table: RunTable) -> tuple[str, list[dict[str, Any]], list[str]]:
@@ -131,9 +133,14 @@ def _given_data(table: RunTable) -> tuple[list[dict[str, Any]], list[str]]:
             before = np.random.get_state()
             try:
                 found = rbd_fast.analyze(
-                    problem_of(keys), x, y, M=_HARMONICS[len(y) >= _MANY], seed=_SEED,
+                    problem_of(keys),
+                    x,
+                    y,
+                    M=_HARMONICS[len(y) >= _MANY],
+                    num_resamples=_RESAMPLES[len(y) > _MOST],
                     conf_level=CONFIDENCE,
-                )  # fmt: skip
+                    seed=_SEED,
+                )
             finally:
                 np.random.set_state(before)
             ranks = known[keys].rank().corrwith(known[statistic].rank())

@@ -1,0 +1,228 @@
+"""Tables of runs: read from files, what counts as an input and as judged, pictures, merging."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from catenary.base.errors import InputError
+from catenary.cases.studies import merged_sweeps
+from catenary.cases.studies.sampling.tables import sampling_of
+from catenary.cases.studies.sweep.jobs import Ended
+from catenary.cases.studies.sweep.output import table_of, write
+from catenary.cases.studies.sweep.variants import Variant
+from catenary.cases.studies.uncertainty import output, pictures
+from catenary.cases.studies.uncertainty.evaluation import evaluate, failing
+from catenary.cases.studies.uncertainty.run_table import (
+    SAMPLING,
+    read_run_table,
+    run_table,
+    sampling_text,
+)
+
+SPEED = "train.speed_km_h"
+SAMPLE = {"n": 30, "keys": {SPEED: {"type": "normal", "standard_deviation": 5.0}}}
+CRITERIA = ("maximum contact force", "arcing NQ")
+
+
+def ended(number: int, speed: float = 250.0, failed: tuple[str, ...] = ()) -> Ended:
+    """A run of two pantographs as a sweep keeps it."""
+    name = f"sample_{number:06d}"
+    summary = {
+        "pantographs": [
+            {"name": who, "mean_N": 120.0 + number / 3, "std_N": 0.1 * speed + shift}
+            for who, shift in (("first", 0.0), ("second", 5.0))
+        ],
+        "supports": {"max_uplift_mm": 50.0 + number / 7},
+        "droppers": {"n_slackened": number},
+        "acceptance": [
+            *({"criterion": one, "passed": one not in failed} for one in CRITERIA),
+            {"criterion": "uplift", "passed": None},
+        ],
+        "passed": not failed,
+        "remarks": ["a remark"] if number % 2 else [],
+    }
+    assignments = (f"{SPEED}={speed!r}",)
+    return Ended(Variant(name, assignments, {SPEED: repr(speed)}), "done", summary, wall=1.5)
+
+
+def some(numbers: range) -> list[Ended]:
+    rng = np.random.default_rng(1)
+    speeds = rng.normal(250.0, 5.0, 100)
+    return [ended(i, float(speeds[i]), ("arcing NQ",) if i % 10 == 0 else ()) for i in numbers]
+
+
+def folder(path: Path, runs: list[Ended], sample: dict[str, Any] | None = None) -> Path:
+    write(path, "a_case", runs, None)
+    if sample is not None:
+        (path / SAMPLING).write_text(sampling_text(sampling_of(sample, "s.toml")))
+    return path
+
+
+def test_files_of_all_kinds_give_the_same_table(tmp_path: Path) -> None:
+    pytest.importorskip("pyarrow")
+    runs = some(range(1, 31))
+    out = folder(tmp_path / "out", runs, SAMPLE)
+    rows = run_table(table_of(runs).records(), sampling_of(SAMPLE, "s.toml"))
+    first = evaluate(rows)
+    for path in (out, out / "sweep.csv", out / "sweep.parquet"):
+        found = read_run_table(path)
+        assert found.sampling == rows.sampling
+        assert found.inputs == (SPEED,)
+        # Not within a tolerance: all digits are kept.
+        assert evaluate(found) == first
+    parquet = pd.read_parquet(out / "sweep.parquet")
+    assert parquet["std_N"].tolist() == [row["std_N"] for row in table_of(runs).rows]
+    assert parquet["judged"].map(list).tolist() == [list(CRITERIA)] * 60
+
+
+def test_statistics_are_of_a_pantograph_or_of_the_line() -> None:
+    found = evaluate(run_table(table_of(some(range(1, 31))).records()))
+    n = {(row["statistic"], row["pantograph"]): row["n"] for row in found.statistics}
+    assert n[("std_N", "first")] == n[("std_N", "second")] == n[("max_uplift_mm", "")] == 30
+    mean = {(row["statistic"], row["pantograph"]): row["mean"] for row in found.statistics}
+    assert mean[("std_N", "second")] - mean[("std_N", "first")] == pytest.approx(5.0)
+    assert found.remarks == [{"remark": "a remark", "n": 15}]
+
+
+def test_probabilities_count_runs_that_were_judged() -> None:
+    rows = failing(run_table(table_of(some(range(1, 31))).records()))
+    found = {row["criterion"]: (row["failed"], row["n"]) for row in rows}
+    # Every tenth run failed; the uplift was judged in none.
+    assert found == {"maximum contact force": (0, 30), "arcing NQ": (3, 30), "any of them": (3, 30)}
+
+
+def test_a_table_without_judged_criteria_takes_them_from_its_verdicts() -> None:
+    table = pd.DataFrame(
+        {
+            "variant": ["a", "b", "c", "d"],
+            "outcome": ["done", "done", "done", "broke"],
+            "passed": [True, False, None, None],
+            "failed": ["", "x; y", "", ""],
+        }
+    )
+    found = {row["criterion"]: (row["failed"], row["n"]) for row in failing(run_table(table))}
+    assert found == {"x": (1, 2), "y": (1, 2), "any of them": (1, 2)}
+
+
+def test_a_table_without_any_run_that_ended_is_evaluated_too() -> None:
+    found = evaluate(run_table([{"variant": "a", SPEED: 1.0, "outcome": "broke", "std_N": None}]))
+    assert (found.n_runs, found.n_done) == (1, 0)
+    assert not found.statistics and not found.probabilities and not found.sensitivity
+    assert "1 run of 1 did not end" in output.as_text(found)
+
+
+@pytest.mark.parametrize("sample", [None, SAMPLE])
+def test_pictures_show_their_runs(sample: dict[str, Any] | None) -> None:
+    sampling = None if sample is None else sampling_of(sample, "s.toml")
+    table = run_table(table_of(some(range(1, 31))).records(), sampling)
+    scatter = pictures.scatter(table)
+    assert scatter is not None
+    std = next(axes for axes in scatter.axes if "standard" in axes.get_ylabel())
+    assert [len(line.get_xdata()) for line in std.lines] == [30, 30]
+    assert std.lines[0].get_xdata() == pytest.approx(table.of("std_N")["first"][SPEED])
+    parallel = pictures.parallel_coordinates(table, ["std_N"])
+    assert parallel is not None
+    (lines,) = parallel.axes[0].collections
+    assert len(lines.get_segments()) == 30
+    convergence = pictures.convergence(table, ["std_N"])
+    assert convergence is not None
+    mean = convergence.axes[0].lines[0]
+    assert mean.get_ydata()[-1] == pytest.approx(table.of("std_N")["first"]["std_N"].mean())
+    histogram = pictures.histograms(table, ["std_N"])
+    assert histogram is not None
+    assert sum(bar.get_height() for bar in histogram.axes[0].patches) == 60
+
+
+def test_what_is_no_table_of_runs_is_one_sentence(tmp_path: Path) -> None:
+    (tmp_path / "empty.csv").write_text("")
+    (tmp_path / "other.csv").write_text("x,y\n1,2\n")
+    (tmp_path / "wrong.parquet").write_text("x,y\n1,2\n")
+    (tmp_path / "notes.txt").write_text("x")
+    for name, sentence in (
+        ("empty.csv", "cannot be read as a table of runs"),
+        ("other.csv", "is no table of runs: it needs a column variant"),
+        ("wrong.parquet", "cannot be read as a table of runs|needs the package pyarrow"),
+        ("notes.txt", "must end in .csv or .parquet"),
+        ("nowhere", "is neither a folder of a sweep nor a table"),
+        (".", "holds no table of a sweep"),
+    ):
+        with pytest.raises(InputError, match=sentence) as error:
+            read_run_table(tmp_path / name)
+        assert "\n" not in str(error.value)
+    out = folder(tmp_path / "out", some(range(1, 4)))
+    (out / SAMPLING).write_text("{")
+    with pytest.raises(InputError, match="is damaged"):
+        read_run_table(out)
+    with pytest.raises(InputError, match="has no column x, which its sampling varies"):
+        keys = {"x": {"type": "seed"}}
+        table = sampling_of({"n": 2, "keys": {SPEED: {"type": "seed"}}}, "s")
+        run_table(read_run_table(folder(tmp_path / "b", some(range(1, 4)))).frame,
+                  table.model_copy(update={"keys": keys}))  # fmt: skip
+
+
+def merged(*folders: Path) -> dict[str, Any]:
+    record, _ = merged_sweeps.merge(folders)
+    return record
+
+
+def test_disjoint_and_common_samples_merge_into_the_table_of_all(tmp_path: Path) -> None:
+    runs = some(range(1, 31))
+    whole = folder(tmp_path / "whole", runs, SAMPLE)
+    odd = folder(tmp_path / "odd", runs[::2], SAMPLE)
+    rest = folder(tmp_path / "rest", [runs[0], *runs[1::2]], SAMPLE)
+    record = merged(rest, odd)
+    assert record["rows"] == json.loads((whole / "sweep.json").read_text())["rows"]
+    assert len(record["variants"]) == 30
+    files, found = merged_sweeps.write(tmp_path / "all", *merged_sweeps.merge([odd, rest]))
+    assert found == evaluate(read_run_table(whole))
+    assert (tmp_path / "all" / "sweep.csv").read_text() == (whole / "sweep.csv").read_text()
+    assert {path.name for path in files} >= {"sweep.csv", "sweep.json", "uncertainty.json"}
+    # The merged folder is a sweep's folder again.
+    assert merged(tmp_path / "all", odd)["rows"] == record["rows"]
+
+
+def test_a_run_that_ended_elsewhere_stands_for_one_that_broke(tmp_path: Path) -> None:
+    broke = Ended(ended(1).variant, "no room on the disk")
+    for order in ((broke, ended(1)), (ended(1), broke)):
+        names = [tmp_path / f"{order[0].done}_{i}" for i in (0, 1)]
+        for name, one in zip(names, order, strict=True):
+            folder(name, [one, ended(2)])
+        assert [row["outcome"] for row in merged(*names)["rows"]] == ["done"] * 4
+
+
+def test_sweeps_that_contradict_each_other_are_refused(tmp_path: Path) -> None:
+    runs = some(range(1, 5))
+    first = folder(tmp_path / "first", runs, SAMPLE)
+    summary = dict(ended(1).summary, droppers={"n_slackened": 99})
+    other_figures = Ended(runs[0].variant, "done", summary)
+    other_values = Ended(Variant(runs[0].variant.name, (f"{SPEED}=1.0",), {SPEED: "1.0"}), "done",
+                         runs[0].summary)  # fmt: skip
+    other_key = Ended(Variant("sample_000009", ("x.y=1.0",), {"x.y": "1.0"}), "done")
+    longer = {**SAMPLE, "n": 40}
+    for name, one, sample, sentence in (
+        ("a", other_figures, SAMPLE, "variant sample_000001 has other figures"),
+        ("b", other_values, SAMPLE, "variant sample_000001 has other assignments"),
+        ("c", other_key, SAMPLE, "they differ in the varied keys"),
+        ("d", runs[1], {**SAMPLE, "seed": 5}, "they differ in the sampling"),
+        ("e", runs[1], None, "they differ in the sampling"),
+        ("f", runs[1], {**longer, "method": "latin_hypercube"}, "they differ in the sampling"),
+    ):
+        with pytest.raises(InputError, match=sentence) as error:
+            merged(first, folder(tmp_path / name, [one], sample))
+        assert "\n" not in str(error.value)
+    # More samples of the same sequence are no contradiction.
+    assert len(merged(first, folder(tmp_path / "g", [ended(9)], longer))["variants"]) == 5
+    write(tmp_path / "h", "another_case", runs, None)
+    with pytest.raises(InputError, match="they differ in the case"):
+        merged(first, tmp_path / "h")
+    with pytest.raises(InputError, match="holds no sweep"):
+        merged(first, tmp_path)
+    (tmp_path / "h" / "sweep.json").write_text('{"case": 1}')
+    with pytest.raises(InputError, match="is damaged"):
+        merged(first, tmp_path / "h")
