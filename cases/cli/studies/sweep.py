@@ -8,8 +8,18 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from catenary.base.errors import InputError
-from catenary.cases.cli import completion
-from catenary.cases.cli.app import Force, Jobs, Out, RunWords, Verbose, app, begin
+from catenary.cases.cli.app import (
+    Force,
+    Jobs,
+    NamedVariants,
+    Out,
+    PartOfRuns,
+    RunWords,
+    Vary,
+    Verbose,
+    app,
+    begin,
+)
 from catenary.cases.result_folder.output_folder import refuse_impossible
 from catenary.cases.terminal import console
 
@@ -18,6 +28,7 @@ if TYPE_CHECKING:
 
     from catenary.cases.studies.sweep.jobs import Ended
     from catenary.cases.studies.sweep.sweep import Sweep
+    from catenary.cases.studies.sweep.variants import Variant
 
 _SHOWN_BROKEN = 3
 
@@ -33,22 +44,8 @@ _SHOWN_BROKEN = 3
 def sweep(
     words: RunWords,
     out: Out,
-    vary: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--vary",
-            metavar="KEY=V1,V2,...",
-            autocompletion=completion.assignments,
-            help="Values that a key takes; repeatable, all combinations are run.",
-        ),
-    ] = None,
-    named: Annotated[
-        Path | None,
-        typer.Option(
-            "--variants",
-            help='TOML file of named variants, each a line name = ["key=value", ...].',
-        ),
-    ] = None,
+    vary: Vary = None,
+    named: NamedVariants = None,
     plotted: Annotated[
         str | None,
         typer.Option(
@@ -61,24 +58,21 @@ def sweep(
         bool, typer.Option("--reports", help="Also write the report of each run.")
     ] = False,
     n_jobs: Jobs = 1,
+    part: PartOfRuns = None,
     force: Force = False,
     verbose: Verbose = False,
 ) -> int:
     """Collective."""
     from catenary.cases.studies.sweep.jobs import RunOptions, check_statistics
+    from catenary.cases.studies.sweep.part import parse_part
     from catenary.cases.studies.sweep.sweep import run_sweep, sweep_of
-    from catenary.cases.studies.sweep.variants import check_keys, parse_vary, product, read_named
+
+    own = None if part is None else parse_part(part)
 
     def read() -> tuple[Sweep, list[str]]:
         changes, options = words.split()
-        if not vary and named is None:
-            raise InputError("there is nothing to vary: give --vary key=v1,v2,... or --variants")
+        variants = read_variants(vary, named)
         check_statistics(_names(plotted))
-        varied = [parse_vary(text) for text in vary or []]
-        check_keys(product(varied, {}), "on the command line (--vary)")
-        table = {} if named is None else read_named(named)
-        check_keys(product([], table), f"in {named}")
-        variants = product(varied, table)
         case, short = words.case, words.shortened
         made = sweep_of(case, variants, out, changes, short, full_report=reports, force=force)
         return made, options
@@ -87,6 +81,10 @@ def sweep(
     for one in made.refused:
         console.warn(f"variant {one.variant.name} is not run: {one.outcome}")
     options = RunOptions(force, arguments, console.say, n_jobs)
+    if own is not None:
+        from catenary.cases.studies.sweep.run_jobs import run_jobs
+
+        return verdict(run_jobs(own.of(made.jobs), out, comm, options), "sweep")
     ended, files = run_sweep(
         made, out, comm, options, f"catenary sweep {words.case}", _names(plotted)
     )
@@ -97,9 +95,33 @@ def sweep(
     return verdict(ended, "sweep")
 
 
-def run_study(words: RunWords, out: Path, n_jobs: int, force: bool, verbose: bool) -> int:
+def read_variants(vary: Sequence[str] | None, named: Path | None) -> list[Variant]:
+    """The variants of ``--vary`` and ``--variants``.
+
+    Raises
+    ------
+    InputError
+        If there are none, or if a key is none of a scene.
+    """
+    from catenary.cases.studies.sweep.variants import check_keys, parse_vary, product, read_named
+
+    if not vary and named is None:
+        raise InputError("there is nothing to vary: give --vary key=v1,v2,... or --variants")
+    varied = [parse_vary(text) for text in vary or []]
+    check_keys(product(varied, {}), "on the command line (--vary)")
+    table = {} if named is None else read_named(named)
+    check_keys(product([], table), f"in {named}")
+    return product(varied, table)
+
+
+def run_study(
+    words: RunWords, out: Path, n_jobs: int, part: str | None, force: bool, verbose: bool
+) -> int:
     """What ``catenary run CASE --study`` does; returns the exit code. Collective."""
     from catenary.cases.studies.case_study import Plan, find_study, make_plan
+    from catenary.cases.studies.sweep.part import parse_part
+
+    own = None if part is None else parse_part(part)
 
     def read() -> tuple[Plan, list[str]]:
         refuse_impossible(out)
@@ -115,6 +137,8 @@ def run_study(words: RunWords, out: Path, n_jobs: int, force: bool, verbose: boo
     from catenary.cases.studies.sweep.jobs import RunOptions
 
     options = RunOptions(force, arguments, console.say, n_jobs)
+    if own is not None:
+        return verdict(case_study.run_part(plan, own, out, comm, options), "study")
     with held(out, comm, f"catenary run {words.case} --study"):
         report, ended = case_study.run(plan, out, comm, options)
     if report is not None:
