@@ -150,6 +150,30 @@ Jobs = Annotated[
         "mpirun the number of ranks: a run on each.",
     ),
 ]
+PartOfRuns = Annotated[
+    str | None,
+    typer.Option(
+        "--part",
+        metavar="I/N",
+        help="Make every N-th run from the I-th on, and no table: a task of a job array.",
+    ),
+]
+Vary = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--vary",
+        metavar="KEY=V1,V2,...",
+        autocompletion=completion.assignments,
+        help="Values that a key takes; repeatable, all combinations are run.",
+    ),
+]
+NamedVariants = Annotated[
+    Path | None,
+    typer.Option(
+        "--variants",
+        help='TOML file of named variants, each a line name = ["key=value", ...].',
+    ),
+]
 Verbose = Annotated[bool, typer.Option("-v", "--verbose", help="Print the time of each phase.")]
 
 

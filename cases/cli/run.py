@@ -12,11 +12,14 @@ from catenary.base.errors import InputError
 from catenary.cases.cli.app import (
     Force,
     Jobs,
+    NamedVariants,
     Out,
+    PartOfRuns,
     PetscOptions,
     RunFolder,
     RunWords,
     Strict,
+    Vary,
     Verbose,
     app,
     begin,
@@ -25,6 +28,7 @@ from catenary.cases.result_folder.output_folder import refuse_impossible
 from catenary.cases.terminal import console
 
 if TYPE_CHECKING:
+    from catenary.cases.run.planning.slurm_script import Job
     from catenary.cases.run.runner import RunOutcome
     from catenary.cases.scene.scene import Scene
 
@@ -45,6 +49,7 @@ def run(
         bool, typer.Option("--study", help="Run the case's study: variants, figures, verdicts.")
     ] = False,
     n_jobs: Jobs = 1,
+    part: PartOfRuns = None,
     verbose: Verbose = False,
 ) -> int:
     """Collective."""
@@ -55,9 +60,9 @@ def run(
 
         if strict:
             raise InputError("a study is not judged as a whole: give --study without --strict")
-        return run_study(words, out, n_jobs, force, verbose)
-    if n_jobs != 1:
-        raise InputError("-j belongs to --study; mpirun shares a single run among ranks")
+        return run_study(words, out, n_jobs, part, force, verbose)
+    if n_jobs != 1 or part is not None:
+        raise InputError("-j and --part belong to --study; mpirun shares a single run among ranks")
 
     def read() -> tuple[Scene, list[str]]:
         changes, options = words.split()
@@ -180,15 +185,22 @@ def _end(result: RunOutcome, folder: Path, strict: bool) -> int:
 @app.command(
     "submit",
     help="Hand a run to SLURM: a job with time and memory from the plan, and jobs that continue it "
-    "where a limit of time or a lost node ends one.",
-    epilog="Example: catenary submit en50318_2002 -o results/en300 --ranks 4 --print > job.sh",
+    "where a limit of time or a lost node ends one. With --array a sweep or study: a job array "
+    "whose tasks make the runs, and a job that makes the table.",
+    epilog="Example: catenary submit en50318_2002 -o results/en300 --ranks 4 --print > job.sh; "
+    "catenary submit en50318_2002 -o results/speeds --array 10 --vary train.speed_km_h=200,250,300",
 )
 @console.guarded
 @console.serial
 def submit(
     words: RunWords,
     out: Out,
-    ranks: Annotated[int, typer.Option("--ranks", min=1, max=10**6, help="MPI ranks.")] = 1,
+    ranks: Annotated[
+        int,
+        typer.Option(
+            "--ranks", min=1, max=10**6, help="MPI ranks; with --array of a task, a run on each."
+        ),
+    ] = 1,
     nodes: Annotated[
         int, typer.Option("--nodes", min=1, max=10**5, help="Number of cluster nodes.")
     ] = 1,
@@ -199,8 +211,23 @@ def submit(
         ),
     ] = None,
     chain: Annotated[
-        int, typer.Option("--chain", min=0, max=1000, help="Jobs that may follow the first.")
+        int,
+        typer.Option(
+            "--chain",
+            min=0,
+            max=1000,
+            help="Jobs that may follow the first, or how often a task may be started again.",
+        ),
     ] = 9,
+    array: Annotated[
+        int | None,
+        typer.Option("--array", metavar="N", min=1, max=10**5, help="Tasks of a sweep or study."),
+    ] = None,
+    vary: Vary = None,
+    named: NamedVariants = None,
+    study: Annotated[
+        bool, typer.Option("--study", help="With --array: the case's study, not a sweep.")
+    ] = False,
     directives: Annotated[
         list[str] | None,
         typer.Option("--sbatch", metavar="OPTION", help="Option of sbatch; repeatable."),
@@ -215,27 +242,78 @@ def submit(
 ) -> None:
     """Serial."""
     import shutil
-    import subprocess
 
-    from catenary.cases.run.planning.plan import make_plan
     from catenary.cases.run.planning.slurm_script import Job, slurm_script
-    from catenary.cases.scene.load import load_scene
 
     refuse_impossible(out)
+    if array is None and (vary or named or study):
+        raise InputError("--vary, --variants and --study belong to --array")
     chosen, options = words.split()
-    plan = make_plan(load_scene(words.case, chosen, words.shortened))
     told = [str(Path(words.case).absolute()) if Path(words.case).exists() else words.case]
     told += ["--short"] if words.shortened else []
-    job = Job(ranks, nodes, minutes, chain, directives or [], before or [])
     # The folder comes last, so that nothing is taken for a further assignment.
-    settings = [word for value in chosen for word in ("--set", value)]
-    script = slurm_script([*told, *settings], out, job, plan.march, plan.memory, options)
+    told += [word for value in chosen for word in ("--set", value)]
+    job = Job(ranks, nodes, minutes, chain, directives or [], before or [], "B:" if array else "")
+    if array is None:
+        from catenary.cases.run.planning.plan import make_plan
+        from catenary.cases.scene.load import load_scene
+
+        plan = make_plan(load_scene(words.case, chosen, words.shortened))
+        script = slurm_script(told, out, job, plan.march, plan.memory, options)
+    else:
+        script = _array_script(words, told, out, job, array, vary, named, study)
     if only_print:
         console.print_as_is(script)
         return
     if shutil.which("sbatch") is None:
         raise InputError("sbatch is not on this machine; --print shows the script instead")
-    done = subprocess.run(["sbatch"], input=script, text=True, capture_output=True, check=False)
+    if array is None:
+        console.say(_sbatch(script))
+        return
+    number = _sbatch(script, "--parsable").partition(";")[0]
+    last = _sbatch(script, "--parsable", "--array=0", f"--dependency=afterany:{number}")
+    console.say(f"job {number}: {array} tasks; job {last.partition(';')[0]}: the table, after them")
+
+
+def _array_script(
+    words: RunWords,
+    told: list[str],
+    out: Path,
+    job: Job,
+    n_tasks: int,
+    vary: list[str] | None,
+    named: Path | None,
+    study: bool,
+) -> str:
+    """The script of a sweep or study whose scenes are all checked."""
+    from catenary.cases.cli.studies.sweep import read_variants
+    from catenary.cases.run.planning.needs import total_needs
+    from catenary.cases.run.planning.slurm_array import array_script
+    from catenary.cases.studies.case_study import make_plan
+    from catenary.cases.studies.sweep.sweep import sweep_of
+
+    chosen, options = words.split()
+    if study:
+        if vary or named:
+            raise InputError("--study has runs of its own; leave --vary and --variants away")
+        jobs = make_plan(words.case, chosen, words.shortened).jobs
+        verb = ["run", *told, "--study"]
+    else:
+        variants = read_variants(vary, named)
+        jobs = sweep_of(words.case, variants, out, chosen, words.shortened).jobs
+        verb = ["sweep", *told, *(word for text in vary or [] for word in ("--vary", text))]
+        verb += [] if named is None else ["--variants", str(named.absolute())]
+    needs = total_needs(each.scene for each in jobs)
+    return array_script(verb, out, job, n_tasks, needs, options)
+
+
+def _sbatch(script: str, *options: str) -> str:
+    """What sbatch says when it takes a script."""
+    import subprocess
+
+    done = subprocess.run(
+        ["sbatch", *options], input=script, text=True, capture_output=True, check=False
+    )
     if done.returncode:
         raise InputError(f"sbatch refused the job: {' '.join(done.stderr.split())}")
-    console.say(done.stdout.strip())
+    return done.stdout.strip()

@@ -32,6 +32,8 @@ T = TypeVar("T")
 _LOOK, _GRACE = 0.1, 30.0
 # Variables by which a launcher tells a process that it is a rank.
 _OF_LAUNCHERS = ("OMPI_", "PMI_", "PMIX_", "PRTE_", "HYDI_", "MPIR_")
+# Of messages between ranks.
+_TAG = 4711
 _PROGRAM = (
     "import json, sys; sys.path[:] = json.loads(sys.argv[1]); "
     "from catenary.cases.process.worker import serve; serve(*map(int, sys.argv[2:]))"
@@ -155,18 +157,55 @@ def _outcome(number: int, function: Callable[[T, Any], Any], item: T, comm: Any)
 def _on_ranks(
     function: Callable[[T, Any], Any], items: Sequence[T], comm: Any
 ) -> Iterator[Outcome]:
-    """Every rank its share, then all outcomes on all ranks. Collective."""
+    """Every rank its share. Collective.
+
+    Outcomes come to rank 0 as they are, and to the others when all are there.
+    """
+    found: list[Outcome] = []
+    with StopRequest() as stop:
+        own = _share(function, items, comm, stop)
+        if comm.rank == 0:
+            for outcome in _gathered(own, comm):
+                found.append(outcome)
+                yield outcome
+        else:
+            sent = [comm.isend(outcome, 0, _TAG) for outcome in own]
+            sent.append(comm.isend(None, 0, _TAG))
+            while not all([request.test()[0] for request in sent]):
+                time.sleep(_LOOK)
+        wait_for_all(comm)
+        found = comm.bcast(found, 0)
+    if comm.rank:
+        yield from found
+
+
+def _share(
+    function: Callable[[T, Any], Any], items: Sequence[T], comm: Any, stop: Callable[[], bool]
+) -> Iterator[Outcome]:
+    """What becomes of the items of this rank. Not collective."""
     from mpi4py import MPI
 
-    own = []
-    with StopRequest() as stop:
-        for number in range(comm.rank, len(items), comm.size):
-            if stop():
-                break
-            own.append(_outcome(number, function, items[number], MPI.COMM_SELF))
-        wait_for_all(comm)
-        found = [one for those in comm.allgather(own) for one in those]
-    yield from sorted(found, key=lambda one: one.number)
+    for number in range(comm.rank, len(items), comm.size):
+        if stop():
+            return
+        yield _outcome(number, function, items[number], MPI.COMM_SELF)
+
+
+def _gathered(own: Iterator[Outcome], comm: Any) -> Iterator[Outcome]:
+    """What becomes of all items, on rank 0: of its own, and between them what others send."""
+    n_working = comm.size - 1
+    mine: Outcome | None = next(own, None)
+    while mine is not None or n_working:
+        if mine is not None:
+            yield mine
+            mine = next(own, None)
+        elif not comm.iprobe(tag=_TAG):
+            time.sleep(_LOOK)
+        while comm.iprobe(tag=_TAG):
+            theirs = comm.recv(tag=_TAG)
+            n_working -= theirs is None
+            if theirs is not None:
+                yield theirs
 
 
 def _in_processes(

@@ -32,6 +32,7 @@ from catenary.cases.studies.sweep.jobs import (
     interrupted,
     make_jobs,
 )
+from catenary.cases.studies.sweep.part import Part
 from catenary.cases.studies.sweep.variants import Variant, slug
 
 if TYPE_CHECKING:
@@ -137,7 +138,24 @@ def run(
     return text, ended
 
 
-class _Measure(NamedTuple):
+def run_part(
+    plan: Plan, part: Part, out_dir: Path, comm: Any, options: RunOptions = AS_USUAL
+) -> list[Ended]:
+    """Make the runs of a part that are not done yet, and no report. Collective.
+
+    Raises
+    ------
+    InputError
+        As ``run``.
+    """
+    from catenary.cases.studies.sweep.run_jobs import run_jobs
+
+    own, folder = part.of(plan.jobs), out_dir / RUNS
+    return run_jobs(own, folder, comm, options, measure=_Measure(plan.path))
+
+
+@dataclass(frozen=True)
+class _Measure:
     """``measure`` of a ``study.py``, which other processes load again: no package has it."""
 
     path: Path

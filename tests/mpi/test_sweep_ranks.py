@@ -12,7 +12,7 @@ import pytest
 from mpi4py import MPI
 
 from catenary.base.errors import InputError
-from catenary.cases.studies.sweep.jobs import make_jobs
+from catenary.cases.studies.sweep.jobs import RunOptions, make_jobs
 from catenary.cases.studies.sweep.run_jobs import run_jobs
 from catenary.cases.studies.sweep.variants import Variant
 
@@ -69,3 +69,27 @@ def test_a_refusal_reaches_all_ranks(folder: Path) -> None:
     other = make_jobs(CASE, VARIANTS[1:], [*TINY, "contact.stiffness_N_per_m=2e4"])
     with pytest.raises(InputError, match="another configuration"):
         run_jobs(other, folder, COMM)
+
+
+def test_each_rank_makes_runs_of_its_own(folder: Path) -> None:
+    """With -j of as many ranks: the same figures as one after the other, to the last bit."""
+    speeds = [f"train.speed_km_h={speed}" for speed in (200, 220, 240, 260)]
+    jobs = make_jobs(CASE, [Variant(f"v{i}", (speed,)) for i, speed in enumerate(speeds)], TINY)
+    lines: list[str] = []
+    options = RunOptions(progress=lines.append, n_jobs=COMM.size)
+    ended = run_jobs(jobs[:3], folder, COMM, options)
+    assert [one.outcome for one in ended] == ["done"] * 3
+    found = COMM.allgather([one.summary["pantographs"] for one in ended])
+    assert found == [found[0]] * COMM.size
+    if COMM.rank == 0:
+        alone = run_jobs(jobs[:3], folder / "alone", MPI.COMM_SELF)
+        assert [one.summary["pantographs"] for one in alone] == found[0]
+    again = run_jobs(jobs, folder, COMM, options)
+    assert [one.skipped for one in again] == [True, True, True, False]
+
+
+@pytest.mark.skipif(COMM.size == 1, reason="for several ranks")
+def test_as_many_runs_at_a_time_as_there_are_ranks_or_one(folder: Path) -> None:
+    jobs = make_jobs(CASE, VARIANTS[1:], TINY)
+    with pytest.raises(InputError, match=f"-j is {COMM.size + 1} on {COMM.size} ranks"):
+        run_jobs(jobs, folder, COMM, RunOptions(n_jobs=COMM.size + 1))

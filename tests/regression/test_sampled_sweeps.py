@@ -141,6 +141,7 @@ def test_parts_of_two_machines_merge_into_the_same_table(
             "sweep", CASE, "-o", folder, "--sample", file, "--part", f"{number}/2", "--set", *TINY
         )
         assert done.exit_code == 0, done.output
+    parts = [folder / f"part_{number}_of_2" for number, folder in enumerate(parts, start=1)]
     merged = tmp_path / "merged"
     done = invoke("merge", *parts, "-o", merged)
     assert done.exit_code == 0, done.output

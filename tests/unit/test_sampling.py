@@ -18,7 +18,7 @@ from catenary.base.errors import InputError
 from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.problem import line_of
 from catenary.cases.scene.scene import Scene
-from catenary.cases.studies.sampling.samples import part_of, sample_name, samples
+from catenary.cases.studies.sampling.samples import sample_name, samples
 from catenary.cases.studies.sampling.tables import SamplingTable, read_sampling, sampling_of
 from catenary.cases.studies.sweep.variants import Variant
 
@@ -296,18 +296,6 @@ def test_thirty_thousand_samples_take_seconds(scene: Scene) -> None:
     assert len(found) == 30_000 and found[-1].name == sample_name(30_000)
     # Three seconds on one core of 2026; a text made number by number would take a minute.
     assert time.process_time() - begin < 20.0
-
-
-def test_parts_share_all_variants() -> None:
-    variants = [Variant(str(i), ()) for i in range(10)]
-    parts = [part_of(variants, f"{k}/3") for k in (1, 2, 3)]
-    assert [one.name for one in parts[0]] == ["0", "3", "6", "9"]
-    assert sorted(one.name for part in parts for one in part) == [str(i) for i in range(10)]
-    for wrong in ("0/3", "4/3", "1", "a/b", "1/", "-1/3"):
-        with pytest.raises(InputError, match="must have the form K/N"):
-            part_of(variants, wrong)
-    with pytest.raises(InputError, match="has no variant: there are 10"):
-        part_of(variants, "11/12")
 
 
 GOOD = {SPEED: {"type": "normal", "standard_deviation": 5.0}}

@@ -8,8 +8,18 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from catenary.base.errors import InputError
-from catenary.cases.cli import completion
-from catenary.cases.cli.app import Force, Jobs, Out, RunWords, Verbose, app, begin
+from catenary.cases.cli.app import (
+    Force,
+    Jobs,
+    NamedVariants,
+    Out,
+    PartOfRuns,
+    RunWords,
+    Vary,
+    Verbose,
+    app,
+    begin,
+)
 from catenary.cases.result_folder.output_folder import refuse_impossible
 from catenary.cases.terminal import console
 
@@ -35,36 +45,14 @@ _SHOWN_BROKEN, _SHOWN_REFUSED = 3, 20
 def sweep(
     words: RunWords,
     out: Out,
-    vary: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--vary",
-            metavar="KEY=V1,V2,...",
-            autocompletion=completion.assignments,
-            help="Values that a key takes; repeatable, all combinations are run.",
-        ),
-    ] = None,
-    named: Annotated[
-        Path | None,
-        typer.Option(
-            "--variants",
-            help='TOML file of named variants, each a line name = ["key=value", ...].',
-        ),
-    ] = None,
+    vary: Vary = None,
+    named: NamedVariants = None,
     sample: Annotated[
         Path | None,
         typer.Option(
             "--sample",
             help="TOML file of distributions by keys, with n, seed and method: samples are run, "
             "and their table evaluated.",
-        ),
-    ] = None,
-    part: Annotated[
-        str | None,
-        typer.Option(
-            "--part",
-            metavar="K/N",
-            help="Run each N-th variant from the K-th on; `catenary merge` joins the parts.",
         ),
     ] = None,
     plotted: Annotated[
@@ -87,29 +75,30 @@ def sweep(
         ),
     ] = False,
     n_jobs: Jobs = 1,
+    part: PartOfRuns = None,
     force: Force = False,
     verbose: Verbose = False,
 ) -> int:
     """Collective."""
     from catenary.cases.studies.sweep.jobs import RunOptions, check_statistics
-    from catenary.cases.studies.sweep.sweep import run_sweep, sweep_of
+    from catenary.cases.studies.sweep.part import parse_part
+    from catenary.cases.studies.sweep.sweep import run_part, run_sweep, sweep_of
+
+    own = None if part is None else parse_part(part)
 
     def read() -> tuple[tuple[Sweep, SamplingTable | None], list[str]]:
         changes, options = words.split()
         check_statistics(_names(plotted))
         sampling = None
         if sample is None:
-            variants = _listed(vary or [], named)
+            variants = read_variants(vary, named)
         elif vary or named is not None:
             raise InputError(
                 "--sample makes all variants itself: give neither --vary nor --variants"
             )
         else:
             variants, sampling = _sampled(words, changes, sample)
-        if part is not None:
-            from catenary.cases.studies.sampling.samples import part_of
 
-            variants = part_of(variants, part)
         case, short = words.case, words.shortened
         if reports and only_statistics:
             raise InputError("--only-statistics leaves nothing that --reports could draw")
@@ -131,6 +120,8 @@ def sweep(
     if len(made.refused) > _SHOWN_REFUSED:
         console.warn(f"{len(made.refused) - _SHOWN_REFUSED} more variants are not run")
     options = RunOptions(force, arguments, console.say, n_jobs)
+    if own is not None:
+        return verdict(run_part(made, own, out, comm, options), "sweep")
     command = f"catenary sweep {words.case}"
     drawn = _names(plotted)
     lines = drawn if sampling is None else None  # samples are drawn as points
@@ -147,15 +138,21 @@ def sweep(
     return verdict(ended, "sweep")
 
 
-def _listed(vary: list[str], named: Path | None) -> list[Variant]:
-    """The variants of --vary and --variants."""
+def read_variants(vary: Sequence[str] | None, named: Path | None) -> list[Variant]:
+    """The variants of ``--vary`` and ``--variants``.
+
+    Raises
+    ------
+    InputError
+        If there are none, or if a key is none of a scene.
+    """
     from catenary.cases.studies.sweep.variants import check_keys, parse_vary, product, read_named
 
     if not vary and named is None:
         raise InputError(
             "there is nothing to vary: give --vary key=v1,v2,..., --variants or --sample"
         )
-    varied = [parse_vary(text) for text in vary]
+    varied = [parse_vary(text) for text in vary or []]
     check_keys(product(varied, {}), "on the command line (--vary)")
     table = {} if named is None else read_named(named)
     check_keys(product([], table), f"in {named}")
@@ -201,9 +198,14 @@ def _evaluated(
     return done
 
 
-def run_study(words: RunWords, out: Path, n_jobs: int, force: bool, verbose: bool) -> int:
+def run_study(
+    words: RunWords, out: Path, n_jobs: int, part: str | None, force: bool, verbose: bool
+) -> int:
     """What ``catenary run CASE --study`` does; returns the exit code. Collective."""
     from catenary.cases.studies.case_study import Plan, find_study, make_plan
+    from catenary.cases.studies.sweep.part import parse_part
+
+    own = None if part is None else parse_part(part)
 
     def read() -> tuple[Plan, list[str]]:
         refuse_impossible(out)
@@ -219,6 +221,8 @@ def run_study(words: RunWords, out: Path, n_jobs: int, force: bool, verbose: boo
     from catenary.cases.studies.sweep.jobs import RunOptions
 
     options = RunOptions(force, arguments, console.say, n_jobs)
+    if own is not None:
+        return verdict(case_study.run_part(plan, own, out, comm, options), "study")
     with held(out, comm, f"catenary run {words.case} --study"):
         report, ended = case_study.run(plan, out, comm, options)
     if report is not None:

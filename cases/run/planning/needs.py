@@ -78,6 +78,21 @@ class Kept(NamedTuple):
     report: bool
 
 
+class NeedsOfRuns(NamedTuple):
+    """What several runs need.
+
+    Attributes
+    ----------
+    n_runs : how many there are
+    march : of all together, and of the longest, on one rank [s]
+    memory : of the largest on one rank [B]
+    """
+
+    n_runs: int
+    march: tuple[float, float]
+    memory: float
+
+
 def needs_of(
     scene: Scene,
     problem: Problem,
@@ -181,6 +196,19 @@ def total_size(runs: Iterable[Kept], n_at_once: int = 1) -> RunSize:
         seconds += needs.march
         n_steps += needs.n_steps
     return RunSize(left + sum(nlargest(n_at_once, passing)), seconds, n_steps)
+
+
+def total_needs(scenes: Iterable[Scene]) -> NeedsOfRuns:
+    """What several runs need together. Not collective.
+
+    Those of scenes that bring their own mesh count as the longest and largest of the others.
+    """
+    known = [needs_before_meshing(scene) for scene in scenes]
+    found = [needs for needs in known if needs is not None]
+    longest = max((needs.march for needs in found), default=0.0)
+    total = sum(needs.march for needs in found) + (len(known) - len(found)) * longest
+    memory = max((needs.memory for needs in found), default=0.0)
+    return NeedsOfRuns(len(known), (total, longest), memory)
 
 
 def _substeps(problem: Problem) -> int:

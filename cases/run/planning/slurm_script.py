@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 import re
 import shlex
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -34,6 +35,7 @@ class Job:
     chain : jobs that may follow the first one
     directives : further options of sbatch, such as ``--account=track``
     before : lines of shell before the run, such as ``module load catenary``
+    signalled : "B:" if the shell of the script is told of the limit, "" if its programs are
     """
 
     ranks: int = 1
@@ -42,6 +44,7 @@ class Job:
     chain: int = 9
     directives: list[str] = field(default_factory=list)
     before: list[str] = field(default_factory=list)
+    signalled: str = ""
 
 
 def slurm_script(
@@ -66,6 +69,30 @@ def slurm_script(
     InputError
         If there are more nodes than ranks, or a directive is none.
     """
+    return _SCRIPT.format(
+        options="\n".join(directives_of(job, out, march_s / job.ranks, memory)),
+        before="".join(f"{line}\n" for line in job.before),
+        out=shlex.quote(str(out.absolute())),
+        words=" ".join(map(shlex.quote, words)),
+        petsc=after_dashes(petsc_options or []),
+        chain=job.chain,
+    )
+
+
+def directives_of(job: Job, out: Path, march_s: float, memory: float) -> list[str]:
+    """The lines for sbatch at the head of a script. Not collective.
+
+    Parameters
+    ----------
+    out : folder of the results, whose name the job takes
+    march_s : estimate of the marches on all its ranks [s]
+    memory : estimate of what its ranks hold together beside libraries [B]
+
+    Raises
+    ------
+    InputError
+        If there are more nodes than ranks, or a directive is none.
+    """
     if job.nodes > job.ranks:
         raise InputError(f"--nodes is {job.nodes}, more than the {job.ranks} ranks of --ranks")
     for directive in job.directives:
@@ -73,7 +100,7 @@ def slurm_script(
             raise InputError(
                 f"--sbatch is {directive!r}; it takes one option of sbatch, such as --account=NAME"
             )
-    minutes = job.minutes or limit_minutes(march_s / job.ranks)
+    minutes = job.minutes or limit_minutes(march_s)
     name = re.sub(r"[^A-Za-z0-9_.-]", "_", f"catenary-{out.name or 'run'}")[:60]
     a_node = math.ceil((1.2 * memory + 0.3 * _GB * job.ranks) / job.nodes / _GB)
     options = [
@@ -83,18 +110,16 @@ def slurm_script(
         "--cpus-per-task=1",
         f"--mem={a_node}G",
         f"--time={minutes // 60:02d}:{minutes % 60:02d}:00",
-        f"--signal=TERM@{NOTICE}",
+        f"--signal={job.signalled}TERM@{NOTICE}",
         "--open-mode=append",
         *job.directives,
     ]
-    return _SCRIPT.format(
-        options="\n".join(f"#SBATCH {option}" for option in options),
-        before="".join(f"{line}\n" for line in job.before),
-        out=shlex.quote(str(out.absolute())),
-        words=" ".join(map(shlex.quote, words)),
-        petsc=" " + " ".join(map(shlex.quote, ["--", *petsc_options])) if petsc_options else "",
-        chain=job.chain,
-    )
+    return [f"#SBATCH {option}" for option in options]
+
+
+def after_dashes(petsc_options: Sequence[str]) -> str:
+    """Options for PETSc as the end of a command of a shell."""
+    return " " + " ".join(map(shlex.quote, ["--", *petsc_options])) if petsc_options else ""
 
 
 def limit_minutes(march_s: float) -> int:

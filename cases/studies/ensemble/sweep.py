@@ -19,6 +19,7 @@ from catenary.cases.scene.load import Draft, read_draft
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.records import KeptRows
 from catenary.cases.studies.sweep.jobs import Ended, RunOptions, scene_of
+from catenary.cases.studies.sweep.part import Part
 from catenary.cases.studies.sweep.variants import Variant
 from catenary.postproc.files.run_schema import DONE, INTERRUPTED
 
@@ -77,18 +78,24 @@ def ensemble_of(
     raise InputError(f"variant {variants[0].name}: {refused}") from refused
 
 
-def run_ensemble(ensemble: Ensemble, out: Path, comm: Any, options: RunOptions) -> list[Ended]:
-    """March what is not done yet, and say how all variants ended, in their order. Collective.
+def run_ensemble(
+    ensemble: Ensemble, out: Path, comm: Any, options: RunOptions, part: Part | None = None
+) -> list[Ended]:
+    """March what is not done yet, and say how variants ended, in their order. Collective.
 
     An interruption ends the list early; its last entry says so. A variant that cannot be run, or
     breaks, stops no other.
 
     Parameters
     ----------
-    out : folder in which pieces of work are kept until the sweep has its table
+    out : folder in which pieces of work are kept
+    part : of the pieces of work, all if None
     """
     size = max(_LEAST, min(_MOST, -(-len(ensemble.variants) // _PIECES)))
     pieces = [ensemble.variants[at : at + size] for at in range(0, len(ensemble.variants), size)]
+    if part is not None:
+        pieces = part.of(pieces)
+    variants = [variant for piece in pieces for variant in piece]
     kept = KeptRows(out, options.force)
     told = json.dumps(ensemble.draft.table(), sort_keys=True, default=str)
     case = hashlib.sha256(told.encode()).hexdigest()
@@ -115,13 +122,13 @@ def run_ensemble(ensemble: Ensemble, out: Path, comm: Any, options: RunOptions) 
             else:
                 rows = outcome.get()
                 ended += [Ended(v, *row) for v, row in zip(piece, rows, strict=True)]
-            spent, n_left = time.perf_counter() - begin, len(ensemble.variants) - len(ended)
+            spent, n_left = time.perf_counter() - begin, len(variants) - len(ended)
             options.progress(
-                f"[{len(ended)}/{len(ensemble.variants)}] {spent:.0f} s gone, about "
+                f"[{len(ended)}/{len(variants)}] {spent:.0f} s gone, about "
                 f"{spent / len(ended) * n_left:.0f} s left"
             )
     except Interrupted:
-        ended.append(Ended(ensemble.variants[len(ended)], INTERRUPTED))
+        ended.append(Ended(variants[len(ended)], INTERRUPTED))
     return ended
 
 

@@ -9,6 +9,7 @@ Limits that are no answer of a single case's are derived here:
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -80,7 +81,8 @@ def check_cases(
             yield Checked([Criterion(*row) for row in found], remarks)
 
 
-class _Check(NamedTuple):
+@dataclass(frozen=True)
+class _Check:
     """Measures a hard case; goes to the processes that do so."""
 
     short: bool

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -133,20 +132,3 @@ def _own_number(key: str, own: dict[str, Any]) -> float:
     if isinstance(here, bool) or not isinstance(here, int | float):
         raise ValueError("needs a mean: the scene has no number of its own there")
     return float(here)
-
-
-def part_of(variants: Sequence[Variant], text: str) -> list[Variant]:
-    """Each N-th variant from the K-th on, of ``K/N``: the share of one machine of N.
-
-    Raises
-    ------
-    InputError
-        If the text has another form, or leaves no variant.
-    """
-    number, slash, of = text.partition("/")
-    whole: Callable[[str], bool] = lambda word: word.isascii() and word.isdigit() and len(word) < 7  # noqa: E731
-    if not (slash and whole(number) and whole(of) and 1 <= int(number) <= int(of)):
-        raise InputError(f"--part {text} must have the form K/N with 1 <= K <= N, e.g. 1/2")
-    if int(number) > len(variants):
-        raise InputError(f"--part {text} has no variant: there are {len(variants)}")
-    return list(variants[int(number) - 1 :: int(of)])

@@ -11,9 +11,10 @@ import json
 import time
 import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from catenary.base.errors import CatenaryError, InputError
 from catenary.base.parallel import on_root
@@ -116,7 +117,8 @@ def run_jobs(
     return [*came.values(), *(Ended(job.variant, INTERRUPTED) for job in missing[:1])]
 
 
-class _Work(NamedTuple):
+@dataclass(frozen=True)
+class _Work:
     """Makes a run; goes to the processes that make some."""
 
     out_dir: Path

@@ -16,6 +16,7 @@ from catenary.cases.studies.sweep.variants import Variant
 if TYPE_CHECKING:
     from catenary.cases.scene.scene import Scene
     from catenary.cases.studies.ensemble.sweep import Ensemble
+    from catenary.cases.studies.sweep.part import Part
 
 
 class Sweep(NamedTuple):
@@ -104,6 +105,28 @@ def run_sweep(
             ended = run_ensemble(sweep.ensemble, out, comm, options)
         files = on_root(comm, lambda: output.write(out, name, ended, show), takes_long=True)
     return ended, files
+
+
+def run_part(sweep: Sweep, part: Part, out: Path, comm: Any, options: RunOptions) -> list[Ended]:
+    """Run a part of a sweep, as a task of a job array; how its variants ended. Collective.
+
+    The part has a table of its own in a folder of its own, for ``catenary merge``. Where parts
+    share ``out`` the whole sweep, once all are done, writes that of all.
+    """
+    from catenary.base.parallel import on_root
+    from catenary.cases.studies.sweep import output
+
+    if sweep.ensemble is None:
+        from catenary.cases.studies.sweep.run_jobs import run_jobs
+
+        ended = run_jobs(part.of(sweep.jobs), out, comm, options)
+    else:
+        from catenary.cases.studies.ensemble.sweep import run_ensemble
+
+        ended = run_ensemble(sweep.ensemble, out, comm, options, part)
+    name, folder = sweep.first.case.name, out / part.folder
+    on_root(comm, lambda: output.write(folder, name, ended, None), takes_long=True)
+    return ended
 
 
 def refuse_other_sweep(out: Path, variants: Sequence[Variant], force: bool) -> None:
