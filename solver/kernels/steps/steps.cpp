@@ -12,6 +12,7 @@ Taken Steps::take(int64_t first, int64_t end) {
         begin(number);
         const int64_t n_compensations = predict_heads(number) ? find_forces(number) : kLeft;
         if (n_compensations < 0) return {number - first, true, false};
+        n_compensations_ = n_compensations;
         finish(n_compensations);
         ++block_.counts[0].steps;
         if (!shows) continue;

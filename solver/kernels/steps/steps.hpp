@@ -75,6 +75,11 @@ class Steps {
     /// Take the steps of the block from number `first` on up to before `end`.
     Taken take(int64_t first, int64_t end);
 
+  protected:
+    const Block& block() const { return block_; }
+    /// Links that had a row in the latest step, which are the first of `switched`.
+    int64_t n_compensations() const { return n_compensations_; }
+
   private:
     void begin(int64_t number);
     bool predict_heads(int64_t number);
@@ -86,6 +91,7 @@ class Steps {
     StepParts parts_;
     Block block_;
     Course course_;
+    int64_t n_compensations_ = 0;
 };
 
 }  // namespace catenary
