@@ -26,10 +26,12 @@ class Tangents:
     dt : time step [s]
     position : (n, n_pantographs) along the track [m]
     force : (n, n_pantographs) contact forces [N]
-    uplift : (n, n_arms) at steady arms [m]
+    uplift : (n, n_arms) at the steady arms in the evaluated stretch [m]
     arm_x : (n_arms,) places of these [m]
+    speed : of the train [m/s]
     by_force : (n, m, n_pantographs) derivatives of contact forces per unit of each parameter
     by_uplift : (n, m, n_arms) those of uplifts
+    by_position : (n, m) those of all positions [m]
     open_steps : steps in which a contact carried nothing
     contact_switches : steps in which contacts opened or closed
     link_switches : steps in which droppers slackened or tightened, or other links switched
@@ -40,8 +42,10 @@ class Tangents:
     force: np.ndarray
     uplift: np.ndarray
     arm_x: np.ndarray
+    speed: float
     by_force: np.ndarray
     by_uplift: np.ndarray
+    by_position: np.ndarray
     open_steps: int
     contact_switches: int
     link_switches: int
@@ -69,16 +73,34 @@ def march_with_tangents(comm: Any, at_rest: LineAtRest, changes: Sequence[Change
         columns = [showing.layout.columns[name] for name in _CHANNELS]
         rows: list[list[np.ndarray]] = [[] for _ in columns]
         results, step = [], 0
+        arms = at_rest.mesh.x(at_rest.mesh.steady_arms)
+        first, last = at_rest.problem.evaluation
+        evaluated = np.flatnonzero((first <= arms) & (arms <= last))
+        n = scheme.pantographs.n
+        kept_results = np.concatenate([np.arange(n), n + evaluated])
         with flushed():
             while step < march.n_steps:
                 left = march.n_steps - step
                 steps.take(step, min(steps.most, left), left)
                 for kept, part in zip(rows, columns, strict=True):
                     kept.append(steps.rows[steps.block, part].copy())
-                results.append(steps.results[steps.block].copy())
+                results.append(steps.results[steps.block][..., kept_results])
                 step += steps.taken
-        arms = at_rest.mesh.x(at_rest.mesh.steady_arms)
     position, force, uplift = (np.concatenate(kept) for kept in rows)
-    found, n = np.concatenate(results), force.shape[1]
-    switches = steps.switches.tolist()
-    return Tangents(dt, position, force, uplift, arms, found[..., :n], found[..., n:], *switches)
+    found = np.concatenate(results)
+    time = dt * np.arange(1, len(force) + 1)
+    moved = [change.start.mean() if change.start.size else 0.0 for change in changes]
+    return Tangents(
+        dt=dt,
+        position=position,
+        force=force,
+        uplift=uplift[:, evaluated],
+        arm_x=arms[evaluated],
+        speed=float(at_rest.problem.train.speed),
+        by_force=found[..., :n],
+        by_uplift=found[..., n:],
+        by_position=moved + np.outer(time, [change.speed for change in changes]),
+        open_steps=int(steps.switches[0]),
+        contact_switches=int(steps.switches[1]),
+        link_switches=int(steps.switches[2]),
+    )
