@@ -32,6 +32,8 @@ from catenary.solver.statics.line_at_rest import LineAtRest
 _STENCIL = {-2: 1.0 / 12.0, -1: -8.0 / 12.0, 1: 8.0 / 12.0, 2: -1.0 / 12.0}
 # Numbers that differ by so many roundings of themselves are equal.
 _ROUNDINGS = 64.0 * float(np.finfo(float).eps)
+# Damping is proportional if no more than such a part of it is not.
+_PROPORTIONAL = 1e-9
 _MATRICES = ("stiffness", "damping", "mass")
 
 
@@ -70,13 +72,16 @@ class SetUp:
     fixed: dict[str, np.ndarray]
 
 
-class MatrixChange(NamedTuple):
-    """Derivatives of matrices, row by row; see `kernels/tangents/tangents.hpp`, as for the next."""
+class MatrixTerm(NamedTuple):
+    """A derivative of matrices times a sum of motions; see `kernels/tangents/tangents.hpp`."""
 
     rows: np.ndarray
     begin: np.ndarray
     columns: np.ndarray
     values: np.ndarray
+    by_displacement: float
+    by_velocity: float
+    by_acceleration: float
 
 
 @dataclass(frozen=True)
@@ -84,7 +89,7 @@ class Change:
     """Derivatives of a set-up by one parameter, per unit of it: as ``SetUp``; parts that do not
     change are empty."""
 
-    matrices: MatrixChange
+    matrices: Sequence[MatrixTerm]
     rest: np.ndarray
     links: np.ndarray
     weights: np.ndarray
@@ -97,7 +102,12 @@ class Change:
     speed: float
 
 
-def set_up_of(comm: Any, at_rest: LineAtRest, n_steps: int | None = None) -> SetUp:
+def set_up_of(
+    comm: Any,
+    at_rest: LineAtRest,
+    n_steps: int | None = None,
+    same_line: SetUp | None = None,
+) -> SetUp:
     """What a march from a line at rest is made of. Not collective: one process.
 
     Parameters
@@ -105,6 +115,7 @@ def set_up_of(comm: Any, at_rest: LineAtRest, n_steps: int | None = None) -> Set
     comm : mpi4py communicator of this process alone
     at_rest : the line
     n_steps : whose drives are wanted; those of the march if not given
+    same_line : of a march of the same line at rest, whose matrices are taken over
 
     Raises
     ------
@@ -136,7 +147,9 @@ def set_up_of(comm: Any, at_rest: LineAtRest, n_steps: int | None = None) -> Set
     links = switching_links(model, form.dropper_force)
     laws = links.arrays.law
     return SetUp(
-        matrices=tuple(whole_matrix(model, **{name: 1.0}) for name in _MATRICES),
+        matrices=same_line.matrices
+        if same_line is not None
+        else tuple(whole_matrix(model, **{name: 1.0}) for name in _MATRICES),
         rest=wires.nodes["rest"].astype(float),
         links=np.stack([laws["rest"], laws["stiffness"], laws["damping"]], axis=1),
         weights=links.arrays.weights,
@@ -234,24 +247,38 @@ def differentiate(set_up: Callable[[float], SetUp], now: SetUp, step: float, wha
     )
 
 
-def _matrices(found: Sequence[dict[int, sparse.csc_matrix]], step: float) -> MatrixChange:
+def _matrices(found: Sequence[dict[int, sparse.csc_matrix]], step: float) -> list[MatrixTerm]:
     """Derivatives of K, C and M from each of them at several steps of the parameter."""
-    parts = []
-    for matrices in found:
-        total = sum(_STENCIL[number] * matrix for number, matrix in matrices.items()) / step
-        scale = abs(matrices[1]) * (_ROUNDINGS / abs(step))
-        changed = abs(total) > scale
-        parts.append(total.multiply(changed).tocsr())
-    pattern = sum(abs(part) for part in parts).tocsr()
-    pattern.eliminate_zeros()
-    pattern.sort_indices()
-    row = np.repeat(np.arange(pattern.shape[0]), np.diff(pattern.indptr))
-    values = np.zeros((pattern.nnz, len(parts)))
-    for number, part in enumerate(parts):
-        values[:, number] = np.asarray(part[row, pattern.indices]).ravel() if pattern.nnz else 0.0
-    rows = np.flatnonzero(np.diff(pattern.indptr)).astype(np.int64)
-    begin = np.append(pattern.indptr[rows], pattern.nnz).astype(np.int64)
-    return MatrixChange(rows, begin, pattern.indices.astype(np.int64), values)
+    stiffness, damping, mass = (_derivative(matrices, step) for matrices in found)
+    by_stiffness, by_mass = _shares(damping, stiffness), _shares(damping, mass)
+    left = damping - by_stiffness * stiffness - by_mass * mass
+    if abs(left).max() <= _PROPORTIONAL * abs(damping).max():
+        terms = (stiffness, 1.0, by_stiffness, 0.0), (mass, 0.0, by_mass, 1.0)
+    else:
+        terms = (stiffness, 1.0, 0.0, 0.0), (mass, 0.0, 0.0, 1.0), (damping, 0.0, 1.0, 0.0)
+    return [_term(matrix.tocsr(), *by) for matrix, *by in terms if matrix.nnz]
+
+
+def _derivative(matrices: dict[int, sparse.csc_matrix], step: float) -> sparse.csc_matrix:
+    """Without what is round-off of the matrix."""
+    total = sum(_STENCIL[number] * matrix for number, matrix in matrices.items()) / step
+    changed = abs(total) > abs(matrices[1]) * (_ROUNDINGS / abs(step))
+    derivative = total.multiply(changed).tocsc()
+    derivative.eliminate_zeros()
+    return derivative
+
+
+def _shares(whole: sparse.csc_matrix, part: sparse.csc_matrix) -> float:
+    """How many times ``part``, if it is not empty, is what ``whole`` has in its place."""
+    square = part.multiply(part).sum()
+    return float(part.multiply(whole).sum() / square) if square else 0.0
+
+
+def _term(matrix: sparse.csr_matrix, *by: float) -> MatrixTerm:
+    matrix.sort_indices()
+    rows = np.flatnonzero(np.diff(matrix.indptr)).astype(np.int64)
+    begin = np.append(matrix.indptr[rows], matrix.nnz).astype(np.int64)
+    return MatrixTerm(rows, begin, matrix.indices.astype(np.int32), matrix.data, *by)
 
 
 def _chain_of(model: Any) -> LumpedPantograph:

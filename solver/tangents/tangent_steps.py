@@ -15,7 +15,7 @@ from catenary.base.errors import RunBroken
 from catenary.solver.kernels import native
 from catenary.solver.model.switching_links import LinkArrays
 from catenary.solver.schemes.one_solve import OneSolve
-from catenary.solver.tangents.set_up import Change, MatrixChange
+from catenary.solver.tangents.set_up import Change, MatrixTerm
 from catenary.solver.time_loop.compiled_steps import Block, CompiledSteps, StepParts
 from catenary.solver.time_loop.prepared_line import make_room
 from catenary.solver.time_loop.views.step_views import Showing
@@ -52,7 +52,7 @@ class Tangent(NamedTuple):
 
     free: native.TwoPasses
     loads: np.ndarray
-    matrices: MatrixChange
+    matrices: Sequence[MatrixTerm]
     rest: np.ndarray
     links: LinkChange
     heads: Sequence[HeadChange]

@@ -58,6 +58,8 @@ _KILONEWTON = 1e3
 _STEP = 1e-3
 _STEP_OF_ZERO = {"mm": 0.05}
 _USUAL_STEP_OF_ZERO = 1e-4
+# Tables without anything of the line.
+_OF_TRAIN = ("pantographs", "train", "contact")
 _BY_SPEED, _FORCE = "static_force_by_speed", "static_force_N"
 
 
@@ -83,6 +85,11 @@ class Parameter:
     def size(self) -> float:
         """The largest value without its sign."""
         return max(map(abs, self.values))
+
+    @property
+    def is_of_train(self) -> bool:
+        """Whether it leaves the line at rest as it is."""
+        return self.key.split(".")[0] in _OF_TRAIN
 
     @property
     def step(self) -> float:

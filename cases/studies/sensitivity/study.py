@@ -101,7 +101,10 @@ def sensitivity_of(
         progress(parameter.key)
 
         def set_up(by: float, parameter: Parameter = parameter) -> Any:
-            return set_up_of(comm, _at_rest(scenes.changed(parameter, by)), n_steps)
+            changed = scenes.changed(parameter, by)
+            if parameter.is_of_train:
+                return set_up_of(comm, at_rest.under(problem_of(changed)), n_steps, now)
+            return set_up_of(comm, _at_rest(changed), n_steps)
 
         try:
             changes.append(differentiate(set_up, now, parameter.step, parameter.key))

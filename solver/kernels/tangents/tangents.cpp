@@ -5,6 +5,8 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "base/targets.hpp"
+
 namespace catenary {
 
 namespace {
@@ -22,6 +24,16 @@ struct Moved {
 };
 Moved moved_at(int64_t unknown, const Motion& motion) {
     return {displacement_at(unknown, motion), velocity_at(unknown, motion)};
+}
+
+/// Make `result` what a term is multiplied with.
+CATENARY_FOR_TARGETS
+void add_up(const MatrixTerm& term, std::span<const double> displacement,
+            std::span<const double> velocity, std::span<const double> acceleration,
+            std::span<double> result) {
+    const double by_d = term.by_displacement, by_v = term.by_velocity, by_a = term.by_acceleration;
+    for (size_t i = 0; i < result.size(); ++i)
+        result[i] = by_d * displacement[i] + by_v * velocity[i] + by_a * acceleration[i];
 }
 
 double at(std::span<const double> numbers, int64_t i) {
@@ -44,7 +56,11 @@ TangentSteps::TangentSteps(StepParts parts, Block block, MarchTangents tangents)
             throw std::invalid_argument("a tangent has other heads than the steps");
         contacts_.push_back(own.contacts);
         contacts_.back().motion = tangent.free->parts().arrays.motion;
+        reads_motion_ = reads_motion_ || !tangent.matrices.empty();
     }
+    if (reads_motion_)
+        for (auto* numbers : {&displacement_, &velocity_, &sum_})
+            numbers->resize(own.contacts.motion.x.size());
     const int64_t n = n_contacts(), most = size(own.problem.unknowns.right);
     for (auto* numbers : {&place_, &rate_, &forces_}) numbers->resize(n);
     for (auto* numbers : {&right_, &solution_, &left_, &change_, &compensations_})
@@ -59,6 +75,7 @@ Taken TangentSteps::take(int64_t first, int64_t end) {
             std::ranges::copy(chains_[h]->arrays().state, before_[h].begin());
         const Taken taken = Steps::take(number, number + 1);
         if (taken.begun) return {number - first, true, false};
+        read_motion();
         find_acting();
         count();
         fill_matrix();
@@ -66,6 +83,12 @@ Taken TangentSteps::take(int64_t first, int64_t end) {
         if (taken.is_full) return {number + 1 - first, false, true};
     }
     return {end - first, false, false};
+}
+
+void TangentSteps::read_motion() {
+    if (!reads_motion_) return;
+    displacements(parts().contacts.motion, 0, displacement_);
+    velocities(parts().contacts.motion, 0, velocity_);
 }
 
 /// Find the contacts and links that act in the step that was taken.
@@ -167,17 +190,17 @@ void TangentSteps::follow(int64_t number) {
 
 /// Put what a tangent's line is loaded with: what changes of its matrices, links and places.
 void TangentSteps::load(const Tangent& tangent, double way) {
-    const Motion& motion = parts().contacts.motion;
     const auto loads = tangent.loads;
-    const auto& [rows, begin, columns, values] = tangent.matrices;
+    const auto acceleration = parts().contacts.motion.z;
     std::ranges::fill(loads, 0.0);
-    for (int64_t i = 0; i < size(rows); ++i) {
-        double value = 0.0;
-        for (int64_t k = begin[i]; k < begin[i + 1]; ++k) {
-            const auto [d, v] = moved_at(columns[k], motion);
-            value += values(k, 0) * d + values(k, 1) * v + values(k, 2) * motion.z[columns[k]];
+    for (const MatrixTerm& term : tangent.matrices) {
+        add_up(term, displacement_, velocity_, acceleration, sum_);
+        for (int64_t i = 0; i < size(term.rows); ++i) {
+            double value = 0.0;
+            for (int64_t k = term.begin[i]; k < term.begin[i + 1]; ++k)
+                value += term.values[k] * sum_[term.columns[k]];
+            loads[term.rows[i]] -= value;
         }
-        loads[rows[i]] = -value;
     }
     for (size_t k = 0; tangent.links.weights.rows > 0 && k < acting_.rows.size(); ++k) {
         const int64_t link = acting_.numbers[k];

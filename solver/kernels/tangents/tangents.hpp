@@ -16,12 +16,14 @@
 
 namespace catenary {
 
-/// Derivatives of the line's matrices, of the rows (m,) that have any: those of row i are from
-/// begin[i] to begin[i + 1], values (n, 3) of K, C and M.
-struct MatrixChange {
-    std::span<const int64_t> rows, begin, columns;
-    Array2<const double> values;
-    CATENARY_RECORD(rows, begin, columns, values)
+/// A derivative of the line's matrices times a sum of displacements, velocities and accelerations:
+/// of the rows (m,) that have any, row i from begin[i] to begin[i + 1].
+struct MatrixTerm {
+    std::span<const int64_t> rows, begin;
+    std::span<const int32_t> columns;
+    std::span<const double> values;
+    double by_displacement, by_velocity, by_acceleration;
+    CATENARY_RECORD(rows, begin, columns, values, by_displacement, by_velocity, by_acceleration)
 };
 
 /// Derivatives of all links of the line by their numbers: rest, stiffness and damping of their laws
@@ -55,7 +57,7 @@ struct LawChange {
 struct Tangent {
     TwoPasses* free;          ///< a step of its motion, without forces
     std::span<double> loads;  ///< that this reads
-    MatrixChange matrices;
+    std::vector<MatrixTerm> matrices;
     Array2<const double> rest;  ///< of the wires' nodes at rest (n_nodes, 2), or no rows
     LinkChange links;
     std::vector<HeadChange> heads;
@@ -93,6 +95,7 @@ class TangentSteps : public Steps {
         int64_t n() const { return static_cast<int64_t>(contacts.size() + rows.size()); }
     };
 
+    void read_motion();
     void find_acting();
     void count();
     void fill_matrix();
@@ -114,9 +117,12 @@ class TangentSteps : public Steps {
     std::vector<const LinearChain*> chains_;
     std::vector<std::vector<double>> before_;  ///< states of the heads before the step
     std::vector<std::vector<double>> free_;    ///< derivatives of heads without contact
-    std::vector<double> place_, rate_;         ///< derivatives of gaps without forces
-    std::vector<double> forces_;               ///< of contacts
-    std::vector<double> compensations_;        ///< of acting links
+    /// Displacements and velocities of the line, and sums of these and of accelerations.
+    std::vector<double> displacement_, velocity_, sum_;
+    bool reads_motion_ = false;          ///< whether any tangent does
+    std::vector<double> place_, rate_;   ///< derivatives of gaps without forces
+    std::vector<double> forces_;         ///< of contacts
+    std::vector<double> compensations_;  ///< of acting links
     Acting acting_, was_;
     std::vector<double> matrix_, right_, solution_, factors_, left_, change_;
     std::vector<int64_t> index_, order_;
