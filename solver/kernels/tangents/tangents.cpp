@@ -111,6 +111,8 @@ void TangentSteps::find_acting() {
 void TangentSteps::count() {
     const auto switches = tangents_.switches;
     switches[0] += static_cast<int64_t>(acting_.contacts.size()) < n_contacts();
+    if (!has_begun_) was_ = acting_;
+    has_begun_ = true;
     switches[1] += acting_.contacts != was_.contacts;
     switches[2] += acting_.numbers != was_.numbers;
 }

@@ -124,6 +124,7 @@ class TangentSteps : public Steps {
     std::vector<double> forces_;         ///< of contacts
     std::vector<double> compensations_;  ///< of acting links
     Acting acting_, was_;
+    bool has_begun_ = false;
     std::vector<double> matrix_, right_, solution_, factors_, left_, change_;
     std::vector<int64_t> index_, order_;
 };
