@@ -41,6 +41,7 @@ ROOMS = {
     "solver": (
         "kernels", "problem", "model", "wind", "ends", "effects", "linear", "statics",
         "waves", "window", "integrators", "contact", "contact_problem", "schemes", "time_loop",
+        "tangents",
     ),
     "postproc": ("standards", "channels", "files", "read", "record", "evaluate", "film", "paraview",
         "report",
@@ -51,8 +52,8 @@ ROOMS = {
         "terminal", "process",
         "result_folder", "run",
         "studies.kept_rows", "studies.sweep", "studies.pantograph_response", "studies.accuracy",
-        "studies.hard",
-        "studies.scaling", "studies.stability", "studies.effect_cost", "studies.waves",
+        "studies.hard", "studies.scaling",
+        "studies.sensitivity", "studies.stability", "studies.effect_cost", "studies.waves",
         "studies.case_study", "studies.paper",
         "ambrosio2012", "cli", FACE,
     ),
