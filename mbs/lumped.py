@@ -91,9 +91,15 @@ class LumpedPantograph(SteppedHead):
             arguments = self._arrays, sprung, self._law_arrays, self._carrier
             self._step_by(native.LawfulChain(*arguments))
         else:
-            self._step_by(native.LinearChain(self._arrays, self._linear_step()))
+            self._step_by(native.LinearChain(self._arrays, self.linear_step()))
 
-    def _linear_step(self) -> LinearStep:
+    @property
+    def is_linear(self) -> bool:
+        """Whether a step is linear in its state and in what drives it."""
+        acts = self._control is not None or self.by_hand
+        return not (acts or self._laws.laws or self._bending is not None)
+
+    def linear_step(self) -> LinearStep:
         """A step without laws: new state = step @ state + drive * by_drive - by_force @ force, with
         the state (positions, velocities, accelerations)."""
         n = self._n

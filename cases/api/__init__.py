@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from catenary.results import Run, open
     from catenary.runs import run, sweep
     from catenary.scenes import Scene, load
+    from catenary.sensitivities import sensitivity
     from catenary.steps import Simulation
 
 __all__ = [
@@ -44,6 +45,7 @@ __all__ = [
     "open",
     "plan",
     "run",
+    "sensitivity",
     "static",
     "sweep",
     "uncertainty",
@@ -56,6 +58,7 @@ _FILES = {
     "results": ("Run", "open"),
     "runs": ("run", "sweep"),
     "scenes": ("Scene", "load"),
+    "sensitivities": ("sensitivity",),
     "base.errors": ("CatenaryError", "Fault", "InputError", "RunBroken"),
     "steps": ("Simulation",),
 }

@@ -31,7 +31,7 @@ def all_verbs() -> typer.Typer:
     from catenary.cases.cli import plan, line, results  # noqa: F401
     from catenary.cases.cli.studies import sweep, uncertainty, accuracy, hard  # noqa: F401
     from catenary.cases.cli import pantograph  # noqa: F401
-    from catenary.cases.cli.studies import stability, waves, scaling  # noqa: F401
+    from catenary.cases.cli.studies import sensitivity, stability, waves, scaling  # noqa: F401
     from catenary.cases.cli import lists, first_steps  # noqa: F401
 
     # isort: on

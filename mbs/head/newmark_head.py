@@ -87,6 +87,11 @@ class SteppedHead(ABC):
         """Whether a controller of one's own regulates it, which no kernel calls."""
         return self._controller is not None
 
+    @property
+    def is_crossed(self) -> bool:
+        """Whether it matters where wires cross its strips: to a head that rolls or bends."""
+        return self._lateral is not None
+
     def regulate(self, regulator: Regulator | None) -> None:
         """Let the lift be regulated from the start on; None leaves it as it is."""
         if isinstance(regulator, Regulation):

@@ -24,7 +24,7 @@ from catenary.solver.integrators.two_pass_step import StationPasses
 from catenary.solver.kernels import aligned_arrays, native
 from catenary.solver.linear.decay_length import reach
 from catenary.solver.linear.pieces.operator_pieces import WantedPieces
-from catenary.solver.linear.step_operators import LineOperators, Loads
+from catenary.solver.linear.step_operators import ByStations, LineOperators, Loads
 from catenary.solver.linear.unit_responses import UnitResponses, Windows
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import Ownership
@@ -135,6 +135,7 @@ class LineIntegrator(ABC):
         motion, steps = ahead
         loads = np.zeros(0) if self.loads is None else self.loads.values
         parts, passes = self.operators.by_stations(not self._proportional, self._shares), None
+        self._steps_ahead = parts, steps
         if parts is not None:
             passes = StationPasses(parts, loads, motion, steps)
         # A rank without stations has no passes; it keeps its state like the others.
@@ -155,6 +156,30 @@ class LineIntegrator(ABC):
         self.motion = motion
         if self.loads is not None:
             self.loads.read(motion)
+
+    def further_motions(self, n: int) -> list[tuple[native.TwoPasses, np.ndarray]]:
+        """Free steps of n further motions at rest, by the same factors, and the loads (n_local,)
+        that each of them reads [N]. On one rank, by Newmark's method in two passes."""
+        parts, steps = self._steps_ahead
+        assert parts is not None and isinstance(steps, Steps)
+        return [self._further_motion(parts, steps) for _ in range(n)]
+
+    def _further_motion(
+        self, parts: ByStations, steps: Steps
+    ) -> tuple[native.TwoPasses, np.ndarray]:
+        _, _, read, velocity, answer, _ = parts
+        domain, n = self.operators.domain, self.ownership.n_local
+        pad = (read.size - (domain.read_high - domain.read_low)) // 2
+        begin = pad + domain.owned_of_read.start
+        own = [aligned_arrays.zeros(array.size, at) for at, array in enumerate((read, answer))]
+        ahead, solved, loads = *own, aligned_arrays.zeros(domain.size, 4)
+        rates = ahead if velocity is read else aligned_arrays.zeros(velocity.size, 6)
+        mine = aligned_arrays.zeros(n, 3) if velocity is read else rates[begin : begin + n]
+        motion = PredictedLineState(
+            ahead[begin : begin + n], mine, solved[domain.owned], np.zeros(n), steps
+        )
+        own_parts = parts._replace(read=ahead, rates=rates, answer=solved)
+        return StationPasses(own_parts, loads, motion, steps).native, loads
 
     def _ahead(self) -> tuple[PredictedLineState, Steps | AlphaSteps] | None:
         """A motion to keep ahead, in the arrays of this one, and the steps it is kept for.

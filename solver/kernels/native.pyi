@@ -265,6 +265,13 @@ class Steps:
     def write(self, path: str, ahead: object) -> None:
         """Write a file with all that they are made of, and what is ``Ahead``."""
 
+class TangentSteps:
+    """The same with derivatives by parameters beside them, of ``Tangents``."""
+
+    def __init__(self, parts: object, block: object, tangents: object) -> None: ...
+    def take(self, first: int, end: int) -> Taken:
+        """As ``Steps.take``."""
+
 TIE: np.dtype[np.void]
 
 class Simulation:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -10,7 +11,7 @@ import numpy as np
 from catenary.base.freed_memory import give_back
 from catenary.base.parallel import on_root
 from catenary.meshgen.mesh import LineMesh
-from catenary.solver.effects.all_effects import with_defects
+from catenary.solver.effects.all_effects import simulated, with_defects
 from catenary.solver.effects.build_model import build
 from catenary.solver.model.model import Model
 from catenary.solver.problem.problem import Problem
@@ -39,6 +40,12 @@ class LineAtRest(NamedTuple):
     def mesh(self) -> LineMesh:
         """The mesh of the line."""
         return self.model.mesh
+
+    def under(self, problem: Problem) -> LineAtRest:
+        """The same line under the train and the contact law of another problem of it."""
+        own = replace(self.problem, train=problem.train, contact=problem.contact)
+        model = replace(self.model, problem=own, simulated=simulated(own))
+        return LineAtRest(own, model, self.form, self.lift)
 
 
 def stable_form(

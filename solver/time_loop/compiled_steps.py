@@ -296,8 +296,12 @@ class CompiledSteps:
         if self._made_of[0] is not share or self._made_of[1] is not unknowns:
             self._made_of = share, unknowns
             problem = coupling.inner.problem(self._at_contacts, share)
-            self._steps = native.Steps(self._parts(problem), self._block_of_steps())
+            self._steps = self._made(self._parts(problem), self._block_of_steps())
         return self._steps
+
+    def _made(self, parts: StepParts, block: Block) -> Any:
+        """What takes steps that are made of these."""
+        return native.Steps(parts, block)
 
     def _parts(self, problem: SmallProblem) -> StepParts:
         pantographs, interaction = self.scheme.pantographs, self.scheme.interaction

@@ -35,6 +35,7 @@ from catenary.solver.model.partition import distribute
 from catenary.solver.problem.incidents import Happened, LineIncident, in_steps
 from catenary.solver.problem.problem import Problem, steps_of
 from catenary.solver.schemes.make_scheme import Parts, SchemeFactory
+from catenary.solver.schemes.one_solve import OneSolve
 from catenary.solver.schemes.scheme import Scheme
 from catenary.solver.statics.changed_line.after_incidents import (
     ChangedLine,
@@ -346,19 +347,33 @@ class March:
         """
         from catenary.solver.time_loop.prepared_line import write_line
 
+        scheme, showing, dt = self.in_loop()
+        blocks = compiled_steps(scheme, showing, dt, shows=False)
+        assert blocks is not None
+        write_line(path, blocks, dt, (self._first_step, self.n_steps))
+        return self.n_steps - self._first_step
+
+    def in_loop(self) -> tuple[OneSolve, Showing, float]:
+        """Scheme, what is shown of it, and time step [s] of a march that one compiled loop takes
+        from its start to its end. Not collective; one rank only.
+
+        Raises
+        ------
+        InputError
+            If its steps need more than that.
+        """
         dt = self._problem.numerics.dt
         if self._ahead:
             raise InputError("incidents change the line, and a prepared line stays as it is")
-        blocks = compiled_steps(self._scheme, self._showing, dt, shows=False)
-        if blocks is None:
+        if compiled_steps(self._scheme, self._showing, dt, shows=False) is None:
             why = (
                 "numerics.scheme is not one_solve"
                 if self.slow_path is None
                 else self.slow_path.reason
             )
             raise InputError(f"its steps are not those of the compiled loop: {why}")
-        write_line(path, blocks, dt, (self._first_step, self.n_steps))
-        return self.n_steps - self._first_step
+        assert isinstance(self._scheme, OneSolve)
+        return self._scheme, self._showing, dt
 
     def destroy(self) -> None:
         """Free all PETSc objects. Collective."""

@@ -184,7 +184,7 @@ def test_python_samples_and_evaluates_too(file: Path) -> None:
     ("words", "sentence"),
     [
         (["--vary", "train.speed_km_h=250"], "give neither --vary nor --variants"),
-        (["--part", "3/2"], "--part 3/2 must have the form K/N"),
+        (["--part", "3/2"], "it must be I/N with I from 1 to N"),
         (["--plot", "sdt_N"], "did you mean std_N?"),
         (["--set", "train.speed_km_h=-3"], "train.speed_km_h is -3"),
     ],

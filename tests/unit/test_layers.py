@@ -41,6 +41,7 @@ ROOMS = {
     "solver": (
         "kernels", "problem", "model", "wind", "ends", "effects", "linear", "statics",
         "waves", "window", "integrators", "contact", "contact_problem", "schemes", "time_loop",
+        "tangents",
     ),
     "postproc": ("standards", "channels", "files", "read", "record", "evaluate", "film", "paraview",
         "report",
@@ -52,8 +53,8 @@ ROOMS = {
         "result_folder", "run",
         "studies.records", "studies.sweep", "studies.sampling", "studies.uncertainty",
         "studies.merged_sweeps", "studies.pantograph_response", "studies.accuracy",
-        "studies.hard",
-        "studies.scaling", "studies.stability", "studies.effect_cost", "studies.waves",
+        "studies.hard", "studies.scaling",
+        "studies.sensitivity", "studies.stability", "studies.effect_cost", "studies.waves",
         "studies.case_study", "studies.paper",
         "ambrosio2012", "cli", FACE,
     ),

@@ -2,6 +2,7 @@
 #include "python/from_python.hpp"
 #include "schemes/step_error.hpp"
 #include "simulation/simulation.hpp"
+#include "tangents/tangents.hpp"
 #include "views/extremes.hpp"
 #include "views/points.hpp"
 
@@ -31,6 +32,20 @@ class HeldSteps : public Steps {
         line.ahead = given;
         write_line(path, line);
     }
+
+  private:
+    Kept kept_;
+};
+
+/// Steps with tangents, and what they are made of.
+class HeldTangentSteps : public TangentSteps {
+  public:
+    HeldTangentSteps(const py::object& parts, const py::object& block, const py::object& tangents,
+                     Kept kept = {})
+        : TangentSteps(From<StepParts>::convert(parts, "parts", kept),
+                       From<Block>::convert(block, "block", kept),
+                       From<MarchTangents>::convert(tangents, "tangents", kept)),
+          kept_(std::move(kept)) {}
 
   private:
     Kept kept_;
@@ -94,6 +109,14 @@ void offer_steps(py::module_& module) {
         .def("take",
              [](HeldSteps& steps, int64_t first, int64_t end) { return steps.take(first, end); })
         .def("write", &HeldSteps::write);
+    py::class_<HeldTangentSteps>(module, "TangentSteps")
+        .def(py::init(
+            [](const py::object& parts, const py::object& block, const py::object& tangents) {
+                return std::make_unique<HeldTangentSteps>(parts, block, tangents);
+            }))
+        .def("take", [](HeldTangentSteps& steps, int64_t first, int64_t end) {
+            return steps.take(first, end);
+        });
     PYBIND11_NUMPY_DTYPE(Tie, stiffness, damping);
     module.attr("TIE") = py::dtype::of<Tie>();
     PYBIND11_NUMPY_DTYPE(Input, lift_force, head_force, base, base_velocity, base_acceleration);

@@ -26,6 +26,7 @@ Taken Steps::take(int64_t first, int64_t end) {
 bool Steps::arrive(int64_t number) {
     const int64_t n_compensations = predict_heads(number) ? find_forces(number) : kLeft;
     if (n_compensations < 0) return false;
+    n_compensations_ = n_compensations;
     finish(n_compensations);
     ++block_.counts[0].steps;
     return true;

@@ -82,6 +82,11 @@ class Steps {
     /// Fill in the row of a step that has been taken.
     void show(int64_t number);
 
+  protected:
+    const Block& block() const { return block_; }
+    /// Links that had a row in the latest step, which are the first of `switched`.
+    int64_t n_compensations() const { return n_compensations_; }
+
   private:
     bool predict_heads(int64_t number);
     int64_t find_forces(int64_t number);
@@ -91,6 +96,7 @@ class Steps {
     StepParts parts_;
     Block block_;
     Course course_;
+    int64_t n_compensations_ = 0;
 };
 
 }  // namespace catenary

@@ -1,0 +1,61 @@
+"""Derivatives of the statistics of a scene."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from catenary.base.lone_process import alone
+from catenary.scenes import SceneLike, checked
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+def sensitivity(scene: SceneLike, parameters: Sequence[str] = ()) -> pd.DataFrame:
+    """What the statistics of a scene change by with its parameters, from one march.
+
+    The march is differentiated step by step: these are no differences of runs. Derivatives hold
+    while a change moves no loss of contact and no slackening of a dropper to another step. One
+    process computes them, under mpirun too: not collective.
+
+    Parameters
+    ----------
+    scene : Scene, str, Path or mapping
+        The scene, or whatever ``load`` takes for one.
+    parameters : sequence of str
+        Keys of numbers, or of lists whose entries change together; with the number of an entry
+        behind it (``line.dropper.pre_sag_mm.3``) that one alone. Those of pantographs, contact,
+        wires, droppers and damping if there are none.
+
+    Returns
+    -------
+    pandas.DataFrame
+        A row for each parameter and pantograph, with the columns of ``sensitivity.csv``; first what
+        changes the standard deviation most. Changes are those under ``change`` of the parameter, in
+        the ``unit`` of its key.
+
+    Raises
+    ------
+    InputError
+        If a key is wrong, or if the march or a parameter has no derivatives (``docs/guide/
+        sensitivities.md`` lists them).
+    RunBroken
+        If the march breaks.
+
+    Examples
+    --------
+    >>> scene = catenary.load("en50318_2002", short=True)
+    >>> table = catenary.sensitivity(scene, ["pantographs.reference.static_force_N"])
+    >>> row = table.iloc[0]
+    >>> row.change, row.unit, bool(0.9 < row.mean_change_N < 1.1)
+    (1.0, 'N', True)
+    """
+    import pandas as pd
+
+    own = checked(scene)
+    comm = alone()  # starts MPI as one process, before anything imports it
+    from catenary.cases.studies.sensitivity.output import table_of
+    from catenary.cases.studies.sensitivity.study import sensitivity_of
+
+    return pd.DataFrame(table_of(sensitivity_of(own, list(parameters), comm)).records())

@@ -1,0 +1,1 @@
+"""Sensitivities of a case: what its statistics change by with each of its parameters."""

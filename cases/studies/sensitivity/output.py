@@ -1,0 +1,98 @@
+"""Sensitivities of a case as a table, ranked, and as text."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from catenary.cases.studies.sensitivity.study import Sensitivity
+from catenary.postproc.report.study_table import Column, StudyTable
+
+_MM = 1e3
+_BY_PERCENT = "std_change_by_percent_N"
+_FORCES = {
+    "mean_change_N": ("mean", "mean [N]"),
+    "std_change_N": ("std", "sigma [N]"),
+    "stat_max_change_N": ("stat_max", ""),
+    "stat_min_change_N": ("stat_min", "stat. min [N]"),
+    "max_change_N": ("maximum", ""),
+    "min_change_N": ("minimum", "least [N]"),
+}
+
+
+def table_of(found: Sensitivity) -> StudyTable:
+    """A row for each parameter and pantograph; first what changes the standard deviation most.
+
+    Figures are changes of the statistics under ``change`` of the parameter, in the unit of its key;
+    the last one is that of the standard deviation under a hundredth of the parameter.
+    """
+    several = len(found.names) > 1
+    columns = [
+        Column("parameter", "parameter"),
+        Column("shown", "value", ">", in_files=False),
+        Column("value"),
+        Column("unit", "unit"),
+        Column("pantograph", "pantograph" if several else ""),
+        Column("change", "change", ".4g"),
+        *(Column(name, head, "+.3f") for name, (_, head) in _FORCES.items()),
+        Column("max_uplift_change_mm", "uplift [mm]", "+.3f"),
+        Column(_BY_PERCENT, "sigma by 1 % [N]", "+.4f"),
+    ]
+    rows = [row for number in range(len(found.parameters)) for row in _rows(found, number)]
+
+    def weight(number: int) -> float:
+        own = [row[_BY_PERCENT] for row in _rows(found, number)]
+        return max((abs(value) for value in own if value is not None), default=-1.0)
+
+    order = sorted(range(len(found.parameters)), key=weight, reverse=True)
+    ranked = [row for number in order for row in _rows(found, number)]
+    assert len(ranked) == len(rows)
+    return StudyTable(columns, ranked)
+
+
+def _rows(found: Sensitivity, number: int) -> list[dict[str, Any]]:
+    parameter = found.parameters[number]
+    change, uplift = parameter.change, found.by_uplift[number]
+    rows = []
+    for name, own in zip(found.names, found.by_force[number], strict=True):
+        row: dict[str, Any] = {
+            "parameter": parameter.key,
+            "shown": parameter.text,
+            "value": parameter.values[0] if len(parameter.values) == 1 else [*parameter.values],
+            "unit": parameter.unit,
+            "pantograph": name,
+            "change": change,
+        }
+        row |= {column: change * float(getattr(own, of)) for column, (of, _) in _FORCES.items()}
+        row["max_uplift_change_mm"] = None if np.isnan(uplift) else change * uplift * _MM
+        row[_BY_PERCENT] = 0.01 * parameter.size * float(own.std) if parameter.size else None
+        rows.append(row)
+    return rows
+
+
+def as_text(found: Sensitivity) -> str:
+    """What is printed: the statistics, the table, and how far the derivatives hold."""
+    lines = []
+    for name, own in zip(found.names, found.statistics, strict=True):
+        lines.append(
+            f"{name}: mean {own.mean:.2f} N, sigma {own.std:.2f} N, "
+            f"statistical minimum {own.mean - 3.0 * own.std:.1f} N, "
+            f"least {own.minimum:.1f} N, largest {own.maximum:.1f} N"
+        )
+    if not np.isnan(found.max_uplift):
+        lines.append(f"largest uplift {found.max_uplift * _MM:.1f} mm")
+    lines += ["", "Changes of these under a change of each parameter:", table_of(found).text(), ""]
+    lines.append(_kinks(found))
+    for key, why in found.left_out.items():
+        lines.append(f"{key} is left out: {why}")
+    return "\n".join(lines)
+
+
+def _kinks(found: Sensitivity) -> str:
+    contacts, links = found.contact_switches, found.link_switches
+    return (
+        f"In {found.n_steps} steps contacts opened or closed {contacts} times and droppers or "
+        f"other links switched {links} times. Derivatives hold while a change moves none of these "
+        "to another step; larger changes also add what the moved switches do."
+    )

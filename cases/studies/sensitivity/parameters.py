@@ -1,0 +1,251 @@
+"""Parameters of a scene: numbers that a march is differentiated by.
+
+A parameter is a key of the scene with a number, or with a list whose entries change together; the
+number of an entry may follow the key. Of a static force that depends on the speed all forces change
+together, under the key of the force.
+"""
+
+from __future__ import annotations
+
+import copy
+import fnmatch
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from catenary.base.errors import InputError
+from catenary.cases.scene.input.faults import Origin, shown
+from catenary.cases.scene.keys.error_sentences import unknown_key
+from catenary.cases.scene.keys.keys import is_known, known_keys
+from catenary.cases.scene.keys.units import unit_of
+from catenary.cases.scene.load import scene_from
+from catenary.cases.scene.problem import resolved
+from catenary.cases.scene.scene import Scene
+
+# Patterns of the parameters that are taken if none are named, in the order in which they are taken.
+USUAL = (
+    "pantographs.*.static_force_N",
+    "pantographs.*.masses_kg",
+    "pantographs.*.stiffnesses_N_per_m",
+    "pantographs.*.dampings_N_s_per_m",
+    "contact.stiffness_N_per_m",
+    "contact.damping_N_s_per_m",
+    "line.*.tension_N",
+    "line.*.mass_kg_per_m",
+    "line.*.bending_stiffness_N_m2",
+    "line.*.pre_sag_mm",
+    "line.*.pre_sag_mid_mm",
+    "line.*dropper.stiffness_N_per_m",
+    "line.*dropper.axial_stiffness_N",
+    "line.*clamp_kg",
+    "line.links.*.stiffness_N_per_m",
+    "line.damping.alpha_s",
+    "line.damping.beta_per_s",
+    "line.support.stiffness_N_per_m",
+    "line.steady_arm.stiffness_N_per_m",
+    "line.steady_arm.length_m",
+)
+# Of these each entry is a parameter, of other lists all entries together.
+_BY_ENTRY = ("masses_kg", "stiffnesses_N_per_m", "dampings_N_s_per_m")
+# By how much a table of changes lets a parameter change, by its unit; others by a hundredth.
+_CHANGES = {"mm": 1.0, "m": 1e-3, "kg": 1.0, "N": 1.0, "km/h": 1.0}
+_KILONEWTON = 1e3
+# Step of the differences by which set-ups are differentiated, in parts of the value: of the fourth
+# order they are off by 4 step^4, some 1e-12, and by round-off over the step, 1e-13 to 1e-10.
+_STEP = 1e-3
+_STEP_OF_ZERO = {"mm": 0.05}
+_USUAL_STEP_OF_ZERO = 1e-4
+# Tables without anything of the line.
+_OF_TRAIN = ("pantographs", "train", "contact")
+_BY_SPEED, _FORCE = "static_force_by_speed", "static_force_N"
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A number of a scene, or a list of numbers that change together.
+
+    Attributes
+    ----------
+    key : dotted, with the number of an entry where it is one of a list
+    values : its value, or all of a list
+    """
+
+    key: str
+    values: tuple[float, ...]
+
+    @property
+    def unit(self) -> str:
+        """That the key names."""
+        return unit_of(self.key)
+
+    @property
+    def size(self) -> float:
+        """The largest value without its sign."""
+        return max(map(abs, self.values))
+
+    @property
+    def is_of_train(self) -> bool:
+        """Whether it leaves the line at rest as it is."""
+        return self.key.split(".")[0] in _OF_TRAIN
+
+    @property
+    def step(self) -> float:
+        """By how much it is changed to differentiate set-ups."""
+        if self.size > 0.0:
+            return _STEP * self.size
+        return _STEP_OF_ZERO.get(self.unit, _USUAL_STEP_OF_ZERO)
+
+    @property
+    def change(self) -> float:
+        """By how much a table lets it change: a millimetre, kilogram or newton, a kilonewton of
+        tension, or a hundredth of itself."""
+        if self.key.endswith("tension_N"):
+            return _KILONEWTON
+        return _CHANGES.get(self.unit, 0.01 * self.size or 1.0)
+
+    @property
+    def text(self) -> str:
+        """Its value where people read it."""
+        return f"{self.values[0]:g}" if len(self.values) == 1 else f"{len(self.values)} values"
+
+
+class ChangedScenes:
+    """Scenes with one parameter changed. Not collective.
+
+    Their windows do not move, as steps of a part of the line have no derivatives, and numbers may
+    be unusual ones.
+
+    Parameters
+    ----------
+    scene : the checked one
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self._raw = resolved(scene)
+        self._raw.pop("window", None)
+        self._raw["case"]["accept_unusual"] = True
+        self.scene = self._checked(self._raw)
+
+    def changed(self, parameter: Parameter, by: float) -> Scene:
+        """The scene with all values of a parameter changed ``by`` a number."""
+        raw = copy.deepcopy(self._raw)
+        holder, place = _found(raw, parameter.key)
+        if place == _FORCE and holder.get(_BY_SPEED):
+            holder[_BY_SPEED] = [[speed, force + by] for speed, force in holder[_BY_SPEED]]
+        elif isinstance(holder[place], list):
+            holder[place] = (np.array(holder[place]) + by).tolist()
+        else:
+            holder[place] += by
+        return self._checked(raw)
+
+    def parameter(self, key: str) -> Parameter:
+        """The parameter of a key.
+
+        Raises
+        ------
+        InputError
+            If the scene has no number there, or if a ready pantograph has it.
+        """
+        known = known_keys(Scene)
+        parts = key.split(".")
+        if not is_known(key, known) and not (
+            parts[-1].isdigit() and is_known(key.rpartition(".")[0], known)
+        ):
+            raise InputError(unknown_key(key, "in --parameter", known))
+        if parts[0] == "pantographs" and len(parts) > 2:
+            kind = self._raw["pantographs"].get(parts[1], {})
+            if kind.get("model") is not None:
+                raise InputError(
+                    f"pantographs.{parts[1]} is the ready {kind['model']}, whose numbers stay: "
+                    "write its lists in place of model (`catenary list --pantographs`)"
+                )
+        values = self._values(key)
+        if values is None:
+            raise InputError(
+                f"{shown(key)[1:-1]} has no value in this scene that is a number, by which a march "
+                "could be differentiated"
+            )
+        return Parameter(key, values)
+
+    def usual(self) -> list[Parameter]:
+        """The parameters of the scene that are taken if none are named, without those that are
+        zero."""
+        on_train = {place["name"] for place in self._raw["train"]["pantographs"]}
+        found = dict.fromkeys(self._usual_keys())
+        kept = []
+        for key in found:
+            parts = key.split(".")
+            if parts[0] == "pantographs":
+                kind = self._raw["pantographs"][parts[1]]
+                if parts[1] not in on_train or kind.get("model") is not None:
+                    continue
+            values = self._values(key)
+            if values is not None and any(values):
+                kept.append(Parameter(key, values))
+        return kept
+
+    def _usual_keys(self) -> Iterator[str]:
+        every = list(_numbers(self._raw))
+        for pattern in USUAL:
+            for key in every:
+                own = key.replace(_BY_SPEED, _FORCE)
+                if not fnmatch.fnmatchcase(own, pattern):
+                    continue
+                values = self._values(own)
+                if own.split(".")[-1] in _BY_ENTRY and values is not None:
+                    yield from (f"{own}.{number}" for number in range(len(values)))
+                else:
+                    yield own
+
+    def _values(self, key: str) -> tuple[float, ...] | None:
+        try:
+            holder, place = _found(self._raw, key)
+        except (KeyError, IndexError, TypeError, ValueError):
+            return None
+        if place == _FORCE and isinstance(holder, dict) and holder.get(_BY_SPEED):
+            speeds, forces = np.array(holder[_BY_SPEED]).T
+            return (float(np.interp(self._raw["train"]["speed_km_h"], speeds, forces)),)
+        value = holder.get(place) if isinstance(holder, dict) else holder[place]
+        values = value if isinstance(value, list) else [value]
+        if not values or not all(_is_number(one) for one in values):
+            return None
+        return tuple(map(float, values))
+
+    @staticmethod
+    def _checked(raw: dict[str, Any]) -> Scene:
+        return scene_from(raw, Origin("the scene", (), recorded=True), folder=Path.cwd())
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _found(raw: Any, key: str) -> tuple[Any, Any]:
+    """The table or list that holds a key's last part, and that part as its place there."""
+    here, parts = raw, key.split(".")
+    for part in parts[:-1]:
+        here = here[int(part)] if isinstance(here, list) else here[part]
+    last: Any = int(parts[-1]) if isinstance(here, list) else parts[-1]
+    if isinstance(here, list):
+        here[last]  # raises if there is none
+    return here, last
+
+
+def _numbers(raw: Any, prefix: str = "") -> Iterator[str]:
+    """Keys of all numbers, and of all lists of what are no tables."""
+    if isinstance(raw, dict):
+        for name, value in raw.items():
+            yield from _numbers(value, f"{prefix}.{name}" if prefix else str(name))
+    elif isinstance(raw, list) and raw and isinstance(raw[0], dict):
+        for number, value in enumerate(raw):
+            yield from _numbers(value, f"{prefix}.{number}")
+    elif _is_number(raw) or isinstance(raw, list):
+        yield prefix
+
+
+def parameters_of(scenes: ChangedScenes, keys: Sequence[str]) -> list[Parameter]:
+    """The parameters of some keys, or the usual ones if there are none."""
+    return [scenes.parameter(key) for key in dict.fromkeys(keys)] if keys else scenes.usual()

@@ -1,0 +1,194 @@
+"""The statistics of a case differentiated by its parameters, in one march."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from catenary.base.errors import InputError
+from catenary.cases.run.scene_mesh import mesh_of
+from catenary.cases.scene.problem import problem_of
+from catenary.cases.scene.scene import Scene
+from catenary.cases.studies.sensitivity.parameters import ChangedScenes, Parameter, parameters_of
+from catenary.postproc.evaluate import derivatives, filters
+from catenary.postproc.evaluate.derivatives import ForceDerivatives
+from catenary.postproc.evaluate.statistics import covers
+from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest
+from catenary.solver.statics.stability_of_rest import refuse_lost_wire
+from catenary.solver.tangents.march import Tangents, march_with_tangents
+from catenary.solver.tangents.set_up import Change, differentiate, set_up_of
+
+# What derivatives of all steps may take before the march is made again for the next parameters [B].
+_BYTES = 2**28
+
+
+@dataclass(frozen=True)
+class Statistics:
+    """Of a pantograph's contact force below 20 Hz in the evaluated stretch [N]."""
+
+    mean: float
+    std: float
+    maximum: float
+    minimum: float
+
+
+@dataclass
+class Sensitivity:
+    """A case differentiated by parameters.
+
+    Attributes
+    ----------
+    names : of the pantographs
+    statistics : of each of them
+    max_uplift : largest uplift of evaluated arms [m], NaN if there are none
+    parameters : by which it was differentiated
+    by_force : of each parameter, for each pantograph, derivatives of its statistics per unit of the
+        parameter's key
+    by_uplift : of each parameter that of the largest uplift [m]
+    n_steps : of the march
+    open_steps, contact_switches, link_switches : see ``Tangents``
+    left_out : keys of usual parameters by which it cannot be differentiated, and why
+    """
+
+    names: list[str]
+    statistics: list[Statistics]
+    max_uplift: float
+    n_steps: int
+    open_steps: int
+    contact_switches: int
+    link_switches: int
+    parameters: list[Parameter] = field(default_factory=list)
+    by_force: list[list[ForceDerivatives]] = field(default_factory=list)
+    by_uplift: list[float] = field(default_factory=list)
+    left_out: dict[str, str] = field(default_factory=dict)
+
+
+def sensitivity_of(
+    scene: Scene,
+    keys: Sequence[str],
+    comm: Any,
+    progress: Callable[[str], None] = lambda line: None,
+) -> Sensitivity:
+    """Differentiate the statistics of a scene. Not collective: one process.
+
+    Parameters
+    ----------
+    scene : checked
+    keys : of the parameters; the usual ones if there are none
+    comm : mpi4py communicator of this process alone
+    progress : called with a line for each parameter
+
+    Raises
+    ------
+    InputError
+        If the march has parts without derivatives, or by a parameter that was named.
+    RunBroken
+        If the march breaks.
+    """
+    filters.check_sampling(scene.numerics.dt_s)
+    scenes = ChangedScenes(scene)
+    parameters = parameters_of(scenes, keys)
+    at_rest = _at_rest(scenes.scene)
+    refuse_lost_wire(at_rest.model, at_rest.form)
+    now = set_up_of(comm, at_rest)
+    n_steps = len(now.drives)
+    changes: list[Change] = []
+    kept, left_out = [], {}
+    for parameter in parameters:
+        progress(parameter.key)
+
+        def set_up(by: float, parameter: Parameter = parameter) -> Any:
+            changed = scenes.changed(parameter, by)
+            if parameter.is_of_train:
+                return set_up_of(comm, at_rest.under(problem_of(changed)), n_steps, now)
+            return set_up_of(comm, _at_rest(changed), n_steps)
+
+        try:
+            changes.append(differentiate(set_up, now, parameter.step, parameter.key))
+        except InputError as error:
+            if keys:
+                raise
+            left_out[parameter.key] = str(error)
+        else:
+            kept.append(parameter)
+    n_results = len(now.heads) + at_rest.mesh.steady_arms.size
+    most = max(1, _BYTES // (8 * n_steps * n_results))
+    found: Sensitivity | None = None
+    for first in range(0, max(1, len(kept)), most):
+        part = slice(first, first + most)
+        progress("march")
+        marched = march_with_tangents(comm, at_rest, changes[part])
+        if found is None:
+            found = _without_parameters(marched, at_rest)
+        _add(found, marched, at_rest, kept[part])
+    assert found is not None
+    found.left_out = left_out
+    return found
+
+
+def _at_rest(scene: Scene) -> LineAtRest:
+    return line_at_rest(problem_of(scene), mesh_of(scene))
+
+
+def _without_parameters(marched: Tangents, at_rest: LineAtRest) -> Sensitivity:
+    statistics = []
+    for number, within in _within(marched, at_rest):
+        force = filters.low_pass(marched.force[:, number], marched.dt)[within]
+        statistics.append(
+            Statistics(
+                float(force.mean()), float(force.std()), float(force.max()), float(force.min())
+            )
+        )
+    n = len(statistics)
+    middle = [f"no. {place}" for place in range(2, n)]
+    names = ["pantograph"] if n == 1 else ["leading", *middle, "trailing"]
+    order = np.argsort([place.behind for place in at_rest.problem.train.placements], kind="stable")
+    return Sensitivity(
+        [names[int(place)] for place in np.argsort(order)],
+        statistics,
+        float(marched.uplift.max()) if marched.uplift.size else float("nan"),
+        len(marched.force),
+        marched.open_steps,
+        marched.contact_switches,
+        marched.link_switches,
+    )
+
+
+def _within(marched: Tangents, at_rest: LineAtRest) -> Iterator[tuple[int, np.ndarray]]:
+    """Each pantograph's number, and which steps it is in the evaluated stretch."""
+    first, last = at_rest.problem.evaluation
+    for number in range(marched.force.shape[1]):
+        position = marched.position[:, number]
+        if not covers(position, (first, last)):
+            raise InputError(
+                f"a pantograph runs from {position[0]:.0f} to {position[-1]:.0f} m, and not "
+                f"through the evaluation stretch from {first:.0f} to {last:.0f} m"
+            )
+        yield number, (position >= first) & (position <= last)
+
+
+def _add(
+    found: Sensitivity, marched: Tangents, at_rest: LineAtRest, parameters: list[Parameter]
+) -> None:
+    """Add the derivatives of a march by some parameters."""
+    by_place = marched.by_position / marched.speed
+    of_all = [
+        derivatives.of_force(
+            marched.force[:, number],
+            marched.by_force[:, :, number],
+            within,
+            marched.dt,
+            by_place,
+        )
+        for number, within in _within(marched, at_rest)
+    ]
+    by_uplift = derivatives.of_largest(marched.uplift, marched.by_uplift)
+    for place, parameter in enumerate(parameters):
+        found.parameters.append(parameter)
+        found.by_force.append(
+            [ForceDerivatives(*(values[place] for values in own)) for own in of_all]
+        )
+        found.by_uplift.append(float(by_uplift[place]))

@@ -1,0 +1,399 @@
+// Derivatives of a march by its parameters.
+#include "tangents/tangents.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "base/targets.hpp"
+
+namespace catenary {
+
+namespace {
+
+/// Second derivatives of the Hermite functions along the track [1/m2], of those of rotations [1/m].
+std::array<double, 4> shape_curvatures(double xi, double length) {
+    const double square = length * length;
+    return {(12 * xi - 6) / square, (6 * xi - 4) / length, (6 - 12 * xi) / square,
+            (6 * xi - 2) / length};
+}
+
+/// Displacement and velocity of an unknown as they are.
+struct Moved {
+    double displacement, velocity;
+};
+Moved moved_at(int64_t unknown, const Motion& motion) {
+    return {displacement_at(unknown, motion), velocity_at(unknown, motion)};
+}
+
+/// Make `result` what a term is multiplied with.
+CATENARY_FOR_TARGETS
+void add_up(const MatrixTerm& term, std::span<const double> displacement,
+            std::span<const double> velocity, std::span<const double> acceleration,
+            std::span<double> result) {
+    const double by_d = term.by_displacement, by_v = term.by_velocity, by_a = term.by_acceleration;
+    for (size_t i = 0; i < result.size(); ++i)
+        result[i] = by_d * displacement[i] + by_v * velocity[i] + by_a * acceleration[i];
+}
+
+double at(std::span<const double> numbers, int64_t i) {
+    return numbers.empty() ? 0.0 : numbers[i];
+}
+
+}  // namespace
+
+TangentSteps::TangentSteps(StepParts parts, Block block, MarchTangents tangents)
+    : Steps(std::move(parts), std::move(block)), tangents_(std::move(tangents)) {
+    const StepParts& own = this->parts();
+    for (const Head* head : own.heads) {
+        chains_.push_back(dynamic_cast<const LinearChain*>(head));
+        if (!chains_.back()) throw std::invalid_argument("a head is no linear chain");
+        before_.emplace_back(3 * head->n());
+        free_.emplace_back(3 * head->n());
+    }
+    for (const Tangent& tangent : tangents_.all) {
+        if (tangent.heads.size() != chains_.size())
+            throw std::invalid_argument("a tangent has other heads than the steps");
+        contacts_.push_back(own.contacts);
+        contacts_.back().motion = tangent.free->parts().arrays.motion;
+        reads_motion_ = reads_motion_ || !tangent.matrices.empty();
+    }
+    if (reads_motion_)
+        for (auto* numbers : {&displacement_, &velocity_, &sum_})
+            numbers->resize(own.contacts.motion.x.size());
+    const int64_t n = n_contacts(), most = size(own.problem.unknowns.right);
+    for (auto* numbers : {&place_, &rate_, &forces_}) numbers->resize(n);
+    for (auto* numbers : {&right_, &solution_, &left_, &change_, &compensations_})
+        numbers->resize(most);
+    for (auto* numbers : {&matrix_, &factors_}) numbers->resize(most * most);
+    for (auto* numbers : {&index_, &order_}) numbers->resize(most);
+}
+
+Taken TangentSteps::take(int64_t first, int64_t end) {
+    for (int64_t number = first; number < end; ++number) {
+        for (size_t h = 0; h < chains_.size(); ++h)
+            std::ranges::copy(chains_[h]->arrays().state, before_[h].begin());
+        const Taken taken = Steps::take(number, number + 1);
+        if (taken.begun) return {number - first, true, false};
+        read_motion();
+        find_acting();
+        count();
+        fill_matrix();
+        follow(number);
+        if (taken.is_full) return {number + 1 - first, false, true};
+    }
+    return {end - first, false, false};
+}
+
+void TangentSteps::read_motion() {
+    if (!reads_motion_) return;
+    displacements(parts().contacts.motion, 0, displacement_);
+    velocities(parts().contacts.motion, 0, velocity_);
+}
+
+/// Find the contacts and links that act in the step that was taken.
+void TangentSteps::find_acting() {
+    const SmallProblem& problem = parts().problem;
+    std::swap(acting_, was_);
+    acting_.contacts.clear();
+    acting_.rows.clear();
+    acting_.numbers.clear();
+    for (int64_t i = 0; i < n_contacts(); ++i)
+        if (force()[i] != 0.0 || (problem.pulls && problem.share.present[i] != 0.0))
+            acting_.contacts.push_back(i);
+    for (int64_t k = 0; k < n_compensations(); ++k) {
+        if (force()[n_contacts() + k] == 0.0) continue;
+        acting_.rows.push_back(k);
+        acting_.numbers.push_back(problem.share.rows.number(k));
+    }
+}
+
+void TangentSteps::count() {
+    const auto switches = tangents_.switches;
+    switches[0] += static_cast<int64_t>(acting_.contacts.size()) < n_contacts();
+    if (!has_begun_) was_ = acting_;
+    has_begun_ = true;
+    switches[1] += acting_.contacts != was_.contacts;
+    switches[2] += acting_.numbers != was_.numbers;
+}
+
+/// The matrix of the small problem, as far as it acts; see `couple` and `press`.
+void TangentSteps::fill_matrix() {
+    const SmallProblem& problem = parts().problem;
+    const auto& [own, offset, by_depth, by_rate] = problem.tangents;
+    const LinkRows& rows = problem.share.rows;
+    const Coupled& coupled = problem.coupled;
+    const int64_t m = acting_.n(), n = static_cast<int64_t>(acting_.contacts.size());
+    const int64_t half = coupled.band.columns / 2;
+    const Array2<double> matrix{matrix_.data(), m, m};
+    for (int64_t i = 0; i < n; ++i) {
+        const int64_t contact = acting_.contacts[i];
+        for (int64_t j = 0; j < n; ++j)
+            matrix(i, j) =
+                by_depth[contact] * problem.gap.by_force(contact, acting_.contacts[j]) +
+                by_rate[contact] * problem.gap.rate_by_force(contact, acting_.contacts[j]);
+        matrix(i, i) += own[contact];
+        for (int64_t k = 0; n + k < m; ++k)
+            matrix(i, n + k) = -(by_depth[contact] * rows.lift(acting_.rows[k], contact) +
+                                 by_rate[contact] * rows.rise(acting_.rows[k], contact));
+    }
+    for (int64_t k = 0; n + k < m; ++k) {
+        const int64_t number = acting_.numbers[k];
+        const double released = coupled.released[number];
+        for (int64_t j = 0; j < n; ++j)
+            matrix(n + k, j) = released * rows.reaction(acting_.rows[k], acting_.contacts[j]);
+        for (int64_t l = 0; n + l < m; ++l) {
+            const int64_t offset_of_band = number - acting_.numbers[l] + half;
+            const bool near = 0 <= offset_of_band && offset_of_band < coupled.band.columns;
+            matrix(n + k, n + l) =
+                near ? -released * coupled.band(acting_.numbers[l], offset_of_band) : 0.0;
+        }
+        matrix(n + k, n + k) += 1.0;
+    }
+}
+
+/// Take all tangents through the step that was taken.
+void TangentSteps::follow(int64_t number) {
+    const SmallProblem& problem = parts().problem;
+    const int64_t m = acting_.n(), n = static_cast<int64_t>(acting_.contacts.size());
+    Room room{};
+    room.factors = {factors_.data(), m, m};
+    room.acting = index_;
+    room.order = order_;
+    room.left = left_;
+    room.change = change_;
+    const std::unique_ptr<bool[]> acts(new bool[m]);
+    std::fill_n(acts.get(), m, true);
+    const double time = block().times[number] - course().since;
+    for (size_t t = 0; t < tangents_.all.size(); ++t) {
+        const Tangent& tangent = tangents_.all[t];
+        const double way = tangent.speed * time;
+        load(tangent, way);
+        tangent.free->step();
+        std::ranges::fill(place_, 0.0);
+        std::ranges::fill(rate_, 0.0);
+        predict_heads(tangent, number);
+        find_places(tangent, way);
+        for (int64_t i = 0; i < n; ++i) right_[i] = of_law(tangent, acting_.contacts[i]);
+        for (int64_t k = 0; n + k < m; ++k)
+            right_[n + k] = -problem.coupled.released[acting_.numbers[k]] *
+                            of_reserve(tangent, acting_.numbers[k], static_cast<int64_t>(t));
+        const System system{
+            {matrix_.data(), m, m}, std::span(right_).first(m), std::span(solution_).first(m)};
+        solve_on(system, {acts.get(), static_cast<size_t>(m)}, room);
+        std::ranges::fill(forces_, 0.0);
+        for (int64_t i = 0; i < n; ++i) forces_[acting_.contacts[i]] = solution_[i];
+        std::copy_n(solution_.begin() + n, m - n, compensations_.begin());
+        move(tangent, contacts_[t]);
+        remember(tangent);
+        show(tangent, number);
+    }
+}
+
+/// Put what a tangent's line is loaded with: what changes of its matrices, links and places.
+void TangentSteps::load(const Tangent& tangent, double way) {
+    const auto loads = tangent.loads;
+    const auto acceleration = parts().contacts.motion.z;
+    std::ranges::fill(loads, 0.0);
+    for (const MatrixTerm& term : tangent.matrices) {
+        add_up(term, displacement_, velocity_, acceleration, sum_);
+        for (int64_t i = 0; i < size(term.rows); ++i) {
+            double value = 0.0;
+            for (int64_t k = term.begin[i]; k < term.begin[i + 1]; ++k)
+                value += term.values[k] * sum_[term.columns[k]];
+            loads[term.rows[i]] -= value;
+        }
+    }
+    for (size_t k = 0; tangent.links.weights.rows > 0 && k < acting_.rows.size(); ++k) {
+        const int64_t link = acting_.numbers[k];
+        const double compensation = force()[n_contacts() + acting_.rows[k]];
+        const auto unknowns = tangents_.links.unknowns[link];
+        for (size_t j = 0; j < unknowns.size(); ++j)
+            loads[unknowns[j]] -= tangent.links.weights(link, j) * compensation;
+    }
+    for (int64_t i : acting_.contacts) {
+        const Touch& touch = parts().contacts.touches[i];
+        const double moved = at(tangent.start, i) + way;
+        if (moved == 0.0) continue;
+        for (int j = 0; j < 4; ++j) loads[touch.local[j]] += force()[i] * touch.slope[j] * moved;
+    }
+}
+
+/// Derivatives of heads without changes of contact forces, and what they add to those of gaps.
+void TangentSteps::predict_heads(const Tangent& tangent, int64_t number) {
+    for (size_t h = 0; h < chains_.size(); ++h) {
+        const LinearChain& chain = *chains_[h];
+        const HeadChange& change = tangent.heads[h];
+        const LinearStep& step = chain.linear();
+        const HeadArrays& arrays = chain.arrays();
+        const NewmarkFactors& newmark = arrays.newmark;
+        const int64_t n = chain.n(), s = chain.n_strips(), first = chain.first();
+        const Drive& drive = *reinterpret_cast<const Drive*>(block().drives[number][h].data());
+        Drive changed{};
+        if (tangent.drives.n > 0)
+            changed = *reinterpret_cast<const Drive*>(
+                tangent.drives[tangents_.first[0] + number][h].data());
+        const bool changes = change.matrix.rows > 0;
+        std::vector<double>& free = free_[h];
+        for (int64_t i = 0; i < 3 * n; ++i) {
+            double value = changed.force * step.by_drive[i] + changed.head_air * step.by_head[i];
+            for (int64_t k = 0; k < 3 * n; ++k) value += step.matrix(i, k) * change.state[k];
+            if (changes) {
+                value += drive.force * change.by_drive[i] + drive.head_air * change.by_head[i];
+                for (int64_t k = 0; k < 3 * n; ++k) value += change.matrix(i, k) * before_[h][k];
+            }
+            free[i] = value;
+        }
+        // What a force takes off the state changes with the masses.
+        for (int64_t j = 0; changes && j < s; ++j)
+            for (int64_t i = 0; i < n; ++i) {
+                double answer = 0.0;
+                for (int64_t k = 0; k < n; ++k)
+                    answer += change.inverse(i, k) * arrays.touch(0, j, k);
+                answer *= force()[first + j];
+                free[i] -= newmark.position * answer;
+                free[n + i] -= newmark.velocity * answer;
+                free[2 * n + i] -= answer;
+            }
+        for (int64_t j = 0; j < s; ++j)
+            for (int64_t k = 0; k < n; ++k) {
+                place_[first + j] += arrays.touch(0, j, k) * free[k];
+                rate_[first + j] +=
+                    arrays.touch(0, j, k) * free[n + k] + arrays.touch(1, j, k) * free[k];
+            }
+    }
+}
+
+/// Take off gaps what the wires' heights change by.
+void TangentSteps::find_places(const Tangent& tangent, double way) {
+    const Contacts& contacts = parts().contacts;
+    const Motion& own = tangent.free->parts().arrays.motion;
+    const double speed = contacts.gains.train_speed;
+    for (int64_t i = 0; i < n_contacts(); ++i) {
+        const Touch& touch = contacts.touches[i];
+        if (touch.present == 0.0) continue;
+        const double moved = at(tangent.start, i) + way;
+        const Node& before = contacts.wires.nodes[touch.element];
+        const double length = contacts.wires.nodes[touch.element + 1].x - before.x;
+        const auto curvature = shape_curvatures((touch.x - before.x) / length, length);
+        for (int j = 0; j < 4; ++j) {
+            const auto [dd, dv] = moved_at(touch.local[j], own);
+            const auto [d, v] = moved_at(touch.local[j], contacts.motion);
+            double shifted = dd;
+            if (tangent.rest.rows > 0) shifted += tangent.rest(touch.element + j / 2, j % 2);
+            const double total = touch.rest[j] + d;
+            place_[i] -= touch.value[j] * shifted + touch.slope[j] * total * moved;
+            rate_[i] -= touch.value[j] * dv + speed * touch.slope[j] * shifted +
+                        (touch.slope[j] * v + speed * curvature[j] * total) * moved +
+                        tangent.speed * touch.slope[j] * total;
+        }
+        const double share = touch.value[0] + touch.value[2];
+        place_[i] -= share * touch.surface[1] * moved;
+        rate_[i] -= share * tangent.speed * touch.surface[1];
+    }
+}
+
+/// Derivative of a contact's law without changes of forces.
+double TangentSteps::of_law(const Tangent& tangent, int64_t i) const {
+    const SmallProblem& problem = parts().problem;
+    const double depth = problem.found.depth[i], rate = problem.found.rate[i];
+    double value =
+        problem.tangents.by_depth[i] * place_[i] + problem.tangents.by_rate[i] * rate_[i];
+    const auto& changes = tangent.law.tangents;
+    if (changes.rows > 0)
+        value += changes(1, i) + changes(2, i) * depth + changes(3, i) * rate -
+                 changes(0, i) * force()[i];
+    if (!parts().law.marched) return value;
+    const auto& [law, speed, tangents, there] = *parts().law.marched;
+    const double spring = law.stiffness * std::pow(depth, law.exponent);
+    const double by_speed = -spring * law.hysteresis * rate / (speed[i] * speed[i]);
+    value += by_speed * tangent.law.speed[i];
+    if (tangent.law.hertz.empty()) return value;
+    const double loss = 1.0 + law.hysteresis * rate / speed[i];
+    const auto change = tangent.law.hertz;
+    return value + spring * loss * (change[0] / law.stiffness + change[1] * std::log(depth)) +
+           spring * rate / speed[i] * change[2];
+}
+
+/// Derivative of a link's reserve without changes of forces.
+double TangentSteps::of_reserve(const Tangent& tangent, int64_t link, int64_t number) const {
+    const Motion& motion = parts().contacts.motion;
+    const Links& links = tangents_.links;
+    const auto& [law, weights] = tangent.links;
+    double value = reserve_of(link, links, contacts_[number].motion) - links.law[link].rest;
+    if (law.rows == 0 && weights.rows == 0) return value;
+    const Reserve& own = links.law[link];
+    if (law.rows > 0) value += law(link, 0);
+    for (int64_t k = 0; k < links.unknowns.columns; ++k) {
+        const auto [d, v] = moved_at(links.unknowns(link, k), motion);
+        if (law.rows > 0) value += links.weights(link, k) * (law(link, 1) * d + law(link, 2) * v);
+        if (weights.rows > 0) value += weights(link, k) * (own.stiffness * d + own.damping * v);
+    }
+    return value;
+}
+
+/// Add what the changes of forces do to line and heads.
+void TangentSteps::move(const Tangent& tangent, const Contacts& contacts) {
+    superpose(contacts, forces_);
+    compensate(contacts, acting_.numbers,
+               std::span<const double>(compensations_).first(acting_.numbers.size()));
+    for (size_t h = 0; h < chains_.size(); ++h) {
+        const LinearChain& chain = *chains_[h];
+        const HeadArrays& arrays = chain.arrays();
+        const NewmarkFactors& newmark = arrays.newmark;
+        const auto state = tangent.heads[h].state;
+        const int64_t n = chain.n();
+        std::ranges::copy(free_[h], state.begin());
+        for (int64_t j = 0; j < chain.n_strips(); ++j)
+            for (int64_t i = 0; i < n; ++i) {
+                double answer = 0.0;
+                for (int64_t k = 0; k < n; ++k)
+                    answer += chain.linear().inverse(i, k) * arrays.touch(0, j, k);
+                answer *= forces_[chain.first() + j];
+                state[i] -= newmark.position * answer;
+                state[n + i] -= newmark.velocity * answer;
+                state[2 * n + i] -= answer;
+            }
+    }
+}
+
+/// Keep what a Hertzian law remembers, see `remember` of the law.
+void TangentSteps::remember(const Tangent& tangent) const {
+    if (!parts().law.marched) return;
+    const SmallProblem& problem = parts().problem;
+    const double least = parts().law.marched->law.least_speed;
+    for (int64_t i = 0; i < n_contacts(); ++i) {
+        if (problem.found.depth[i] > 0.0) continue;
+        double& speed = tangent.law.speed[i];
+        if (problem.found.rate[i] <= least) {
+            speed = at(tangent.law.hertz, 3);
+            continue;
+        }
+        speed = rate_[i];
+        for (int64_t j = 0; j < n_contacts(); ++j)
+            speed -= problem.gap.rate_by_force(i, j) * forces_[j];
+        for (size_t k = 0; k < acting_.rows.size(); ++k)
+            speed += problem.share.rows.rise(acting_.rows[k], i) * compensations_[k];
+    }
+}
+
+/// Fill in a tangent's row.
+void TangentSteps::show(const Tangent& tangent, int64_t number) const {
+    const auto& [of_strip, of_pantograph] = parts().train_outputs.ends;
+    const double gamma = parts().law.reported.gamma;
+    const auto row = tangent.results[number];
+    const int64_t n_pantographs = size(of_pantograph) - 1;
+    for (int64_t p = 0; p < n_pantographs; ++p) {
+        row[p] = 0.0;
+        for (int64_t i = of_strip[of_pantograph[p]]; i < of_strip[of_pantograph[p + 1]]; ++i) {
+            row[p] += gamma == 0.0 ? forces_[i]
+                                   : gamma * forces_[i] + (1.0 - gamma) * tangent.law.latest[i];
+            tangent.law.latest[i] = forces_[i];
+        }
+    }
+    const auto arms = parts().shown.arms;
+    for (int64_t i = 0; i < size(arms); ++i)
+        row[n_pantographs + i] = displacement_at(arms[i], tangent.free->parts().arrays.motion);
+}
+
+}  // namespace catenary

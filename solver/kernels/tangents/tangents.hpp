@@ -1,0 +1,132 @@
+#pragma once
+// Derivatives of a march by its parameters: tangents, which go beside the steps.
+//
+// A step solves M a + C v + K d = sum_i b_i f_i - sum_l L_l s_l with forces of contacts and
+// compensations of links. Its derivative by a parameter p, written d., is a motion of the same
+// line:
+//
+//     M da + C dv + K dd = sum_i (b_i df_i + db_i f_i) - sum_l (L_l ds_l + dL_l s_l)
+//                          - dM a - dC v - dK d,
+//
+// by the same method and with the same factors. Contacts that touch and links that have switched
+// keep their laws, differentiated; others keep no force. Heads and contact laws likewise.
+#include "contact_problem/active_set.hpp"
+#include "heads/linear_chain.hpp"
+#include "steps/steps.hpp"
+
+namespace catenary {
+
+/// A derivative of the line's matrices times a sum of displacements, velocities and accelerations:
+/// of the rows (m,) that have any, row i from begin[i] to begin[i + 1].
+struct MatrixTerm {
+    std::span<const int64_t> rows, begin;
+    std::span<const int32_t> columns;
+    std::span<const double> values;
+    double by_displacement, by_velocity, by_acceleration;
+    CATENARY_RECORD(rows, begin, columns, values, by_displacement, by_velocity, by_acceleration)
+};
+
+/// Derivatives of all links of the line by their numbers: rest, stiffness and damping of their laws
+/// (n, 3), and weights of their directions (n, m); no rows if nothing changes.
+struct LinkChange {
+    Array2<const double> law, weights;
+    CATENARY_RECORD(law, weights)
+};
+
+/// Derivatives of a head: of the step of a chain, all of its arrays or none, and of its state
+/// (3 n,), which goes on with the steps.
+struct HeadChange {
+    Array2<const double> matrix;
+    std::span<const double> by_drive, by_head;
+    Array2<const double> inverse;
+    std::span<double> state;
+    CATENARY_RECORD(matrix, by_drive, by_head, inverse, state)
+};
+
+/// Derivatives of the contact law at n contacts: of own, offset, by_depth and by_rate (4, n), and
+/// of a Hertzian law those of K, n, chi and the least speed (4,); nothing if they do not change.
+struct LawChange {
+    Array2<const double> tangents;
+    std::span<const double> hertz;
+    std::span<double> speed;   ///< of the rates at which gaps closed (n,)
+    std::span<double> latest;  ///< of the latest forces (n,)
+    CATENARY_RECORD(tangents, hertz, speed, latest)
+};
+
+/// A march differentiated by one parameter.
+struct Tangent {
+    TwoPasses* free;          ///< a step of its motion, without forces
+    std::span<double> loads;  ///< that this reads
+    std::vector<MatrixTerm> matrices;
+    Array2<const double> rest;  ///< of the wires' nodes at rest (n_nodes, 2), or no rows
+    LinkChange links;
+    std::vector<HeadChange> heads;
+    Array3<const double> drives;  ///< of the heads in all steps (n_steps, n_heads, width), or none
+    LawChange law;
+    std::span<const double> start;  ///< of the places of contacts at the start (n,)
+    double speed;                   ///< of the train's speed
+    Array2<double> results;         ///< (n, n_pantographs + n_arms) of each step of a block:
+                                    ///< contact forces, displacements at arms
+    CATENARY_RECORD(free, loads, matrices, rest, links, heads, drives, law, start, speed, results)
+};
+
+/// What tangents need of the march besides its steps.
+struct MarchTangents {
+    std::vector<Tangent> all;
+    Links links;                     ///< of the line, by their numbers
+    std::span<const int64_t> first;  ///< (1,) steps of the march before the block
+    std::span<int64_t> switches;     ///< (3,) steps in which a contact is open, in which a contact
+                                     ///< opened or closed, and in which links switched
+    CATENARY_RECORD(all, links, first, switches)
+};
+
+/// Steps with tangents.
+class TangentSteps : public Steps {
+  public:
+    /// Throws std::invalid_argument if a head is no linear chain.
+    TangentSteps(StepParts parts, Block block, MarchTangents tangents);
+    /// Take steps as `Steps::take`; those that are left to others have no tangents.
+    Taken take(int64_t first, int64_t end);
+
+  private:
+    /// Whose unknown stands where in the small problem: contacts, then links, that act.
+    struct Acting {
+        std::vector<int64_t> contacts, rows, numbers;
+        int64_t n() const { return static_cast<int64_t>(contacts.size() + rows.size()); }
+    };
+
+    void read_motion();
+    void find_acting();
+    void count();
+    void fill_matrix();
+    void follow(int64_t number);
+    void load(const Tangent& tangent, double way);
+    void predict_heads(const Tangent& tangent, int64_t number);
+    void find_places(const Tangent& tangent, double way);
+    double of_law(const Tangent& tangent, int64_t contact) const;
+    double of_reserve(const Tangent& tangent, int64_t link, int64_t number) const;
+    void move(const Tangent& tangent, const Contacts& contacts);
+    void remember(const Tangent& tangent) const;
+    void show(const Tangent& tangent, int64_t number) const;
+
+    std::span<const double> force() const { return parts().problem.unknowns.solution; }
+    int64_t n_contacts() const { return size(parts().problem.found.depth); }
+
+    MarchTangents tangents_;
+    std::vector<Contacts> contacts_;  ///< of each tangent, with its motion
+    std::vector<const LinearChain*> chains_;
+    std::vector<std::vector<double>> before_;  ///< states of the heads before the step
+    std::vector<std::vector<double>> free_;    ///< derivatives of heads without contact
+    /// Displacements and velocities of the line, and sums of these and of accelerations.
+    std::vector<double> displacement_, velocity_, sum_;
+    bool reads_motion_ = false;          ///< whether any tangent does
+    std::vector<double> place_, rate_;   ///< derivatives of gaps without forces
+    std::vector<double> forces_;         ///< of contacts
+    std::vector<double> compensations_;  ///< of acting links
+    Acting acting_, was_;
+    bool has_begun_ = false;
+    std::vector<double> matrix_, right_, solution_, factors_, left_, change_;
+    std::vector<int64_t> index_, order_;
+};
+
+}  // namespace catenary

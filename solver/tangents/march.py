@@ -1,0 +1,106 @@
+"""A march with its derivatives by parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from catenary.solver.kernels.flush_to_zero import flushed
+from catenary.solver.statics.line_at_rest import LineAtRest
+from catenary.solver.tangents.set_up import Change
+from catenary.solver.tangents.tangent_steps import TangentSteps
+from catenary.solver.time_loop.march import March
+
+_CHANNELS = ("contact_position", "contact_force", "arm_uplift")
+
+
+@dataclass(frozen=True)
+class Tangents:
+    """A march of n steps, and its derivatives by m parameters.
+
+    Attributes
+    ----------
+    dt : time step [s]
+    position : (n, n_pantographs) along the track [m]
+    force : (n, n_pantographs) contact forces [N]
+    uplift : (n, n_arms) at the steady arms in the evaluated stretch [m]
+    arm_x : (n_arms,) places of these [m]
+    speed : of the train [m/s]
+    by_force : (n, m, n_pantographs) derivatives of contact forces per unit of each parameter
+    by_uplift : (n, m, n_arms) those of uplifts
+    by_position : (n, m) those of all positions [m]
+    open_steps : steps in which a contact carried nothing
+    contact_switches : steps in which contacts opened or closed
+    link_switches : steps in which droppers slackened or tightened, or other links switched
+    """
+
+    dt: float
+    position: np.ndarray
+    force: np.ndarray
+    uplift: np.ndarray
+    arm_x: np.ndarray
+    speed: float
+    by_force: np.ndarray
+    by_uplift: np.ndarray
+    by_position: np.ndarray
+    open_steps: int
+    contact_switches: int
+    link_switches: int
+
+
+def march_with_tangents(comm: Any, at_rest: LineAtRest, changes: Sequence[Change]) -> Tangents:
+    """March a line, and differentiate each step. Not collective: one process.
+
+    Parameters
+    ----------
+    comm : mpi4py communicator of this process alone
+    at_rest : the line
+    changes : derivatives of its set-up by each parameter
+
+    Raises
+    ------
+    InputError
+        If steps of the line need more than the compiled loop.
+    RunBroken
+        If the march breaks.
+    """
+    with March(comm, *at_rest) as march:
+        scheme, showing, dt = march.in_loop()
+        steps = TangentSteps(scheme, showing, dt, changes)
+        columns = [showing.layout.columns[name] for name in _CHANNELS]
+        rows: list[list[np.ndarray]] = [[] for _ in columns]
+        results, step = [], 0
+        arms = at_rest.mesh.x(at_rest.mesh.steady_arms)
+        first, last = at_rest.problem.evaluation
+        evaluated = np.flatnonzero((first <= arms) & (arms <= last))
+        n = scheme.pantographs.n
+        kept_results = np.concatenate([np.arange(n), n + evaluated])
+        with flushed():
+            while step < march.n_steps:
+                left = march.n_steps - step
+                steps.take(step, min(steps.most, left), left)
+                for kept, part in zip(rows, columns, strict=True):
+                    kept.append(steps.rows[steps.block, part].copy())
+                results.append(steps.results[steps.block][..., kept_results])
+                step += steps.taken
+    position, force, uplift = (np.concatenate(kept) for kept in rows)
+    found = np.concatenate(results)
+    time = dt * np.arange(1, len(force) + 1)
+    moved = [change.start.mean() if change.start.size else 0.0 for change in changes]
+    return Tangents(
+        dt=dt,
+        position=position,
+        force=force,
+        uplift=uplift[:, evaluated],
+        arm_x=arms[evaluated],
+        speed=float(at_rest.problem.train.speed),
+        by_force=found[..., :n],
+        by_uplift=found[..., n:],
+        by_position=moved + np.outer(time, [change.speed for change in changes]),
+        open_steps=int(steps.switches[0]),
+        contact_switches=int(steps.switches[1]),
+        link_switches=int(steps.switches[2]),
+    )

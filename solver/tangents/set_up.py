@@ -1,0 +1,308 @@
+"""What a march is made of, as numbers, and their derivatives by a parameter.
+
+A march depends on a parameter through its set-up only: matrices and links of the line, the wires'
+shape at rest, heads, contact law, train. These are differentiated here by central differences of
+set-ups, which cost no march; `tangent_steps` takes the derivatives through the march without a
+further approximation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy import sparse
+
+from catenary.base.errors import InputError
+from catenary.mbs.head.head_arrays import N_DRIVE, LinearStep, drive_width
+from catenary.mbs.lumped import LumpedPantograph
+from catenary.solver.contact.contact_wire import ContactWires
+from catenary.solver.contact.train.pantographs import Pantographs, nominal_height_rule
+from catenary.solver.contact_problem.law_tangents import law_in_steps
+from catenary.solver.model.matrices import whole_matrix
+from catenary.solver.model.partition import distribute
+from catenary.solver.model.switching_links import switching_links
+from catenary.solver.problem.contact_laws import HertzLaw
+from catenary.solver.problem.problem import steps_of
+from catenary.solver.statics.line_at_rest import LineAtRest
+
+# Weights of a derivative of the fourth order by values at -2, -1, 1 and 2 steps.
+_STENCIL = {-2: 1.0 / 12.0, -1: -8.0 / 12.0, 1: 8.0 / 12.0, 2: -1.0 / 12.0}
+# Numbers that differ by so many roundings of themselves are equal.
+_ROUNDINGS = 64.0 * float(np.finfo(float).eps)
+# Damping is proportional if no more than such a part of it is not.
+_PROPORTIONAL = 1e-9
+_MATRICES = ("stiffness", "damping", "mass")
+
+
+@dataclass(frozen=True)
+class SetUp:
+    """A march before its first step, in SI units.
+
+    Attributes
+    ----------
+    matrices : K, C and M of the line, without rows and columns of held unknowns
+    rest : (n_nodes, 2) height [m] and slope [-] of the contact wires' nodes at rest
+    links : (n_links, 3) rest [N], stiffness [N/m] and damping [N s/m] of the laws of links
+    weights : (n_links, m) of their directions
+    heads : the step of each pantograph
+    states : (3 n,) of each at the start
+    drives : (n_steps, n_pantographs, width) what their steps depend on besides
+    law : (4, n_contacts) own, offset, by_depth and by_rate of the contact law; of a Hertzian law
+        zero
+    hertz : (4,) K, n, chi and least speed of a Hertzian law, else empty
+    start : (n_contacts,) places of the contacts at the start [m]
+    speed : of the train [m/s]
+    fixed : what no parameter that can be differentiated changes, by what a sentence calls it
+    """
+
+    matrices: tuple[sparse.csc_matrix, ...]
+    rest: np.ndarray
+    links: np.ndarray
+    weights: np.ndarray
+    heads: Sequence[LinearStep]
+    states: Sequence[np.ndarray]
+    drives: np.ndarray
+    law: np.ndarray
+    hertz: np.ndarray
+    start: np.ndarray
+    speed: float
+    fixed: dict[str, np.ndarray]
+
+
+class MatrixTerm(NamedTuple):
+    """A derivative of matrices times a sum of motions; see `kernels/tangents/tangents.hpp`."""
+
+    rows: np.ndarray
+    begin: np.ndarray
+    columns: np.ndarray
+    values: np.ndarray
+    by_displacement: float
+    by_velocity: float
+    by_acceleration: float
+
+
+@dataclass(frozen=True)
+class Change:
+    """Derivatives of a set-up by one parameter, per unit of it: as ``SetUp``; parts that do not
+    change are empty."""
+
+    matrices: Sequence[MatrixTerm]
+    rest: np.ndarray
+    links: np.ndarray
+    weights: np.ndarray
+    heads: Sequence[LinearStep]
+    states: Sequence[np.ndarray]
+    drives: np.ndarray
+    law: np.ndarray
+    hertz: np.ndarray
+    start: np.ndarray
+    speed: float
+
+
+def set_up_of(
+    comm: Any,
+    at_rest: LineAtRest,
+    n_steps: int | None = None,
+    same_line: SetUp | None = None,
+) -> SetUp:
+    """What a march from a line at rest is made of. Not collective: one process.
+
+    Parameters
+    ----------
+    comm : mpi4py communicator of this process alone
+    at_rest : the line
+    n_steps : whose drives are wanted; those of the march if not given
+    same_line : of a march of the same line at rest, whose matrices are taken over
+
+    Raises
+    ------
+    InputError
+        If the march has parts whose derivatives are not taken.
+    """
+    problem, model, form, lift = at_rest
+    simulated = model.simulated
+    _refuse(at_rest)
+    wires = ContactWires(model, form, distribute(model, 1, 0))
+    air_speed = problem.train.speed if simulated.meets_air else None
+    height = nominal_height_rule(wires, lift, air_speed, problem.contact)
+    pantographs = Pantographs(comm, problem, simulated, wires, height)
+    heads = [_chain_of(model) for model in pantographs.models]
+    if pantographs.lateral and any(head.is_crossed for head in heads):
+        raise InputError(
+            "a march with heads that roll under wires which move across the track is not "
+            "differentiated; set effects.head_roll = false"
+        )
+    n_steps = steps_of(problem) if n_steps is None else n_steps
+    drives = np.zeros((n_steps, pantographs.n, drive_width(pantographs.most_contacts)))
+    times = np.arange(1, n_steps + 1) * problem.numerics.dt
+    pantographs.fill_drives(times.tolist(), drives)
+    law = law_in_steps(problem, simulated, pantographs.n_contacts)
+    hertz = np.zeros(0)
+    if isinstance(simulated.contact, HertzLaw):
+        own = simulated.contact
+        hertz = np.array([own.stiffness, own.exponent, own.hysteresis, own.least_speed])
+    links = switching_links(model, form.dropper_force)
+    laws = links.arrays.law
+    return SetUp(
+        matrices=same_line.matrices
+        if same_line is not None
+        else tuple(whole_matrix(model, **{name: 1.0}) for name in _MATRICES),
+        rest=wires.nodes["rest"].astype(float),
+        links=np.stack([laws["rest"], laws["stiffness"], laws["damping"]], axis=1),
+        weights=links.arrays.weights,
+        heads=[head.linear_step() for head in heads],
+        states=[head.state() for head in heads],
+        drives=drives,
+        law=np.stack(law.tangents),
+        hertz=hertz,
+        start=pantographs.places_along.start[: pantographs.n_contacts].copy(),
+        speed=float(problem.train.speed),
+        fixed={
+            "the number of unknowns": np.array([model.n_dofs, model.n_unknowns]),
+            "places of nodes": wires.nodes["x"].copy(),
+            "places of droppers and other links": laws["place"],
+            "which links there are": np.stack(
+                [links.component, links.index, links.master, links.bent]
+            ),
+            "which links are taut at rest, or what slack ones keep": np.stack(
+                [laws["released"], laws["carried"], links.broken]
+            ),
+            "the time step or the duration of the raising": np.array(
+                [problem.numerics.dt, problem.numerics.beta, problem.numerics.gamma]
+            ),
+            "where wires cross the strips": drives[:, :, N_DRIVE:].ravel(),
+            "the running surface": wires.shapes.surface["height"],
+        },
+    )
+
+
+def differentiate(set_up: Callable[[float], SetUp], now: SetUp, step: float, what: str) -> Change:
+    """Derivatives of a set-up by a parameter. Not collective.
+
+    Differences of the fourth order: their error is some step^4 of the set-up's fifth derivative
+    and the round-off of the set-up over the step.
+
+    Parameters
+    ----------
+    set_up : the set-up where the parameter is changed by its argument
+    now : the set-up of the march
+    step : by how much it is changed, of which set-ups at one and two are taken to either side
+    what : the parameter, for sentences
+
+    Raises
+    ------
+    InputError
+        If the parameter changes what has no derivative, such as the mesh.
+    """
+    found = {number: set_up(number * step) for number in _STENCIL}
+    for other in found.values():
+        for name, values in now.fixed.items():
+            mine = other.fixed[name]
+            if mine.shape != values.shape or not np.allclose(mine, values, rtol=1e-9, atol=1e-9):
+                raise InputError(
+                    f"{what} changes {name}, by which a march has no derivative here; take it away"
+                )
+
+    def of(part: Callable[[SetUp], Any]) -> np.ndarray:
+        values = {number: np.asarray(part(found[number])) for number in _STENCIL}
+        total = sum(_STENCIL[number] * value for number, value in values.items()) / step
+        largest = max(float(np.abs(value).max(initial=0.0)) for value in values.values())
+        if float(np.abs(total).max(initial=0.0)) <= _ROUNDINGS * largest / step:
+            return np.zeros_like(total)
+        return np.asarray(total)
+
+    def or_none(values: np.ndarray) -> np.ndarray:
+        """Without rows where nothing changes."""
+        return np.ascontiguousarray(values if values.any() else values[:0])
+
+    heads = []
+    for number in range(len(now.heads)):
+        parts = [
+            of(lambda one, number=number, name=name: getattr(one.heads[number], name))
+            for name in LinearStep._fields
+        ]
+        if not any(part.any() for part in parts):
+            parts = [part[:0] for part in parts]
+        heads.append(LinearStep(*map(np.ascontiguousarray, parts)))
+    drives = of(lambda one: one.drives)
+    return Change(
+        matrices=_matrices(
+            [{n: one.matrices[i] for n, one in found.items()} for i in range(3)], step
+        ),
+        rest=or_none(of(lambda one: one.rest)),
+        links=or_none(of(lambda one: one.links)),
+        weights=or_none(of(lambda one: one.weights)),
+        heads=heads,
+        states=[
+            of(lambda one, number=number: one.states[number]) for number in range(len(now.states))
+        ],
+        drives=or_none(drives),
+        law=or_none(of(lambda one: one.law)),
+        hertz=or_none(of(lambda one: one.hertz)),
+        start=or_none(of(lambda one: one.start)),
+        speed=float(of(lambda one: one.speed)),
+    )
+
+
+def _matrices(found: Sequence[dict[int, sparse.csc_matrix]], step: float) -> list[MatrixTerm]:
+    """Derivatives of K, C and M from each of them at several steps of the parameter."""
+    stiffness, damping, mass = (_derivative(matrices, step) for matrices in found)
+    by_stiffness, by_mass = _shares(damping, stiffness), _shares(damping, mass)
+    left = damping - by_stiffness * stiffness - by_mass * mass
+    if abs(left).max() <= _PROPORTIONAL * abs(damping).max():
+        terms = (stiffness, 1.0, by_stiffness, 0.0), (mass, 0.0, by_mass, 1.0)
+    else:
+        terms = (stiffness, 1.0, 0.0, 0.0), (mass, 0.0, 0.0, 1.0), (damping, 0.0, 1.0, 0.0)
+    return [_term(matrix.tocsr(), *by) for matrix, *by in terms if matrix.nnz]
+
+
+def _derivative(matrices: dict[int, sparse.csc_matrix], step: float) -> sparse.csc_matrix:
+    """Without what is round-off of the matrix."""
+    total = sum(_STENCIL[number] * matrix for number, matrix in matrices.items()) / step
+    changed = abs(total) > abs(matrices[1]) * (_ROUNDINGS / abs(step))
+    derivative = total.multiply(changed).tocsc()
+    derivative.eliminate_zeros()
+    return derivative
+
+
+def _shares(whole: sparse.csc_matrix, part: sparse.csc_matrix) -> float:
+    """How many times ``part``, if it is not empty, is what ``whole`` has in its place."""
+    square = part.multiply(part).sum()
+    return float(part.multiply(whole).sum() / square) if square else 0.0
+
+
+def _term(matrix: sparse.csr_matrix, *by: float) -> MatrixTerm:
+    matrix.sort_indices()
+    rows = np.flatnonzero(np.diff(matrix.indptr)).astype(np.int64)
+    begin = np.append(matrix.indptr[rows], matrix.nnz).astype(np.int64)
+    return MatrixTerm(rows, begin, matrix.indices.astype(np.int32), matrix.data, *by)
+
+
+def _chain_of(model: Any) -> LumpedPantograph:
+    if isinstance(model, LumpedPantograph) and model.is_linear:
+        return model
+    raise InputError(
+        "a pantograph is no chain of lumped masses on linear springs, or its lift is regulated: of "
+        "others there are no derivatives yet"
+    )
+
+
+def _refuse(at_rest: LineAtRest) -> None:
+    """Refuse a march with parts whose derivatives are not taken."""
+    problem, simulated = at_rest.problem, at_rest.model.simulated
+    numerics = problem.numerics
+    lacking = {
+        'numerics.scheme other than "one_solve"': numerics.scheme != "one_solve",
+        'numerics.coupling other than "implicit"': numerics.coupling != "implicit",
+        'numerics.integrator other than "newmark"': numerics.integrator != "newmark",
+        "steps that adapt": numerics.adaptive_tolerance is not None,
+        "incidents": bool(simulated.incidents),
+        "a window that moves with the train": problem.window.moves,
+        "loads in time, such as gusts or ends that go on": bool(at_rest.model.loads),
+    }
+    for what, has in lacking.items():
+        if has:
+            raise InputError(f"a march with {what} is not differentiated")

@@ -1,0 +1,207 @@
+"""``catenary sensitivity``: parameters of a scene, the ranked table, and what is refused."""
+
+from __future__ import annotations
+
+import csv
+import functools
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from measuring import check
+from mpi4py import MPI
+from typer.testing import CliRunner
+
+from catenary.base.errors import InputError
+from catenary.cases.cli.main import app
+from catenary.cases.run.scene_mesh import mesh_of
+from catenary.cases.scene.load import load_scene
+from catenary.cases.scene.problem import problem_of
+from catenary.cases.studies.sensitivity.output import as_text, table_of
+from catenary.cases.studies.sensitivity.parameters import ChangedScenes, Parameter
+from catenary.cases.studies.sensitivity.study import Sensitivity, sensitivity_of
+from catenary.postproc.evaluate.statistics import contact_statistics
+from catenary.solver.statics.line_at_rest import line_at_rest
+from catenary.solver.tangents.march import march_with_tangents
+
+CASE = "en50318_2002"
+# Six spans with two elements a gap, run through in 1152 steps; droppers slacken, contact lasts.
+TINY = (
+    "line.n_spans=6",
+    "mesh.elements_per_gap=2",
+    "train.start_m=65",
+    "train.end_m=225",
+    "train.raise_time_s=0.2",
+    "numerics.dt_s=0.002",
+    "evaluation.from_m=120",
+    "evaluation.to_m=220",
+)
+KEYS = ["pantographs.reference.static_force_N", "line.contact_wire.tension_N"]
+
+
+@pytest.fixture(autouse=True)
+def own_hook(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The command line installs an exception hook; it goes with the test."""
+    monkeypatch.setattr(sys, "excepthook", sys.excepthook)
+
+
+def scenes(*words: str, case: str = CASE) -> ChangedScenes:
+    return ChangedScenes(load_scene(case, words))
+
+
+def invoke(*words: str) -> Any:
+    return CliRunner().invoke(app, ["sensitivity", CASE, *words])
+
+
+@functools.cache
+def tiny() -> Sensitivity:
+    return sensitivity_of(load_scene(CASE, TINY), KEYS, MPI.COMM_SELF)
+
+
+def test_statistics_change_as_runs_with_other_values() -> None:
+    """Runs at both sides of a parameter, near enough for contacts and droppers to keep their
+    steps."""
+    found, other = tiny(), scenes(*TINY)
+    for key, own, by_uplift in zip(KEYS, found.by_force, found.by_uplift, strict=True):
+        parameter = other.parameter(key)
+        step, both = 1e-6 * parameter.size, []
+        for by in (step, -step):
+            scene = other.changed(parameter, by)
+            rest = line_at_rest(problem_of(scene), mesh_of(scene))
+            seen = march_with_tangents(MPI.COMM_SELF, rest, [])
+            force, place = seen.force[:, 0], seen.position[:, 0]
+            stretch = rest.problem.evaluation
+            both.append((contact_statistics("", place, force, force, seen.dt, stretch), seen))
+        for name in ("mean", "std", "maximum", "minimum", "stat_max", "stat_min"):
+            high, low = (getattr(statistics, name) for statistics, _ in both)
+            # Round-off of 100 N, 1e-12 N after a march, over the step, and the step itself.
+            limit = 1e-12 * 100.0 / step + 1e-5 * abs(getattr(own[0], name))
+            check(
+                f"{name} by {key}", getattr(own[0], name), (high - low) / (2 * step), within=limit
+            )
+        high, low = (seen.uplift.max() for _, seen in both)
+        limit = 1e-12 / step + 1e-5 * abs(by_uplift)
+        check(f"uplift by {key}", by_uplift, (high - low) / (2 * step), within=limit)
+
+
+def test_the_table_is_ranked_and_in_the_units_of_keys() -> None:
+    found = tiny()
+    table = table_of(found)
+    ranks = [abs(row["std_change_by_percent_N"]) for row in table.rows]
+    assert ranks == sorted(ranks, reverse=True) and len(ranks) == 2
+    force = next(row for row in table.rows if row["parameter"] == KEYS[0])
+    assert (force["unit"], force["value"], force["change"]) == ("N", 120.0, 1.0)
+    assert force["mean_change_N"] == found.by_force[0][0].mean
+    assert force["std_change_by_percent_N"] == pytest.approx(1.2 * found.by_force[0][0].std)
+    assert force["max_uplift_change_mm"] == pytest.approx(1e3 * found.by_uplift[0])
+    tension = next(row for row in table.rows if row["parameter"] == KEYS[1])
+    assert tension["change"] == 1000.0
+    assert tension["std_change_N"] == pytest.approx(1000.0 * found.by_force[1][0].std)
+    # A newton of static force is a newton of mean force, but for the base's spring of 50 N/m.
+    assert force["mean_change_N"] == pytest.approx(1.0, abs=0.03)
+
+
+def test_what_is_printed_tells_how_often_contacts_and_droppers_switch() -> None:
+    text = as_text(tiny())
+    assert f"other links switched {tiny().link_switches} times" in text
+    assert tiny().link_switches > 0
+    assert text.startswith("pantograph: mean ")
+
+
+def test_entries_lists_and_forces_by_speed_are_parameters() -> None:
+    line = scenes(case="ac_simple")
+    sag = line.parameter("line.dropper.pre_sag_mm")
+    one = line.parameter("line.dropper.pre_sag_mm.3")
+    before = line.scene.line.dropper
+    assert before is not None and before.pre_sag_mm is not None
+    assert sag.values == tuple(before.pre_sag_mm) and one.values == (before.pre_sag_mm[3],)
+    for parameter, moved in ((sag, range(9)), (one, [3])):
+        after = line.changed(parameter, 0.5).line.dropper
+        assert after is not None and after.pre_sag_mm is not None
+        changed = np.array(after.pre_sag_mm) - np.array(before.pre_sag_mm)
+        assert np.flatnonzero(changed).tolist() == list(moved)
+        assert changed[list(moved)] == pytest.approx(0.5)
+    force = line.parameter("pantographs.three_masses.static_force_N")
+    changed_force = problem_of(line.changed(force, 2.0)).train.placements[0].static_force
+    assert changed_force == pytest.approx(force.values[0] + 2.0)
+    assert (sag.unit, sag.change, sag.text) == ("mm", 1.0, "9 values")
+
+
+def test_the_usual_parameters_are_those_of_the_train_and_the_line() -> None:
+    usual = {parameter.key for parameter in scenes().usual()}
+    expected = {
+        "pantographs.reference.static_force_N", "pantographs.reference.masses_kg.1",
+        "contact.stiffness_N_per_m", "line.contact_wire.tension_N", "line.damping.alpha_s",
+        "line.dropper.stiffness_N_per_m", "line.steady_arm.stiffness_N_per_m",
+    }  # fmt: skip
+    assert expected <= usual
+    assert "line.dropper.mass_kg_per_m" not in usual  # which is zero
+    assert not any(key.startswith(("numerics.", "mesh.", "train.")) for key in usual)
+    assert "line.stitch_wire.tension_N" in {
+        parameter.key for parameter in scenes(case="re330_stitched").usual()
+    }
+
+
+def test_a_step_follows_from_the_size_of_a_value() -> None:
+    assert Parameter("line.contact_wire.tension_N", (2e4,)).step == pytest.approx(20.0)
+    assert Parameter("line.dropper.pre_sag_mm", (0.0, 0.0)).step == pytest.approx(0.05)
+    assert Parameter("line.damping.beta_per_s", (0.0,)).change == 1.0
+
+
+@pytest.mark.parametrize(
+    ("key", "told"),
+    [
+        ("line.contact_wire.tensoin_N", "did you mean line.contact_wire.tension_N"),
+        ("line.topology", "line.topology has no value in this scene that is a number"),
+        ("pantographs.reference.masses_kg.7", "masses_kg.7 has no value in this scene"),
+        ("line.curve.radius_m", "has no value in this scene"),
+    ],
+)
+def test_a_wrong_parameter_is_told_in_one_sentence(key: str, told: str) -> None:
+    result = invoke("-p", key)
+    assert result.exit_code == 2
+    assert told in result.output and result.output.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["numerics.integrator=hht", "numerics.spectral_radius=0.8"], 'numerics.integrator other than "newmark"'),
+        (["numerics.coupling=explicit"], 'numerics.coupling other than "implicit"'),
+        (["numerics.dt_s=0.025"], "too slowly for the 20 Hz filter"),
+    ],
+)
+def test_a_march_without_derivatives_is_told(words: list[str], told: str) -> None:
+    result = invoke("-p", KEYS[0], "--set", *TINY, *words, "case.accept_unusual=true")
+    assert result.exit_code == 2 and told in result.output
+
+
+def test_a_ready_pantograph_keeps_its_numbers() -> None:
+    ready = scenes(
+        *TINY, "pantographs.reference.model=dsa380", "pantographs.reference.masses_kg=",
+        "pantographs.reference.stiffnesses_N_per_m=", "pantographs.reference.dampings_N_s_per_m=",
+    )  # fmt: skip
+    with pytest.raises(InputError, match=r"pantographs\.reference is the ready dsa380"):
+        ready.parameter("pantographs.reference.masses_kg.0")
+    assert not any(one.key.startswith("pantographs") for one in ready.usual())
+
+
+def test_the_geometry_of_the_mesh_is_no_parameter() -> None:
+    key = "line.dropper.positions_m.2"
+    with pytest.raises(InputError, match="by which a march has no derivative"):
+        sensitivity_of(load_scene(CASE, TINY), [key], MPI.COMM_SELF)
+
+
+def test_the_verb_writes_its_table_once(tmp_path: Path) -> None:
+    words = ["-p", KEYS[0], "-o", str(tmp_path), "--set", *TINY]
+    first = invoke(*words)
+    assert first.exit_code == 0, first.output
+    (row,) = csv.DictReader((tmp_path / "sensitivity.csv").read_text().splitlines())
+    assert row["parameter"] == KEYS[0]
+    expected = tiny().by_force[0][0].std
+    assert float(row["std_change_N"]) == pytest.approx(expected, rel=1e-12)
+    again = invoke(*words)
+    assert again.exit_code == 2 and "is there already" in again.output
+    assert invoke(*words, "--force").exit_code == 0

@@ -1,0 +1,357 @@
+"""Derivatives of marches by parameters: beside dense matrices, and beside differences of marches.
+
+A march is a smooth function of a parameter as long as no contact and no dropper switches in another
+step. Differences of marches are taken so close that none does: within 1e-6 of the parameter.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+from dense_line import DenseLine
+from measuring import check
+from mpi4py import MPI
+from small_lines import EN_CONTACT_WIRE, WHOLE, en50318_line, mesh_of, numerics, problem_of, train
+
+from catenary.base.errors import InputError
+from catenary.cases.run.scene_mesh import mesh_of as mesh_of_scene
+from catenary.cases.scene.load import load_scene
+from catenary.cases.scene.problem import problem_of as problem_of_scene
+from catenary.cases.studies.sensitivity.parameters import ChangedScenes
+from catenary.mbs.lumped_data import LumpedData
+from catenary.solver.problem.contact_laws import LinearLaw
+from catenary.solver.problem.problem import Damping, Problem
+from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest
+from catenary.solver.tangents.march import Tangents, march_with_tangents
+from catenary.solver.tangents.set_up import Change, differentiate, set_up_of
+
+COMM = MPI.COMM_SELF
+DT = 1e-3
+
+
+class ActingLine(DenseLine):
+    """A dense line whose links and contact act, or do not, as in the latest step."""
+
+    def matrices_of(self, acting: frozenset[int], x: float) -> list[np.ndarray]:
+        """M, C, K and load under what acts, with the head at ``x`` [m]."""
+        mass, damping, stiffness = (matrix.copy() for matrix in self.matrices)
+        load = self.load.copy()
+        for link in (number for number in acting if number >= 0):
+            along = self.pull[link]
+            stiffness -= self.spring[link] * np.outer(along, along)
+            damping -= self.alpha * self.spring[link] * np.outer(along, along)
+            load += self.rest[link] * along
+        if -1 in acting:
+            along, rest = self.meets(x)
+            stiffness += self.law * np.outer(along, along)
+            load -= self.law * rest * along
+        return [mass, damping, stiffness, load]
+
+    @cache  # noqa: B019  (a march's places, of lines that end with the test)
+    def meets(self, x: float, contact: int = 0) -> tuple[np.ndarray, float]:
+        return super().meets(x, contact)
+
+    __hash__ = object.__hash__
+
+    @property
+    def law(self) -> float:
+        """Stiffness of the contact [N/m]."""
+        assert isinstance(self.problem.contact, LinearLaw)
+        return self.problem.contact.stiffness
+
+
+class DenseTangent:
+    """The derivative of a dense line's march: average acceleration, differentiated.
+
+    ``sides`` are the line at both sides of the parameter, ``step`` from it; ``start`` (3, size) the
+    derivative of its first state.
+    """
+
+    def __init__(
+        self, sides: tuple[ActingLine, ActingLine], step: float, start: np.ndarray
+    ) -> None:
+        self.sides, self.step, self.tangent = sides, step, start
+
+    def follow(self, line: ActingLine, x: float, matrices: list[np.ndarray]) -> float:
+        """Take the derivative through a step that ``line`` has taken, whose ``matrices`` are under
+        what acted in it; of the contact force [N per unit]."""
+        both = [side.matrices_of(line.acting, x) for side in self.sides]
+        by_mass, by_damping, by_stiffness, by_load = (
+            (high - low) / (2.0 * self.step) for high, low in zip(*both, strict=True)
+        )
+        mass, damping, stiffness, _ = matrices
+        d, v, a = line.state
+        dd, dv, da = self.tangent
+        dd, dv = dd + DT * dv + DT**2 / 4 * da, dv + DT / 2 * da
+        right = by_load - by_mass @ a - by_damping @ v - by_stiffness @ d
+        right -= damping @ dv + stiffness @ dd
+        free, new = line.free, np.zeros(line.size)
+        matrix = mass + DT / 2 * damping + DT**2 / 4 * stiffness
+        new[free] = np.linalg.solve(matrix[np.ix_(free, free)], right[free])
+        self.tangent = np.array([dd + DT**2 / 4 * new, dv + DT / 2 * new, new])
+        if -1 not in line.acting:
+            return 0.0
+        along, _ = line.meets(x)
+        forces = [side.law * (along @ d + side.meets(x)[1]) for side in self.sides]
+        by_law = (forces[0] - forces[1]) / (2.0 * self.step)
+        return float(line.law * along @ self.tangent[0] + by_law)
+
+
+def small_problem() -> Problem:
+    """A head that rises into the wire, fast and strong enough to slacken droppers."""
+    line = replace(
+        en50318_line(2),
+        span_lengths=(24.0, 24.0),
+        dropper_positions=((4.0, 12.0, 20.0),) * 2,
+        pre_sag=((0.0,) * 3,) * 2,
+    )
+    run = train(100.0, 6.0, 42.0, static_force=260.0, raise_time=0.0, nominal_height=5.5)
+    return problem_of(
+        line,
+        WHOLE,
+        damping=Damping(alpha=5e-3, beta=0.0),
+        train=replace(run, start_below=0.02),
+        numerics=numerics(DT),
+        evaluation=(10.0, 40.0),
+    )
+
+
+def with_head(problem: Problem, **changes: Any) -> Problem:
+    (placement,) = problem.train.placements
+    placement = replace(placement, **changes)
+    return replace(problem, train=replace(problem.train, placements=(placement,)))
+
+
+def with_tension(problem: Problem, by: float) -> Problem:
+    line = replace(
+        en50318_line(2),
+        span_lengths=(24.0, 24.0),
+        dropper_positions=((4.0, 12.0, 20.0),) * 2,
+        pre_sag=((0.0,) * 3,) * 2,
+        contact_wire=replace(EN_CONTACT_WIRE, tension=EN_CONTACT_WIRE.tension + by),
+    )
+    return replace(problem, line=problem_of(line).line)
+
+
+# Each with the step of differences, for which dense matrices are linear or nearly so.
+CHANGES: dict[str, tuple[float, Callable[[Problem, float], Problem]]] = {
+    "static force": (1.0, lambda p, by: with_head(p, static_force=260.0 + by)),
+    "head mass": (
+        1e-3,
+        lambda p, by: with_head(p, data=LumpedData((7.2 + by, 15.0), (4200.0, 50.0), (10.0, 90.0))),
+    ),
+    "contact stiffness": (
+        10.0,
+        lambda p, by: replace(p, contact=LinearLaw(5e4 + by, 0.0)),
+    ),
+    "tension": (10.0, with_tension),
+    "damping": (1e-6, lambda p, by: replace(p, damping=Damping(5e-3 + by, 0.0))),
+}
+
+
+def at_rest(problem: Problem) -> LineAtRest:
+    return line_at_rest(problem, mesh_of(problem.line, 2))
+
+
+def change_of(problem: Problem, name: str) -> Change:
+    step, changed = CHANGES[name]
+    now = set_up_of(COMM, at_rest(problem))
+    return differentiate(lambda by: set_up_of(COMM, at_rest(changed(problem, by))), now, step, name)
+
+
+def acting_line(rest: LineAtRest) -> ActingLine:
+    return ActingLine(rest.problem, rest.mesh, rest.form, dampers_act=False)
+
+
+def test_tangents_are_those_of_dense_matrices() -> None:
+    """NumPy alone, with the set of slack droppers and of contact that its own search finds."""
+    problem = small_problem()
+    rest = at_rest(problem)
+    changes = [change_of(problem, name) for name in CHANGES]
+    marched = march_with_tangents(COMM, rest, changes)
+    line = acting_line(rest)
+    line.state = np.zeros((3, line.size))
+    line.state[:, -2:] = set_up_of(COMM, rest).states[0].reshape(3, 2)
+    tangents = []
+    for change, (step, changed) in zip(changes, CHANGES.values(), strict=True):
+        sides = (
+            acting_line(at_rest(changed(problem, step))),
+            acting_line(at_rest(changed(problem, -step))),
+        )
+        # Heads start with the accelerations of their forces, which are other ones at both sides.
+        start = np.zeros((3, line.size))
+        start[:, -2:] = change.states[0].reshape(3, 2)
+        tangents.append(DenseTangent(sides, step, start))
+    forces, sets = np.zeros((len(marched.force), len(CHANGES))), set()
+    for row, x in zip(forces, marched.position[:, 0], strict=True):
+        line.step(x)
+        matrices = line.matrices_of(line.acting, x)
+        row[:] = [tangent.follow(line, x, matrices) for tangent in tangents]
+        sets.add(line.acting)
+    print(f"{len(sets)} sets; {marched.contact_switches} switches of contact")
+    assert len(sets) > 5 and marched.open_steps > 40 and marched.link_switches > 5
+    for number, name in enumerate(CHANGES):
+        expected = forces[:, number]
+        # Second differences of dense matrices, which are not linear in tension and mass of heads,
+        # over steps of 1e-4 to 5e-4 of them: 1e-8 to 1e-7 of the derivative.
+        limit = 1e-6 * np.abs(expected).max()
+        check(f"by {name}", marched.by_force[:, number, 0], expected, within=limit)
+
+
+def test_a_march_is_the_same_with_and_without_tangents() -> None:
+    problem = small_problem()
+    rest = at_rest(problem)
+    alone = march_with_tangents(COMM, rest, [])
+    beside = march_with_tangents(COMM, rest, [change_of(problem, "tension")] * 2)
+    assert np.array_equal(alone.force, beside.force)
+    assert np.array_equal(alone.uplift, beside.uplift)
+    assert np.array_equal(beside.by_force[:, 0], beside.by_force[:, 1])
+    assert alone.by_force.shape == (len(alone.force), 0, 1)
+
+
+SHORT = ["line.n_spans=6", "evaluation.from_m=140", "evaluation.to_m=240"]
+RESTITUTION = ["contact.law=lankarani_nikravesh", "contact.restitution=0.8"]
+KINEMATIC = [
+    "contact.law=kinematic", "contact.stiffness_N_per_m=", "train.speed_km_h=200",
+    "numerics.newmark_gamma=0.55", "numerics.newmark_beta=0.28",
+]  # fmt: skip
+TWO = ["line.n_spans=6", "evaluation.from_m=160", "evaluation.to_m=220",
+       "train.pantographs.1.name=three_masses", "train.pantographs.1.behind_m=100"]  # fmt: skip
+HEAD = "pantographs.reference"
+# A case, how it is changed, and parameters with steps of differences in parts of them.
+SCENES: dict[str, tuple[str, list[str], dict[str, float]]] = {
+    "simple": (
+        "en50318_2002",
+        SHORT,
+        {
+            f"{HEAD}.static_force_N": 1e-5,
+            f"{HEAD}.masses_kg.0": 1e-5,
+            f"{HEAD}.stiffnesses_N_per_m.0": 1e-5,
+            "contact.stiffness_N_per_m": 2e-4,
+            "line.messenger_wire.tension_N": 1e-5,
+            "line.damping.alpha_s": 1e-4,
+        },
+    ),
+    "impact": (
+        "en50318_2002",
+        [*SHORT, *RESTITUTION, "effects.contact_damping=true"],
+        {"contact.restitution": 1e-4, f"{HEAD}.static_force_N": 1e-5},
+    ),
+    "kinematic": (
+        "en50318_2002",
+        [*SHORT, *KINEMATIC],
+        {f"{HEAD}.static_force_N": 1e-5, "line.contact_wire.tension_N": 1e-5},
+    ),
+    "two pantographs": (
+        "ac_simple",
+        TWO,
+        {"line.dropper.pre_sag_mm.2": 1e-5, "line.contact_wire.mass_kg_per_m": 1e-5},
+    ),
+}
+LONG = {
+    "stitched": (
+        "re330_stitched",
+        [],
+        {"line.stitch_wire.tension_N": 1e-5, "line.messenger_wire.mass_kg_per_m": 1e-5},
+    ),
+    "twin": (
+        "dc_twin",
+        [],
+        {"line.contact_wire.tension_N": 1e-6, "line.dropper.pre_sag_mid_mm": 1e-5},
+    ),
+    "overlap": ("overlap", [], {"line.contact_wire.tension_N": 1e-7}),
+    "three dimensions": ("ac_simple_3d", [], {"line.contact_wire.tension_N": 1e-6}),
+}
+
+
+def marched_scene(
+    case: str, words: list[str], keys: list[str]
+) -> tuple[Tangents, Callable[[str, float], Tangents]]:
+    """A march with tangents, and marches with a parameter changed."""
+    scenes = ChangedScenes(load_scene(case, words, shortened=True))
+
+    def rest_of(scene: Any) -> LineAtRest:
+        return line_at_rest(problem_of_scene(scene), mesh_of_scene(scene))
+
+    def changed(key: str, by: float) -> LineAtRest:
+        return rest_of(scenes.changed(scenes.parameter(key), by))
+
+    rest = rest_of(scenes.scene)
+    now = set_up_of(COMM, rest)
+    changes = [
+        differentiate(
+            lambda by, key=key: set_up_of(COMM, changed(key, by), len(now.drives)),
+            now,
+            scenes.parameter(key).step,
+            key,
+        )
+        for key in keys
+    ]
+
+    def again(key: str, part: float) -> Tangents:
+        return march_with_tangents(COMM, changed(key, part * scenes.parameter(key).size), [])
+
+    own = march_with_tangents(COMM, rest, changes)
+    # Per part of a parameter, as differences are.
+    sizes = np.array([scenes.parameter(key).size for key in keys])
+    scaled = replace(
+        own,
+        by_force=own.by_force * sizes[:, None],
+        by_uplift=own.by_uplift * sizes[:, None],
+    )
+    return scaled, again
+
+
+def is_difference(case: str, words: list[str], steps: dict[str, float]) -> None:
+    own, again = marched_scene(case, words, list(steps))
+    print(f"{own.contact_switches} switches of contacts, {own.link_switches} of links")
+    for number, (key, part) in enumerate(steps.items()):
+        high, low = again(key, part), again(key, -part)
+        n = min(len(high.force), len(low.force), len(own.force))
+        for what, of, by in (("force", "force", "by_force"), ("uplift", "uplift", "by_uplift")):
+            expected = (getattr(high, of)[:n] - getattr(low, of)[:n]) / (2.0 * part)
+            # Round-off of a march, some 1e-9 N, over the step, and the step's square.
+            limit = 1e-6 * np.abs(expected).max()
+            check(f"{what} by {key}", getattr(own, by)[:n, number], expected, within=limit)
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_tangents_are_differences_of_marches(name: str) -> None:
+    is_difference(*SCENES[name])
+
+
+@pytest.mark.study
+@pytest.mark.parametrize("name", LONG)
+def test_tangents_are_differences_of_marches_of_cases(name: str) -> None:
+    is_difference(*LONG[name])
+
+
+def test_a_smooth_march_has_derivatives_by_speed_and_place() -> None:
+    """Without switches; contacts cross nodes, where third derivatives of heights jump."""
+    words = [*SHORT, "effects.contact_loss=false", "effects.dropper_slackening=false",
+             "train.speed_km_h=251.37"]  # fmt: skip
+    own, again = marched_scene("en50318_2002", words, ["train.speed_km_h"])
+    high, low = again("train.speed_km_h", 1e-8), again("train.speed_km_h", -1e-8)
+    n = min(len(high.force), len(low.force))
+    expected = (high.force[:n] - low.force[:n]) / 2e-8
+    check("by speed", own.by_force[:n, 0], expected, within=1e-4 * np.abs(expected).max())
+
+
+def test_what_is_not_differentiated_is_refused() -> None:
+    problem = small_problem()
+    rest = at_rest(problem)
+    coarse = replace(rest.problem, numerics=numerics(DT, coupling="explicit"))
+    with pytest.raises(InputError, match='coupling other than "implicit" is not differentiated'):
+        set_up_of(COMM, rest._replace(problem=coarse))
+    now = set_up_of(COMM, rest)
+    longer = replace(problem, train=replace(problem.train, start=problem.train.start + 1.0))
+    moved = set_up_of(COMM, at_rest(longer), len(now.drives))
+    assert moved.start[0] == now.start[0] + 1.0
+    finer = line_at_rest(problem, mesh_of(problem.line, 3))
+    with pytest.raises(InputError, match="the mesh changes the number of unknowns"):
+        differentiate(lambda by: set_up_of(COMM, finer), now, 1.0, "the mesh")
