@@ -41,7 +41,7 @@ ROOMS = {
     "solver": (
         "kernels", "problem", "model", "wind", "ends", "effects", "linear", "statics",
         "waves", "window", "integrators", "contact", "contact_problem", "schemes", "time_loop",
-        "tangents",
+        "tangents", "ensemble",
     ),
     "postproc": ("standards", "channels", "files", "read", "record", "evaluate", "film", "paraview",
         "report",
@@ -51,7 +51,7 @@ ROOMS = {
         "scene.problem", "scene.cost_model", "scene.checks", "scene.load", "scene.starter",
         "terminal", "process",
         "result_folder", "run",
-        "studies.records", "studies.sweep", "studies.sampling", "studies.uncertainty",
+        "studies.records", "studies.ensemble", "studies.sweep", "studies.sampling", "studies.uncertainty",
         "studies.merged_sweeps", "studies.pantograph_response", "studies.accuracy",
         "studies.hard", "studies.scaling",
         "studies.sensitivity", "studies.stability", "studies.effect_cost", "studies.waves",

@@ -15,7 +15,7 @@ from catenary.cases.studies.sweep.variants import Variant
 
 if TYPE_CHECKING:
     from catenary.cases.scene.scene import Scene
-    from catenary.cases.studies.ensemble.sweep import Ensemble
+    from catenary.cases.studies.sweep.together import Ensemble
     from catenary.cases.studies.sweep.part import Part
 
 
@@ -57,7 +57,7 @@ def sweep_of(
         one has not, and ``force`` is not given.
     """
     if only_statistics:
-        from catenary.cases.studies.ensemble.sweep import ensemble_of
+        from catenary.cases.studies.sweep.together import ensemble_of
 
         ensemble = ensemble_of(case, variants, overrides, shortened)
         refuse_other_sweep(out, variants, force)
@@ -99,7 +99,7 @@ def run_sweep(
             ended = run_jobs(sweep.jobs, out, comm, options)
             ended = in_order(sweep.variants, ended, sweep.refused)
         else:
-            from catenary.cases.studies.ensemble.sweep import run_ensemble
+            from catenary.cases.studies.sweep.together import run_ensemble
 
             on_root(comm, lambda: refuse_earlier(out, options.force))
             ended = run_ensemble(sweep.ensemble, out, comm, options)
@@ -121,7 +121,7 @@ def run_part(sweep: Sweep, part: Part, out: Path, comm: Any, options: RunOptions
 
         ended = run_jobs(part.of(sweep.jobs), out, comm, options)
     else:
-        from catenary.cases.studies.ensemble.sweep import run_ensemble
+        from catenary.cases.studies.sweep.together import run_ensemble
 
         ended = run_ensemble(sweep.ensemble, out, comm, options, part)
     name, folder = sweep.first.case.name, out / part.folder
