@@ -190,6 +190,9 @@ def are_compiled(rows: Layout, factors: Layout) -> bool:
     """Whether kernels were compiled for stations of such rows and factors; others are stepped by
     general ones, which ask what is joined."""
 
+def are_compiled_for_scenes(rows: Layout, factors: Layout) -> bool:
+    """Whether this processor has kernels that step several scenes side by side."""
+
 class Products:
     """Products with rows of K, and C, of stations of each make-up."""
 
@@ -255,7 +258,10 @@ class Taken:
     @property
     def is_full(self) -> bool: ...
 
-class Steps:
+class BlockSteps:
+    """Steps of a block, which an ``Ensemble`` takes, too."""
+
+class Steps(BlockSteps):
     """Steps of the scheme ``one_solve`` on one rank, of ``StepParts`` and a ``Block`` of these."""
 
     def __init__(self, parts: object, block: object) -> None: ...
@@ -265,8 +271,37 @@ class Steps:
     def write(self, path: str, ahead: object) -> None:
         """Write a file with all that they are made of, and what is ``Ahead``."""
 
+SCENES: int
+
+class Ensemble:
+    """Marches of ``SCENES`` scenes side by side, each in a lane of vectors.
+
+    Parameters
+    ----------
+    rows, factors, parts : as of ``TwoPasses``, with arrays of all scenes
+    extremes : ``LineExtremes``
+    """
+
+    def __init__(
+        self, rows: Sequence[Layout], factors: Sequence[Layout], parts: object, extremes: object
+    ) -> None: ...
+    def track(self, links: object, rest: np.ndarray, reserves: Sequence[np.ndarray]) -> None:
+        """Fill ``reserves`` (n,) of links in each lane, from those at ``rest`` (n, SCENES) [N]."""
+
+    def rest(self, lane: int) -> None:
+        """Put the line of a lane at rest."""
+
+    def begin(self, lane: int, steps: Steps, n: int) -> None:
+        """Let a scene begin in a lane, with n steps of its block."""
+
+    def take(self, most: int) -> None:
+        """Take steps until a scene is at its end, or left, or until so many were taken."""
+
+    def at(self, lane: int) -> tuple[int, bool]:
+        """Steps that the scene of a lane has taken, and whether its forces were not found then."""
+
 class TangentSteps:
-    """The same with derivatives by parameters beside them, of ``Tangents``."""
+    """``Steps`` with derivatives by parameters beside them, of ``Tangents``."""
 
     def __init__(self, parts: object, block: object, tangents: object) -> None: ...
     def take(self, first: int, end: int) -> Taken:

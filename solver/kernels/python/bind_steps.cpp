@@ -101,7 +101,7 @@ void offer_steps(py::module_& module) {
     py::class_<Taken>(module, "Taken")
         .def_readonly("begun", &Taken::begun)
         .def_readonly("is_full", &Taken::is_full);
-    py::class_<Steps>(module, "StepsOnParts");
+    py::class_<Steps>(module, "BlockSteps");
     py::class_<HeldSteps, Steps>(module, "Steps")
         .def(py::init([](const py::object& parts, const py::object& block) {
             return std::make_unique<HeldSteps>(parts, block);
