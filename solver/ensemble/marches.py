@@ -18,6 +18,7 @@ from catenary.solver.contact_problem.coupling import Implicit, make_coupling
 from catenary.solver.contact_problem.law_tangents import law_in_steps
 from catenary.solver.effects.all_effects import simulated
 from catenary.solver.ensemble.shared_line import N_LANES, Lane, SharedLine
+from catenary.solver.integrators.line_state import Motion
 from catenary.solver.kernels import native
 from catenary.solver.kernels.flush_to_zero import flushed
 from catenary.solver.model.switching_links import NO_LINKS, Riders
@@ -101,13 +102,13 @@ def march_side_by_side(
             return
         with flushed():
             shared.native.take(_MOST_STEPS)
-        for lane, march in enumerate(marches):
+        for place, march in enumerate(marches):
             if march is None:
                 continue
-            taken, is_left = shared.native.at(lane)
+            taken, is_left = shared.native.at(place)
             if is_left or taken == march.n_steps:
-                marches[lane] = None
-                yield _ended(shared, lane, march, taken, is_left)
+                marches[place] = None
+                yield _ended(shared, place, march, taken, is_left)
 
 
 def _begin(shared: SharedLine, lane: Lane, number: int, at_rest: LineAtRest) -> _OnItsWay:
@@ -151,7 +152,7 @@ def _begin(shared: SharedLine, lane: Lane, number: int, at_rest: LineAtRest) -> 
 
 
 def _steps(
-    scheme: OneSolve, motion: object, n_steps: int, dt: float
+    scheme: OneSolve, motion: Motion, n_steps: int, dt: float
 ) -> tuple[native.Steps, np.ndarray]:
     """What takes the steps of a scheme, and the rows of outputs that they fill, the first one
     before the first step."""
@@ -198,7 +199,7 @@ def _steps(
     return native.Steps(parts, block), rows
 
 
-def _nothing_of_line(motion: object) -> Shown:
+def _nothing_of_line(motion: Motion) -> Shown:
     """What rows show of the line."""
     no_riders = Riders(NO_LINKS, np.zeros(1, dtype=np.int64))
     ends = np.array([0, 1])
@@ -214,12 +215,16 @@ def _ended(
     """What is kept of a scene that is at its end, or left."""
     n, rows = march.n, march.rows[: taken + 1]
     extremes = shared.extremes
+    position, force, head, wire = (rows[:, k * n : (k + 1) * n] for k in range(4))
     return SceneHistory(
         march.number,
         march.at_rest,
         taken,
         is_left,
-        *(rows[:, k * n : (k + 1) * n] for k in range(4)),
+        position,
+        force,
+        head,
+        wire,
         extremes.uplift[:, lane].copy(),
         np.stack([extremes.least[:, lane], extremes.largest[:, lane]]),
     )

@@ -154,22 +154,24 @@ class SharedLine:
 def _in_lanes(passes: StationPasses, motion: LineState) -> tuple[PassArrays, Sequence[LineState]]:
     """Arrays of passes over all lanes, and the motion in each of them."""
     given = passes.parts.arrays
-    x, n = given.motion.x, given.motion.x.size
+    n = given.motion.x.size
     pad = (given.factor.size - n) // 2
     own = slice(pad * N_LANES, (pad + n) * N_LANES)
     factor = aligned_arrays.zeros(given.factor.size * N_LANES, 0)
     answer = aligned_arrays.zeros(n * N_LANES, 1)
     rates = np.shares_memory(given.velocity, given.motion.y)
     velocity = aligned_arrays.zeros(given.factor.size * N_LANES, 2)
-    assert np.shares_memory(x, given.factor) and np.shares_memory(given.answer, given.motion.z)
+    assert np.shares_memory(given.motion.x, given.factor) and np.shares_memory(
+        given.answer, given.motion.z
+    )
     whole = Motion(factor[own], velocity[own], answer, given.motion.shares, N_LANES)
     arrays = given._replace(
         factor=factor, velocity=velocity if rates else factor, answer=answer, motion=whole
     )
     motions = []
     for lane in range(N_LANES):
-        numbers = (array[lane:] for array in (whole.x, whole.y, whole.z))
-        read = Motion(*numbers, given.motion.shares, N_LANES)
+        x, y, z = (array[lane:] for array in whole[:3])
+        read = Motion(x, y, z, given.motion.shares, N_LANES)
         motions.append(LineState.of(read, motion.gains))
     return arrays, motions
 
@@ -181,10 +183,10 @@ def _same_matrices(one: Model, other: Model) -> bool:
     pairs = zip(one.blocks, other.blocks, strict=True)
     return (
         all(
-            np.array_equal(a.kind, b.kind)
-            and np.array_equal(a.stiffness, b.stiffness)
-            and np.array_equal(a.mass, b.mass)
-            and np.array_equal(a.damping, b.damping)
+            _equal(a.kind, b.kind)
+            and _equal(a.stiffness, b.stiffness)
+            and _equal(a.mass, b.mass)
+            and _equal(a.damping, b.damping)
             for a, b in pairs
         )
         and all(
@@ -193,6 +195,12 @@ def _same_matrices(one: Model, other: Model) -> bool:
         )
         and np.array_equal(one.constrained, other.constrained)
     )
+
+
+def _equal(one: np.ndarray | None, other: np.ndarray | None) -> bool:
+    if one is None or other is None:
+        return one is other
+    return np.array_equal(one, other)
 
 
 def _same_links(one: LinkTable, other: LinkTable) -> bool:

@@ -64,7 +64,8 @@ class Marches:
     """Marches scenes in this process alone; keeps the line of the latest for those to come."""
 
     def __init__(self) -> None:
-        self._key, self._line = "", None
+        self._key = ""
+        self._line: _Line | None = None
 
     def of(self, scenes: Sequence[Scene]) -> Iterator[Marched]:
         """March scenes, as they come to their ends. Not collective.
