@@ -15,8 +15,8 @@ from catenary.cases.studies.sweep.variants import Variant
 
 if TYPE_CHECKING:
     from catenary.cases.scene.scene import Scene
-    from catenary.cases.studies.sweep.together import Ensemble
     from catenary.cases.studies.sweep.part import Part
+    from catenary.cases.studies.sweep.together import Ensemble
 
 
 class Sweep(NamedTuple):
