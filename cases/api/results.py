@@ -13,9 +13,9 @@ from catenary.base.errors import InputError
 from catenary.cases.scene.load import Draft
 from catenary.pictures import Pictures
 from catenary.postproc.evaluate import statistics as stats
+from catenary.postproc.evaluate.acceptance import criteria_of
 from catenary.postproc.evaluate.statistics import RunStatistics
 from catenary.postproc.read.results import Results
-from catenary.postproc.report.report import judge
 from catenary.postproc.report.summary import summarise
 from catenary.scenes import Scene
 from catenary.solver.time_loop.views import channels
@@ -116,7 +116,7 @@ class Run:
         >>> run.summary["case"], run.summary["speed_km_h"]
         ('en50318_2002', 250.0)
         """
-        criteria = judge(self._results, self._evaluated)
+        criteria = criteria_of(self._results, self._evaluated)
         return summarise(self._results, self._evaluated, criteria)
 
     @property
@@ -136,17 +136,19 @@ class Run:
 
     @property
     def verdict(self) -> pd.DataFrame:
-        """Acceptance by EN 50367, a row for each criterion with its value and limit.
+        """Acceptance by rule books, a row for each criterion with its value and limit.
 
-        ``passed`` is true, false, or missing where there is nothing to judge; ``clause`` says where
-        the limit comes from.
+        ``passed`` is true, false, or missing where it is not judged, ``because`` of something;
+        ``book`` and ``clause`` say where the limit comes from, ``compared`` whether it was compared
+        with the text of the standard.
 
         Examples
         --------
         >>> run.verdict.set_index("criterion").loc["mean contact force", "unit"]
         'N'
         """
-        found = _table(self.summary["acceptance"])
+        summary = self.summary
+        found = _table([*summary["acceptance"], *summary["not_judged"]])
         return found.astype({"passed": "boolean"})
 
     @property

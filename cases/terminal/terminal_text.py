@@ -69,18 +69,38 @@ def summary_text(
         *_sizes_of_steps(summary.get("inner_iterations", {})),
         "",
     ]
-    words = {True: "passed", False: "FAILED", None: "not judged"}
-    for row in summary["acceptance"]:
-        value, limit = row["value"], row["limit"]
-        digits = decimals_that_tell(value, limit, 2)
-        lines.append(
-            f"  {words[row['passed']]:10}  {row['criterion']}: {_number(value, digits)}, limit "
-            f"{_number(limit, digits)} {row.get('unit', '')}".rstrip()
-        )
+    lines += _acceptance(summary)
     told = [*summary.get("complaints", []), *summary.get("remarks", [])]
     lines += ["", *(f"  REMARK      {text}" for text in told)]
     lines += [""] * bool(told) + [f"Results: {folder}"]
     return "\n".join(lines)
+
+
+def _acceptance(summary: Mapping[str, Any]) -> list[str]:
+    """All criteria, those that are not judged with the reason, and by which rule books."""
+    words = {True: "passed", False: "FAILED", None: "not judged"}
+    judged, left = summary["acceptance"], summary.get("not_judged", [])
+    several = len({row.get("book") for row in [*judged, *left]}) > 1
+    lines = []
+    for row in judged:
+        value, limit = row["value"], row["limit"]
+        digits = decimals_that_tell(value, limit, 2)
+        lines.append(
+            f"  {words[row['passed']]:10}  {labelled(row, several)}: {_number(value, digits)}, "
+            f"limit {_number(limit, digits)} {row.get('unit', '')}".rstrip()
+        )
+    lines += [
+        f"  {words[None]:10}  {labelled(row, several)}, because {row['because']}" for row in left
+    ]
+    if summary.get("judged_by"):
+        whole = {True: "PASSED", False: "NOT PASSED", None: "NOT JUDGED"}[summary.get("passed")]
+        lines.append(f"  {whole} by {summary['judged_by']}")
+    return lines
+
+
+def labelled(row: Mapping[str, Any], several: bool) -> str:
+    """The name of a criterion in ``summary.json``, with its rule book where there are several."""
+    return f"{row['criterion']} ({row['book']})" if several else str(row["criterion"])
 
 
 def _waited(phase_wall: Mapping[str, float], waited: float | None) -> list[str]:
