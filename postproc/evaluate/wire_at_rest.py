@@ -10,8 +10,8 @@ import numpy as np
 from catenary.postproc.read.line_of_run import ContactProfile
 from catenary.postproc.read.results import Results
 
-# Form finding meets heights to micrometres; smaller gradients are none [-].
-_NO_GRADIENT = 1e-6
+# A smaller gradient, a millimetre from mast to mast, is none: erection leaves ten times that [-].
+_NO_GRADIENT = 2e-5
 # Wires that differ by less in height are both met [m].
 _SAME_HEIGHT = 1e-3
 
