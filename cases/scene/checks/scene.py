@@ -291,11 +291,11 @@ def _standard(scene: Scene) -> Iterator[Fault]:
         why = f'it is short for evaluation.rules = ["{DEFAULT}:{judged.edition}"]: take one away'
         yield scene.refused("evaluation.edition", judged.edition, why)
         return
-    for number, name in enumerate(judged.chosen):
+    for place, name in enumerate(judged.chosen):
         try:
             book_named(name)
         except InputError as unknown:
-            yield scene.refused(f"evaluation.rules.{number}", name, str(unknown))
+            yield scene.refused(f"evaluation.rules.{place}", name, str(unknown))
             return
     if judged.own_rules is not None:
         try:
@@ -313,11 +313,11 @@ def _standard(scene: Scene) -> Iterator[Fault]:
     except InputError as twice:
         yield scene.fault("evaluation.rules", f"has a book twice: {twice}")
         return
-    for key, value in judged.own_limits.items():
-        if key not in _limits_read(books):
-            readers = [book.key for book in shipped().values() if key in _limits_read([book])]
+    for name, number in judged.own_limits.items():
+        if name not in _limits_read(books):
+            readers = [book.key for book in shipped().values() if name in _limits_read([book])]
             why = f"no chosen rule book reads it; those that do are {', '.join(readers)}"
-            yield scene.refused(f"evaluation.limits.{key}", value, why)
+            yield scene.refused(f"evaluation.limits.{name}", number, why)
 
 
 def _limits_read(books: Iterable[RuleBook]) -> set[str]:
