@@ -36,7 +36,11 @@ _COLUMNS = {
 }
 _PLACES = {channels.ARM: "arm_x", channels.DROPPER: "dropper_x", channels.WIRE_END: "end_x"}
 _PLACE = {"units": "m", "long_name": "position along the track"}
-_WORDS = ("name", "kind", "model", "criterion", "unit", "relation", "clause", "wire")
+_WORDS = (
+    *("name", "kind", "model", "criterion", "unit", "relation", "clause", "wire"),
+    *("book", "rule", "because"),
+)
+_TRUE_OR_FALSE = ("passed", "evaluated", "compared")
 
 
 class Run:
@@ -147,9 +151,19 @@ class Run:
         >>> run.verdict.set_index("criterion").loc["mean contact force", "unit"]
         'N'
         """
-        summary = self.summary
-        found = _table([*summary["acceptance"], *summary["not_judged"]])
+        found = _table(self.summary["acceptance"])
         return found.astype({"passed": "boolean"})
+
+    @property
+    def not_judged(self) -> pd.DataFrame:
+        """Criteria for which scene or rule book lack data, a row for each with the reason.
+
+        Examples
+        --------
+        >>> run.not_judged["because"].tolist()
+        ['no contact wire moves sideways in this run']
+        """
+        return _table(self.summary["not_judged"])
 
     @property
     def passed(self) -> bool | None:
@@ -406,5 +420,5 @@ def _table(rows: list[Mapping[str, Any]]) -> pd.DataFrame:
     import pandas as pd
 
     found = pd.DataFrame(rows)
-    numbers = [name for name in found.columns if name not in (*_WORDS, "passed", "evaluated")]
+    numbers = [name for name in found.columns if name not in (*_WORDS, *_TRUE_OR_FALSE)]
     return found.astype(dict.fromkeys(numbers, float))

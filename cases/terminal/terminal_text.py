@@ -12,6 +12,7 @@ from catenary.cases.scene.input.case_files import CaseEntry
 from catenary.mbs.library import READY, ReadyPantograph
 from catenary.meshgen.line import Line
 from catenary.meshgen.wires import Role, Wire
+from catenary.postproc.evaluate.verdict import UNCOMPARED, UNCOMPARED_SAYS
 from catenary.postproc.evaluate.wording import counted, decimals_that_tell, fixed
 from catenary.postproc.read.registration import Registration
 
@@ -88,6 +89,7 @@ def _acceptance(summary: Mapping[str, Any]) -> list[str]:
         lines.append(
             f"  {words[row['passed']]:10}  {labelled(row, several)}: {_number(value, digits)}, "
             f"limit {_number(limit, digits)} {row.get('unit', '')}".rstrip()
+            + ("" if row.get("compared", True) else f" {UNCOMPARED}")
         )
     lines += [
         f"  {words[None]:10}  {labelled(row, several)}, because {row['because']}" for row in left
@@ -95,6 +97,8 @@ def _acceptance(summary: Mapping[str, Any]) -> list[str]:
     if summary.get("judged_by"):
         whole = {True: "PASSED", False: "NOT PASSED", None: "NOT JUDGED"}[summary.get("passed")]
         lines.append(f"  {whole} by {summary['judged_by']}")
+    if not all(row.get("compared", True) for row in judged):
+        lines.append(f"  {UNCOMPARED_SAYS}")
     return lines
 
 

@@ -10,7 +10,7 @@ from catenary.postproc.evaluate import statistics as stats
 from catenary.postproc.evaluate.acceptance import criteria_of, judged_by
 from catenary.postproc.evaluate.error_indicators import indicate
 from catenary.postproc.evaluate.remarks import all_remarks
-from catenary.postproc.evaluate.verdict import Criterion, labels
+from catenary.postproc.evaluate.verdict import UNCOMPARED, UNCOMPARED_SAYS, Criterion, labels
 from catenary.postproc.evaluate.wording import counted, fixed
 from catenary.postproc.read.records import Records
 from catenary.postproc.read.results import Results
@@ -108,10 +108,12 @@ def _acceptance(*runs: _Evaluated) -> list[str]:
     for letter, (run, _), criteria in zip("AB", runs, found, strict=True):
         lines.append(f"  {letter} by {judged_by(run, criteria)}")
     columns = [dict(zip(labels(criteria), criteria, strict=True)) for criteria in found]
-    for label in dict.fromkeys(label for column in columns for label in column):
+    every = list(dict.fromkeys(label for column in columns for label in column))
+    width = max(map(len, every), default=0)
+    for label in every:
         cells = [_judged(column.get(label)) for column in columns]
-        lines.append(f"  {label:56}{cells[0]:>24}{cells[1]:>24}")
-    return lines
+        lines.append(f"  {label:{width}}{cells[0]:>26}{cells[1]:>26}")
+    return [*lines, f"  {UNCOMPARED_SAYS}"]
 
 
 def _judged(one: Criterion | None) -> str:
@@ -119,7 +121,8 @@ def _judged(one: Criterion | None) -> str:
         return "-"
     if one.absent:
         return _WORDS[None]
-    return f"{fixed(one.value, 2)} {one.unit} {_WORDS[one.passed]}"
+    mark = "" if one.compared else f" {UNCOMPARED}"
+    return f"{fixed(one.value, 2)} {one.unit} {_WORDS[one.passed]}{mark}"
 
 
 def _row(label: str, first: float, second: float) -> str:

@@ -111,15 +111,20 @@ def verdict_sentence(criteria: Sequence[Criterion], supply: str) -> str:
     said += f", {left} not judged" if left else ""
     unseen = sum(not c.compared for c in judged)
     if unseen:
-        which = "no limit" if unseen == len(judged) else f"{len(judged) - unseen} limits"
-        said += f"; {which} compared with the text of a standard"
-    return f"{' and '.join(titles)} ({SYSTEMS[supply]}): {said}"
+        said += f"; {unseen} of {len(judged)} limits not compared with the text of their standard"
+    named = " and ".join([", ".join(titles[:-1]), titles[-1]] if titles[1:] else titles)
+    return f"{named} ({SYSTEMS[supply]}): {said}"
+
+
+# Stands behind a limit that was not compared with the text of its standard, and explains itself.
+UNCOMPARED = "*"
+UNCOMPARED_SAYS = f"{UNCOMPARED} limit not compared with the text of the standard"
 
 
 def labels(criteria: Sequence[Criterion]) -> list[str]:
     """Names of criteria, with those of their books where there are several."""
     several = len({c.book for c in criteria}) > 1
-    return [f"{c.criterion} ({c.title})" if several else c.criterion for c in criteria]
+    return [f"{c.criterion} ({c.book})" if several else c.criterion for c in criteria]
 
 
 class _Unjudged(Exception):

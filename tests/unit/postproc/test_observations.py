@@ -244,8 +244,8 @@ def test_every_reader_of_a_run_tells_the_same_list(
     page = (tmp_path / "report.html").read_text()
     text = compare(tmp_path, tmp_path)
     for one in criteria:
-        assert _escaped(f"{one.criterion} ({one.title})") in page, one
-        assert f"{one.criterion} ({one.title})" in text
+        assert _escaped(f"{one.criterion} ({one.book})") in page, one
+        assert f"{one.criterion} ({one.book})" in text
         assert not one.because or _escaped(one.because) in page
     assert page.count("not compared with the text") >= sum(not c.compared for c in criteria) - len(
         left
