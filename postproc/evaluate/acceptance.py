@@ -11,6 +11,8 @@ from catenary.postproc.standards.book import Conditions, RuleBook
 from catenary.postproc.standards.library import DEFAULT, book_named, books_of_entries
 from catenary.postproc.standards.supplies import KMH
 
+_STOPS = "uplift_stops"  # the effect by which steady arms have stops
+
 
 def books_of(results: Results) -> list[RuleBook]:
     """The rule books of a run; of a file without them the edition of EN 50367 that it names.
@@ -31,9 +33,8 @@ def books_of(results: Results) -> list[RuleBook]:
 def criteria_of(results: Results, statistics: RunStatistics) -> list[Criterion]:
     """All criteria of a run's rule books. Not collective."""
     books, about = books_of(results), results.attributes
-    conditions = Conditions(
-        KMH * results.fact("speed"), about["system"], stops=results.has("stop_force")
-    )
+    stops = any(name == _STOPS for name, *_ in about["effects_on"])
+    conditions = Conditions(KMH * results.fact("speed"), about["system"], stops)
     observations = observe(quantities_of(books), results, statistics)
     names = [p.name for p in statistics.pantographs]
     return judge(books, observations, conditions, about.get("limits") or {}, names)

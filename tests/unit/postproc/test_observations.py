@@ -31,6 +31,7 @@ from catenary.postproc.read.results import Results
 from catenary.postproc.report.report import write_report
 from catenary.postproc.standards.library import shipped
 from catenary.postproc.standards.quantities import QUANTITIES
+from catenary.solver.effects.all_effects import registry
 from catenary.solver.problem.watched_links import TENSION
 
 NONE = np.zeros(0, dtype=int)
@@ -255,6 +256,20 @@ def test_every_reader_of_a_run_tells_the_same_list(
     assert (uplift.limit, uplift.passed) == (100.0, True)
     assert by_rule(criteria, "line")["dropper_slackenings"].limit == 1.0
     assert "edition" not in summary
+
+
+@pytest.mark.parametrize(("effects", "limit"), [([], 90.0), (["uplift_stops"], 120.0)])
+def test_a_stop_is_seen_by_its_effect(
+    tmp_path: Path, make_march: Any, record_run: Any, effects: list[str], limit: float
+) -> None:
+    march = make_march(separations=(0.0,), n_steps=100)
+    on = [(name, name, "default") for name in ("vertical", *effects)]
+    about = {"rules": ["line"], "limits": {"uplift_space_mm": 180.0}, "effects_on": on}
+    record_run(tmp_path / "run.h5", march, attributes=about)
+    with Results(tmp_path) as results:
+        criteria = criteria_of(results, statistics.evaluate(results))
+    assert by_rule(criteria, "line")["uplift_space"].limit == limit
+    assert "uplift_stops" in registry()
 
 
 def by_rule(criteria: list[Criterion], book: str) -> dict[str, Criterion]:
