@@ -12,8 +12,13 @@ from catenary.cases.scene.input.case_files import CaseEntry
 from catenary.mbs.library import READY, ReadyPantograph
 from catenary.meshgen.line import Line
 from catenary.meshgen.wires import Role, Wire
-from catenary.postproc.evaluate.verdict import UNCOMPARED, UNCOMPARED_SAYS
-from catenary.postproc.evaluate.wording import counted, decimals_that_tell, fixed
+from catenary.postproc.evaluate.wording import (
+    UNCOMPARED,
+    UNCOMPARED_SAYS,
+    counted,
+    decimals_that_tell,
+    fixed,
+)
 from catenary.postproc.read.registration import Registration
 
 

@@ -10,8 +10,8 @@ from catenary.postproc.evaluate import statistics as stats
 from catenary.postproc.evaluate.acceptance import criteria_of, judged_by
 from catenary.postproc.evaluate.error_indicators import indicate
 from catenary.postproc.evaluate.remarks import all_remarks
-from catenary.postproc.evaluate.verdict import UNCOMPARED, UNCOMPARED_SAYS, Criterion, labels
-from catenary.postproc.evaluate.wording import counted, fixed
+from catenary.postproc.evaluate.verdict import Criterion, labels
+from catenary.postproc.evaluate.wording import UNCOMPARED, UNCOMPARED_SAYS, counted, fixed
 from catenary.postproc.read.records import Records
 from catenary.postproc.read.results import Results
 

@@ -116,11 +116,6 @@ def verdict_sentence(criteria: Sequence[Criterion], supply: str) -> str:
     return f"{named} ({SYSTEMS[supply]}): {said}"
 
 
-# Stands behind a limit that was not compared with the text of its standard, and explains itself.
-UNCOMPARED = "*"
-UNCOMPARED_SAYS = f"{UNCOMPARED} limit not compared with the text of the standard"
-
-
 def labels(criteria: Sequence[Criterion]) -> list[str]:
     """Names of criteria, with those of their books where there are several."""
     several = len({c.book for c in criteria}) > 1
