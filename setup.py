@@ -175,7 +175,11 @@ setup(
             "studies/hard/hard.toml",
             "*/*.py",
         ],
-        "catenary.postproc": ["report/templates/*", "paraview/*.template"],
+        "catenary.postproc": [
+            "report/templates/*",
+            "paraview/*.template",
+            "standards/books/*.toml",
+        ],
         "catenary.solver": ["kernels/simulation/catenary.h"],
     },
     exclude_package_data={"catenary.cases": ["api/*"], "catenary.solver": ["base/*"]},

@@ -1,4 +1,4 @@
-"""Pages that are made from the program: keys of a scene, their JSON schema, verbs."""
+"""Pages that are made from the program: keys of a scene, their JSON schema, verbs, rule books."""
 
 from __future__ import annotations
 
@@ -12,6 +12,9 @@ from mkdocs.structure.files import File, Files
 from catenary.cases.cli.main import app
 from catenary.cases.terminal.json_schema import scene_schema
 from catenary.cases.terminal.key_list import Key, allowed, keys_of_a_scene
+from catenary.cases.terminal.rule_list import comparison
+from catenary.postproc.standards.library import shipped
+from catenary.postproc.standards.quantities import LIMIT_KEYS, QUANTITIES
 
 _KEYS = """# Keys of a scene
 
@@ -27,6 +30,11 @@ All verbs and their options, made from the program. Every verb has `--help`.
 [Results](../guide/results.md)
 explains output and exit codes. `-q` silences everything but errors.
 """
+_RULES = """# Rule books
+
+All shipped [rule books](../guide/rules.md), made from their files in `postproc/standards/books`.
+v is the speed of the train in km/h. The first limit whose condition holds is the one that counts.
+"""
 
 
 def on_files(files: Files, config: Any) -> Files:
@@ -35,6 +43,7 @@ def on_files(files: Files, config: Any) -> Files:
     for name, text in (
         ("reference/keys.md", keys_page()),
         ("reference/command_line.md", verbs_page()),
+        ("reference/rules.md", rules_page()),
         ("reference/case.schema.json", schema),
     ):
         files.append(File.generated(config, name, content=text))
@@ -58,6 +67,24 @@ def _row(key: Key) -> str:
     only = f" (only of {', '.join(key.kinds)})" if key.kinds else ""
     cells = (f"`{key.name}`", key.unit.strip("[]"), key.default, allowed(key), key.meaning + only)
     return f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |"
+
+
+def rules_page() -> str:
+    """A section for each rule book with its criteria, and tables of quantities and of keys."""
+    parts = [_RULES]
+    for key, book in shipped().items():
+        parts += [f"\n## {key}\n", f"{book.title}. {' '.join(book.source.split())}\n"]
+        parts += ["| criterion | quantity | limit | clause | |", "|---|---|---|---|---|"]
+        for rule in book.criteria:
+            clause = f"{rule.clause}; {rule.note}" if rule.note else rule.clause
+            cells = rule.title, f"`{rule.quantity}`", rule.words(), clause, comparison(book, rule)
+            parts.append(f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |")
+    parts += ["\n## Quantities\n", "| quantity | unit | of each | meaning |", "|---|---|---|---|"]
+    parts += [f"| `{name}` | {q.unit} | {q.per} | {q.meaning} |" for name, q in QUANTITIES.items()]
+    parts += ["\n## Limits of the line\n", "| key of evaluation.limits | unit | meaning |"]
+    parts += ["|---|---|---|"]
+    parts += [f"| `{name}` | {key.unit} | {key.meaning} |" for name, key in LIMIT_KEYS.items()]
+    return "\n".join(parts) + "\n"
 
 
 def verbs_page() -> str:

@@ -13,9 +13,9 @@ from catenary.base.errors import InputError
 from catenary.cases.scene.load import Draft
 from catenary.pictures import Pictures
 from catenary.postproc.evaluate import statistics as stats
+from catenary.postproc.evaluate.acceptance import criteria_of
 from catenary.postproc.evaluate.statistics import RunStatistics
 from catenary.postproc.read.results import Results
-from catenary.postproc.report.report import judge
 from catenary.postproc.report.summary import summarise
 from catenary.scenes import Scene
 from catenary.solver.time_loop.views import channels
@@ -36,7 +36,11 @@ _COLUMNS = {
 }
 _PLACES = {channels.ARM: "arm_x", channels.DROPPER: "dropper_x", channels.WIRE_END: "end_x"}
 _PLACE = {"units": "m", "long_name": "position along the track"}
-_WORDS = ("name", "kind", "model", "criterion", "unit", "relation", "clause", "wire")
+_WORDS = (
+    *("name", "kind", "model", "criterion", "unit", "relation", "clause", "wire"),
+    *("book", "rule", "because"),
+)
+_TRUE_OR_FALSE = ("passed", "evaluated", "compared")
 
 
 class Run:
@@ -116,7 +120,7 @@ class Run:
         >>> run.summary["case"], run.summary["speed_km_h"]
         ('en50318_2002', 250.0)
         """
-        criteria = judge(self._results, self._evaluated)
+        criteria = criteria_of(self._results, self._evaluated)
         return summarise(self._results, self._evaluated, criteria)
 
     @property
@@ -136,10 +140,11 @@ class Run:
 
     @property
     def verdict(self) -> pd.DataFrame:
-        """Acceptance by EN 50367, a row for each criterion with its value and limit.
+        """Acceptance by rule books, a row for each criterion with its value and limit.
 
-        ``passed`` is true, false, or missing where there is nothing to judge; ``clause`` says where
-        the limit comes from.
+        ``passed`` is true, false, or missing where it is not judged, ``because`` of something;
+        ``book`` and ``clause`` say where the limit comes from, ``compared`` whether it was compared
+        with the text of the standard.
 
         Examples
         --------
@@ -148,6 +153,17 @@ class Run:
         """
         found = _table(self.summary["acceptance"])
         return found.astype({"passed": "boolean"})
+
+    @property
+    def not_judged(self) -> pd.DataFrame:
+        """Criteria for which scene or rule book lack data, a row for each with the reason.
+
+        Examples
+        --------
+        >>> run.not_judged["because"].tolist()
+        ['no contact wire moves sideways in this run']
+        """
+        return _table(self.summary["not_judged"])
 
     @property
     def passed(self) -> bool | None:
@@ -404,5 +420,5 @@ def _table(rows: list[Mapping[str, Any]]) -> pd.DataFrame:
     import pandas as pd
 
     found = pd.DataFrame(rows)
-    numbers = [name for name in found.columns if name not in (*_WORDS, "passed", "evaluated")]
+    numbers = [name for name in found.columns if name not in (*_WORDS, *_TRUE_OR_FALSE)]
     return found.astype(dict.fromkeys(numbers, float))

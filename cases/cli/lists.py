@@ -14,7 +14,8 @@ from catenary.cases.terminal import console
 
 @app.command(
     "list",
-    help="List the shipped cases, keys of a scene, ready pantographs, or the schema of case.toml.",
+    help="List the shipped cases, keys of a scene, ready pantographs, rule books, or the schema of "
+    "case.toml.",
     epilog="Example: catenary list --keys damping",
 )
 @console.guarded
@@ -33,26 +34,42 @@ def list_cases(
             "--schema", help="The JSON schema of case.toml, for editors that complete keys."
         ),
     ] = False,
+    rules: Annotated[
+        bool,
+        typer.Option("--rules", help="Rule books that judge a run, for evaluation.rules."),
+    ] = False,
     wanted: Annotated[
         str | None,
         typer.Argument(
             metavar="FILTER",
             autocompletion=completion.keys,
             help="With --keys: a part of a key, or a pattern with * and ?; tells also bounds, the "
-            "words that a key accepts, and typical values.",
+            "words that a key accepts, and typical values. With --rules: a book, whose criteria "
+            "and limits are told.",
         ),
     ] = None,
 ) -> None:
     """Serial."""
     given = [
         name
-        for name, on in (("--keys", keys), ("--pantographs", pantographs), ("--schema", schema))
+        for name, on in (
+            ("--keys", keys),
+            ("--pantographs", pantographs),
+            ("--rules", rules),
+            ("--schema", schema),
+        )
         if on
     ]
     if len(given) > 1:
         raise InputError(
-            f"list takes one of --keys, --pantographs and --schema, not {' and '.join(given)}"
+            "list takes one of --keys, --pantographs, --rules and --schema, not "
+            f"{' and '.join(given)}"
         )
+    if rules:
+        from catenary.cases.terminal.rule_list import book_table, criteria_text
+
+        console.say(book_table() if wanted is None else criteria_text(wanted))
+        return
     if keys:
         from catenary.cases.terminal.key_list import key_details, key_table
 

@@ -21,7 +21,7 @@ from catenary.solver.model.model import Model
 from catenary.solver.time_loop.views.channels import CHANNELS
 
 # What a restart finds again; the rest of the head may be another version's.
-_SAME = ("case", "n_dofs", "system", "edition")
+_SAME = ("case", "n_dofs", "system")
 _SAME_FACTS = ("time_step", "speed", "wave_speed")
 # What a state and the records of its step both hold, copied from the same arrays; so far apart
 # they may be, as a share of the largest or of 1 m or 1 N.

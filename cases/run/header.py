@@ -12,6 +12,7 @@ from catenary.cases.run.describe.incidents import incident_facts
 from catenary.cases.run.describe.pantographs import header_words
 from catenary.cases.run.planning.plan import effect_rows
 from catenary.cases.scene.problem import resolved
+from catenary.cases.scene.run.case import rule_entries
 from catenary.cases.scene.scene import Scene
 from catenary.postproc.channels.facts import facts_of
 from catenary.postproc.channels.header import Header, line_datasets, static_datasets, wire_roles
@@ -53,7 +54,8 @@ def header_of(
             "title": scene.case.title,
             "n_dofs": at_rest.model.n_unknowns,
             "system": scene.evaluation.system,
-            "edition": scene.evaluation.edition,
+            "rules": rule_entries(scene.evaluation),
+            "limits": scene.evaluation.own_limits,
             "defects": defect_facts(scene, problem),
             "incidents": incident_facts(scene, problem),
             **by_what,

@@ -27,6 +27,7 @@ from catenary.mbs.vehicle.base_motion import VehicleMotion
 from catenary.meshgen.line import Line
 from catenary.meshgen.topologies.all_topologies import make_line
 from catenary.meshgen.topologies.line_data import LineData
+from catenary.postproc.standards.library import book_named
 from catenary.solver.problem.problem import Damping, Numerics, Placement, Problem, Train
 from catenary.solver.problem.window import BOUNDED, WindowChoice
 from catenary.solver.window.choice import spans_of_window
@@ -81,6 +82,9 @@ def resolved(scene: Scene) -> dict[str, Any]:
     plain: dict[str, Any] = scene.model_dump(mode="json", exclude_none=True)
     plain["train"]["end_m"] = end_of(scene)
     plain["effects"] = scene.switches()
+    judged = plain["evaluation"]
+    judged.pop("edition", None)
+    judged["rules"] = [book_named(name).key for name in scene.evaluation.chosen]
     if scene.mesh.file is not None:
         plain["mesh"] = {"file": scene.mesh.file}
     return plain

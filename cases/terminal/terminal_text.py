@@ -12,7 +12,13 @@ from catenary.cases.scene.input.case_files import CaseEntry
 from catenary.mbs.library import READY, ReadyPantograph
 from catenary.meshgen.line import Line
 from catenary.meshgen.wires import Role, Wire
-from catenary.postproc.evaluate.wording import counted, decimals_that_tell, fixed
+from catenary.postproc.evaluate.wording import (
+    UNCOMPARED,
+    UNCOMPARED_SAYS,
+    counted,
+    decimals_that_tell,
+    fixed,
+)
 from catenary.postproc.read.registration import Registration
 
 
@@ -69,18 +75,41 @@ def summary_text(
         *_sizes_of_steps(summary.get("inner_iterations", {})),
         "",
     ]
-    words = {True: "passed", False: "FAILED", None: "not judged"}
-    for row in summary["acceptance"]:
-        value, limit = row["value"], row["limit"]
-        digits = decimals_that_tell(value, limit, 2)
-        lines.append(
-            f"  {words[row['passed']]:10}  {row['criterion']}: {_number(value, digits)}, limit "
-            f"{_number(limit, digits)} {row.get('unit', '')}".rstrip()
-        )
+    lines += _acceptance(summary)
     told = [*summary.get("complaints", []), *summary.get("remarks", [])]
     lines += ["", *(f"  REMARK      {text}" for text in told)]
     lines += [""] * bool(told) + [f"Results: {folder}"]
     return "\n".join(lines)
+
+
+def _acceptance(summary: Mapping[str, Any]) -> list[str]:
+    """All criteria, those that are not judged with the reason, and by which rule books."""
+    words = {True: "passed", False: "FAILED", None: "not judged"}
+    judged, left = summary["acceptance"], summary.get("not_judged", [])
+    several = len({row.get("book") for row in [*judged, *left]}) > 1
+    lines = []
+    for row in judged:
+        value, limit = row["value"], row["limit"]
+        digits = decimals_that_tell(value, limit, 2)
+        lines.append(
+            f"  {words[row['passed']]:10}  {labelled(row, several)}: {_number(value, digits)}, "
+            f"limit {_number(limit, digits)} {row.get('unit', '')}".rstrip()
+            + ("" if row.get("compared", True) else f" {UNCOMPARED}")
+        )
+    lines += [
+        f"  {words[None]:10}  {labelled(row, several)}, because {row['because']}" for row in left
+    ]
+    if summary.get("judged_by"):
+        whole = {True: "PASSED", False: "NOT PASSED", None: "NOT JUDGED"}[summary.get("passed")]
+        lines.append(f"  {whole} by {summary['judged_by']}")
+    if not all(row.get("compared", True) for row in judged):
+        lines.append(f"  {UNCOMPARED_SAYS}")
+    return lines
+
+
+def labelled(row: Mapping[str, Any], several: bool) -> str:
+    """The name of a criterion in ``summary.json``, with its rule book where there are several."""
+    return f"{row['criterion']} ({row['book']})" if several else str(row["criterion"])
 
 
 def _waited(phase_wall: Mapping[str, float], waited: float | None) -> list[str]:

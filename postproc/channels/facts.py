@@ -235,6 +235,13 @@ FACTS: dict[str, Fact] = {
         _of_contacts(lambda source, wire: wire.bending_stiffness),
         per=WIRE,
     ),
+    "contact_wire_axial_stiffness": Fact(
+        "N",
+        "axial stiffness of a contact wire, NaN if it is not known",
+        _of_contacts(lambda source, wire: _or_none(wire.axial_stiffness)),
+        per=WIRE,
+        may_be_nan=True,
+    ),
     "contact_wire_stiffness_damping": Fact(
         "s",
         "alpha of a contact wire's proportional damping C = alpha K + beta M",

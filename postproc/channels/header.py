@@ -22,7 +22,7 @@ REQUIRED_ATTRIBUTES = (
     "title",
     "n_dofs",
     "system",
-    "edition",
+    "rules",
     "versions",
     "config",
     "wires",
@@ -38,8 +38,9 @@ class Header:
     Attributes
     ----------
     attributes : at least ``REQUIRED_ATTRIBUTES``; text and numbers are stored as they are, lists
-        and tables as JSON. ``system`` and ``edition`` are keys of ``postproc.standards``;
-        ``effects_on`` and ``effects_off`` are lists of (name, title, reason).
+        and tables as JSON. ``system`` is a key of ``postproc.standards``, ``rules`` lists names of
+        rule books, and whole ones; ``effects_on`` and ``effects_off`` are lists of (name, title,
+        reason).
     datasets : path in the file -> array, from ``line_datasets`` and ``static_datasets``
     facts : name -> value of all facts, from ``facts_of``
     """

@@ -7,9 +7,11 @@ from pathlib import Path
 import numpy as np
 
 from catenary.postproc.evaluate import statistics as stats
+from catenary.postproc.evaluate.acceptance import criteria_of, judged_by
 from catenary.postproc.evaluate.error_indicators import indicate
 from catenary.postproc.evaluate.remarks import all_remarks
-from catenary.postproc.evaluate.wording import counted, fixed
+from catenary.postproc.evaluate.verdict import Criterion, labels
+from catenary.postproc.evaluate.wording import UNCOMPARED, UNCOMPARED_SAYS, counted, fixed
 from catenary.postproc.read.records import Records
 from catenary.postproc.read.results import Results
 
@@ -86,12 +88,41 @@ def _statistics(a: Results, b: Results) -> list[str]:
         _row("  max dropper force [N]", of_a.droppers.maximum, of_b.droppers.maximum),
         _row("  min dropper force [N]", of_a.droppers.minimum, of_b.droppers.minimum),
     ]
+    lines += _acceptance((a, of_a), (b, of_b))
     said = [
         f"{letter}: {text}"
         for letter, run in (("A", a), ("B", b))
         for text in all_remarks(run, indicate(run))
     ]
     return lines + of_a.complaints + of_b.complaints + a.damage + b.damage + said
+
+
+_Evaluated = tuple[Results, stats.RunStatistics]
+_WORDS = {True: "passed", False: "FAILED", None: "not judged"}
+
+
+def _acceptance(*runs: _Evaluated) -> list[str]:
+    """Every criterion of either run with its value and verdict in both."""
+    found = [criteria_of(run, statistics) for run, statistics in runs]
+    lines = ["acceptance"]
+    for letter, (run, _), criteria in zip("AB", runs, found, strict=True):
+        lines.append(f"  {letter} by {judged_by(run, criteria)}")
+    columns = [dict(zip(labels(criteria), criteria, strict=True)) for criteria in found]
+    every = list(dict.fromkeys(label for column in columns for label in column))
+    width = max(map(len, every), default=0)
+    for label in every:
+        cells = [_judged(column.get(label)) for column in columns]
+        lines.append(f"  {label:{width}}{cells[0]:>26}{cells[1]:>26}")
+    return [*lines, f"  {UNCOMPARED_SAYS}"]
+
+
+def _judged(one: Criterion | None) -> str:
+    if one is None:
+        return "-"
+    if one.absent:
+        return _WORDS[None]
+    mark = "" if one.compared else f" {UNCOMPARED}"
+    return f"{fixed(one.value, 2)} {one.unit} {_WORDS[one.passed]}{mark}"
 
 
 def _row(label: str, first: float, second: float) -> str:

@@ -1,20 +1,17 @@
-"""Acceptance of a run: its statistics beside the limits of an edition of EN 50367."""
+"""Acceptance of a run: its quantities beside the limits of rule books."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+import operator
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 
-from catenary.postproc.evaluate.statistics import PantographStatistics, RunStatistics
-from catenary.postproc.standards.en50367 import (
-    KMH,
-    edition_of,
-    max_force_limit,
-    mean_force_limit,
-)
+from catenary.postproc.evaluate.observations import Observation
+from catenary.postproc.standards.book import Conditions, LimitRow, Rule, RuleBook
+from catenary.postproc.standards.supplies import SYSTEMS
 
-# Where the limit of lateral places comes from, which no edition has.
-_STRIPS_END = "strips.length_m"
+_MET = {"<=": operator.le, "<": operator.lt, ">=": operator.ge, ">": operator.gt}
 
 
 @dataclass(frozen=True)
@@ -24,11 +21,17 @@ class Criterion:
     Attributes
     ----------
     criterion : what is judged, in words; names the pantograph where there are several
-    value, limit : in ``unit``; the value is NaN where the run gives none
+    value, limit : in ``unit``; NaN where there is none
     unit : for readers: N, mm, %, km/h
-    relation : how the value must stand to the limit, "<=", "<" or ">"
-    passed : None if there is no value to judge
+    relation : how the value must stand to the limit: "<=", "<", ">=" or ">"
+    passed : None if it is not judged
     clause : where the limit comes from
+    book, title : ``name:edition`` of the rule book, and how it is cited
+    rule, quantity : id of the criterion in the book, and name of what it limits
+    compared : whether the limit was compared with the text of the standard
+    because : why it is not judged, empty if it is
+    absent : whether it is not judged because scene or book lack what it takes: such a criterion
+        leaves the verdict as it is
     """
 
     criterion: str
@@ -38,138 +41,164 @@ class Criterion:
     relation: str
     passed: bool | None
     clause: str
+    book: str = ""
+    title: str = ""
+    rule: str = ""
+    quantity: str = ""
+    compared: bool = False
+    because: str = ""
+    absent: bool = False
 
 
 def judge(
-    statistics: RunStatistics,
-    speed: float,
-    wave_speed: float,
-    system: str,
-    edition: str,
-    by_bending: bool = False,
+    books: Sequence[RuleBook],
+    observations: Mapping[str, Observation],
+    conditions: Conditions,
+    limits: Mapping[str, float],
+    pantographs: Sequence[str],
 ) -> list[Criterion]:
-    """Every line of an edition's table, judged: those of each pantograph, then those of the line.
+    """Every criterion of the books: of each pantograph, then of the run, book after book.
 
     Parameters
     ----------
-    statistics : of the run
-    speed : of the train [m/s]
-    wave_speed : of the slowest wave of the contact wire [m/s]
-    system : key of ``SYSTEMS``
-    edition : key of ``EDITIONS``
-    by_bending : whether that wave is one of a conductor rail, for which EN 50119 states no rule
-
-    Raises
-    ------
-    InputError
-        If system or edition is unknown.
+    observations : of all quantities of the books, as ``quantities_of`` names them
+    conditions : speed [km/h], supply, stops
+    limits : keys of ``evaluation.limits`` that the scene has, in their units
+    pantographs : names in the order of tables
     """
-    table = edition_of(edition)
-    judged = []
-    several = len(statistics.pantographs) > 1
-    for pantograph in statistics.pantographs:
-        suffix = f", {pantograph.name}" if several else ""
-        judged += _of_pantograph(pantograph, suffix, speed, system, edition)
-    for lateral in statistics.lateral:
-        if not math.isnan(lateral.half_length):
-            judged.append(
-                _criterion(
-                    "lateral place of the contact wire on the strips"
-                    + (f", {lateral.name}" if several else ""),
-                    1e3 * abs(lateral.place),
-                    1e3 * lateral.half_length,
-                    "mm",
-                    "<=",
-                    _STRIPS_END,
-                )
-            )
-    uplift = statistics.supports.maximum
-    judged.append(
-        _criterion(
-            "contact-wire uplift at steady arms",
-            1e3 * uplift,
-            1e3 * table.arm_uplift,
-            "mm",
-            "<=",
-            table.clause["uplift"],
-        )
-    )
-    judged.append(
-        _criterion(
-            f"train speed against {table.speed_ratio:g} of the wave speed",
-            KMH * speed,
-            KMH * table.speed_ratio * wave_speed,
-            "km/h",
-            "<=",
-            table.clause["speed_by_bending" if by_bending else "speed"],
-        )
-    )
-    return judged
+    found: list[Criterion] = []
+    for book in books:
+        run = _Judge(book, observations, conditions, limits, several=len(pantographs) > 1)
+        own = [rule for rule in book.criteria if rule.per_pantograph]
+        for number, name in enumerate(pantographs):
+            for rule in own:
+                found += run.of_pantograph(rule, name, first=number == 0)
+        found += [run.criterion(rule, "") for rule in book.criteria if not rule.per_pantograph]
+    return found
 
 
-def verdict(criteria: list[Criterion]) -> bool | None:
-    """True if all passed, False if one failed, None if none failed but some were not judged."""
-    if any(c.passed is False for c in criteria):
+def quantities_of(books: Sequence[RuleBook]) -> list[str]:
+    """Names of the quantities that books judge, or take limits from."""
+    named = []
+    for rule in (rule for book in books for rule in book.criteria):
+        named += [rule.quantity, *(row.of_quantity for row in rule.limit if row.of_quantity)]
+    return list(dict.fromkeys(named))
+
+
+def verdict(criteria: Sequence[Criterion]) -> bool | None:
+    """True if all passed, False if one failed, None if none failed but some have no value.
+
+    Criteria without data (``absent``) do not count; None if no other is there.
+    """
+    counted = [c for c in criteria if not c.absent]
+    if any(c.passed is False for c in counted):
         return False
-    return None if any(c.passed is None for c in criteria) else True
+    return None if not counted or any(c.passed is None for c in counted) else True
 
 
-def _of_pantograph(
-    p: PantographStatistics, suffix: str, speed: float, system: str, edition: str
-) -> list[Criterion]:
-    table = edition_of(edition)
-    mean_limit = mean_force_limit(speed, system, edition)
-    rows = [
-        ("mean contact force", p.mean, mean_limit, "N", "<=", "mean"),
-        (
-            f"standard deviation, {table.std_ratio:g} of the mean",
-            p.std,
-            table.std_ratio * p.mean,
-            "N",
-            "<=",
-            "std",
-        ),
-        (
-            f"standard deviation, {table.std_ratio:g} of the allowed mean",
-            p.std,
-            table.std_ratio * mean_limit,
-            "N",
-            "<=",
-            "std",
-        ),
-        (
-            "maximum contact force",
-            p.maximum,
-            max_force_limit(speed, system, edition),
-            "N",
-            "<",
-            "max",
-        ),
-    ]
-    if table.min_force is not None:
-        rows.append(("minimum contact force", p.minimum, table.min_force, "N", ">", "min"))
-    rows += [
-        (
-            "vertical amplitude of the contact point",
-            1e3 * p.contact_height_range,
-            1e3 * table.height_range,
-            "mm",
-            "<=",
-            "height",
-        ),
-        ("arcing NQ", p.arcing_percent, table.arcing_percent, "%", "<=", "arcing"),
-    ]
-    criteria = [
-        _criterion(what + suffix, value, limit, unit, relation, table.clause[line])
-        for what, value, limit, unit, relation, line in rows
-    ]
-    return [replace(c, passed=None) for c in criteria] if p.unjudged else criteria
+def verdict_sentence(criteria: Sequence[Criterion], supply: str) -> str:
+    """By which books a run is judged, and how many criteria each verdict has.
+
+    Parameters
+    ----------
+    supply : key of ``SYSTEMS``
+    """
+    titles = list(dict.fromkeys(c.title for c in criteria))
+    judged = [c for c in criteria if c.passed is not None]
+    failed = sum(c.passed is False for c in judged)
+    said = f"{len(judged) - failed} of {len(judged)} criteria passed"
+    left = len(criteria) - len(judged)
+    said += f", {left} not judged" if left else ""
+    unseen = sum(not c.compared for c in judged)
+    if unseen:
+        said += f"; {unseen} of {len(judged)} limits not compared with the text of their standard"
+    named = " and ".join([", ".join(titles[:-1]), titles[-1]] if titles[1:] else titles)
+    return f"{named} ({SYSTEMS[supply]}): {said}"
 
 
-def _criterion(
-    what: str, value: float, limit: float, unit: str, relation: str, clause: str
-) -> Criterion:
-    passed: bool | None = None
-    if not (math.isnan(value) or math.isnan(limit)):
-        passed = bool({"<=": value <= limit, "<": value < limit, ">": value > limit}[relation])
-    return Criterion(what, value, limit, unit, relation, passed, clause)
+def labels(criteria: Sequence[Criterion]) -> list[str]:
+    """Names of criteria, with those of their books where there are several."""
+    several = len({c.book for c in criteria}) > 1
+    return [f"{c.criterion} ({c.book})" if several else c.criterion for c in criteria]
+
+
+class _Unjudged(Exception):
+    """Why a criterion is not judged."""
+
+
+@dataclass(frozen=True)
+class _Judge:
+    book: RuleBook
+    observations: Mapping[str, Observation]
+    conditions: Conditions
+    limits: Mapping[str, float]
+    several: bool
+
+    def of_pantograph(self, rule: Rule, name: str, first: bool) -> Iterator[Criterion]:
+        """A criterion of a pantograph: once for all where the run has no such quantity, and none
+        of one that alone has no value of it."""
+        observation = self.observations[rule.quantity]
+        if observation.absent:
+            if first:
+                yield self.criterion(rule, "")
+        elif name in observation.values:
+            yield self.criterion(rule, name)
+
+    def criterion(self, rule: Rule, name: str) -> Criterion:
+        """A criterion, judged or with the reason why not."""
+        observation = self.observations[rule.quantity]
+        value, limit, clause = observation.values.get(name, math.nan), math.nan, rule.clause
+        passed, absent, because = None, False, observation.absent
+        if because:
+            absent = True
+        else:
+            try:
+                limit, note = self._limit(rule, name)
+                clause = "; ".join(part for part in (clause, note) if part)
+                because = observation.unjudged.get(name, "")
+                if not because and (math.isnan(value) or math.isnan(limit)):
+                    because = "the record gives no value"
+            except _Unjudged as why:
+                because, absent = str(why), True
+        if not because:
+            passed = bool(_MET[rule.relation](value, limit))
+        return Criterion(
+            rule.title + (f", {name}" if self.several and name else ""),
+            value,
+            limit,
+            rule.unit,
+            rule.relation,
+            passed,
+            clause,
+            self.book.key,
+            self.book.title,
+            rule.id,
+            rule.quantity,
+            self.book.is_compared(rule),
+            because,
+            absent,
+        )
+
+    def _limit(self, rule: Rule, name: str) -> tuple[float, str]:
+        """The limit, and a note to its clause."""
+        row = rule.row(self.conditions)
+        if row is None:
+            supply, speed = SYSTEMS[self.conditions.supply], self.conditions.speed
+            raise _Unjudged(f"the book has no limit for {supply} at {speed:.4g} km/h")
+        number = row.number(self.conditions.speed)
+        return (number, "") if number is not None else self._share(row, name)
+
+    def _share(self, row: LimitRow, name: str) -> tuple[float, str]:
+        if row.of_limit is not None:
+            number, note = self._limit(self.book.rule(row.of_limit), name)
+            return row.share(number), note
+        if row.of_key is not None:
+            if row.of_key not in self.limits:
+                raise _Unjudged(f"the scene has no evaluation.limits.{row.of_key}")
+            return row.share(self.limits[row.of_key]), ""
+        assert row.of_quantity is not None  # the book was checked
+        other = self.observations[row.of_quantity]
+        of = other.values.get(name, other.values.get("", math.nan))
+        if other.absent or not (name in other.values or "" in other.values):
+            raise _Unjudged(other.absent or f"there is no {row.of_quantity} of this pantograph")
+        return row.share(of), other.note

@@ -4,6 +4,10 @@ from __future__ import annotations
 
 import math
 
+# Stands behind a limit that was not compared with the text of its standard, and explains itself.
+UNCOMPARED = "*"
+UNCOMPARED_SAYS = f"{UNCOMPARED} limit not compared with the text of the standard"
+
 
 def fixed(value: float, digits: int) -> str:
     """``value`` with so many decimals, without a sign where it is rounded to zero."""

@@ -13,11 +13,14 @@ from typing import Annotated, Any, NamedTuple, NotRequired
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 from typing_extensions import TypedDict
 
+from catenary.base.errors import InputError
 from catenary.meshgen.wires import Role
 from catenary.postproc.channels.facts import FACTS
 from catenary.postproc.channels.facts import WIRE as CONTACT_WIRE
 from catenary.postproc.channels.line_record import LineRecord, from_table
-from catenary.postproc.standards.en50367 import EDITIONS, SYSTEMS
+from catenary.postproc.standards.library import DEFAULT, books_of_entries, editions_of
+from catenary.postproc.standards.quantities import LIMIT_KEYS
+from catenary.postproc.standards.supplies import SYSTEMS
 from catenary.solver.time_loop.views import channels
 from catenary.solver.time_loop.views.channels import Channel
 from catenary.solver.waves.excitation import excitation_of_facts
@@ -76,6 +79,19 @@ def _read_watched(table: dict[str, Any]) -> None:
         raise ValueError("only remarks are a list")
 
 
+def _read_rules(entries: Any) -> None:
+    try:
+        books_of_entries(entries)
+    except InputError as error:
+        raise ValueError(str(error)) from error
+
+
+def _read_limits(table: dict[str, Any]) -> None:
+    if not set(table) <= set(LIMIT_KEYS):
+        raise ValueError("keys of limits")
+
+
+_EDITIONS = list(editions_of(DEFAULT))
 Number = Annotated[float, Field(allow_inf_nan=False)]
 
 
@@ -125,9 +141,21 @@ class RunAttributes(BaseModel):
     system: Annotated[
         str, read_by(SYSTEMS.__getitem__), Field(description=f"one of {', '.join(SYSTEMS)}")
     ]
+    rules: Annotated[
+        list[Any],
+        JSON,
+        read_by(_read_rules),
+        Field(min_length=1, description="a list of rule books"),
+    ] = MISSING
+    limits: Annotated[dict[str, Number], JSON, read_by(_read_limits)] = Field(
+        default={}, description="a table of limits"
+    )
+    # Of files before there were rule books.
     edition: Annotated[
-        str, read_by(EDITIONS.__getitem__), Field(description=f"one of {', '.join(EDITIONS)}")
-    ]
+        str,
+        read_by(_EDITIONS.index),
+        Field(description=f"one of {', '.join(_EDITIONS)}"),
+    ] = MISSING
     n_steps_planned: Positive
     n_steps_begun_for: Positive = MISSING
     n_ranks: Positive = 1

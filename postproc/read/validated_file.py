@@ -40,6 +40,10 @@ from catenary.solver.time_loop.views import channels
 _ESSENTIAL_FACTS = ("time_step", "speed", "wave_speed")
 
 
+# What says by which rules a run is judged: one of these, without which there is no report.
+_RULES = ('its attribute "rules"', 'its attribute "edition"')
+
+
 class ValidatedFile:
     """A result file whose attributes, constants and tables have been checked. Not collective.
 
@@ -89,6 +93,9 @@ class ValidatedFile:
         self.sizes: dict[str, int] = {}
         self.facts: dict[str, np.ndarray] = {}
         self.attrs, fatal, self._partial = read_attributes(self._file, RunAttributes)
+        if not (self.attrs.get("rules") or self.attrs.get("edition")):
+            own = [f for f in self._partial if f.startswith(_RULES)]
+            fatal += own or [f"{_RULES[0]} is missing"]
         known = self.attrs.get("line_record")
         self.record = LineRecord() if known is None else from_table(known)
         fatal += [*self._read_facts(), *self._constant_faults()]

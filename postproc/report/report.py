@@ -10,9 +10,9 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from catenary.meshgen.slowest_wave import bends
 from catenary.postproc.evaluate import statistics as stats
 from catenary.postproc.evaluate import verdict as acceptance
+from catenary.postproc.evaluate.acceptance import criteria_of
 from catenary.postproc.evaluate.statistics import RunStatistics
 from catenary.postproc.evaluate.verdict import Criterion
 from catenary.postproc.evaluate.wording import counted
@@ -25,7 +25,7 @@ from catenary.postproc.report.sections import acceptance as acceptance_section
 from catenary.postproc.report.sections import contact_force, line, run_facts
 from catenary.postproc.report.sections.section import EvaluatedRun, Picture, Section, number
 from catenary.postproc.report.summary import as_json, summarise
-from catenary.postproc.standards.en50367 import KMH
+from catenary.postproc.standards.supplies import KMH
 
 logger = logging.getLogger("catenary.report")
 
@@ -78,7 +78,7 @@ def write_report(
         for sentence in results.damage:
             logger.warning("%s", sentence)
         statistics = stats.evaluate(results)
-        criteria = judge(results, statistics)
+        criteria = criteria_of(results, statistics)
         run = EvaluatedRun(results, statistics, criteria)
         summary = as_json(summarise(results, statistics, criteria, run.indicators))
         content: dict[str, bytes | str] = {"droppers.csv": csv_tables.droppers_csv(results)}
@@ -102,31 +102,16 @@ def write_summary(result_path: Path | str, out_dir: Path | str) -> bool | None:
     """
     with Results(result_path) as results:
         statistics = stats.evaluate(results)
-        criteria = judge(results, statistics)
+        criteria = criteria_of(results, statistics)
         text = as_json(summarise(results, statistics, criteria))
         verdict = acceptance.verdict(criteria) if results.complete else None
     write_into(Path(out_dir), {"summary.json": text})
     return verdict
 
 
-def judge(results: Results, statistics: RunStatistics) -> list[Criterion]:
-    """The criteria of the edition and system that the result file names. Not collective."""
-    about, slowest = results.attributes, results.fact("wave_speed")
-    tensions = results.facts_of_wires("contact_wire_tension")
-    masses = results.facts_of_wires("contact_wire_mass")
-    return acceptance.judge(
-        statistics,
-        results.fact("speed"),
-        slowest,
-        about["system"],
-        about["edition"],
-        all(bends(slowest, tensions[wire], masses[wire]) for wire in tensions),
-    )
-
-
 def drawings(results: Results, statistics: RunStatistics) -> Iterator[Picture]:
     """What makes each picture of a run, in their order."""
-    run = EvaluatedRun(results, statistics)
+    run = EvaluatedRun(results, statistics, criteria_of(results, statistics))
     for section in SECTIONS:
         yield from section(run).pictures
 

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from catenary.meshgen.wires import Role
+from catenary.postproc.evaluate.acceptance import judged_by
 from catenary.postproc.evaluate.error_indicators import Indicators, as_table, indicate
 from catenary.postproc.evaluate.lateral_places import as_table as as_lateral_table
 from catenary.postproc.evaluate.remarks import all_remarks
@@ -19,7 +20,7 @@ from catenary.postproc.evaluate.statistics import PantographStatistics, RunStati
 from catenary.postproc.evaluate.verdict import Criterion, verdict
 from catenary.postproc.files.disk import plain
 from catenary.postproc.read.results import Results
-from catenary.postproc.standards.en50367 import KMH
+from catenary.postproc.standards.supplies import KMH
 
 
 def summarise(
@@ -78,7 +79,9 @@ def summarise(
             "min_force_N": statistics.droppers.minimum,
         },
         "static": _static(results),
-        "acceptance": [_criterion(c) for c in criteria],
+        "acceptance": [_criterion(c) for c in criteria if not c.absent],
+        "not_judged": [_unjudged(c) for c in criteria if c.absent],
+        "judged_by": judged_by(results, criteria),
         "passed": verdict(criteria) if results.complete else None,
         "indicators": as_table(indicators),
         "complaints": statistics.complaints + results.damage,
@@ -201,4 +204,18 @@ def _criterion(c: Criterion) -> dict[str, Any]:
         "relation": c.relation,
         "passed": c.passed,
         "clause": c.clause,
+        "book": c.book,
+        "rule": c.rule,
+        "compared": c.compared,
+        "because": c.because or None,
+    }
+
+
+def _unjudged(c: Criterion) -> dict[str, Any]:
+    return {
+        "criterion": c.criterion,
+        "clause": c.clause,
+        "book": c.book,
+        "rule": c.rule,
+        "because": c.because,
     }

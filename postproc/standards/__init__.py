@@ -1,1 +1,1 @@
-"""The limits of EN 50367, edition by edition."""
+"""Rule books: the criteria of standards as data, and the quantities that they limit."""

@@ -22,12 +22,13 @@ from damaging import as_json, flip, raw_ranges, spoil_chunk, unseal
 from program import catenary, short_run
 
 from catenary.base.errors import InputError
+from catenary.postproc.evaluate import acceptance
 from catenary.postproc.evaluate import statistics as stats
 from catenary.postproc.evaluate.compare import compare
 from catenary.postproc.read import guard
 from catenary.postproc.read.guard import examined
 from catenary.postproc.read.results import Results
-from catenary.postproc.report import report, summary
+from catenary.postproc.report import summary
 
 FIRST = int(os.environ.get("FUZZ_SEED", "1"))
 FLIPS = int(os.environ.get("FUZZ_FLIPS", "3"))
@@ -53,7 +54,7 @@ def figures(folder: Path, records: Any = None) -> dict[str, Any]:
     """All that is read of a run: figures, histories, the state to continue from."""
     with Results(folder, records) as results:
         statistics = stats.evaluate(results)
-        told = summary.summarise(results, statistics, report.judge(results, statistics))
+        told = summary.summarise(results, statistics, acceptance.criteria_of(results, statistics))
         told["complaints"] = statistics.complaints
         sums = {
             name: results.channel(name).sum()
@@ -141,8 +142,8 @@ def in_both_states(name: str, number: float) -> Callable[[h5py.File], None]:
 # What a restart refuses before it computes, in files whose checksums have gone.
 NOT_CONTINUED: dict[str, tuple[Callable[[h5py.File], None], str]] = {
     "edition 2099": (
-        lambda file: file.attrs.__setitem__("edition", "2099"),
-        '"edition" is not one',
+        lambda file: file.attrs.__setitem__("rules", '["en50367:2099"]'),
+        '"rules" is not a list of rule books',
     ),
     "state NaN": (in_both_states("displacement", np.nan), "displacement holds NaN or infinity"),
     "state of other nodes": (in_both_states("row_of_node", 3), "row_of_node puts node 0 in row 3"),

@@ -32,13 +32,15 @@ for words in json.loads(sys.argv[1]):
             found.append([end.code, sorted({name.partition(".")[0] for name in sys.modules})])
 print(json.dumps(found))
 """
-ANSWERED = ["--help", "run --help", "list", "list --keys"]
+ANSWERED = ["--help", "run --help", "list", "list --keys", "list --rules", "list --rules line"]
 REFUSED = [
     "check no_such_case",
     "check en50318_2002 --set train.sped=300",
     "check en50318_2002 --set train.speed_km_h=-1",
     "check en50318_2002 --set train.speed_km_h=900",
     "check ambrosio2012 --set train.speed_km_h=900",
+    "check ac_simple --set evaluation.edition=1999",
+    "list --rules no_such_book",
     "plan ac_simple --set line.n_spans=0",
     "run ac_simple -o nowhere --set evaluation.to_m=1e6",
     "sweep ac_simple -o nowhere --vary train.speed_km_h=250,900",

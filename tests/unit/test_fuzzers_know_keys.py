@@ -13,7 +13,7 @@ from catenary.cases.scene.scene import Scene
 MOST_SEEDS = 4000
 # Left to tests of their own: texts, files, mechanisms as data, options of PETSc, what is written.
 ELSEWHERE = re.compile(
-    r"case\b|test\b|petsc\b|output\b|evaluation\.(edition|system)|mesh\.file|.*_file$|.*\.patterns\.\*\.spans$"
+    r"case\b|test\b|petsc\b|output\b|evaluation\.(edition|system|rules|own_rules|limits)\b|mesh\.file|.*_file$|.*\.patterns\.\*\.spans$"
     r"|pantographs\.\*\.(type|head|arm|actuator|calibrate|working_height_m|assembly_tolerance_m"
     r"|gravity|as_published|bodies|joints|forces|corrections)\b"
     r"|numerics\.(eps_\w+|max_iterations)|effects\.(vertical|gravity|several_pantographs)"

@@ -76,6 +76,7 @@ def data() -> list[Path]:
         "cases/studies/hard/hard.toml",
         "postproc/report/templates/*",
         "postproc/paraview/*.template",
+        "postproc/standards/books/*.toml",
         "solver/kernels/simulation/catenary.h",
     )
     return [path for pattern in patterns for path in ROOT.glob(pattern) if path.is_file()]

@@ -8,7 +8,7 @@ left out; all others go on.
 from __future__ import annotations
 
 import difflib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -52,11 +52,15 @@ from catenary.cases.scene.keys.keys import is_known, known_keys
 from catenary.cases.scene.keys.units import unit_of
 from catenary.cases.scene.keys.usual_values import USUAL, unit_guess
 from catenary.cases.scene.problem import end_of, line_data_of, strips_ahead
+from catenary.cases.scene.run.case import chosen_books
 from catenary.cases.scene.scene import Scene
 from catenary.meshgen.slowest_wave import bends, slowest_wave
 from catenary.meshgen.topologies.all_topologies import make_line
 from catenary.meshgen.topologies.line_data import LineData
 from catenary.postproc.record.snapshots.blocks import OTHER_PARTS
+from catenary.postproc.standards.book import RuleBook, book_of
+from catenary.postproc.standards.library import DEFAULT, book_named, editions_of, shipped
+from catenary.postproc.standards.supplies import SYSTEMS
 from catenary.solver.effects.effect import Limit
 
 # Two heads cannot stand closer on a roof; their contacts would also share one finite element.
@@ -275,14 +279,51 @@ def _raising(scene: Scene) -> Iterator[Fault]:
 
 
 def _standard(scene: Scene) -> Iterator[Fault]:
-    from catenary.postproc.standards.en50367 import EDITIONS, SYSTEMS
-
+    judged = scene.evaluation
     for key, value, known in (
-        ("evaluation.edition", scene.evaluation.edition, EDITIONS),
-        ("evaluation.system", scene.evaluation.system, SYSTEMS),
+        ("evaluation.edition", judged.edition, editions_of(DEFAULT)),
+        ("evaluation.system", judged.system, SYSTEMS),
     ):
-        if value not in known:
+        if value is not None and value not in known:
             yield scene.refused(key, value, f"it must be one of {', '.join(known)}")
+            return
+    if judged.edition is not None and judged.rules is not None:
+        why = f'it is short for evaluation.rules = ["{DEFAULT}:{judged.edition}"]: take one away'
+        yield scene.refused("evaluation.edition", judged.edition, why)
+        return
+    for place, name in enumerate(judged.chosen):
+        try:
+            book_named(name)
+        except InputError as unknown:
+            yield scene.refused(f"evaluation.rules.{place}", name, str(unknown))
+            return
+    if judged.own_rules is not None:
+        try:
+            book_of(
+                judged.own_rules, f"evaluation.own_rules {scene.origin.of('evaluation.own_rules')}"
+            )
+        except InputError as wrong:
+            yield Fault("evaluation.own_rules", str(wrong))
+            return
+    elif not judged.chosen:
+        yield scene.refused("evaluation.rules", [], "without books a rules_file must be given")
+        return
+    try:
+        books = chosen_books(judged)
+    except InputError as twice:
+        yield scene.fault("evaluation.rules", f"has a book twice: {twice}")
+        return
+    for name, number in judged.own_limits.items():
+        if name not in _limits_read(books):
+            readers = [book.key for book in shipped().values() if name in _limits_read([book])]
+            why = f"no chosen rule book reads it; those that do are {', '.join(readers)}"
+            yield scene.refused(f"evaluation.limits.{name}", number, why)
+
+
+def _limits_read(books: Iterable[RuleBook]) -> set[str]:
+    """Keys of ``evaluation.limits`` that books refer to."""
+    rows = (row for book in books for rule in book.criteria for row in rule.limit)
+    return {row.of_key for row in rows if row.of_key is not None}
 
 
 def _mesh_file(scene: Scene) -> Iterator[Fault]:

@@ -1,4 +1,4 @@
-"""Numbers that stand in CSV files, put into the scene in place of the files' names.
+"""Numbers that stand in CSV files, and rule books, put into the scene in place of the files' names.
 
 A result then holds the numbers themselves, and does not change with the file. Courses and curves
 are pairs of numbers. Tables of spans and of droppers have columns with names, as planners export
@@ -18,6 +18,8 @@ from typing import Any
 from catenary.base.errors import InputError
 from catenary.cases.scene.input.faults import Fault, Origin, shown
 from catenary.cases.scene.input.plain_text import decode, read_whole
+from catenary.cases.scene.input.toml_input import read_toml
+from catenary.postproc.standards.book import book_of
 
 _LONGEST_NAME = 1000
 
@@ -41,8 +43,11 @@ def take_in_files(
         file_key, pairs_key = f"{where}.{named}", f"{where}.{key}"
         del table[named]
         own = origin.is_overridden(file_key) or folder is None
-        path = (Path.cwd() if own else folder or Path()) / name
+        base = Path.cwd() if own or folder is None else folder
+        path = base / name
         try:
+            if read is _book:
+                _refuse_outside(path, base, f"{file_key} is {_named(name)} {origin.of(file_key)}")
             if key in table:
                 raise InputError(
                     f"{file_key} is {shown(name)} {origin.of(file_key)}; {pairs_key} is given too: "
@@ -59,11 +64,25 @@ def take_in_files(
 
 def absolute_names(raw: dict[str, Any], folder_of: Callable[[str], Path]) -> None:
     """Write every name of a file with numbers as a path from the root, in place; by its key
-    ``folder_of`` says to which folder it is relative."""
-    for where, table, named, _, _ in _places(raw):
+    ``folder_of`` says to which folder it is relative. A rule book takes the place of its name: it
+    stands in that folder and in no other.
+
+    Raises
+    ------
+    InputError
+        If a rule book does not stand there, or is none.
+    """
+    for where, table, named, key, read in _places(raw):
         name = table.get(named) if isinstance(table, dict) else None
-        if isinstance(name, str) and name:
-            table[named] = str(folder_of(f"{where}.{named}") / name)
+        if not isinstance(name, str) or not name:
+            continue
+        base = folder_of(f"{where}.{named}")
+        if read is _book:
+            sentence = f"{where}.{named} is {_named(name)}"
+            _refuse_outside(base / name, base, sentence)
+            table[key] = read(base / table.pop(named), sentence, raw)
+        else:
+            table[named] = str(base / name)
 
 
 # What reads a file: its path, the begin of a sentence about it, and the raw scene.
@@ -82,6 +101,7 @@ def _places(raw: dict[str, Any]) -> Iterator[tuple[str, Any, str, str, _Read]]:
         for course in ("by_time", "by_place"):
             where = f"vehicle.{direction}"
             yield where, below(vehicle, direction), f"{course}_file", course, _pairs
+    yield "evaluation", raw.get("evaluation"), "rules_file", "own_rules", _book
     yield "line", line, "spans_file", "span_m", _spans
     links = below(line, "links")
     hung = [("line.dropper", below(line, "dropper"))]
@@ -90,6 +110,22 @@ def _places(raw: dict[str, Any]) -> Iterator[tuple[str, Any, str, str, _Read]]:
     for where, table in hung:
         yield where, table, "curve_file", "curve", _pairs
         yield where, table, "patterns_file", "patterns", _patterns
+
+
+def _refuse_outside(path: Path, base: Path, where: str) -> None:
+    try:
+        inside = path.resolve().is_relative_to(base.resolve())
+    except (OSError, ValueError, RuntimeError):  # names too long, null bytes, links in a circle
+        inside = False
+    if not inside:
+        raise InputError(f"{where}; it must stand in the folder of its scene")
+
+
+def _book(path: Path, where: str, raw: dict[str, Any]) -> dict[str, Any]:
+    """The table of a rule book, which is one."""
+    table = read_toml(path)
+    book_of(table, f"{where}, which")
+    return table
 
 
 def _is_list(value: Any) -> bool:

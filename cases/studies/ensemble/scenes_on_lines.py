@@ -23,16 +23,17 @@ from catenary.cases.run.header import header_of
 from catenary.cases.run.planning.plan import effect_rows
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.problem import problem_of, resolved
+from catenary.cases.scene.run.case import rule_entries
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.ensemble.keeper import Keeper
 from catenary.postproc.channels.facts import facts_of
 from catenary.postproc.channels.header import Header, static_datasets
 from catenary.postproc.evaluate import statistics as stats
+from catenary.postproc.evaluate.acceptance import criteria_of
 from catenary.postproc.files.run_schema import DONE
 from catenary.postproc.read.marched_results import MarchedFile
 from catenary.postproc.read.results import Results
 from catenary.postproc.record.run_watch import RunWatch, watch_cadence, watched
-from catenary.postproc.report.report import judge
 from catenary.postproc.report.summary import summarise
 from catenary.solver.ensemble.marches import SceneHistory, march_side_by_side
 from catenary.solver.ensemble.shared_line import SharedLine, why_alone
@@ -225,7 +226,8 @@ class _Line:
             "case": scene.case.name,
             "title": scene.case.title,
             "system": scene.evaluation.system,
-            "edition": scene.evaluation.edition,
+            "rules": rule_entries(scene.evaluation),
+            "limits": scene.evaluation.own_limits,
             "pantographs": header_words(scene, problem),
             "arrivals": arrival_facts(scene, problem),
             "defects": defect_facts(scene, problem),
@@ -297,4 +299,4 @@ def _summary(
     """What a run of the scene writes as its summary."""
     results = Results.of(MarchedFile(head, tables, extremes, outcome))
     statistics = stats.evaluate(results)
-    return summarise(results, statistics, judge(results, statistics))
+    return summarise(results, statistics, criteria_of(results, statistics))

@@ -16,6 +16,7 @@ from catenary.cases.scene.keys.units import SUFFIXES, unit_of
 from catenary.cases.studies.sweep.jobs import OF_LINE, OF_PANTOGRAPH, STATISTICS, Ended
 from catenary.cases.studies.sweep.variants import NAMES
 from catenary.cases.terminal.key_list import Key, keys_of_a_scene
+from catenary.cases.terminal.terminal_text import labelled
 from catenary.postproc.files.disk import plain, write_all
 from catenary.postproc.report.pictures import figures
 from catenary.postproc.report.study_table import Column, StudyTable, cell, remark_lines
@@ -31,9 +32,9 @@ def table_of(ended: Sequence[Ended]) -> StudyTable:
     """One row per variant and pantograph; a variant that broke has one without figures.
 
     Columns: ``variant``, the varied keys with values of their own types, ``outcome``,
-    ``pantograph``, ``STATISTICS``, ``passed`` (the standard's verdict, None if not judged),
-    ``failed`` (the criteria that failed), ``judged`` (all that were judged), ``remarks`` (what
-    decides the results), ``wall_s``.
+    ``pantograph``, ``STATISTICS``, ``rules`` (the books that judge), ``passed`` (their verdict,
+    None if not judged), ``failed`` (the criteria that failed), ``judged`` (all that were judged),
+    ``not_judged`` (those without data), ``remarks`` (what decides the results), ``wall_s``.
     """
     keys = varied_keys(ended)
     rows = []
@@ -42,7 +43,9 @@ def table_of(ended: Sequence[Ended]) -> StudyTable:
         head |= {key: _typed(key, one.variant.varied.get(key)) for key in keys}
         failed = failed_criteria(one.summary)
         head |= {"passed": one.summary.get("passed"), "failed": failed, "remarks": one.remarks}
-        head["judged"] = judged_criteria(one.summary)
+        head |= {"judged": judged_criteria(one.summary)}
+        head |= {"not_judged": unjudged_criteria(one.summary)}
+        head |= {"rules": list(dict.fromkeys(row["book"] for row in _judged_rows(one.summary)))}
         head |= {"wall_s": one.wall, "accepted": _verdict(one.summary.get("passed"), failed)}
         for pantograph in one.summary.get("pantographs", [{}]):
             row: dict[str, Any] = {**head, "pantograph": pantograph.get("name", "")}
@@ -55,7 +58,10 @@ def table_of(ended: Sequence[Ended]) -> StudyTable:
         Column("pantograph", "pantograph"),
         *STATISTICS.values(),
         Column("accepted", "accepted", in_files=False),
-        *(Column(name) for name in ("passed", "failed", "judged", "remarks", "wall_s")),
+        *(
+            Column(name)
+            for name in ("rules", "passed", "failed", "judged", "not_judged", "remarks", "wall_s")
+        ),
     ]
     return StudyTable(columns, rows)
 
@@ -71,13 +77,28 @@ def _typed(key: str, text: str | None) -> Any:
 def failed_criteria(summary: Mapping[str, Any]) -> list[str]:
     """Names of the acceptance criteria that a run failed, each once."""
     rows = summary.get("acceptance", [])
-    return list(dict.fromkeys(row["criterion"] for row in rows if row["passed"] is False))
+    several = len({row.get("book") for row in rows}) > 1
+    failed = (labelled(row, several) for row in rows if row["passed"] is False)
+    return list(dict.fromkeys(failed))
+
+
+def unjudged_criteria(summary: Mapping[str, Any]) -> list[str]:
+    """Names of the criteria for which a run has no data, each once."""
+    rows = summary.get("not_judged", [])
+    return list(dict.fromkeys(labelled(row, several=True) for row in rows))
+
+
+def _judged_rows(summary: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    rows = [*summary.get("acceptance", []), *summary.get("not_judged", [])]
+    return [row for row in rows if row.get("book")]
 
 
 def judged_criteria(summary: Mapping[str, Any]) -> list[str]:
     """Names of the acceptance criteria that were judged in a run, each once."""
     rows = summary.get("acceptance", [])
-    return list(dict.fromkeys(row["criterion"] for row in rows if row["passed"] is not None))
+    several = len({row.get("book") for row in rows}) > 1
+    judged = (labelled(row, several) for row in rows if row["passed"] is not None)
+    return list(dict.fromkeys(judged))
 
 
 def _verdict(passed: bool | None, failed: Sequence[str]) -> str:

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from catenary.postproc.evaluate.verdict import Criterion
+from catenary.postproc.evaluate.acceptance import judged_by
+from catenary.postproc.evaluate.verdict import Criterion, labels
 from catenary.postproc.evaluate.wording import decimals_that_tell
 from catenary.postproc.report.sections.section import EvaluatedRun, Section, Text, number
 from catenary.postproc.report.study_table import StudyTable, texts_table
-from catenary.postproc.standards import en50367 as standards
+from catenary.postproc.standards.supplies import KMH
 
-_RELATIONS = {"<=": "≤", "<": "<", ">": ">"}
+_RELATIONS = {"<=": "≤", "<": "<", ">=": "≥", ">": ">"}
+_UNCOMPARED = "not compared with the text"
 _WORDS = {None: "not judged", True: "passed", False: "failed"}
 _BROKEN_OFF = {
     "running": "The file was not closed: the run is still going on or its program was ended.",
@@ -33,15 +35,20 @@ def _status(run: EvaluatedRun) -> Iterator[Text]:
             "open",
             "This run is not complete.",
         )
-    edition = standards.EDITIONS[about["edition"]].title
-    by = f"{edition} ({standards.SYSTEMS[about['system']]})"
+    by = judged_by(results, list(run.criteria))
     if run.verdict is None:
-        yield Text("No criterion failed, but some could not be judged.", "open", "Not judged.")
+        yield Text(
+            f"No criterion failed, but some could not be judged. {by}.", "open", "Not judged."
+        )
     elif not run.verdict:
-        failed = [_sentence(one) for one in run.criteria if one.passed is False]
-        yield Text(f"Failed by {by}:", "bad", "Not passed.", failed)
+        failed = [
+            _sentence(one, label)
+            for one, label in zip(run.criteria, labels(run.criteria), strict=True)
+            if one.passed is False
+        ]
+        yield Text(f"{by}. Failed:", "bad", "Not passed.", failed)
     elif results.complete:
-        yield Text(f"All criteria of {by} are met.", "good", "Passed.")
+        yield Text(f"{by}.", "good", "Passed.")
     yield from (Text(sentence, "open") for sentence in run.statistics.complaints)
 
 
@@ -50,10 +57,10 @@ def _figures(one: Criterion) -> tuple[str, str]:
     return number(one.value, digits), number(one.limit, digits)
 
 
-def _sentence(one: Criterion) -> str:
+def _sentence(one: Criterion, label: str) -> str:
     value, limit = _figures(one)
     relation = _RELATIONS[one.relation]
-    return f"{one.criterion}: {value} {one.unit}, must be {relation} {limit} {one.unit}"
+    return f"{label}: {value} {one.unit}, must be {relation} {limit} {one.unit}"
 
 
 def section(run: EvaluatedRun) -> Section:
@@ -62,13 +69,19 @@ def section(run: EvaluatedRun) -> Section:
 
 
 def _criteria(run: EvaluatedRun) -> Iterator[Text | StudyTable]:
-    rows = []
-    for one in run.criteria:
+    rows, left = [], []
+    for one, label in zip(run.criteria, labels(run.criteria), strict=True):
+        if one.absent:
+            left.append(f"{label}: because {one.because}")
+            continue
         value, limit = _figures(one)
-        words = one.unit, _WORDS[one.passed], one.clause
-        rows.append([one.criterion, value, _RELATIONS[one.relation], limit, *words])
+        source = one.clause if one.compared else f"{one.clause}; {_UNCOMPARED}"
+        words = one.unit, _WORDS[one.passed], source
+        rows.append([label, value, _RELATIONS[one.relation], limit, *words])
     yield texts_table(["criterion", "value", "", "limit", "unit", "", "source"], rows, {1, 3})
-    speed = number(standards.KMH * run.results.fact("wave_speed"), 0)
+    if left:
+        yield Text("for want of data or of a limit:", "open", "Not judged", left)
+    speed = number(KMH * run.results.fact("wave_speed"), 0)
     yield Text(
         f"Wave speed of the contact wire: {speed} km/h. Forces are filtered by a 20 Hz low-pass "
         "(Butterworth, 6th order, forward and backward)."

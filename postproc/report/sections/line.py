@@ -17,7 +17,6 @@ from catenary.postproc.report.sections.section import (
     number,
 )
 from catenary.postproc.report.study_table import StudyTable, texts_table
-from catenary.postproc.standards import en50367 as standards
 
 
 def in_motion(run: EvaluatedRun) -> Section:
@@ -39,7 +38,10 @@ def _of_motion(run: EvaluatedRun) -> Iterator[Picture]:
 
     results, statistics = run.results, run.statistics
     if results.n_rows("time") > 1 and statistics.supports.x.size:
-        limit = standards.EDITIONS[results.attributes["edition"]].arm_uplift
+        limits = [
+            c.limit for c in run.criteria if c.quantity == "arm_uplift" and c.limit == c.limit
+        ]
+        limit = 1e-3 * min(limits) if limits else None
         text = "Uplift of the contact wire at the steady arms."
         yield Picture("uplift", text, lambda: line_pictures.arm_uplift(results, statistics, limit))
     if results.n_rows("time") > 1 and statistics.droppers.x.size:

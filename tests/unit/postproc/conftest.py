@@ -128,7 +128,7 @@ def make_header(problem: Problem, mesh: LineMesh, **attributes: Any) -> Header:
         "title": "A made-up line <with> & awkward title",
         "n_dofs": 2 * mesh.n_nodes,
         "system": "ac",
-        "edition": "2006",
+        "rules": ["en50367:2006"],
         "versions": {"catenary": "0.1.0", "petsc": "3.18.5", "python": "3.11"},
         "config": {"line": {"n_spans": N_SPANS}, "numerics": {"scheme": "one_solve"}},
         "wires": wire_roles(line),

@@ -76,7 +76,11 @@ def number(name: str, value: float) -> Callable[[h5py.File], None]:
 # away first, as in a file of an earlier version.
 REFUSED: dict[str, tuple[Callable[[h5py.File], None], str]] = {
     "no case": (removed("case"), 'its attribute "case" is missing'),
-    "edition 2099": (put("edition", "2099"), '"edition" is not one of 2006, 2012'),
+    "edition 2099": (
+        put("rules", '["en50367:2099"]'),
+        'its attribute "rules" is not a list of rule books',
+    ),
+    "no rules": (removed("rules"), 'its attribute "rules" is missing'),
     "no step": (number("time_step", 0.0), "facts/time_step holds 0 in place of 1e-12 to 1000 s"),
     "step NaN": (number("time_step", np.nan), "facts/time_step holds nan"),
     "speed as text": (

@@ -1,0 +1,316 @@
+"""A rule book as data: criteria with limits that depend on speed, supply, or keys of the scene.
+
+A limit is arithmetic of four forms, no more: a number, a polynomial of the speed, or a share of
+another quantity, of another criterion's limit, or of a key of the scene. Nothing is evaluated as
+code.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Any, Literal, NamedTuple
+
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    ValidationError,
+    field_validator,
+    model_validator,
+)
+
+from catenary.base.errors import InputError
+from catenary.postproc.standards.quantities import LIMIT_KEYS, PANTOGRAPH, QUANTITIES
+from catenary.postproc.standards.supplies import SYSTEMS
+
+# Speeds in km/h come from m/s with a rounding error: 200 km/h is 55.555... m/s.
+_ROUNDING = 1e-9
+_NAME = r"^[a-z][a-z0-9_]*$"
+_LONGEST = 500
+_FORMS = ("value", "polynomial", "of_quantity", "of_limit", "of_key")
+
+Text = Annotated[str, Field(max_length=_LONGEST, pattern=r"^[^\x00-\x1f\x7f-\x9f]*$")]
+Number = Annotated[float, Field(ge=-1e9, le=1e9)]
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class Conditions(NamedTuple):
+    """What decides which row of a limit holds: speed [km/h], supply, stops above steady arms."""
+
+    speed: float
+    supply: str
+    stops: bool = False
+
+
+class LimitRow(_Part):
+    """A limit under conditions: one of ``value``, ``polynomial``, ``of_...``; the last three times
+    ``times`` over ``over``.
+
+    Attributes
+    ----------
+    supply : for which supplies it holds, all if empty
+    up_to_km_h, below_km_h : up to which speed [km/h], including it or not
+    stops : whether it holds with or without stops above the steady arms, None for both
+    value : in the unit of the quantity
+    polynomial : coefficients of v^0, v^1, ..., v in km/h
+    of_quantity, of_limit, of_key : a quantity, id of a criterion of the book, key of the scene
+    """
+
+    supply: Annotated[list[str], Field(max_length=10)] = []
+    up_to_km_h: Annotated[float, Field(gt=0)] | None = None
+    below_km_h: Annotated[float, Field(gt=0)] | None = None
+    stops: bool | None = None
+    value: Number | None = None
+    polynomial: Annotated[list[Number], Field(min_length=1, max_length=5)] | None = None
+    of_quantity: Text | None = None
+    of_limit: Text | None = None
+    of_key: Text | None = None
+    times: Annotated[float, Field(gt=0, le=1e6)] = 1.0
+    over: Annotated[float, Field(gt=0, le=1e6)] = 1.0
+
+    @model_validator(mode="after")
+    def _one_form(self) -> LimitRow:
+        given = [name for name in _FORMS if getattr(self, name) is not None]
+        if len(given) != 1:
+            but = "none is given" if not given else f"{' and '.join(given)} are given"
+            raise ValueError(f"needs exactly one of {', '.join(_FORMS)}, but {but}")
+        if given[0] in _FORMS[:2] and (self.times, self.over) != (1.0, 1.0):
+            raise ValueError(f"has times or over, which {given[0]} does not take")
+        if self.up_to_km_h is not None and self.below_km_h is not None:
+            raise ValueError("needs one of up_to_km_h and below_km_h, but both are given")
+        _known("supply", self.supply, SYSTEMS)
+        _known("of_quantity", [self.of_quantity] if self.of_quantity else [], QUANTITIES)
+        _known("of_key", [self.of_key] if self.of_key else [], LIMIT_KEYS)
+        return self
+
+    def holds(self, conditions: Conditions) -> bool:
+        """Whether it is the limit under conditions that no earlier row covers."""
+        v = conditions.speed
+        return (
+            (not self.supply or conditions.supply in self.supply)
+            and (self.up_to_km_h is None or v <= self.up_to_km_h * (1.0 + _ROUNDING))
+            and (self.below_km_h is None or v < self.below_km_h * (1.0 - _ROUNDING))
+            and (self.stops is None or self.stops == conditions.stops)
+        )
+
+    def number(self, speed: float) -> float | None:
+        """The limit at a speed [km/h], None if it depends on something else."""
+        if self.polynomial is not None:
+            total = 0.0
+            for coefficient in reversed(self.polynomial):
+                total = total * speed + coefficient
+            return total
+        return self.value
+
+    def share(self, of: float) -> float:
+        """The limit, from what it is a share of."""
+        return self.times * of / self.over
+
+    def words(self, unit: str) -> str:
+        """The limit as a formula, without its conditions."""
+        if self.value is not None:
+            return f"{self.value:g} {unit}".rstrip()
+        if self.polynomial is not None:
+            return f"{_polynomial(self.polynomial)} {unit}".rstrip()
+        over = f" / {self.over:g}" if self.over != 1.0 else ""
+        times = f"{self.times:g} x " if self.times != 1.0 else ""
+        if self.of_limit:
+            return f"{times}the limit of {self.of_limit}{over}"
+        what = self.of_quantity or f"evaluation.limits.{self.of_key}"
+        return f"{times}{what}{over}"
+
+    def when(self) -> str:
+        """Its conditions in words, empty if it holds always."""
+        said = [", ".join(SYSTEMS[name] for name in self.supply)] if self.supply else []
+        said += [] if self.up_to_km_h is None else [f"up to {self.up_to_km_h:g} km/h"]
+        said += [] if self.below_km_h is None else [f"below {self.below_km_h:g} km/h"]
+        said += [] if self.stops is None else ["with stops" if self.stops else "without stops"]
+        return ", ".join(said)
+
+
+def _polynomial(coefficients: list[float]) -> str:
+    powers = ("", " v", *(f" v^{n}" for n in range(2, len(coefficients))))
+    terms = [f"{c:.12g}{p}" for c, p in zip(coefficients, powers, strict=False) if c]
+    return " + ".join(reversed(terms)).replace("+ -", "- ") or "0"
+
+
+def _as_list(value: Any) -> Any:
+    return [value] if isinstance(value, dict | LimitRow) else value
+
+
+class Rule(_Part):
+    """A criterion of a book.
+
+    Attributes
+    ----------
+    id : name within the book
+    title : in words, as tables name it
+    quantity : key of ``QUANTITIES``
+    relation : how the value must stand to the limit
+    limit : rows, of which the first that holds is the limit
+    clause : where the limit stands
+    compared : whether the limit was compared with the text of the standard; None as the book says
+    note : what is to be known of it
+    """
+
+    id: Annotated[str, Field(max_length=60, pattern=_NAME)]
+    title: Annotated[Text, Field(min_length=1)]
+    quantity: Text
+    relation: Literal["<=", "<", ">=", ">"]
+    limit: Annotated[list[LimitRow], BeforeValidator(_as_list), Field(min_length=1, max_length=100)]
+    clause: Text = ""
+    compared: bool | None = None
+    note: Text = ""
+
+    @field_validator("quantity")
+    @classmethod
+    def _is_known(cls, name: str) -> str:
+        _known("quantity", [name], QUANTITIES)
+        return name
+
+    @property
+    def unit(self) -> str:
+        """Unit of value and limit."""
+        return QUANTITIES[self.quantity].unit
+
+    @property
+    def per_pantograph(self) -> bool:
+        """Whether each pantograph is judged."""
+        return QUANTITIES[self.quantity].per == PANTOGRAPH
+
+    def row(self, conditions: Conditions) -> LimitRow | None:
+        """The row that holds under conditions, None if the book has no limit for them."""
+        return next((row for row in self.limit if row.holds(conditions)), None)
+
+    def words(self) -> str:
+        """The limit in words, with the conditions of its rows."""
+        said = []
+        for row in self.limit:
+            when = row.when()
+            said.append(f"{row.words(self.unit)} ({when})" if when else row.words(self.unit))
+        return f"{self.relation} {'; '.join(said)}"
+
+
+class RuleBook(_Part):
+    """A rule book.
+
+    Attributes
+    ----------
+    name, edition : ``name:edition`` chooses it in a scene
+    title : as cited
+    source : where its limits come from
+    compared : whether they were compared with the text of the standard
+    criteria : in the order of tables
+    """
+
+    name: Annotated[str, Field(max_length=40, pattern=_NAME)]
+    edition: Annotated[str, Field(max_length=20, pattern=r"^[A-Za-z0-9.+-]*$")] = ""
+    title: Annotated[Text, Field(min_length=1)]
+    source: Annotated[str, Field(max_length=2000, pattern=r"^[^\x00-\x09\x0b-\x1f\x7f-\x9f]*$")] = (
+        ""
+    )
+    compared: bool = False
+    criteria: Annotated[list[Rule], Field(min_length=1, max_length=200)]
+
+    @model_validator(mode="after")
+    def _consistent(self) -> RuleBook:
+        rules = {rule.id: rule for rule in self.criteria}
+        if len(rules) < len(self.criteria):
+            ids = [rule.id for rule in self.criteria]
+            twice = next(name for name in ids if ids.count(name) > 1)
+            raise ValueError(f"has several criteria with the id {twice}")
+        for rule in self.criteria:
+            for fault in _faults_of_limit(rule, rules):
+                raise ValueError(f"has a criterion {rule.id} whose limit {fault}")
+        return self
+
+    @property
+    def key(self) -> str:
+        """What chooses it in a scene."""
+        return f"{self.name}:{self.edition}" if self.edition else self.name
+
+    def is_compared(self, rule: Rule) -> bool:
+        """Whether the limit of a criterion was compared with the text of the standard."""
+        return self.compared if rule.compared is None else rule.compared
+
+    def rule(self, name: str) -> Rule:
+        """The criterion with an id, which there is."""
+        return next(rule for rule in self.criteria if rule.id == name)
+
+
+def _faults_of_limit(rule: Rule, rules: Mapping[str, Rule]) -> Iterator[str]:
+    for row in rule.limit:
+        if row.of_limit is not None:
+            other = rules.get(row.of_limit)
+            if other is None:
+                yield f"is a share of that of {row.of_limit}, which the book does not have"
+            elif any(one.of_limit for one in other.limit):
+                yield f"is a share of that of {row.of_limit}, which is itself a share of a limit"
+            elif other.per_pantograph and not rule.per_pantograph:
+                yield f"is a share of that of {row.of_limit}, which each pantograph has"
+            elif other.unit != rule.unit:
+                yield f"is a share of that of {row.of_limit}, which is in {other.unit}"
+        if row.of_quantity is not None:
+            quantity = QUANTITIES[row.of_quantity]
+            if quantity.unit != rule.unit:
+                yield f"in {rule.unit} is a share of {row.of_quantity}, which is in {quantity.unit}"
+            elif quantity.per == PANTOGRAPH and not rule.per_pantograph:
+                yield f"is a share of {row.of_quantity}, which each pantograph has"
+        if row.of_key is not None and LIMIT_KEYS[row.of_key].unit != rule.unit:
+            unit = LIMIT_KEYS[row.of_key].unit
+            yield f"in {rule.unit} is a share of {row.of_key}, which is in {unit}"
+
+
+def _known(key: str, names: list[str], known: Mapping[str, object]) -> None:
+    for name in names:
+        if name not in known:
+            raise ValueError(f"has {key} {name!r}, but it must be one of {', '.join(known)}")
+
+
+def book_of(table: Any, where: str) -> RuleBook:
+    """The rule book of a table, such as a TOML file holds.
+
+    Parameters
+    ----------
+    where : begins sentences about it, such as the name of its file
+
+    Raises
+    ------
+    InputError
+        If it is none: one sentence on the first fault.
+    """
+    try:
+        return RuleBook.model_validate(table)
+    except ValidationError as failed:
+        raise InputError(f"{where} {_sentence(failed)}") from None
+
+
+def _sentence(failed: ValidationError) -> str:
+    """The first fault, completed after the name of the file."""
+    faults = failed.errors(include_url=False)
+    # A misspelt key often shows up as a missing one too: the misspelling is the cause.
+    fault = min(faults, key=lambda one: one["type"] != "extra_forbidden")
+    key = _plain(".".join(str(part) for part in fault["loc"]))
+    if fault["type"] == "extra_forbidden":
+        return f"has an unknown key {key}"
+    if fault["type"] == "missing":
+        return f"has no {key}"
+    if fault["type"] == "value_error":
+        says = _plain(str(fault["ctx"]["error"]), 400)
+        return says if not key else f"has {key}, which {says}"
+    wanted = _plain(fault["msg"].removeprefix("Input "), 200)
+    if not key:
+        return "is no table"
+    return f"has {key} = {_plain(repr(fault['input']), 60)}; it {wanted}"
+
+
+def _plain(text: str, most: int = 200) -> str:
+    """``text`` on one line, without what cannot be seen, cut to ``most`` characters."""
+    text = re.sub(r"\s+", " ", text)
+    text = "".join(letter if letter.isprintable() else "?" for letter in text)
+    return text if len(text) <= most else f"{text[: most - 3]}..."
