@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import signal
 import sys
 from pathlib import Path
@@ -20,6 +21,7 @@ from catenary.cases.studies.sweep.jobs import RunOptions, make_jobs
 from catenary.cases.studies.sweep.output import table_of
 from catenary.cases.studies.sweep.run_jobs import run_jobs
 from catenary.cases.studies.sweep.variants import parse_vary, product
+from catenary.cases.terminal.runs_bar import RunsBar
 
 CASE = "en50318_2002"
 # Six spans with one element a gap, run through in 2300 steps.
@@ -131,3 +133,27 @@ def test_many_files_that_do_not_stay_take_room_side_by_side() -> None:
     one, two, many = (total_size(kept, n).n_bytes for n in (1, 2, 9))
     alone = [total_size(kept[i : i + 1]).n_bytes for i in range(3)]
     assert one < two < many == pytest.approx(sum(alone))
+
+
+class Terminal(io.StringIO):
+    """A stream that says it is a terminal."""
+
+    def isatty(self) -> bool:
+        return True
+
+
+def test_a_terminal_shows_one_bar_below_the_lines(caplog: pytest.LogCaptureFixture) -> None:
+    stream = Terminal()
+    with caplog.at_level("INFO", "catenary.progress"):
+        with RunsBar(4, lambda line: print(line, file=stream), stream) as bar:
+            for name in ("a", "b"):
+                bar.ended()
+                bar.say(f"{name} has ended")
+        shown = stream.getvalue()
+        assert "a has ended\n" in shown and "b has ended\n" in shown
+        assert "2 of 4, left " in shown and " 50% |" in shown
+    with caplog.at_level("ERROR", "catenary.progress"):  # --quiet
+        silent = Terminal()
+        with RunsBar(4, lambda line: None, silent) as bar:
+            bar.ended()
+        assert silent.getvalue() == ""
