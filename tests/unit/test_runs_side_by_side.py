@@ -11,10 +11,12 @@ from typing import Any
 
 import pytest
 from measuring import COMM
-from program import catenary_started
+from program import catenary_started, python, started
 from typer.testing import CliRunner
 from work_items import die_at_275, measure_steps
 
+import catenary
+from catenary.base.errors import InputError
 from catenary.cases.cli.main import app
 from catenary.cases.run.planning.needs import Kept, total_size
 from catenary.cases.studies.sweep.jobs import RunOptions, make_jobs
@@ -157,3 +159,29 @@ def test_a_terminal_shows_one_bar_below_the_lines(caplog: pytest.LogCaptureFixtu
         with RunsBar(4, lambda line: None, silent) as bar:
             bar.ended()
         assert silent.getvalue() == ""
+
+
+PROGRAM = f"""
+import catenary
+scene = catenary.load("{CASE}", short=True)
+for jobs in (1, 2):
+    table = catenary.sweep(scene, {{"train.speed_km_h": [250, 275]}}, jobs=jobs)
+    print(table.std_N.tolist())
+"""
+
+
+@pytest.mark.process
+def test_a_program_of_a_user_needs_no_guard_of_its_main_part(tmp_path: Path) -> None:
+    """As it would for the processes of ``multiprocessing``, which load the program again."""
+    (tmp_path / "program.py").write_text(PROGRAM)
+    with started(python("program.py"), tmp_path) as program:
+        done = program.end(200.0)
+    assert done.code == 0, done.stderr
+    one, two = done.stdout.splitlines()
+    assert one == two and one.count(",") == 1
+
+
+@pytest.mark.parametrize("jobs", [-1, 1.5, "2"])
+def test_a_number_of_runs_that_is_none_is_refused(jobs: Any) -> None:
+    with pytest.raises(InputError, match="jobs is .*; it is a number of runs"):
+        catenary.sweep(CASE, {"train.speed_km_h": [250]}, jobs=jobs)
