@@ -11,6 +11,7 @@ import json
 import time
 import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, closing
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -93,7 +94,8 @@ def run_jobs(
     shows = several and comm.size == 1  # on ranks the first one shows what it does itself
     work = _Work(out_dir, options._replace(progress=_silent), measure)
     begin = time.perf_counter()
-    with RunsBar(len(left) if shows else 0, options.progress) as bar:
+    with ExitStack() as stack:
+        bar = stack.enter_context(RunsBar(len(left) if shows else 0, options.progress))
 
         def begun() -> Iterator[Job]:
             for job, place, found in zip(jobs, places, earlier, strict=True):
@@ -104,7 +106,8 @@ def run_jobs(
                     bar.say(place)
                 yield job
 
-        outcomes = each(work, begun(), n_at_once, comm, partial(start_petsc, list(options.petsc)))
+        petsc = partial(start_petsc, list(options.petsc))
+        outcomes = stack.enter_context(closing(each(work, begun(), n_at_once, comm, petsc)))
         for n_run, outcome in enumerate(outcomes, start=1):
             number = left[outcome.number]
             one = ended[number] = _ended(jobs[number], outcome)
