@@ -16,7 +16,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from multiprocessing import Pipe
 from multiprocessing.connection import wait
 from typing import Any, NamedTuple, TypeVar
@@ -102,14 +102,15 @@ def each(
     n_at_once: int,
     comm: Any,
     initialise: Callable[[], object] | None = None,
-) -> Iterator[Outcome]:
+) -> Generator[Outcome, None, None]:
     """What ``function(item, comm)`` gives for each item, as they come. Collective.
 
     With ``n_at_once`` 1 the items are worked on here, by all ranks together. With more there are so
     many processes, or, on as many ranks, each takes every so manieth item; ``comm`` is then of one
     rank alone. Items are drawn when they begin, except on ranks. An error of the program and a lost
     process are the outcome of their item. After a signal no further item begins, and those that
-    are under way are ended: there are fewer outcomes than items.
+    are under way are ended: there are fewer outcomes than items. So are they when the generator is
+    closed, but for those of other ranks.
 
     Parameters
     ----------
@@ -159,7 +160,8 @@ def _on_ranks(
 ) -> Iterator[Outcome]:
     """Every rank its share. Collective.
 
-    Outcomes come to rank 0 as they are, and to the others when all are there.
+    Results come to rank 0 as they are. All else comes when all is there, so that an error, which
+    may end a rank, ends them all.
     """
     found: list[Outcome] = []
     with StopRequest() as stop:
@@ -167,7 +169,8 @@ def _on_ranks(
         if comm.rank == 0:
             for outcome in _gathered(own, comm):
                 found.append(outcome)
-                yield outcome
+                if outcome.error is None:
+                    yield outcome
         else:
             sent = [comm.isend(outcome, 0, _TAG) for outcome in own]
             sent.append(comm.isend(None, 0, _TAG))
@@ -175,8 +178,7 @@ def _on_ranks(
                 time.sleep(_LOOK)
         wait_for_all(comm)
         found = comm.bcast(found, 0)
-    if comm.rank:
-        yield from found
+    yield from (one for one in found if comm.rank or one.error is not None)
 
 
 def _share(
@@ -250,8 +252,9 @@ def _in_processes(
     finally:
         for one in busy:
             one.stop()
+        last = (stopped_at or time.monotonic()) + _GRACE
         for one in (*idle, *busy, *gone):
-            one.end()
+            one.end(last)
 
 
 class _Process:
@@ -303,7 +306,7 @@ class _Process:
         """
         try:
             kind, what, self.goes_on = self.connection.recv()
-        except (EOFError, ConnectionError):
+        except (EOFError, OSError):  # at once, or in the middle of its answer
             self.goes_on = False
             self.process.wait()
             return Outcome(self._number, error=WorkerLost(self._how_it_ended()))
@@ -327,11 +330,11 @@ class _Process:
             os.close(self._life)
             self._life = -1
 
-    def end(self) -> None:
-        """Wait for its end, for so long; then kill it."""
+    def end(self, last: float) -> None:
+        """Wait for its end until a time of the monotonic clock [s]; then kill it."""
         self.connection.close()  # an idle one ends by that
         try:
-            self.process.wait(_GRACE)
+            self.process.wait(max(0.0, last - time.monotonic()))
         except subprocess.TimeoutExpired:
             self.process.kill()
             self.process.wait()

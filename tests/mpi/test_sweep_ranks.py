@@ -11,7 +11,8 @@ from pathlib import Path
 import pytest
 from mpi4py import MPI
 
-from catenary.base.errors import InputError
+from catenary.base.errors import InputError, RunBroken
+from catenary.cases.process.workers import each
 from catenary.cases.studies.sweep.jobs import RunOptions, make_jobs
 from catenary.cases.studies.sweep.run_jobs import run_jobs
 from catenary.cases.studies.sweep.variants import Variant
@@ -86,6 +87,18 @@ def test_each_rank_makes_runs_of_its_own(folder: Path) -> None:
         assert [one.summary["pantographs"] for one in alone] == found[0]
     again = run_jobs(jobs, folder, COMM, options)
     assert [one.skipped for one in again] == [True, True, True, False]
+
+
+def test_an_error_on_a_rank_reaches_all_when_the_others_are_done(folder: Path) -> None:
+    def work(item: int, comm: object) -> int:
+        if item == 1:
+            raise RunBroken("the disk is full")
+        return 2 * item
+
+    found = {one.number: one for one in each(work, range(4), COMM.size, COMM)}
+    assert [found[i].value for i in range(4)] == [0, None, 4, 6]
+    with pytest.raises(RunBroken, match="the disk is full"):
+        found[1].get()
 
 
 @pytest.mark.skipif(COMM.size == 1, reason="for several ranks")

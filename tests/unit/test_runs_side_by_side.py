@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import signal
 import sys
 from pathlib import Path
@@ -10,16 +11,19 @@ from typing import Any
 
 import pytest
 from measuring import COMM
-from program import catenary_started
+from program import catenary_started, python, started
 from typer.testing import CliRunner
 from work_items import die_at_275, measure_steps
 
+import catenary
+from catenary.base.errors import InputError
 from catenary.cases.cli.main import app
 from catenary.cases.run.planning.needs import Kept, total_size
 from catenary.cases.studies.sweep.jobs import RunOptions, make_jobs
 from catenary.cases.studies.sweep.output import table_of
 from catenary.cases.studies.sweep.run_jobs import run_jobs
 from catenary.cases.studies.sweep.variants import parse_vary, product
+from catenary.cases.terminal.runs_bar import RunsBar
 
 CASE = "en50318_2002"
 # Six spans with one element a gap, run through in 2300 steps.
@@ -131,3 +135,53 @@ def test_many_files_that_do_not_stay_take_room_side_by_side() -> None:
     one, two, many = (total_size(kept, n).n_bytes for n in (1, 2, 9))
     alone = [total_size(kept[i : i + 1]).n_bytes for i in range(3)]
     assert one < two < many == pytest.approx(sum(alone))
+
+
+class Terminal(io.StringIO):
+    """A stream that says it is a terminal."""
+
+    def isatty(self) -> bool:
+        return True
+
+
+def test_a_terminal_shows_one_bar_below_the_lines(caplog: pytest.LogCaptureFixture) -> None:
+    stream = Terminal()
+    with caplog.at_level("INFO", "catenary.progress"):
+        with RunsBar(4, lambda line: print(line, file=stream), stream) as bar:
+            for name in ("a", "b"):
+                bar.ended()
+                bar.say(f"{name} has ended")
+        shown = stream.getvalue()
+        assert "a has ended\n" in shown and "b has ended\n" in shown
+        assert "2 of 4, left " in shown and " 50% |" in shown
+    with caplog.at_level("ERROR", "catenary.progress"):  # --quiet
+        silent = Terminal()
+        with RunsBar(4, lambda line: None, silent) as bar:
+            bar.ended()
+        assert silent.getvalue() == ""
+
+
+PROGRAM = f"""
+import catenary
+scene = catenary.load("{CASE}", short=True)
+for jobs in (1, 2):
+    table = catenary.sweep(scene, {{"train.speed_km_h": [250, 275]}}, jobs=jobs)
+    print(table.std_N.tolist())
+"""
+
+
+@pytest.mark.process
+def test_a_program_of_a_user_needs_no_guard_of_its_main_part(tmp_path: Path) -> None:
+    """As it would for the processes of ``multiprocessing``, which load the program again."""
+    (tmp_path / "program.py").write_text(PROGRAM)
+    with started(python("program.py"), tmp_path) as program:
+        done = program.end(200.0)
+    assert done.code == 0, done.stderr
+    one, two = done.stdout.splitlines()
+    assert one == two and one.count(",") == 1
+
+
+@pytest.mark.parametrize("jobs", [-1, 1.5, "2"])
+def test_a_number_of_runs_that_is_none_is_refused(jobs: Any) -> None:
+    with pytest.raises(InputError, match="jobs is .*; it is a number of runs"):
+        catenary.sweep(CASE, {"train.speed_km_h": [250]}, jobs=jobs)

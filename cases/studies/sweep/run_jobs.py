@@ -11,6 +11,7 @@ import json
 import time
 import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, closing
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -31,6 +32,7 @@ from catenary.cases.run.runner import RESULT, run_case
 from catenary.cases.scene.problem import resolved
 from catenary.cases.studies.records import is_whole, read_record, read_table, write_record
 from catenary.cases.studies.sweep.jobs import AS_USUAL, Ended, Job, RunOptions
+from catenary.cases.terminal.runs_bar import RunsBar
 from catenary.postproc.evaluate.wording import fixed
 from catenary.postproc.files.disk import plain
 from catenary.postproc.files.own_files import VARIANT_FILE as RECORD
@@ -88,30 +90,36 @@ def run_jobs(
     on_root(comm, lambda: _check_room([jobs[i] for i in left], out_dir, options.force, n_at_once))
     ended = {number: found for number, found in enumerate(earlier) if found is not None}
     places = [f"[{i}/{len(jobs)}] {job.variant.name}" for i, job in enumerate(jobs, start=1)]
-
-    def begun() -> Iterator[Job]:
-        for job, place, found in zip(jobs, places, earlier, strict=True):
-            if found is not None:
-                options.progress(f"{place}: done already")
-                continue
-            if n_at_once == 1:
-                options.progress(place)
-            yield job
-
+    several = n_at_once > 1
+    shows = several and comm.size == 1  # on ranks the first one shows what it does itself
     work = _Work(out_dir, options._replace(progress=_silent), measure)
     begin = time.perf_counter()
-    outcomes = each(work, begun(), n_at_once, comm, partial(start_petsc, list(options.petsc)))
-    for n_run, outcome in enumerate(outcomes, start=1):
-        number = left[outcome.number]
-        one = ended[number] = _ended(jobs[number], outcome)
-        if one.outcome == INTERRUPTED:
-            if n_at_once == 1:
-                break
-            continue
-        spent = time.perf_counter() - begin
-        ahead = spent / n_run * (len(left) - n_run)
-        place = "   " if n_at_once == 1 else f"{places[number]}:"
-        options.progress(f"{place} {_figures(one)}; {spent:.0f} s gone, about {ahead:.0f} s left")
+    with ExitStack() as stack:
+        bar = stack.enter_context(RunsBar(len(left) if shows else 0, options.progress))
+
+        def begun() -> Iterator[Job]:
+            for job, place, found in zip(jobs, places, earlier, strict=True):
+                if found is not None:
+                    bar.say(f"{place}: done already")
+                    continue
+                if not several:
+                    bar.say(place)
+                yield job
+
+        petsc = partial(start_petsc, list(options.petsc))
+        outcomes = stack.enter_context(closing(each(work, begun(), n_at_once, comm, petsc)))
+        for n_run, outcome in enumerate(outcomes, start=1):
+            number = left[outcome.number]
+            one = ended[number] = _ended(jobs[number], outcome)
+            if one.outcome == INTERRUPTED:
+                if not several:
+                    break
+                continue
+            spent = time.perf_counter() - begin
+            ahead = spent / n_run * (len(left) - n_run)
+            place = f"{places[number]}:" if several else "   "
+            bar.ended()
+            bar.say(f"{place} {_figures(one)}; {spent:.0f} s gone, about {ahead:.0f} s left")
     came = {number: one for number, one in sorted(ended.items()) if one.outcome != INTERRUPTED}
     missing = [job for number, job in enumerate(jobs) if number not in came]
     return [*came.values(), *(Ended(job.variant, INTERRUPTED) for job in missing[:1])]
