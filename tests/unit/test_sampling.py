@@ -303,7 +303,7 @@ WRONG: list[tuple[dict[str, Any], str]] = [
     ({"keys": GOOD}, r"n \(number of samples.*\) is missing in uncertain.toml"),
     ({"n": 1, "keys": GOOD}, "n is 1 in uncertain.toml; it must be at least 2"),
     ({"n": 200_000, "keys": GOOD}, "it must be at most 100000"),
-    ({"n": 4}, "needs keys or fields"),
+    ({"n": 4}, "^uncertain.toml needs keys or fields"),
     ({"n": 4, "keys": GOOD, "sede": 3}, "sede in uncertain.toml is unknown; did you mean seed"),
     ({"n": 4, "keys": GOOD, "method": "halton"}, "must be sobol, latin_hypercube"),
     (
@@ -355,6 +355,15 @@ def test_a_wrong_file_is_one_sentence(raw: dict[str, Any], sentence: str) -> Non
 
 FIELD = {"type": "normal", "standard_deviation": 5.0}
 UNFIT: list[tuple[dict[str, Any], str]] = [
+    (
+        {"keys": {SPEED: {"type": "lognormal", "mean": 1e-3, "standard_deviation": 1.0}}},
+        "must have a standard_deviation of at most 100 times the mean",
+    ),
+    (
+        {"keys": {SPEED: {"type": "truncated_normal", "mean": 1e9, "standard_deviation": 1e-9,
+                          "least": 0.0, "most": 1.0}}},
+        "must have bounds within 8 standard deviations of the mean",
+    ),
     ({"fields": {"line.contact_height_m": FIELD}}, "takes no field; there are irregularities"),
     (
         {"fields": {LENGTHS: FIELD}, "keys": {"line.n_spans": {"type": "choices", "values": [9]}}},

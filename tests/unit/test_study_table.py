@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import math
 from pathlib import Path
 
@@ -61,6 +62,19 @@ def test_a_page_has_no_column_that_is_empty() -> None:
         "| \u5317 | 0.0 |  |",
         "| lost | BROKE: it fell |  |",
     ]
+
+
+def test_parquet_keeps_all_digits_and_types() -> None:
+    parquet = pytest.importorskip("pyarrow.parquet")
+    rows = [
+        {"name": "a", "x": 0.1 + 0.2, "n": 3, "mixed": 1, "odd": "text", "failed": ["u", "v"]},
+        {"name": "b", "x": None, "n": None, "mixed": 0.5, "odd": [1, 2], "failed": []},
+    ]
+    content = StudyTable([Column(name) for name in rows[0]], rows).parquet()
+    assert content is not None
+    found = parquet.read_table(io.BytesIO(content)).to_pylist()
+    # A column has one type: whole numbers beside others become numbers, other mixtures texts.
+    assert found == [{**rows[0], "mixed": 1.0}, {**rows[1], "odd": "[1, 2]"}]
 
 
 def test_texts_stand_as_they_are_given() -> None:

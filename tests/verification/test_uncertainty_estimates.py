@@ -86,9 +86,9 @@ def test_a_quantile_that_few_values_leave_open_has_no_bound() -> None:
 
 @pytest.mark.parametrize(("n", "short"), [(60, 0.02), (1200, 0.0)])
 def test_bounds_of_mean_and_deviation_cover_them(n: int, short: float) -> None:
-    """Of normal values: the mean exactly; of more than 1000 values the deviation's normal limit."""
+    """Of normal values: bootstrap up to 1000 values, Student's and the normal limit beyond."""
     rng = np.random.default_rng(6)
-    repetitions = 300
+    repetitions = 200
     of_mean = of_deviation = 0
     for _ in range(repetitions):
         x = rng.normal(50.0, 4.0, n)
@@ -96,11 +96,19 @@ def test_bounds_of_mean_and_deviation_cover_them(n: int, short: float) -> None:
         found = deviation(x)
         of_deviation += found.low <= 4.0 <= found.high
     error = math.sqrt(0.95 * 0.05 / repetitions)
-    check("coverage of the mean", of_mean / repetitions, 0.95, within=3 * error)
+    check("coverage of the mean", of_mean / repetitions, 0.95, within=3 * error + short / 2)
     # Bootstrap intervals of a variance are short at n = 60: by 1 to 3 % (Efron and Tibshirani 1993,
     # table 14.2 has 4 to 6 % at n = 26).
     check("coverage of the deviation", of_deviation / repetitions, 0.95 - short / 2,
           within=3 * error + short / 2)  # fmt: skip
+
+
+def test_bounds_of_a_mean_stay_where_its_values_can_be() -> None:
+    """A loss of contact in a few runs only: no share of time is negative."""
+    x = np.where(np.arange(16) < 2, [0.9] * 8 + [0.4] * 8, 0.0)
+    assert mean(x).low >= 0.0 < mean(x).value < mean(x).high <= 0.9
+    one = np.where(np.arange(16) < 1, 0.9, 0.0)
+    assert 0.0 <= mean(one).low <= mean(one).value and deviation(one).value > 0
 
 
 def test_what_is_constant_has_no_deviation_and_two_values_leave_its_bounds_open() -> None:

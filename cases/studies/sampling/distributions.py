@@ -17,6 +17,8 @@ _Number = Annotated[float, Field(ge=-1e15, le=1e15)]
 _Positive = Annotated[float, Field(gt=0, le=1e15)]
 # Seeds of a scene are smaller; so are the numbers of realisations.
 N_SEEDS = 2**31 - 1
+_FARTHEST = 8.0  # standard deviations, beyond which is less than 1e-15 of a normal quantity
+_WIDEST = 100.0  # standard deviations of lognormal quantities over their means
 
 
 class NormalTable(Table):
@@ -138,7 +140,8 @@ def inverse(
     Raises
     ------
     ValueError
-        If the distribution is lognormal and its mean is not positive, with a predicate.
+        With a predicate, if a lognormal quantity has no positive mean or is too wide, or if bounds
+        are too far from the mean; of the function, if its values are not finite.
     """
     from scipy import stats
 
@@ -153,6 +156,11 @@ def inverse(
     if isinstance(table, LognormalTable):
         if centre <= 0:
             raise ValueError(f"must have a mean above 0, but it is {centre:g}")
+        if deviation > _WIDEST * centre:
+            raise ValueError(
+                f"must have a standard_deviation of at most {_WIDEST:g} times the mean, but they "
+                f"are {deviation:g} and {centre:g}"
+            )
         # Mean m and standard deviation s of the quantity: sigma^2 = ln(1 + s^2/m^2) and
         # mu = ln m - sigma^2/2 of its logarithm (Johnson, Kotz, Balakrishnan, vol. 1, ch. 14).
         variance = math.log1p((deviation / centre) ** 2)
@@ -160,12 +168,25 @@ def inverse(
         return _function(stats.lognorm(math.sqrt(variance), scale=median))
     low = -math.inf if table.least is None else (table.least - centre) / deviation
     high = math.inf if table.most is None else (table.most - centre) / deviation
+    if low > _FARTHEST or high < -_FARTHEST:
+        raise ValueError(
+            f"must have bounds within {_FARTHEST:g} standard deviations of the mean {centre:g}"
+        )
     return _function(stats.truncnorm(low, high, centre, deviation))
 
 
 def _function(frozen: Any) -> Callable[[np.ndarray], np.ndarray]:
-    inverse_function: Callable[[np.ndarray], np.ndarray] = frozen.ppf
-    return inverse_function
+    """The inverse function of SciPy's distribution; ValueError where its numbers are not finite."""
+    import numpy as np
+
+    def values(probabilities: np.ndarray) -> np.ndarray:
+        with np.errstate(all="ignore"):
+            found = np.asarray(frozen.ppf(probabilities))
+        if not np.isfinite(found).all():
+            raise ValueError("gives numbers that are not finite")
+        return found
+
+    return values
 
 
 def chosen(table: ChoicesTable, probabilities: np.ndarray) -> list[int]:

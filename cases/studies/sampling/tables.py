@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, ValidationError, model_validator
 
 from catenary.base.errors import InputError
-from catenary.cases.scene.input.faults import Origin, SceneError, shown, text_faults
+from catenary.cases.scene.input.faults import Origin, shown, text_faults
 from catenary.cases.scene.input.plain_text import refuse_deep
 from catenary.cases.scene.input.toml_input import read_toml
 from catenary.cases.scene.keys.error_sentences import schema_faults, unknown_key
@@ -217,7 +217,9 @@ def sampling_of(raw: Mapping[str, Any], file: str) -> SamplingTable:
         told = {fault.key for fault in faults}
         faults += [fault for fault in of_schema if fault.key not in told]
     if faults:
-        raise SceneError(faults, more)
+        others = len(faults) - 1 + more
+        first = faults[0].sentence.removeprefix("the scene in ")  # of no key: of the file
+        raise InputError(first + (f" (and {others} more)" if others else ""))
     known = known_keys(Scene)
     for key in (*table.keys, *table.fields):
         if key.split(".")[0] == "petsc":

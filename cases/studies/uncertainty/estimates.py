@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import functools
+import warnings
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -21,7 +24,7 @@ class Bounded(NamedTuple):
     high: float
 
 
-def mean(x: np.ndarray) -> Bounded:
+def student(x: np.ndarray) -> Bounded:
     """Mean with the bounds of Student's distribution.
 
     Parameters
@@ -35,12 +38,27 @@ def mean(x: np.ndarray) -> Bounded:
     return Bounded(value, value - half, value + half)
 
 
+def mean(x: np.ndarray) -> Bounded:
+    """Mean with bounds by the bootstrap (BCa, Efron 1987), which stay where values can be.
+
+    Of fewer than ``_FEWEST_RESAMPLED`` values, or more than ``_MOST_RESAMPLED``, by Student's
+    distribution.
+
+    Parameters
+    ----------
+    x : independent values, shape (n,), n >= 2
+    """
+    if np.ptp(x) == 0.0 or not _FEWEST_RESAMPLED <= len(x) <= _MOST_RESAMPLED:
+        return student(x)
+    return _bootstrap(x, np.mean)
+
+
 def deviation(x: np.ndarray) -> Bounded:
     """Standard deviation s with n - 1 degrees of freedom, and its bounds.
 
-    Up to ``_MOST_RESAMPLED`` values by the bootstrap, corrected for bias and skewness (BCa, Efron
-    1987); of more by the normal limit, var(s) = s^2 (kurtosis - 1)/(4 n) (Cramer 1946, sec. 27.7).
-    Below ``_FEWEST_RESAMPLED`` there are none.
+    Up to ``_MOST_RESAMPLED`` values by the bootstrap (BCa, Efron 1987); of more by the normal
+    limit, var(s) = s^2 (kurtosis - 1)/(4 n) (Cramer 1946, sec. 27.7). Fewer than
+    ``_FEWEST_RESAMPLED`` values have none.
 
     Parameters
     ----------
@@ -57,15 +75,24 @@ def deviation(x: np.ndarray) -> Bounded:
         error = value * np.sqrt((stats.kurtosis(x, fisher=False) - 1.0) / (4.0 * n))
         half = float(stats.norm.ppf(0.5 + 0.5 * CONFIDENCE) * error)
         return Bounded(value, value - half, value + half)
-    found = stats.bootstrap(
-        (x,),
-        lambda sample, axis: np.std(sample, ddof=1, axis=axis),
-        n_resamples=_RESAMPLES,
-        confidence_level=CONFIDENCE,
-        method="BCa",
-        random_state=np.random.default_rng(1),
-    ).confidence_interval
-    return Bounded(value, float(found.low), float(found.high))
+    return _bootstrap(x, functools.partial(np.std, ddof=1))
+
+
+def _bootstrap(x: np.ndarray, estimate: Callable[..., Any]) -> Bounded:
+    """An estimate with BCa bounds; NaN where values are so alike that resamples show none."""
+    from scipy import stats
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", stats.DegenerateDataWarning)
+        found = stats.bootstrap(
+            (x,),
+            lambda sample, axis: estimate(sample, axis=axis),
+            n_resamples=_RESAMPLES,
+            confidence_level=CONFIDENCE,
+            method="BCa",
+            random_state=np.random.default_rng(1),
+        ).confidence_interval
+    return Bounded(float(estimate(x)), float(found.low), float(found.high))
 
 
 def quantile(x: np.ndarray, probability: float) -> Bounded:

@@ -12,7 +12,7 @@ from matplotlib.ticker import LogLocator, NullFormatter
 
 from catenary.cases.studies.sweep.jobs import STATISTICS
 from catenary.cases.studies.sweep.output import PLOTTED, key_in_words
-from catenary.cases.studies.uncertainty.estimates import mean, quantile
+from catenary.cases.studies.uncertainty.estimates import quantile, student
 from catenary.cases.studies.uncertainty.evaluation import independent_runs
 from catenary.cases.studies.uncertainty.run_table import RunTable
 from catenary.cases.studies.uncertainty.sensitivity import ranked_inputs
@@ -118,7 +118,7 @@ def convergence(table: RunTable, wanted: Sequence[str] = ()) -> Figure | None:
         if len(x) < 10:
             continue
         counts = np.unique(np.geomspace(10, len(x), _STEPS).round().astype(int))
-        means = np.array([mean(x[:n]) for n in counts])
+        means = np.array([student(x[:n]) for n in counts])
         uppers = np.array([quantile(x[:n], _UPPER) for n in counts])
         for number, (label, found) in enumerate(
             (("mean", means), (f"{100 * _UPPER:g} % quantile", uppers))
