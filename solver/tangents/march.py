@@ -10,7 +10,7 @@ import numpy as np
 
 from catenary.solver.kernels.flush_to_zero import flushed
 from catenary.solver.statics.line_at_rest import LineAtRest
-from catenary.solver.tangents.set_up import Change
+from catenary.solver.tangents.set_up import Change, set_up_of
 from catenary.solver.tangents.tangent_steps import TangentSteps
 from catenary.solver.time_loop.march import March
 
@@ -67,9 +67,10 @@ def march_with_tangents(comm: Any, at_rest: LineAtRest, changes: Sequence[Change
     RunBroken
         If the march breaks.
     """
+    others = [set_up_of(comm, at_rest, n_steps=1).heads for _ in range(2)]
     with March(comm, *at_rest) as march:
         scheme, showing, dt = march.in_loop()
-        steps = TangentSteps(scheme, showing, dt, changes)
+        steps = TangentSteps(scheme, showing, dt, changes, others)
         columns = [showing.layout.columns[name] for name in _CHANNELS]
         rows: list[list[np.ndarray]] = [[] for _ in columns]
         results, step = [], 0

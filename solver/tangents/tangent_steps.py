@@ -12,6 +12,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from catenary.base.errors import RunBroken
+from catenary.mbs.head.head_arrays import LinearStep
+from catenary.mbs.head.newmark_head import SteppedHead
 from catenary.solver.kernels import native
 from catenary.solver.model.switching_links import LinkArrays
 from catenary.solver.schemes.one_solve import OneSolve
@@ -36,6 +38,8 @@ class HeadChange(NamedTuple):
     by_head: np.ndarray
     inverse: np.ndarray
     state: np.ndarray
+    beside: Sequence[native.Head]
+    step: float
 
 
 class LawChange(NamedTuple):
@@ -68,6 +72,7 @@ class MarchTangents(NamedTuple):
     contacts opened or closed, and in which links switched."""
 
     all: Sequence[Tangent]
+    pairs: Sequence[Sequence[native.Head]]
     links: LinkArrays
     first: np.ndarray
     switches: np.ndarray
@@ -85,10 +90,16 @@ class TangentSteps(CompiledSteps):
     Parameters
     ----------
     changes : of the set-up by each parameter
+    others : heads of two further set-ups of the same march
     """
 
     def __init__(
-        self, scheme: OneSolve, showing: Showing, dt: float, changes: Sequence[Change]
+        self,
+        scheme: OneSolve,
+        showing: Showing,
+        dt: float,
+        changes: Sequence[Change],
+        others: Sequence[Sequence[LinearStep | SteppedHead]],
     ) -> None:
         super().__init__(scheme, showing, dt, shows=True)
         make_room(scheme)
@@ -103,6 +114,7 @@ class TangentSteps(CompiledSteps):
                 _tangent(change, motion, n, results)
                 for change, motion, results in zip(changes, motions, self._by_tangent, strict=True)
             ],
+            [_without_chains(heads) for heads in zip(*others, strict=True)],
             scheme.interaction.links.local,
             first,
             self.switches,
@@ -142,7 +154,9 @@ def _tangent(
         change.rest,
         LinkChange(change.links, change.weights),
         [
-            HeadChange(*head, state.copy())
+            HeadChange(
+                *head.arrays, state.copy(), [model.stepped for model in head.beside], head.step
+            )
             for head, state in zip(change.heads, change.states, strict=True)
         ],
         change.drives,
@@ -151,6 +165,11 @@ def _tangent(
         change.speed,
         results,
     )
+
+
+def _without_chains(heads: Sequence[LinearStep | SteppedHead]) -> list[native.Head]:
+    """Of a pantograph in several set-ups what steps it, none of a linear chain."""
+    return [head.stepped for head in heads if isinstance(head, SteppedHead)]
 
 
 def _least_speeds(change: Change, n: int) -> np.ndarray:

@@ -168,7 +168,10 @@ def test_a_wrong_parameter_is_told_in_one_sentence(key: str, told: str) -> None:
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        (["numerics.integrator=hht", "numerics.spectral_radius=0.8"], 'numerics.integrator other than "newmark"'),
+        (
+            ["numerics.integrator=hht", "numerics.spectral_radius=0.8"],
+            'numerics.integrator other than "newmark"',
+        ),
         (["numerics.coupling=explicit"], 'numerics.coupling other than "implicit"'),
         (["numerics.dt_s=0.025"], "too slowly for the 20 Hz filter"),
     ],
