@@ -67,7 +67,8 @@ def march_with_tangents(comm: Any, at_rest: LineAtRest, changes: Sequence[Change
     RunBroken
         If the march breaks.
     """
-    others = [set_up_of(comm, at_rest, n_steps=1).heads for _ in range(2)]
+    one = set_up_of(comm, at_rest, n_steps=1)
+    others = [one.heads, set_up_of(comm, at_rest, n_steps=1, same_line=one).heads]
     with March(comm, *at_rest) as march:
         scheme, showing, dt = march.in_loop()
         steps = TangentSteps(scheme, showing, dt, changes, others)

@@ -29,6 +29,9 @@ from catenary.cases.scene.scene import Scene
 USUAL = (
     "pantographs.*.static_force_N",
     "pantographs.*.masses_kg",
+    "pantographs.*.bodies.*.mass_kg",
+    "pantographs.*.forces.*.stiffness_N_per_m",
+    "pantographs.*.forces.*.damping_N_s_per_m",
     "pantographs.*.stiffnesses_N_per_m",
     "pantographs.*.dampings_N_s_per_m",
     "contact.stiffness_N_per_m",
@@ -50,9 +53,10 @@ USUAL = (
 )
 # Of these each entry is a parameter, of other lists all entries together.
 _BY_ENTRY = ("masses_kg", "stiffnesses_N_per_m", "dampings_N_s_per_m")
-# By how much a table of changes lets a parameter change, by its unit; others by a hundredth.
-_CHANGES = {"mm": 1.0, "m": 1e-3, "kg": 1.0, "N": 1.0, "km/h": 1.0}
-_KILONEWTON = 1e3
+# By how much a table of changes lets a parameter change, by its unit or the end of its key; others
+# by a hundredth.
+_CHANGES = {"mm": 1.0, "m": 1e-3, "kg": 1.0, "km/h": 1.0}
+_CHANGES_OF_FORCES = {"tension_N": 1e3, "force_N": 1.0}
 # Step of the differences by which set-ups are differentiated, in parts of the value: of the fourth
 # order they are off by 4 step^4, some 1e-12, and by round-off over the step, 1e-13 to 1e-10.
 _STEP = 1e-3
@@ -102,8 +106,9 @@ class Parameter:
     def change(self) -> float:
         """By how much a table lets it change: a millimetre, kilogram or newton, a kilonewton of
         tension, or a hundredth of itself."""
-        if self.key.endswith("tension_N"):
-            return _KILONEWTON
+        for end, by in _CHANGES_OF_FORCES.items():
+            if self.key.endswith(end):
+                return by
         return _CHANGES.get(self.unit, 0.01 * self.size or 1.0)
 
     @property

@@ -46,6 +46,8 @@ std::span<double> laws_of(const Head& head) {
 /// By how much a state is changed to differentiate a step: heights and their rates little beside
 /// the bends of tables, and much beside round-off.
 constexpr double kMoved[] = {1e-4, 1e-2, 1.0}, kDriven = 1.0;
+/// How much nearer it is moved if a law bends by more than such a part in between, and at least.
+constexpr double kNearer = 1e-2, kBent = 1e-5, kNearest = 1e-3;
 /// Weights of a derivative of the fourth order, see set_up.py.
 constexpr double kStencil[] = {1.0 / 12.0, -8.0 / 12.0, 8.0 / 12.0, -1.0 / 12.0};
 
@@ -313,18 +315,28 @@ void TangentSteps::step_beside(const HeadChange& change, std::span<const double>
         largest = std::max(largest, std::abs(change.state[i]) / kMoved[i / n]);
     for (size_t i = 0; i < row.size() && !changed.empty(); ++i)
         largest = std::max(largest, std::abs(changed[i]) / kDriven);
-    for (int side = 0; largest > 0.0 && side < 2; ++side) {
-        const double by = (side == 0 ? 1.0 : -1.0) / largest;
-        Head& head = *tangents_.pairs[h][side];
-        put_state(head, h);
-        for (int64_t i = 0; i < 3 * n; ++i) head.arrays().state[i] += by * change.state[i];
-        for (size_t i = 0; i < row.size(); ++i)
-            row[i] = drive[i] + (changed.empty() ? 0.0 : by * changed[i]);
-        add_step(head, row, h, 0.5 / by);
+    // Nearer still where a law bends in between.
+    for (double by = 1.0; largest > 0.0; by *= kNearer) {
+        const double step = by / largest;
+        for (int side = 0; side < 2; ++side) {
+            const double sign = side == 0 ? step : -step;
+            Head& head = *tangents_.pairs[h][side];
+            put_state(head, h);
+            for (int64_t i = 0; i < 3 * n; ++i) head.arrays().state[i] += sign * change.state[i];
+            for (size_t i = 0; i < row.size(); ++i)
+                row[i] = drive[i] + (changed.empty() ? 0.0 : sign * changed[i]);
+            take_step(head, row, h);
+        }
+        if (by < kNearest || is_straight(h)) {
+            for (int side = 0; side < 2; ++side)
+                add_end(*tangents_.pairs[h][side], h, (side == 0 ? 0.5 : -0.5) / step);
+            break;
+        }
     }
     for (size_t side = 0; side < change.beside.size(); ++side) {
         put_state(*change.beside[side], h);
-        add_step(*change.beside[side], drive.first(row.size()), h, kStencil[side] / change.step);
+        take_step(*change.beside[side], drive.first(row.size()), h);
+        add_end(*change.beside[side], h, kStencil[side] / change.step);
     }
 }
 
@@ -333,11 +345,29 @@ void TangentSteps::put_state(Head& head, size_t h) const {
     std::ranges::copy(pressed_[h], laws_of(head).begin());
 }
 
-/// Take a step with the forces that were found, and add its end to derivatives with a weight.
-void TangentSteps::add_step(Head& head, std::span<const double> drive, size_t h, double weight) {
+/// Take a step with the forces that were found.
+void TangentSteps::take_step(Head& head, std::span<const double> drive, size_t h) const {
     const int64_t first = parts().heads[h]->first();
     head.step(drive);
     head.advance(part(force(), first, first + head.n_strips()));
+}
+
+/// Whether the ends of a pair's steps are to both sides of that of the head, as of a smooth law.
+bool TangentSteps::is_straight(size_t h) const {
+    const auto here = parts().heads[h]->arrays().state;
+    const auto one = tangents_.pairs[h][0]->arrays().state,
+               other = tangents_.pairs[h][1]->arrays().state;
+    const int64_t n = parts().heads[h]->n();
+    double bent = 0.0, moved = 0.0;
+    for (int64_t i = 0; i < 3 * n; ++i) {
+        bent = std::max(bent, std::abs(one[i] + other[i] - 2.0 * here[i]) / kMoved[i / n]);
+        moved = std::max(moved, std::abs(one[i] - other[i]) / kMoved[i / n]);
+    }
+    return bent <= kBent * moved;
+}
+
+/// Add the end of a step to derivatives with a weight.
+void TangentSteps::add_end(const Head& head, size_t h, double weight) {
     const auto state = head.arrays().state;
     for (size_t i = 0; i < state.size(); ++i) free_[h][i] += weight * state[i];
     add_places(head, state, h, weight);

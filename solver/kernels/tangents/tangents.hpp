@@ -113,7 +113,9 @@ class TangentSteps : public Steps {
     void step_beside(const HeadChange& change, std::span<const double> drive,
                      std::span<const double> changed, size_t h);
     void add_places(const Head& head, std::span<const double> state, size_t h, double weight);
-    void add_step(Head& head, std::span<const double> drive, size_t h, double weight);
+    void take_step(Head& head, std::span<const double> drive, size_t h) const;
+    bool is_straight(size_t h) const;
+    void add_end(const Head& head, size_t h, double weight);
     void put_state(Head& head, size_t h) const;
     void find_places(const Tangent& tangent, double way);
     double of_law(const Tangent& tangent, int64_t contact) const;
