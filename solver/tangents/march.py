@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 
 from catenary.solver.kernels.flush_to_zero import flushed
+from catenary.solver.model.partition import Ownership
+from catenary.solver.statics.changed_line.after_incidents import divided_by_mass
 from catenary.solver.statics.line_at_rest import LineAtRest
 from catenary.solver.tangents.set_up import Change, set_up_of
 from catenary.solver.tangents.tangent_steps import TangentSteps
@@ -71,7 +73,10 @@ def march_with_tangents(comm: Any, at_rest: LineAtRest, changes: Sequence[Change
     others = [one.heads, set_up_of(comm, at_rest, n_steps=1, same_line=one).heads]
     with March(comm, *at_rest) as march:
         scheme, showing, dt = march.in_loop()
-        steps = TangentSteps(scheme, showing, dt, changes, others)
+        line = scheme.interaction.line
+        still = line.acceleration.copy()
+        starts = [_start_of(comm, at_rest, change, still, line.ownership) for change in changes]
+        steps = TangentSteps(scheme, showing, dt, changes, others, starts)
         columns = [showing.layout.columns[name] for name in _CHANNELS]
         rows: list[list[np.ndarray]] = [[] for _ in columns]
         results, step = [], 0
@@ -106,3 +111,16 @@ def march_with_tangents(comm: Any, at_rest: LineAtRest, changes: Sequence[Change
         contact_switches=int(steps.switches[1]),
         link_switches=int(steps.switches[2]),
     )
+
+
+def _start_of(
+    comm: Any, at_rest: LineAtRest, change: Change, acceleration: np.ndarray, ownership: Ownership
+) -> np.ndarray:
+    """Derivative of the acceleration (n,) of a line at rest by loads: M a' = -M' a."""
+    force = np.zeros_like(acceleration)
+    if not acceleration.any():
+        return force
+    for term in change.matrices:
+        products = term.by_acceleration * term.values * acceleration[term.columns]
+        force[term.rows] -= np.add.reduceat(products, term.begin[:-1])
+    return divided_by_mass(comm, ownership, at_rest.model, force)

@@ -22,7 +22,9 @@ from catenary.mbs.lumped import LumpedPantograph
 from catenary.solver.contact.contact_wire import ContactWires
 from catenary.solver.contact.train.pantographs import Pantographs, nominal_height_rule
 from catenary.solver.contact_problem.law_tangents import law_in_steps
+from catenary.solver.model.loads import FieldLoad, FunctionLoad, MemoryLoad, ShapeLoad
 from catenary.solver.model.matrices import whole_matrix
+from catenary.solver.model.model import Model
 from catenary.solver.model.partition import distribute
 from catenary.solver.model.switching_links import switching_links
 from catenary.solver.problem.contact_laws import HertzLaw
@@ -191,6 +193,7 @@ def set_up_of(
             "the time step or Newmark's parameters": np.array(
                 [problem.numerics.dt, problem.numerics.beta, problem.numerics.gamma]
             ),
+            "loads in time": _loads(model),
             "where wires cross the strips": drives[:, :, N_DRIVE:].ravel(),
             "the running surface": wires.shapes.surface["height"],
         },
@@ -321,6 +324,19 @@ def _stepped(model: Any) -> SteppedHead:
     )
 
 
+def _loads(model: Model) -> np.ndarray:
+    """Numbers of loads in time: those of shapes, and of fields their weights and first slices."""
+    found = [np.zeros(0)]
+    for load in model.loads:
+        if isinstance(load, ShapeLoad):
+            found += [load.forces, load.factor.numbers]
+        elif isinstance(load, FieldLoad):
+            slices = np.zeros((2, load.weights.shape[1]))
+            load.fill(0, slice(0, slices.shape[1]), slices)
+            found += [load.weights.data, slices.ravel()]
+    return np.concatenate(found)
+
+
 def _refuse(at_rest: LineAtRest) -> None:
     """Refuse a march with parts whose derivatives are not taken."""
     problem, simulated = at_rest.problem, at_rest.model.simulated
@@ -332,7 +348,10 @@ def _refuse(at_rest: LineAtRest) -> None:
         "steps that adapt": numerics.adaptive_tolerance is not None,
         "incidents": bool(simulated.incidents),
         "a window that moves with the train": problem.window.moves,
-        "loads in time, such as gusts or ends that go on": bool(at_rest.model.loads),
+        "ends that go on": any(isinstance(load, MemoryLoad) for load in at_rest.model.loads),
+        "loads that a function in Python gives": any(
+            isinstance(load, FunctionLoad) for load in at_rest.model.loads
+        ),
     }
     for what, has in lacking.items():
         if has:

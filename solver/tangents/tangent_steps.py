@@ -14,6 +14,7 @@ import numpy as np
 from catenary.base.errors import RunBroken
 from catenary.mbs.head.head_arrays import LinearStep
 from catenary.mbs.head.newmark_head import SteppedHead
+from catenary.solver.integrators.line_integrator import FurtherMotion
 from catenary.solver.kernels import native
 from catenary.solver.model.switching_links import LinkArrays
 from catenary.solver.schemes.one_solve import OneSolve
@@ -91,6 +92,7 @@ class TangentSteps(CompiledSteps):
     ----------
     changes : of the set-up by each parameter
     others : heads of two further set-ups of the same march
+    starts : derivatives of the line's acceleration at the start, (n_local,) each [m/s2 per unit]
     """
 
     def __init__(
@@ -100,6 +102,7 @@ class TangentSteps(CompiledSteps):
         dt: float,
         changes: Sequence[Change],
         others: Sequence[Sequence[LinearStep | SteppedHead]],
+        starts: Sequence[np.ndarray],
     ) -> None:
         super().__init__(scheme, showing, dt, shows=True)
         make_room(scheme)
@@ -109,6 +112,8 @@ class TangentSteps(CompiledSteps):
         n, first = pantographs.n_contacts, np.zeros(1, dtype=np.int64)
         self.switches = np.zeros(3, dtype=np.int64)
         motions = line.further_motions(len(changes))
+        for motion, start in zip(motions, starts, strict=True):
+            motion.state.put(np.zeros_like(start), np.zeros_like(start), start)
         self._tangents = MarchTangents(
             [
                 _tangent(change, motion, n, results)
@@ -142,14 +147,11 @@ class TangentSteps(CompiledSteps):
         return native.TangentSteps(parts, block, self._tangents)
 
 
-def _tangent(
-    change: Change, motion: tuple[native.TwoPasses, np.ndarray], n: int, results: np.ndarray
-) -> Tangent:
-    """A tangent at the start of a march with n contacts, where the line is at rest."""
-    free, loads = motion
+def _tangent(change: Change, motion: FurtherMotion, n: int, results: np.ndarray) -> Tangent:
+    """A tangent at the start of a march with n contacts."""
     return Tangent(
-        free,
-        loads,
+        motion.free,
+        motion.loads,
         change.matrices,
         change.rest,
         LinkChange(change.links, change.weights),

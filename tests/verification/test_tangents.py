@@ -281,6 +281,7 @@ LONG = {
             "contact.stiffness_N_per_m": 1e-4,
         },
     ),
+    "gusts": ("windy_viaduct", [], {"line.contact_wire.mass_kg_per_m": 1e-5}),
     "three dimensions": ("ac_simple_3d", [], {"line.contact_wire.tension_N": 1e-6}),
 }
 
