@@ -25,7 +25,7 @@ from catenary.cases.studies.sensitivity.study import Sensitivity, sensitivity_of
 from catenary.postproc.evaluate.statistics import contact_statistics
 from catenary.solver.statics.line_at_rest import line_at_rest
 from catenary.solver.tangents.march import march_with_tangents
-from catenary.solver.tangents.set_up import set_up_of
+from catenary.solver.tangents.set_up import differentiate, set_up_of
 
 CASE = "en50318_2002"
 # Six spans with two elements a gap, run through in 1152 steps; droppers slacken, contact lasts.
@@ -102,6 +102,36 @@ def test_the_table_is_ranked_and_in_the_units_of_keys() -> None:
     assert tension["std_change_N"] == pytest.approx(1000.0 * found.by_force[1][0].std)
     # A newton of static force is a newton of mean force, but for the base's spring of 50 N/m.
     assert force["mean_change_N"] == pytest.approx(1.0, abs=0.03)
+
+
+def test_the_place_of_one_pantograph_moves_that_one_only() -> None:
+    """By the second one's place the first one's statistics change through the wire alone."""
+    two = ["line.n_spans=8", "train.start_m=130", "train.end_m=285", "mesh.elements_per_gap=2",
+           "train.raise_time_s=0.1", "numerics.dt_s=0.002", "evaluation.from_m=180",
+           "evaluation.to_m=220", "train.pantographs.1.name=reference",
+           "train.pantographs.1.behind_m=60"]  # fmt: skip
+    key = "train.pantographs.1.behind_m"
+    other = scenes(*two)
+    rest = line_at_rest(problem_of(other.scene), mesh_of(other.scene))
+    now = set_up_of(MPI.COMM_SELF, rest)
+    parameter = other.parameter(key)
+    change = differentiate(
+        lambda by: set_up_of(
+            MPI.COMM_SELF,
+            rest.under(problem_of(other.changed(parameter, by))),
+            len(now.drives),
+            now,
+        ),
+        now,
+        parameter.step,
+        key,
+    )
+    seen = march_with_tangents(MPI.COMM_SELF, rest, [change])
+    assert np.allclose(seen.by_position[:, 0], [0.0, -1.0], rtol=0.0, atol=1e-9)
+    found = sensitivity_of(load_scene(CASE, two), [key], MPI.COMM_SELF)
+    assert found.names == ["leading", "trailing"]
+    leading, trailing = found.by_force[0]
+    assert 0.0 < abs(leading.std) and abs(trailing.std) > 0.0
 
 
 def test_what_is_printed_tells_how_often_contacts_and_droppers_switch() -> None:

@@ -184,7 +184,7 @@ def _add(
             marched.by_force[:, :, number],
             within,
             marched.dt,
-            by_place,
+            by_place[:, :, number],
         )
         for number, within in _within(marched, at_rest)
     ]
