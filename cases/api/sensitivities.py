@@ -12,7 +12,9 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-def sensitivity(scene: SceneLike, parameters: Sequence[str] = ()) -> pd.DataFrame:
+def sensitivity(
+    scene: SceneLike, parameters: Sequence[str] = (), *, droppers: bool = False
+) -> pd.DataFrame:
     """What the statistics of a scene change by with its parameters, from one march.
 
     The march is differentiated step by step: these are no differences of runs. Derivatives hold
@@ -27,6 +29,9 @@ def sensitivity(scene: SceneLike, parameters: Sequence[str] = ()) -> pd.DataFram
         Keys of numbers, or of lists whose entries change together; with the number of an entry
         behind it (``line.dropper.pre_sag_mm.3``) that one alone. Those of pantographs, contact,
         wires, droppers and damping if there are none.
+    droppers : bool
+        Whether the length of each dropper in the evaluated stretch is a parameter, too: how many
+        millimetres it is too long.
 
     Returns
     -------
@@ -58,4 +63,5 @@ def sensitivity(scene: SceneLike, parameters: Sequence[str] = ()) -> pd.DataFram
     from catenary.cases.studies.sensitivity.output import table_of
     from catenary.cases.studies.sensitivity.study import sensitivity_of
 
-    return pd.DataFrame(table_of(sensitivity_of(own, list(parameters), comm)).records())
+    found = sensitivity_of(own, list(parameters), comm, droppers=droppers)
+    return pd.DataFrame(table_of(found).records())

@@ -92,6 +92,11 @@ class SteppedHead(ABC):
         """Whether it matters where wires cross its strips: to a head that rolls or bends."""
         return self._lateral is not None
 
+    @property
+    def is_regulated(self) -> bool:
+        """Whether a controller changes its lift under way."""
+        return self._control is not None or self.by_hand
+
     def regulate(self, regulator: Regulator | None) -> None:
         """Let the lift be regulated from the start on; None leaves it as it is."""
         if isinstance(regulator, Regulation):

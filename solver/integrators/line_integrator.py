@@ -10,7 +10,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from mpi4py import MPI
@@ -33,6 +33,15 @@ from catenary.solver.window.moving_window import MovingWindow
 
 # What every state of a line has.
 MOTION = ("displacement", "velocity", "acceleration")
+
+
+class FurtherMotion(NamedTuple):
+    """Another motion of a line: what takes its free steps, the loads (n_local,) that these read
+    [N], and its state."""
+
+    free: native.TwoPasses
+    loads: np.ndarray
+    state: PredictedLineState
 
 
 class LineIntegrator(ABC):
@@ -157,16 +166,14 @@ class LineIntegrator(ABC):
         if self.loads is not None:
             self.loads.read(motion)
 
-    def further_motions(self, n: int) -> list[tuple[native.TwoPasses, np.ndarray]]:
-        """Free steps of n further motions at rest, by the same factors, and the loads (n_local,)
-        that each of them reads [N]. On one rank, by Newmark's method in two passes."""
+    def further_motions(self, n: int) -> list[FurtherMotion]:
+        """N further motions at rest that step by the same factors. On one rank, by Newmark's method
+        in two passes."""
         parts, steps = self._steps_ahead
         assert parts is not None and isinstance(steps, Steps)
         return [self._further_motion(parts, steps) for _ in range(n)]
 
-    def _further_motion(
-        self, parts: ByStations, steps: Steps
-    ) -> tuple[native.TwoPasses, np.ndarray]:
+    def _further_motion(self, parts: ByStations, steps: Steps) -> FurtherMotion:
         _, _, read, velocity, answer, _ = parts
         domain, n = self.operators.domain, self.ownership.n_local
         pad = (read.size - (domain.read_high - domain.read_low)) // 2
@@ -179,7 +186,7 @@ class LineIntegrator(ABC):
             ahead[begin : begin + n], mine, solved[domain.owned], np.zeros(n), steps
         )
         own_parts = parts._replace(read=ahead, rates=rates, answer=solved)
-        return StationPasses(own_parts, loads, motion, steps).native, loads
+        return FurtherMotion(StationPasses(own_parts, loads, motion, steps).native, loads, motion)
 
     def _ahead(self) -> tuple[PredictedLineState, Steps | AlphaSteps] | None:
         """A motion to keep ahead, in the arrays of this one, and the steps it is kept for.

@@ -8,9 +8,12 @@ from typing import Any
 
 import numpy as np
 
+from catenary.solver.contact.train.pantographs import Pantographs
 from catenary.solver.kernels.flush_to_zero import flushed
+from catenary.solver.model.partition import Ownership
+from catenary.solver.statics.changed_line.after_incidents import divided_by_mass
 from catenary.solver.statics.line_at_rest import LineAtRest
-from catenary.solver.tangents.set_up import Change
+from catenary.solver.tangents.set_up import Change, set_up_of
 from catenary.solver.tangents.tangent_steps import TangentSteps
 from catenary.solver.time_loop.march import March
 
@@ -31,7 +34,7 @@ class Tangents:
     speed : of the train [m/s]
     by_force : (n, m, n_pantographs) derivatives of contact forces per unit of each parameter
     by_uplift : (n, m, n_arms) those of uplifts
-    by_position : (n, m) those of all positions [m]
+    by_position : (n, m, n_pantographs) those of positions [m]
     open_steps : steps in which a contact carried nothing
     contact_switches : steps in which contacts opened or closed
     link_switches : steps in which droppers slackened or tightened, or other links switched
@@ -67,9 +70,14 @@ def march_with_tangents(comm: Any, at_rest: LineAtRest, changes: Sequence[Change
     RunBroken
         If the march breaks.
     """
+    one = set_up_of(comm, at_rest, n_steps=1)
+    others = [one.heads, set_up_of(comm, at_rest, n_steps=1, same_line=one).heads]
     with March(comm, *at_rest) as march:
         scheme, showing, dt = march.in_loop()
-        steps = TangentSteps(scheme, showing, dt, changes)
+        line = scheme.interaction.line
+        still = line.acceleration.copy()
+        starts = [_start_of(comm, at_rest, change, still, line.ownership) for change in changes]
+        steps = TangentSteps(scheme, showing, dt, changes, others, starts)
         columns = [showing.layout.columns[name] for name in _CHANNELS]
         rows: list[list[np.ndarray]] = [[] for _ in columns]
         results, step = [], 0
@@ -77,6 +85,8 @@ def march_with_tangents(comm: Any, at_rest: LineAtRest, changes: Sequence[Change
         first, last = at_rest.problem.evaluation
         evaluated = np.flatnonzero((first <= arms) & (arms <= last))
         n = scheme.pantographs.n
+        moved = np.array([_moved(change, scheme.pantographs) for change in changes])
+        moved = moved.reshape(len(changes), n)
         kept_results = np.concatenate([np.arange(n), n + evaluated])
         with flushed():
             while step < march.n_steps:
@@ -89,7 +99,6 @@ def march_with_tangents(comm: Any, at_rest: LineAtRest, changes: Sequence[Change
     position, force, uplift = (np.concatenate(kept) for kept in rows)
     found = np.concatenate(results)
     time = dt * np.arange(1, len(force) + 1)
-    moved = [change.start.mean() if change.start.size else 0.0 for change in changes]
     return Tangents(
         dt=dt,
         position=position,
@@ -99,8 +108,29 @@ def march_with_tangents(comm: Any, at_rest: LineAtRest, changes: Sequence[Change
         speed=float(at_rest.problem.train.speed),
         by_force=found[..., :n],
         by_uplift=found[..., n:],
-        by_position=moved + np.outer(time, [change.speed for change in changes]),
+        by_position=moved + np.outer(time, [change.speed for change in changes])[..., None],
         open_steps=int(steps.switches[0]),
         contact_switches=int(steps.switches[1]),
         link_switches=int(steps.switches[2]),
     )
+
+
+def _moved(change: Change, pantographs: Pantographs) -> list[float]:
+    """Derivatives of the places at which pantographs start [m]."""
+    if not change.start.size:
+        return [0.0] * pantographs.n
+    of_strip, of_pantograph = pantographs.ends
+    return [float(change.start[of_strip[first]]) for first in of_pantograph[:-1]]
+
+
+def _start_of(
+    comm: Any, at_rest: LineAtRest, change: Change, acceleration: np.ndarray, ownership: Ownership
+) -> np.ndarray:
+    """Derivative of the acceleration (n,) of a line at rest by loads: M a' = -M' a."""
+    force = np.zeros_like(acceleration)
+    if not acceleration.any():
+        return force
+    for term in change.matrices:
+        products = term.by_acceleration * term.values * acceleration[term.columns]
+        force[term.rows] -= np.add.reduceat(products, term.begin[:-1])
+    return divided_by_mass(comm, ownership, at_rest.model, force)

@@ -17,11 +17,14 @@ from scipy import sparse
 
 from catenary.base.errors import InputError
 from catenary.mbs.head.head_arrays import N_DRIVE, LinearStep, drive_width
+from catenary.mbs.head.newmark_head import SteppedHead
 from catenary.mbs.lumped import LumpedPantograph
 from catenary.solver.contact.contact_wire import ContactWires
 from catenary.solver.contact.train.pantographs import Pantographs, nominal_height_rule
 from catenary.solver.contact_problem.law_tangents import law_in_steps
+from catenary.solver.model.loads import FieldLoad, FunctionLoad, MemoryLoad, ShapeLoad
 from catenary.solver.model.matrices import whole_matrix
+from catenary.solver.model.model import Model
 from catenary.solver.model.partition import distribute
 from catenary.solver.model.switching_links import switching_links
 from catenary.solver.problem.contact_laws import HertzLaw
@@ -34,6 +37,7 @@ _STENCIL = {-2: 1.0 / 12.0, -1: -8.0 / 12.0, 1: 8.0 / 12.0, 2: -1.0 / 12.0}
 _ROUNDINGS = 64.0 * float(np.finfo(float).eps)
 # Damping is proportional if no more than such a part of it is not.
 _PROPORTIONAL = 1e-9
+_NO_STEP = LinearStep(np.zeros((0, 0)), np.zeros(0), np.zeros(0), np.zeros((0, 0)))
 _MATRICES = ("stiffness", "damping", "mass")
 
 
@@ -47,7 +51,7 @@ class SetUp:
     rest : (n_nodes, 2) height [m] and slope [-] of the contact wires' nodes at rest
     links : (n_links, 3) rest [N], stiffness [N/m] and damping [N s/m] of the laws of links
     weights : (n_links, m) of their directions
-    heads : the step of each pantograph
+    heads : each pantograph: the step of a linear chain, of others the model itself
     states : (3 n,) of each at the start
     drives : (n_steps, n_pantographs, width) what their steps depend on besides
     law : (4, n_contacts) own, offset, by_depth and by_rate of the contact law; of a Hertzian law
@@ -55,6 +59,7 @@ class SetUp:
     hertz : (4,) K, n, chi and least speed of a Hertzian law, else empty
     start : (n_contacts,) places of the contacts at the start [m]
     speed : of the train [m/s]
+    follows_surface : whether contacts follow raked strips or an irregular running surface
     fixed : what no parameter that can be differentiated changes, by what a sentence calls it
     """
 
@@ -62,14 +67,24 @@ class SetUp:
     rest: np.ndarray
     links: np.ndarray
     weights: np.ndarray
-    heads: Sequence[LinearStep]
+    heads: Sequence[LinearStep | SteppedHead]
     states: Sequence[np.ndarray]
     drives: np.ndarray
     law: np.ndarray
     hertz: np.ndarray
     start: np.ndarray
     speed: float
+    follows_surface: bool
     fixed: dict[str, np.ndarray]
+
+
+class StepChange(NamedTuple):
+    """The derivative of a pantograph's step: of a linear chain ``arrays``, empty if it does not
+    change; of others models ``beside`` it in the order of differences, ``step`` apart."""
+
+    arrays: LinearStep
+    beside: Sequence[SteppedHead]
+    step: float
 
 
 class MatrixTerm(NamedTuple):
@@ -93,7 +108,7 @@ class Change:
     rest: np.ndarray
     links: np.ndarray
     weights: np.ndarray
-    heads: Sequence[LinearStep]
+    heads: Sequence[StepChange]
     states: Sequence[np.ndarray]
     drives: np.ndarray
     law: np.ndarray
@@ -129,7 +144,7 @@ def set_up_of(
     air_speed = problem.train.speed if simulated.meets_air else None
     height = nominal_height_rule(wires, lift, air_speed, problem.contact)
     pantographs = Pantographs(comm, problem, simulated, wires, height)
-    heads = [_chain_of(model) for model in pantographs.models]
+    heads = [_stepped(model) for model in pantographs.models]
     if pantographs.lateral and any(head.is_crossed for head in heads):
         raise InputError(
             "a march with heads that roll under wires which move across the track is not "
@@ -153,13 +168,18 @@ def set_up_of(
         rest=wires.nodes["rest"].astype(float),
         links=np.stack([laws["rest"], laws["stiffness"], laws["damping"]], axis=1),
         weights=links.arrays.weights,
-        heads=[head.linear_step() for head in heads],
-        states=[head.state() for head in heads],
+        heads=[
+            head.linear_step() if isinstance(head, LumpedPantograph) and head.is_linear else head
+            for head in heads
+        ],
+        states=[head.state()[: 3 * head.position.size] for head in heads],
         drives=drives,
         law=np.stack(law.tangents),
         hertz=hertz,
         start=pantographs.places_along.start[: pantographs.n_contacts].copy(),
         speed=float(problem.train.speed),
+        follows_surface=bool(pantographs.places_along.leads.contact.size)
+        or bool(wires.shapes.surface.size),
         fixed={
             "the number of unknowns": np.array([model.n_dofs, model.n_unknowns]),
             "places of nodes": wires.nodes["x"].copy(),
@@ -170,9 +190,10 @@ def set_up_of(
             "which links are taut at rest, or what slack ones keep": np.stack(
                 [laws["released"], laws["carried"], links.broken]
             ),
-            "the time step or the duration of the raising": np.array(
+            "the time step or Newmark's parameters": np.array(
                 [problem.numerics.dt, problem.numerics.beta, problem.numerics.gamma]
             ),
+            "loads in time": _loads(model),
             "where wires cross the strips": drives[:, :, N_DRIVE:].ravel(),
             "the running surface": wires.shapes.surface["height"],
         },
@@ -218,32 +239,46 @@ def differentiate(set_up: Callable[[float], SetUp], now: SetUp, step: float, wha
         """Without rows where nothing changes."""
         return np.ascontiguousarray(values if values.any() else values[:0])
 
-    heads = []
-    for number in range(len(now.heads)):
+    def of_head(number: int) -> StepChange:
+        if not isinstance(now.heads[number], LinearStep):
+            models = [found[side].heads[number] for side in _STENCIL]
+            beside = [model for model in models if isinstance(model, SteppedHead)]
+            return StepChange(_NO_STEP, beside, step)
         parts = [
-            of(lambda one, number=number, name=name: getattr(one.heads[number], name))
+            of(lambda one, name=name: getattr(one.heads[number], name))  # type: ignore[misc]
             for name in LinearStep._fields
         ]
         if not any(part.any() for part in parts):
-            parts = [part[:0] for part in parts]
-        heads.append(LinearStep(*map(np.ascontiguousarray, parts)))
-    drives = of(lambda one: one.drives)
-    return Change(
-        matrices=_matrices(
+            return StepChange(_NO_STEP, (), step)
+        return StepChange(LinearStep(*map(np.ascontiguousarray, parts)), (), step)
+
+    def of_state(number: int) -> np.ndarray:
+        return of(lambda one: one.states[number])
+
+    pantographs = range(len(now.heads))
+    start, speed = or_none(of(lambda one: one.start)), float(of(lambda one: one.speed))
+    if (start.size or speed) and now.follows_surface:
+        raise InputError(
+            f"{what} moves the contacts, by which a march has no derivative where strips are raked "
+            "or contact wires have an irregular running surface"
+        )
+    terms: list[MatrixTerm] = []
+    if any(other.matrices is not now.matrices for other in found.values()):
+        terms = _matrices(
             [{n: one.matrices[i] for n, one in found.items()} for i in range(3)], step
-        ),
+        )
+    return Change(
+        matrices=terms,
         rest=or_none(of(lambda one: one.rest)),
         links=or_none(of(lambda one: one.links)),
         weights=or_none(of(lambda one: one.weights)),
-        heads=heads,
-        states=[
-            of(lambda one, number=number: one.states[number]) for number in range(len(now.states))
-        ],
-        drives=or_none(drives),
+        heads=[of_head(number) for number in pantographs],
+        states=[of_state(number) for number in pantographs],
+        drives=or_none(of(lambda one: one.drives)),
         law=or_none(of(lambda one: one.law)),
         hertz=or_none(of(lambda one: one.hertz)),
-        start=or_none(of(lambda one: one.start)),
-        speed=float(of(lambda one: one.speed)),
+        start=start,
+        speed=speed,
     )
 
 
@@ -252,10 +287,9 @@ def _matrices(found: Sequence[dict[int, sparse.csc_matrix]], step: float) -> lis
     stiffness, damping, mass = (_derivative(matrices, step) for matrices in found)
     by_stiffness, by_mass = _shares(damping, stiffness), _shares(damping, mass)
     left = damping - by_stiffness * stiffness - by_mass * mass
-    if abs(left).max() <= _PROPORTIONAL * abs(damping).max():
-        terms = (stiffness, 1.0, by_stiffness, 0.0), (mass, 0.0, by_mass, 1.0)
-    else:
-        terms = (stiffness, 1.0, 0.0, 0.0), (mass, 0.0, 0.0, 1.0), (damping, 0.0, 1.0, 0.0)
+    terms = [(stiffness, 1.0, by_stiffness, 0.0), (mass, 0.0, by_mass, 1.0)]
+    if abs(left).max() > _PROPORTIONAL * abs(damping).max():
+        terms = [(stiffness, 1.0, 0.0, 0.0), (mass, 0.0, 0.0, 1.0), (damping, 0.0, 1.0, 0.0)]
     return [_term(matrix.tocsr(), *by) for matrix, *by in terms if matrix.nnz]
 
 
@@ -281,13 +315,26 @@ def _term(matrix: sparse.csr_matrix, *by: float) -> MatrixTerm:
     return MatrixTerm(rows, begin, matrix.indices.astype(np.int32), matrix.data, *by)
 
 
-def _chain_of(model: Any) -> LumpedPantograph:
-    if isinstance(model, LumpedPantograph) and model.is_linear:
+def _stepped(model: Any) -> SteppedHead:
+    if isinstance(model, SteppedHead) and not model.is_regulated:
         return model
     raise InputError(
-        "a pantograph is no chain of lumped masses on linear springs, or its lift is regulated: of "
-        "others there are no derivatives yet"
+        "a pantograph has all its bodies in the time loop, is lowered, or its lift is regulated: "
+        "of such a march there are no derivatives"
     )
+
+
+def _loads(model: Model) -> np.ndarray:
+    """Numbers of loads in time: those of shapes, and of fields their weights and first slices."""
+    found = [np.zeros(0)]
+    for load in model.loads:
+        if isinstance(load, ShapeLoad):
+            found += [load.forces, load.factor.numbers]
+        elif isinstance(load, FieldLoad):
+            slices = np.zeros((2, load.weights.shape[1]))
+            load.fill(0, slice(0, slices.shape[1]), slices)
+            found += [load.weights.data, slices.ravel()]
+    return np.concatenate(found)
 
 
 def _refuse(at_rest: LineAtRest) -> None:
@@ -301,7 +348,10 @@ def _refuse(at_rest: LineAtRest) -> None:
         "steps that adapt": numerics.adaptive_tolerance is not None,
         "incidents": bool(simulated.incidents),
         "a window that moves with the train": problem.window.moves,
-        "loads in time, such as gusts or ends that go on": bool(at_rest.model.loads),
+        "ends that go on": any(isinstance(load, MemoryLoad) for load in at_rest.model.loads),
+        "loads that a function in Python gives": any(
+            isinstance(load, FunctionLoad) for load in at_rest.model.loads
+        ),
     }
     for what, has in lacking.items():
         if has:

@@ -12,6 +12,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from catenary.base.errors import RunBroken
+from catenary.mbs.head.head_arrays import LinearStep
+from catenary.mbs.head.newmark_head import SteppedHead
+from catenary.solver.integrators.line_integrator import FurtherMotion
 from catenary.solver.kernels import native
 from catenary.solver.model.switching_links import LinkArrays
 from catenary.solver.schemes.one_solve import OneSolve
@@ -36,6 +39,8 @@ class HeadChange(NamedTuple):
     by_head: np.ndarray
     inverse: np.ndarray
     state: np.ndarray
+    beside: Sequence[native.Head]
+    step: float
 
 
 class LawChange(NamedTuple):
@@ -68,6 +73,7 @@ class MarchTangents(NamedTuple):
     contacts opened or closed, and in which links switched."""
 
     all: Sequence[Tangent]
+    pairs: Sequence[Sequence[native.Head]]
     links: LinkArrays
     first: np.ndarray
     switches: np.ndarray
@@ -85,10 +91,18 @@ class TangentSteps(CompiledSteps):
     Parameters
     ----------
     changes : of the set-up by each parameter
+    others : heads of two further set-ups of the same march
+    starts : derivatives of the line's acceleration at the start, (n_local,) each [m/s2 per unit]
     """
 
     def __init__(
-        self, scheme: OneSolve, showing: Showing, dt: float, changes: Sequence[Change]
+        self,
+        scheme: OneSolve,
+        showing: Showing,
+        dt: float,
+        changes: Sequence[Change],
+        others: Sequence[Sequence[LinearStep | SteppedHead]],
+        starts: Sequence[np.ndarray],
     ) -> None:
         super().__init__(scheme, showing, dt, shows=True)
         make_room(scheme)
@@ -98,11 +112,14 @@ class TangentSteps(CompiledSteps):
         n, first = pantographs.n_contacts, np.zeros(1, dtype=np.int64)
         self.switches = np.zeros(3, dtype=np.int64)
         motions = line.further_motions(len(changes))
+        for motion, start in zip(motions, starts, strict=True):
+            motion.state.put(np.zeros_like(start), np.zeros_like(start), start)
         self._tangents = MarchTangents(
             [
                 _tangent(change, motion, n, results)
                 for change, motion, results in zip(changes, motions, self._by_tangent, strict=True)
             ],
+            [_without_chains(heads) for heads in zip(*others, strict=True)],
             scheme.interaction.links.local,
             first,
             self.switches,
@@ -130,19 +147,18 @@ class TangentSteps(CompiledSteps):
         return native.TangentSteps(parts, block, self._tangents)
 
 
-def _tangent(
-    change: Change, motion: tuple[native.TwoPasses, np.ndarray], n: int, results: np.ndarray
-) -> Tangent:
-    """A tangent at the start of a march with n contacts, where the line is at rest."""
-    free, loads = motion
+def _tangent(change: Change, motion: FurtherMotion, n: int, results: np.ndarray) -> Tangent:
+    """A tangent at the start of a march with n contacts."""
     return Tangent(
-        free,
-        loads,
+        motion.free,
+        motion.loads,
         change.matrices,
         change.rest,
         LinkChange(change.links, change.weights),
         [
-            HeadChange(*head, state.copy())
+            HeadChange(
+                *head.arrays, state.copy(), [model.stepped for model in head.beside], head.step
+            )
             for head, state in zip(change.heads, change.states, strict=True)
         ],
         change.drives,
@@ -151,6 +167,11 @@ def _tangent(
         change.speed,
         results,
     )
+
+
+def _without_chains(heads: Sequence[LinearStep | SteppedHead]) -> list[native.Head]:
+    """Of a pantograph in several set-ups what steps it, none of a linear chain."""
+    return [head.stepped for head in heads if isinstance(head, SteppedHead)]
 
 
 def _least_speeds(change: Change, n: int) -> np.ndarray:

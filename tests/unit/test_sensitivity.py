@@ -25,6 +25,7 @@ from catenary.cases.studies.sensitivity.study import Sensitivity, sensitivity_of
 from catenary.postproc.evaluate.statistics import contact_statistics
 from catenary.solver.statics.line_at_rest import line_at_rest
 from catenary.solver.tangents.march import march_with_tangents
+from catenary.solver.tangents.set_up import differentiate, set_up_of
 
 CASE = "en50318_2002"
 # Six spans with two elements a gap, run through in 1152 steps; droppers slacken, contact lasts.
@@ -103,6 +104,36 @@ def test_the_table_is_ranked_and_in_the_units_of_keys() -> None:
     assert force["mean_change_N"] == pytest.approx(1.0, abs=0.03)
 
 
+def test_the_place_of_one_pantograph_moves_that_one_only() -> None:
+    """By the second one's place the first one's statistics change through the wire alone."""
+    two = ["line.n_spans=8", "train.start_m=130", "train.end_m=285", "mesh.elements_per_gap=2",
+           "train.raise_time_s=0.1", "numerics.dt_s=0.002", "evaluation.from_m=180",
+           "evaluation.to_m=220", "train.pantographs.1.name=reference",
+           "train.pantographs.1.behind_m=60"]  # fmt: skip
+    key = "train.pantographs.1.behind_m"
+    other = scenes(*two)
+    rest = line_at_rest(problem_of(other.scene), mesh_of(other.scene))
+    now = set_up_of(MPI.COMM_SELF, rest)
+    parameter = other.parameter(key)
+    change = differentiate(
+        lambda by: set_up_of(
+            MPI.COMM_SELF,
+            rest.under(problem_of(other.changed(parameter, by))),
+            len(now.drives),
+            now,
+        ),
+        now,
+        parameter.step,
+        key,
+    )
+    seen = march_with_tangents(MPI.COMM_SELF, rest, [change])
+    assert np.allclose(seen.by_position[:, 0], [0.0, -1.0], rtol=0.0, atol=1e-9)
+    found = sensitivity_of(load_scene(CASE, two), [key], MPI.COMM_SELF)
+    assert found.names == ["leading", "trailing"]
+    leading, trailing = found.by_force[0]
+    assert 0.0 < abs(leading.std) and abs(trailing.std) > 0.0
+
+
 def test_what_is_printed_tells_how_often_contacts_and_droppers_switch() -> None:
     text = as_text(tiny())
     assert f"other links switched {tiny().link_switches} times" in text
@@ -127,6 +158,37 @@ def test_entries_lists_and_forces_by_speed_are_parameters() -> None:
     changed_force = problem_of(line.changed(force, 2.0)).train.placements[0].static_force
     assert changed_force == pytest.approx(force.values[0] + 2.0)
     assert (sag.unit, sag.change, sag.text) == ("mm", 1.0, "9 values")
+
+
+def test_a_dropper_has_a_length() -> None:
+    key = "irregularities.dropper_lengths.3.2"
+    line = scenes(*TINY)
+    parameter = line.parameter(key)
+    assert (parameter.values, parameter.unit, parameter.change) == ((0.0,), "mm", 1.0)
+    lengths = line.changed(parameter, 0.5).irregularities.dropper_lengths
+    assert lengths is not None and lengths.by_dropper == [[3.0, 2.0, 0.5]]
+    evaluated = [one.key for one in line.droppers()]
+    # Spans of 60 m, evaluated from 120 to 220 m; nine droppers from 5 to 55 m of each.
+    assert len(evaluated) == 9 + 6
+    assert evaluated[0].endswith(".3.1") and evaluated[-1].endswith(".4.6")
+
+
+def test_a_longer_dropper_changes_the_rest_as_elasticity_says() -> None:
+    """The wire at a dropper too long by e sinks by e less what its neighbours take over."""
+    line = scenes(*TINY)
+    parameter = line.parameter("irregularities.dropper_lengths.3.5")
+    rests = []
+    for by in (0.05, -0.05):
+        rest = line_at_rest(problem_of(line.changed(parameter, by)), mesh_of(line.scene))
+        rests.append(set_up_of(MPI.COMM_SELF, rest, 1))
+    sinks = (rests[0].rest[:, 0] - rests[1].rest[:, 0]) / 1e-4  # of 0.1 mm
+    lowest = int(np.argmin(sinks))
+    nodes = line_at_rest(problem_of(line.scene), mesh_of(line.scene)).model.contact_x
+    assert nodes[lowest] == pytest.approx(150.0) and -1.0 < sinks[lowest] < -0.1
+    found = sensitivity_of(load_scene(CASE, TINY), [parameter.key], MPI.COMM_SELF)
+    assert found.by_force[0][0].std != 0.0
+    (row,) = table_of(found).rows
+    assert row["std_change_by_percent_N"] is None
 
 
 def test_the_usual_parameters_are_those_of_the_train_and_the_line() -> None:
@@ -157,6 +219,9 @@ def test_a_step_follows_from_the_size_of_a_value() -> None:
         ("line.topology", "line.topology has no value in this scene that is a number"),
         ("pantographs.reference.masses_kg.7", "masses_kg.7 has no value in this scene"),
         ("line.curve.radius_m", "has no value in this scene"),
+        ("line.n_spans", "must be a whole number"),
+        ("irregularities.dropper_lengths.3.44", "and 9 droppers in this one"),
+        ("irregularities.dropper_lengths.99.4", "names no dropper: the line has 22 spans"),
     ],
 )
 def test_a_wrong_parameter_is_told_in_one_sentence(key: str, told: str) -> None:
@@ -192,9 +257,9 @@ def test_a_ready_pantograph_keeps_its_numbers() -> None:
 
 
 def test_the_geometry_of_the_mesh_is_no_parameter() -> None:
-    key = "line.dropper.positions_m.2"
-    with pytest.raises(InputError, match="by which a march has no derivative"):
-        sensitivity_of(load_scene(CASE, TINY), [key], MPI.COMM_SELF)
+    for key in ("line.dropper.positions_m.2", "numerics.dt_s"):
+        with pytest.raises(InputError, match="by which a march has no derivative"):
+            sensitivity_of(load_scene(CASE, TINY), [key], MPI.COMM_SELF)
 
 
 def test_the_verb_writes_its_table_once(tmp_path: Path) -> None:

@@ -38,6 +38,13 @@ def sensitivity(
             "and damping if absent.",
         ),
     ] = None,
+    droppers: Annotated[
+        bool,
+        typer.Option(
+            "--droppers",
+            help="The length of each dropper in the evaluated stretch, besides what -p names.",
+        ),
+    ] = False,
     out: Annotated[
         Path | None, folder_option(f"Folder for {TABLE}; without it nothing is written.")
     ] = None,
@@ -53,7 +60,7 @@ def sensitivity(
     from catenary.cases.studies.sensitivity.study import sensitivity_of
     from catenary.postproc.files.disk import write_all
 
-    found = sensitivity_of(scene, keys or [], console.alone())
+    found = sensitivity_of(scene, keys or [], console.alone(), droppers=droppers)
     console.say(as_text(found))
     if out is not None:
         for path in write_all(out, {TABLE: table_of(found).csv()}):

@@ -25,7 +25,8 @@ def table_of(found: Sensitivity) -> StudyTable:
     """A row for each parameter and pantograph; first what changes the standard deviation most.
 
     Figures are changes of the statistics under ``change`` of the parameter, in the unit of its key;
-    the last one is that of the standard deviation under a hundredth of the parameter.
+    the last one is that of the standard deviation under a hundredth of the parameter. Both decide
+    the order: the latter, or the former of a parameter that is zero.
     """
     several = len(found.names) > 1
     columns = [
@@ -39,16 +40,13 @@ def table_of(found: Sensitivity) -> StudyTable:
         Column("max_uplift_change_mm", "uplift [mm]", "+.3f"),
         Column(_BY_PERCENT, "sigma by 1 % [N]", "+.4f"),
     ]
-    rows = [row for number in range(len(found.parameters)) for row in _rows(found, number)]
 
     def weight(number: int) -> float:
-        own = [row[_BY_PERCENT] for row in _rows(found, number)]
-        return max((abs(value) for value in own if value is not None), default=-1.0)
+        ranked = _BY_PERCENT if found.parameters[number].size else "std_change_N"
+        return max(abs(row[ranked]) for row in _rows(found, number))
 
     order = sorted(range(len(found.parameters)), key=weight, reverse=True)
-    ranked = [row for number in order for row in _rows(found, number)]
-    assert len(ranked) == len(rows)
-    return StudyTable(columns, ranked)
+    return StudyTable(columns, [row for number in order for row in _rows(found, number)])
 
 
 def _rows(found: Sensitivity, number: int) -> list[dict[str, Any]]:

@@ -2,13 +2,15 @@
 
 A parameter is a key of the scene with a number, or with a list whose entries change together; the
 number of an entry may follow the key. Of a static force that depends on the speed all forces change
-together, under the key of the force.
+together, under the key of the force. The length of a single dropper has the key
+``irregularities.dropper_lengths.SPAN.DROPPER``, both counted from 1.
 """
 
 from __future__ import annotations
 
 import copy
 import fnmatch
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,13 +24,16 @@ from catenary.cases.scene.keys.error_sentences import unknown_key
 from catenary.cases.scene.keys.keys import is_known, known_keys
 from catenary.cases.scene.keys.units import unit_of
 from catenary.cases.scene.load import scene_from
-from catenary.cases.scene.problem import resolved
+from catenary.cases.scene.problem import line_of, resolved
 from catenary.cases.scene.scene import Scene
 
 # Patterns of the parameters that are taken if none are named, in the order in which they are taken.
 USUAL = (
     "pantographs.*.static_force_N",
     "pantographs.*.masses_kg",
+    "pantographs.*.bodies.*.mass_kg",
+    "pantographs.*.forces.*.stiffness_N_per_m",
+    "pantographs.*.forces.*.damping_N_s_per_m",
     "pantographs.*.stiffnesses_N_per_m",
     "pantographs.*.dampings_N_s_per_m",
     "contact.stiffness_N_per_m",
@@ -50,9 +55,10 @@ USUAL = (
 )
 # Of these each entry is a parameter, of other lists all entries together.
 _BY_ENTRY = ("masses_kg", "stiffnesses_N_per_m", "dampings_N_s_per_m")
-# By how much a table of changes lets a parameter change, by its unit; others by a hundredth.
-_CHANGES = {"mm": 1.0, "m": 1e-3, "kg": 1.0, "N": 1.0, "km/h": 1.0}
-_KILONEWTON = 1e3
+# By how much a table of changes lets a parameter change, by its unit or the end of its key; others
+# by a hundredth.
+_CHANGES = {"mm": 1.0, "m": 1e-3, "kg": 1.0, "km/h": 1.0}
+_CHANGES_OF_FORCES = {"tension_N": 1e3, "force_N": 1.0}
 # Step of the differences by which set-ups are differentiated, in parts of the value: of the fourth
 # order they are off by 4 step^4, some 1e-12, and by round-off over the step, 1e-13 to 1e-10.
 _STEP = 1e-3
@@ -60,6 +66,9 @@ _STEP_OF_ZERO = {"mm": 0.05}
 _USUAL_STEP_OF_ZERO = 1e-4
 # Tables without anything of the line.
 _OF_TRAIN = ("pantographs", "train", "contact")
+# The length of one dropper, which scenes have as entries of a list.
+_LENGTHS = "irregularities.dropper_lengths"
+_OF_DROPPER = re.compile(re.escape(_LENGTHS) + r"\.([1-9]\d{0,5})\.([1-9]\d{0,5})")
 _BY_SPEED, _FORCE = "static_force_by_speed", "static_force_N"
 
 
@@ -79,7 +88,7 @@ class Parameter:
     @property
     def unit(self) -> str:
         """That the key names."""
-        return unit_of(self.key)
+        return "mm" if _OF_DROPPER.fullmatch(self.key) else unit_of(self.key)
 
     @property
     def size(self) -> float:
@@ -102,8 +111,9 @@ class Parameter:
     def change(self) -> float:
         """By how much a table lets it change: a millimetre, kilogram or newton, a kilonewton of
         tension, or a hundredth of itself."""
-        if self.key.endswith("tension_N"):
-            return _KILONEWTON
+        for end, by in _CHANGES_OF_FORCES.items():
+            if self.key.endswith(end):
+                return by
         return _CHANGES.get(self.unit, 0.01 * self.size or 1.0)
 
     @property
@@ -132,6 +142,10 @@ class ChangedScenes:
     def changed(self, parameter: Parameter, by: float) -> Scene:
         """The scene with all values of a parameter changed ``by`` a number."""
         raw = copy.deepcopy(self._raw)
+        if dropper := _OF_DROPPER.fullmatch(parameter.key):
+            span, number = map(int, dropper.groups())
+            _lengthen(raw, span, number, parameter.values[0] + by)
+            return self._checked(raw)
         holder, place = _found(raw, parameter.key)
         if place == _FORCE and holder.get(_BY_SPEED):
             holder[_BY_SPEED] = [[speed, force + by] for speed, force in holder[_BY_SPEED]]
@@ -149,6 +163,8 @@ class ChangedScenes:
         InputError
             If the scene has no number there, or if a ready pantograph has it.
         """
+        if dropper := _OF_DROPPER.fullmatch(key):
+            return self._length_of(key, *map(int, dropper.groups()))
         known = known_keys(Scene)
         parts = key.split(".")
         if not is_known(key, known) and not (
@@ -169,6 +185,31 @@ class ChangedScenes:
                 "could be differentiated"
             )
         return Parameter(key, values)
+
+    def droppers(self) -> list[Parameter]:
+        """The length of each dropper in the evaluated stretch."""
+        line, evaluation = line_of(self.scene), self.scene.evaluation
+        found = []
+        for span in range(line.n_spans):
+            for number, x in enumerate(line.droppers_of_span(span)):
+                if evaluation.from_m <= x <= evaluation.to_m:
+                    key = f"{_LENGTHS}.{span + 1}.{number + 1}"
+                    found.append(self._length_of(key, span + 1, number + 1))
+        return found
+
+    def _length_of(self, key: str, span: int, number: int) -> Parameter:
+        """The error of a dropper's length that the scene gives, mostly none."""
+        line = line_of(self.scene)
+        droppers = line.droppers_of_span(span - 1) if span <= line.n_spans else ()
+        if number > len(droppers):
+            raise InputError(
+                f"{key} names no dropper: the line has {line.n_spans} spans"
+                + (f", and {len(droppers)} droppers in this one" if span <= line.n_spans else "")
+            )
+        lengths = self._raw.get("irregularities", {}).get("dropper_lengths", {})
+        given = lengths.get("by_dropper", [])
+        own = [error for at, place, error in given if (at, place) == (span, number)]
+        return Parameter(key, (float(sum(own)),))
 
     def usual(self) -> list[Parameter]:
         """The parameters of the scene that are taken if none are named, without those that are
@@ -219,6 +260,14 @@ class ChangedScenes:
         return scene_from(raw, Origin("the scene", (), recorded=True), folder=Path.cwd())
 
 
+def _lengthen(raw: dict[str, Any], span: int, number: int, error: float) -> None:
+    """Let a dropper have an error of its length [mm]."""
+    lengths = raw.setdefault("irregularities", {}).setdefault("dropper_lengths", {})
+    others = [own for own in lengths.get("by_dropper", []) if own[:2] != [span, number]]
+    lengths["by_dropper"] = [*others, [span, number, error]]
+    raw["effects"]["dropper_lengths"] = True
+
+
 def _is_number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool)
 
@@ -246,6 +295,21 @@ def _numbers(raw: Any, prefix: str = "") -> Iterator[str]:
         yield prefix
 
 
-def parameters_of(scenes: ChangedScenes, keys: Sequence[str]) -> list[Parameter]:
-    """The parameters of some keys, or the usual ones if there are none."""
-    return [scenes.parameter(key) for key in dict.fromkeys(keys)] if keys else scenes.usual()
+def parameters_of(
+    scenes: ChangedScenes, keys: Sequence[str], with_droppers: bool = False
+) -> list[Parameter]:
+    """The parameters of some keys, and lengths of evaluated droppers if they are wanted; the usual
+    ones if neither is.
+
+    Raises
+    ------
+    InputError
+        As ``ChangedScenes.parameter``, and if there are no such droppers.
+    """
+    named = [scenes.parameter(key) for key in dict.fromkeys(keys)]
+    if with_droppers:
+        droppers = scenes.droppers()
+        if not droppers:
+            raise InputError("there are no droppers in the evaluation stretch to differentiate by")
+        named += [one for one in droppers if one.key not in keys]
+    return named or scenes.usual()

@@ -70,6 +70,8 @@ def sensitivity_of(
     scene: Scene,
     keys: Sequence[str],
     comm: Any,
+    *,
+    droppers: bool = False,
     progress: Callable[[str], None] = lambda line: None,
 ) -> Sensitivity:
     """Differentiate the statistics of a scene. Not collective: one process.
@@ -77,7 +79,8 @@ def sensitivity_of(
     Parameters
     ----------
     scene : checked
-    keys : of the parameters; the usual ones if there are none
+    keys : of the parameters; the usual ones if there are none and ``droppers`` is not set
+    droppers : whether the length of each dropper in the evaluated stretch is a parameter
     comm : mpi4py communicator of this process alone
     progress : called with a line for each parameter
 
@@ -90,7 +93,7 @@ def sensitivity_of(
     """
     filters.check_sampling(scene.numerics.dt_s)
     scenes = ChangedScenes(scene)
-    parameters = parameters_of(scenes, keys)
+    parameters = parameters_of(scenes, keys, droppers)
     at_rest = _at_rest(scenes.scene)
     refuse_lost_wire(at_rest.model, at_rest.form)
     now = set_up_of(comm, at_rest)
@@ -109,7 +112,7 @@ def sensitivity_of(
         try:
             changes.append(differentiate(set_up, now, parameter.step, parameter.key))
         except InputError as error:
-            if keys:
+            if keys or droppers:
                 raise
             left_out[parameter.key] = str(error)
         else:
@@ -181,7 +184,7 @@ def _add(
             marched.by_force[:, :, number],
             within,
             marched.dt,
-            by_place,
+            by_place[:, :, number],
         )
         for number, within in _within(marched, at_rest)
     ]

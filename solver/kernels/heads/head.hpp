@@ -91,6 +91,8 @@ class Head {
                std::span<double> place) const;
     /// `step`, whose results are put into the train's `numbers` (2 n + 2 n^2,).
     bool predict(std::span<const double> drive, std::span<double> numbers, int64_t n_contacts);
+    /// What a unit of each contact force takes off the state, (3 n, s), in the latest step.
+    Array2<const double> answers() const { return {by_force_.data(), 3 * n_, n_strips_}; }
     /// `advance` with forces at all contacts of the train.
     void move(std::span<const double> force) { advance(part(force, first_, first_ + n_strips_)); }
 

@@ -33,14 +33,18 @@ struct LinkChange {
     CATENARY_RECORD(law, weights)
 };
 
-/// Derivatives of a head: of the step of a chain, all of its arrays or none, and of its state
-/// (3 n,), which goes on with the steps.
+/// Derivatives of a head: of its state (3 n,), which goes on with the steps, and of the step
+/// itself. Of a linear chain these are all of its arrays or none; others are made anew with the
+/// parameter two steps below, one below, one above and two above where it is, `step` apart, or not
+/// at all.
 struct HeadChange {
     Array2<const double> matrix;
     std::span<const double> by_drive, by_head;
     Array2<const double> inverse;
     std::span<double> state;
-    CATENARY_RECORD(matrix, by_drive, by_head, inverse, state)
+    std::vector<Head*> beside;
+    double step;
+    CATENARY_RECORD(matrix, by_drive, by_head, inverse, state, beside, step)
 };
 
 /// Derivatives of the contact law at n contacts: of own, offset, by_depth and by_rate (4, n), and
@@ -73,17 +77,19 @@ struct Tangent {
 /// What tangents need of the march besides its steps.
 struct MarchTangents {
     std::vector<Tangent> all;
+    /// Of each head that is no linear chain two others like it, whose state is free to be changed.
+    std::vector<std::vector<Head*>> pairs;
     Links links;                     ///< of the line, by their numbers
     std::span<const int64_t> first;  ///< (1,) steps of the march before the block
     std::span<int64_t> switches;     ///< (3,) steps in which a contact is open, in which a contact
                                      ///< opened or closed, and in which links switched
-    CATENARY_RECORD(all, links, first, switches)
+    CATENARY_RECORD(all, pairs, links, first, switches)
 };
 
 /// Steps with tangents.
 class TangentSteps : public Steps {
   public:
-    /// Throws std::invalid_argument if a head is no linear chain.
+    /// Throws std::invalid_argument if a head is no linear chain and has no others like it.
     TangentSteps(StepParts parts, Block block, MarchTangents tangents);
     /// Take steps as `Steps::take`; those that are left to others have no tangents.
     Taken take(int64_t first, int64_t end);
@@ -102,6 +108,15 @@ class TangentSteps : public Steps {
     void follow(int64_t number);
     void load(const Tangent& tangent, double way);
     void predict_heads(const Tangent& tangent, int64_t number);
+    void step_chain(const LinearChain& chain, const HeadChange& change, const Drive& drive,
+                    const Drive& changed, size_t h);
+    void step_beside(const HeadChange& change, std::span<const double> drive,
+                     std::span<const double> changed, size_t h);
+    void add_places(const Head& head, std::span<const double> state, size_t h, double weight);
+    void take_step(Head& head, std::span<const double> drive, size_t h) const;
+    bool is_straight(size_t h) const;
+    void add_end(const Head& head, size_t h, double weight);
+    void put_state(Head& head, size_t h) const;
     void find_places(const Tangent& tangent, double way);
     double of_law(const Tangent& tangent, int64_t contact) const;
     double of_reserve(const Tangent& tangent, int64_t link, int64_t number) const;
@@ -113,10 +128,12 @@ class TangentSteps : public Steps {
     int64_t n_contacts() const { return size(parts().problem.found.depth); }
 
     MarchTangents tangents_;
-    std::vector<Contacts> contacts_;  ///< of each tangent, with its motion
-    std::vector<const LinearChain*> chains_;
-    std::vector<std::vector<double>> before_;  ///< states of the heads before the step
-    std::vector<std::vector<double>> free_;    ///< derivatives of heads without contact
+    std::vector<Contacts> contacts_;            ///< of each tangent, with its motion
+    std::vector<const LinearChain*> chains_;    ///< of heads that are such
+    std::vector<std::vector<double>> before_;   ///< states of the heads before the step
+    std::vector<std::vector<double>> pressed_;  ///< contact forces that their laws read then
+    std::vector<double> row_;                   ///< room for what drives a head
+    std::vector<std::vector<double>> free_;     ///< derivatives of heads without contact
     /// Displacements and velocities of the line, and sums of these and of accelerations.
     std::vector<double> displacement_, velocity_, sum_;
     bool reads_motion_ = false;          ///< whether any tangent does
