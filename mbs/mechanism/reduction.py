@@ -13,10 +13,10 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from catenary.base.errors import InputError, RunBroken
 from catenary.mbs.head.head_arrays import SplineTables
+from catenary.mbs.mechanism.height_tables import height_tables
 from catenary.mbs.rigid.bodies import Motion, Vector
 from catenary.mbs.rigid.forces import Force
 from catenary.mbs.rigid.joints import ORIGIN, PrescribedPoint
@@ -50,13 +50,11 @@ class ReducedMechanism:
     name: str = ""
     carried: np.ndarray | None = None
     blown: np.ndarray | None = None
-    _table: CubicSpline = field(init=False, repr=False, compare=False)
-    _slopes: CubicSpline = field(init=False, repr=False, compare=False)
+    _table: SplineTables = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         columns = np.stack([self.masses, self.lifts, self.dampings], axis=1)
-        object.__setattr__(self, "_table", CubicSpline(self.heights, columns))
-        object.__setattr__(self, "_slopes", self._table.derivative())
+        object.__setattr__(self, "_table", height_tables(self.heights, columns))
 
     def at(self, height: float) -> tuple[np.ndarray, np.ndarray]:
         """Mass, lift and damping at a height [m], shape (3,), and their slopes, per metre.
@@ -68,7 +66,7 @@ class ReducedMechanism:
         """
         if not self.heights[0] <= height <= self.heights[-1]:
             raise self.left(height)
-        return self._table(height), self._slopes(height)
+        return self._table.at(height)
 
     def tables(self, carried: bool) -> SplineTables:
         """Splines of mass, lift, damping, carried mass (zero without ``carried``) and, of a
@@ -80,12 +78,14 @@ class ReducedMechanism:
             last = self.carried
         listed = [self.masses, self.lifts, self.dampings, last]
         columns = np.stack(listed if self.blown is None else [*listed, self.blown], axis=1)
-        spline = CubicSpline(self.heights, columns)
-        return SplineTables(spline.x, np.ascontiguousarray(spline.c.transpose(1, 2, 0)))
+        return height_tables(self.heights, columns)
 
     def blown_at(self, height: float) -> float:
         """Upward force on the point by the air on the bodies at a height [m], 0 without air."""
-        return 0.0 if self.blown is None else float(CubicSpline(self.heights, self.blown)(height))
+        if self.blown is None:
+            return 0.0
+        values, _ = height_tables(self.heights, self.blown[:, None]).at(height)
+        return float(values[0])
 
     def left(self, height: float, time: float | None = None) -> RunBroken:
         """The error of a mechanism that has left its tables at a height [m] and a time [s]."""
@@ -228,13 +228,14 @@ def _refined(raised: _Raised, places: list[_Place], tolerance: float) -> list[_P
     """The same with further heights in between where splines miss the lift, such as at stops."""
     doubtful = list(pairwise(places))
     while doubtful:
-        lift = CubicSpline([p.height for p in places], [p.columns[1] for p in places])
+        heights = np.array([place.height for place in places])
+        lift = height_tables(heights, np.array([place.columns[1:2] for place in places]))
         missed = set()
         for low, high in doubtful:
             if high.height - low.height > 2.0 * FINEST:
                 middle = 0.5 * (low.height + high.height)
                 there = raised.from_near(middle, low)
-                if abs(lift(middle) - there.columns[1]) > tolerance:
+                if abs(lift.at(middle)[0][0] - there.columns[1]) > tolerance:
                     missed.add(middle)
                     places.append(there)
         places.sort(key=lambda place: place.height)

@@ -10,15 +10,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import NamedTuple, Protocol
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
-from scipy.interpolate import BSpline, make_interp_spline
 
 from catenary.base.errors import InputError
 from catenary.mbs.rigid.bodies import Motion, Vector
 from catenary.mbs.rigid.joints import ORIGIN
 from catenary.mbs.rigid.kinematics import difference, point
+
+if TYPE_CHECKING:
+    from scipy.interpolate import BSpline
 
 
 class Force(Protocol):
@@ -49,6 +51,8 @@ class Table:
                 f"The {what} must have at least two points and as many values as growing "
                 f"arguments; it has arguments {list(x)} and values {list(y)}."
             )
+        from scipy.interpolate import make_interp_spline  # of which few mechanisms have need
+
         self._points = tuple(zip(map(float, x), map(float, y), strict=True))
         self._line: BSpline = make_interp_spline(x, y, k=1)
         self._work: BSpline = self._line.antiderivative()

@@ -12,10 +12,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import ClassVar, Protocol
+from typing import TYPE_CHECKING, ClassVar, Protocol
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from catenary.base.errors import InputError
 from catenary.mbs.rigid.bodies import SPACE, Motion, Vector, rotation_matrix
@@ -34,6 +33,9 @@ from catenary.mbs.rigid.kinematics import (
     stacked,
     total,
 )
+
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicSpline
 
 ORIGIN = (0.0, 0.0, 0.0)
 AXES = np.eye(3)
@@ -104,6 +106,8 @@ def steady(start: float, speed: float) -> TimeLaw:
 
 def tabulated(times: Vector, values: Vector) -> TimeLaw:
     """A prescribed number from a table, by a cubic spline with free ends."""
+    from scipy.interpolate import CubicSpline  # of which few mechanisms have need
+
     spline = CubicSpline(times, values, bc_type="natural")
     return lambda time: Law(*(float(spline(time, k)) for k in range(3)))
 
@@ -282,6 +286,8 @@ class PointOnCurve:
     _splines: tuple[CubicSpline, CubicSpline] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
+        from scipy.interpolate import CubicSpline
+
         if len(self.x) < 2 or np.any(np.diff(self.x) <= 0.0):
             raise InputError(f"Joint {self.name!r}: x of the curve must grow from point to point.")
         splines = tuple(CubicSpline(self.x, c, bc_type="natural") for c in (self.y, self.z))

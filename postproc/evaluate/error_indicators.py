@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy import linalg, optimize, signal
 
 from catenary.base.errors import InputError
 from catenary.meshgen.slowest_wave import bends
@@ -153,8 +152,13 @@ def _spectrum(values: np.ndarray, dt: float) -> tuple[np.ndarray, np.ndarray]:
     """Angular frequencies [rad/s], without zero, and what each has of the power of values
     (n,) about their mean, under a Hann window; of a long record the mean over stretches."""
     stretch = min(values.size, _STRETCH)
-    frequency, power = signal.welch(values, 1.0 / dt, nperseg=stretch, noverlap=0)
-    return 2.0 * np.pi * frequency[1:], power[1:]
+    pieces = values[: values.size // stretch * stretch].reshape(-1, stretch)
+    window = 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(stretch) / stretch)
+    waves = np.fft.rfft(window * (pieces - pieces.mean(axis=1, keepdims=True)))
+    power = (np.abs(waves) ** 2).mean(axis=0)
+    # Each but the fastest of an even number stands for its negative too.
+    power[1 : (stretch + 1) // 2] *= 2.0
+    return 2.0 * np.pi * np.fft.rfftfreq(stretch, dt)[1:], power[1:]
 
 
 def memory(omega: np.ndarray, alpha: float, beta: float) -> np.ndarray:
@@ -199,10 +203,13 @@ def required_frequency(felt: float, speed: float, alpha: float) -> float:
     def slowness(omega: float) -> complex:
         return complex(1.0 / np.sqrt(1.0 + 1j * alpha * omega))
 
-    undamped = own / (1.0 - speed)
-    omega = optimize.brentq(
-        lambda w: w * (1.0 - speed * slowness(w).real) - own, own, undamped * (1.0 + 1e-9)
-    )
+    # Damping makes it slower than without, so that it lies between; halved until nothing is left.
+    low, high = own, own / (1.0 - speed) * (1.0 + 1e-9)
+    while low < (omega := 0.5 * (low + high)) < high:
+        if omega * (1.0 - speed * slowness(omega).real) < own:
+            low = omega
+        else:
+            high = omega
     return float(omega * abs(slowness(omega)) / (2.0 * np.pi))
 
 
@@ -256,17 +263,22 @@ def resolved_frequency(
     mass = beam.mass(h, mass_per_length)[0]
     numbers = np.linspace(0.0, 2.0 * np.pi / length, _WAVE_NUMBERS + 1)[1:]
     exact = np.sqrt((tension + bending_stiffness * numbers**2) / mass_per_length) * numbers
-    best = 0.0
-    for k, omega in zip(numbers, exact, strict=True):
-        # Both nodes of an element in terms of the first one's deflection and slope.
-        shift = np.vstack([np.eye(2), np.exp(1j * k * length) * np.eye(2)])
-        both = linalg.eigvalsh(shift.conj().T @ stiffness @ shift, shift.conj().T @ mass @ shift)
-        # Two waves share the nodes' motion; the longer one lies on the lower branch.
-        square = both[0 if k * length < _ZONE else 1]
-        if abs(np.sqrt(max(square, 0.0)) / omega - 1.0) > RESOLVED:
-            break
-        best = omega
-    return float(best / (2.0 * np.pi))
+    # Both nodes of an element in terms of the first one's deflection and slope.
+    shift = np.concatenate(
+        [
+            np.tile(np.eye(2), (numbers.size, 1, 1)),
+            np.exp(1j * numbers * length)[:, None, None] * np.eye(2),
+        ],
+        axis=1,
+    )
+    turned = shift.conj().swapaxes(1, 2)
+    root = np.linalg.inv(np.linalg.cholesky(turned @ mass @ shift))
+    both = np.linalg.eigvalsh(root @ (turned @ stiffness @ shift) @ root.conj().swapaxes(1, 2))
+    # Two waves share the nodes' motion; the longer one lies on the lower branch.
+    square = np.where(numbers * length < _ZONE, both[:, 0], both[:, 1])
+    wrong = np.abs(np.sqrt(np.maximum(square, 0.0)) / exact - 1.0) > RESOLVED
+    carried = int(np.argmax(wrong)) if wrong.any() else numbers.size
+    return float(exact[carried - 1] / (2.0 * np.pi)) if carried else 0.0
 
 
 def as_table(indicators: Indicators) -> dict[str, Any]:
