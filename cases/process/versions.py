@@ -25,14 +25,23 @@ def versions() -> dict[str, str]:
     standard = ".".join(str(part) for part in MPI.Get_version())
     library = MPI.Get_library_version().replace("\0", "").splitlines()[0].split(",")[0].strip()
     found = {
-        "catenary": metadata.version("catenary"),
+        "catenary": _recorded("catenary"),
         "PETSc": f"{petsc} (petsc4py {_petsc4py()})",
         "MPI": f"{standard}, {library} (mpi4py {mpi4py.__version__})",
         "HDF5": f"{hdf5} (h5py {h5py.__version__})",
     }
-    found |= {name: metadata.version(name) for name in _PACKAGES}
+    found |= {name: _recorded(name) for name in _PACKAGES}
     found["Python"] = platform.python_version()
     return found
+
+
+def _recorded(package: str) -> str:
+    """The version in the record of an installed package, of which nothing else is parsed: records
+    hold whole descriptions."""
+    record = metadata.distribution(package).read_text("METADATA") or ""
+    lines = (line.partition(":") for line in record.splitlines())
+    found = next((value.strip() for key, _, value in lines if key == "Version"), None)
+    return metadata.version(package) if found is None else found
 
 
 def _petsc4py() -> str:

@@ -7,8 +7,11 @@ values are 0.02 to 3).
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from scipy import linalg
+from scipy.linalg import lapack
 
 
 def least_squares(matrix: np.ndarray, right: np.ndarray, cond: float) -> np.ndarray:
@@ -17,7 +20,27 @@ def least_squares(matrix: np.ndarray, right: np.ndarray, cond: float) -> np.ndar
     Directions in which the matrix is smaller than ``cond`` of its size count as none. By QR with
     pivoting, which iterates nothing.
     """
-    return np.asarray(linalg.lstsq(matrix, right, cond=cond, lapack_driver="gelsy")[0])
+    matrix, right = np.asarray_chkfinite(matrix), np.asarray_chkfinite(right)
+    m, n = matrix.shape
+    if 0 in (m, n, right.size):
+        return np.zeros((n, *right.shape[1:]))
+    columns = right.reshape(m, -1)
+    room = np.zeros((max(m, n), columns.shape[1]), order="F")
+    room[:m] = columns
+    # As `scipy.linalg.lstsq` calls it, which asks for the work space each time.
+    _, found, _, _, info = lapack.dgelsy(
+        matrix, room, np.zeros(n, dtype=np.int32), cond, _work(m, n, columns.shape[1], cond),
+        overwrite_b=True,
+    )  # fmt: skip
+    assert info == 0
+    return np.asarray(found[:n]).reshape(n, *right.shape[1:])
+
+
+@lru_cache(maxsize=256)
+def _work(m: int, n: int, n_right: int, cond: float) -> int:
+    """Numbers of work space for equations (m, n) with so many right-hand sides."""
+    work, _ = lapack.dgelsy_lwork(m, n, n_right, cond)
+    return int(work)
 
 
 def null_space(matrix: np.ndarray, cond: float = 1e-8) -> np.ndarray:
