@@ -76,6 +76,8 @@ def main() -> None:
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     # A crash ends the process: Open MPI's handler, which prints a trace, may wait for ever.
     os.environ.setdefault("OMPI_MCA_opal_signal", "")
+    # One process alone starts no others: Open MPI need not start its daemon beside it for them.
+    os.environ.setdefault("OMPI_MCA_ess_singleton_isolated", "1")
     logging.getLogger("catenary").addHandler(console.LogHandler())
     interrupts.install(several_ranks=launched_by_mpirun())
     matplotlib_setup.choose_folder()
