@@ -46,7 +46,7 @@ SANITIZED_FLAGS = [
     *SANITIZED,
 ]
 # Kernels of stations have their products written out: checks of each access, written out as well,
-# took half an hour and 6 GB to compile. They are calls there, and what address and processor check
+# take most of the time and gigabytes to compile. They are calls there, and what address and processor check
 # too is left to them.
 SANITIZED_STATIONS = [
     *("--param", "asan-instrumentation-with-call-threshold=0"),
