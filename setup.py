@@ -46,8 +46,8 @@ SANITIZED_FLAGS = [
     *SANITIZED,
 ]
 # Kernels of stations have their products written out: checks of each access, written out as well,
-# take most of the time and gigabytes to compile. They are calls there, and what address and processor check
-# too is left to them.
+# take most of the time and gigabytes to compile. They are calls there, and what the checks of
+# addresses find too is left to those.
 SANITIZED_STATIONS = [
     *("--param", "asan-instrumentation-with-call-threshold=0"),
     "-fno-sanitize=null,alignment,pointer-overflow",
