@@ -280,7 +280,7 @@ CODE
     else
         pip_install "${wanted[@]}"
     fi
-    compile_kernels "two to three minutes"
+    compile_kernels "some two minutes"
     pip_install --no-deps --no-build-isolation --editable .
     begin "compiling the packages to bytecode"
     # Bytecode on all cores at once: pip makes it on one, which took a third of its time. Packages

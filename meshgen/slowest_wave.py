@@ -16,6 +16,7 @@ ones 0.92 to 1 of sqrt(F / m + EI (pi / L)^2 / m); sqrt(F / m) on a string.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -69,6 +70,7 @@ def slowest_wave_of(line: Line, wire: Wire, share: float = 1.0) -> float:
     return found if bends(found, tension, wire.mass_per_length) else string
 
 
+@lru_cache(maxsize=64)
 def supported_wave(
     tension: float,
     bending_stiffness: float,

@@ -27,3 +27,5 @@ def choose() -> None:
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     # A crash ends the process: Open MPI's handler, which prints a trace, may wait for ever.
     os.environ.setdefault("OMPI_MCA_opal_signal", "")
+    # One process alone starts no others: Open MPI need not start its daemon beside it for them.
+    os.environ.setdefault("OMPI_MCA_ess_singleton_isolated", "1")

@@ -9,10 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy import linalg, optimize, signal
+from scipy import optimize, signal
 
 from catenary.base.errors import InputError
 from catenary.meshgen.slowest_wave import bends
@@ -237,6 +238,7 @@ def required_by_bending(
     return float((own + speed * ahead.max()) / (2.0 * np.pi))
 
 
+@lru_cache(maxsize=256)
 def resolved_frequency(
     length: float, tension: float, bending_stiffness: float, mass_per_length: float
 ) -> float:
@@ -256,17 +258,22 @@ def resolved_frequency(
     mass = beam.mass(h, mass_per_length)[0]
     numbers = np.linspace(0.0, 2.0 * np.pi / length, _WAVE_NUMBERS + 1)[1:]
     exact = np.sqrt((tension + bending_stiffness * numbers**2) / mass_per_length) * numbers
-    best = 0.0
-    for k, omega in zip(numbers, exact, strict=True):
-        # Both nodes of an element in terms of the first one's deflection and slope.
-        shift = np.vstack([np.eye(2), np.exp(1j * k * length) * np.eye(2)])
-        both = linalg.eigvalsh(shift.conj().T @ stiffness @ shift, shift.conj().T @ mass @ shift)
-        # Two waves share the nodes' motion; the longer one lies on the lower branch.
-        square = both[0 if k * length < _ZONE else 1]
-        if abs(np.sqrt(max(square, 0.0)) / omega - 1.0) > RESOLVED:
-            break
-        best = omega
-    return float(best / (2.0 * np.pi))
+    # Both nodes of an element in terms of the first one's deflection and slope.
+    shift = np.concatenate(
+        [
+            np.tile(np.eye(2), (numbers.size, 1, 1)),
+            np.exp(1j * numbers * length)[:, None, None] * np.eye(2),
+        ],
+        axis=1,
+    )
+    turned = shift.conj().swapaxes(1, 2)
+    root = np.linalg.inv(np.linalg.cholesky(turned @ mass @ shift))
+    both = np.linalg.eigvalsh(root @ (turned @ stiffness @ shift) @ root.conj().swapaxes(1, 2))
+    # Two waves share the nodes' motion; the longer one lies on the lower branch.
+    square = np.where(numbers * length < _ZONE, both[:, 0], both[:, 1])
+    wrong = np.abs(np.sqrt(np.maximum(square, 0.0)) / exact - 1.0) > RESOLVED
+    carried = int(np.argmax(wrong)) if wrong.any() else numbers.size
+    return float(exact[carried - 1] / (2.0 * np.pi)) if carried else 0.0
 
 
 def as_table(indicators: Indicators) -> dict[str, Any]:

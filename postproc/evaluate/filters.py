@@ -7,6 +7,8 @@ gain is 1/2 (-6 dB), at frequency f of a low-pass 1 / (1 + (tan(pi f dt)/tan(pi 
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from scipy import signal
 
@@ -46,8 +48,7 @@ def low_pass(values: np.ndarray, dt: float, cut_off: float = CUT_OFF) -> np.ndar
         If the record is sampled at no more than twice the cut-off.
     """
     check_sampling(dt, cut_off)
-    sos = signal.butter(ORDER, cut_off, btype="low", fs=1.0 / dt, output="sos")
-    return _both_ways(sos, values, dt, cut_off)
+    return _both_ways(_sections("low", (cut_off,), dt), values, dt, cut_off)
 
 
 def band_0_5(values: np.ndarray, dt: float) -> np.ndarray:
@@ -58,9 +59,15 @@ def band_0_5(values: np.ndarray, dt: float) -> np.ndarray:
 def band_5_20(values: np.ndarray, dt: float) -> np.ndarray:
     """Part of ``values`` between 5 and 20 Hz, free of the mean: a band-pass of 6th-order edges."""
     check_sampling(dt, CUT_OFF)
-    edges = (BAND_LIMIT, CUT_OFF)
-    sos = signal.butter(ORDER, edges, btype="bandpass", fs=1.0 / dt, output="sos")
-    return _both_ways(sos, values, dt, BAND_LIMIT)
+    sections = _sections("bandpass", (BAND_LIMIT, CUT_OFF), dt)
+    return _both_ways(sections, values, dt, BAND_LIMIT)
+
+
+@lru_cache(maxsize=64)
+def _sections(kind: str, edges: tuple[float, ...], dt: float) -> np.ndarray:
+    """Second-order sections of a filter, which a sweep asks for again and again."""
+    found = signal.butter(ORDER, np.squeeze(edges), btype=kind, fs=1.0 / dt, output="sos")
+    return np.asarray(found)
 
 
 def _both_ways(sos: np.ndarray, values: np.ndarray, dt: float, slowest: float) -> np.ndarray:

@@ -86,7 +86,7 @@ def write_report(
         if registration is not None:
             content["registration.csv"] = registration.csv()
         files = write_into(out, {"summary.json": summary, **content})
-        pictures = _painted(results, statistics)
+        pictures = _painted(run)
         content = {f"{name}.png": data for name, data in pictures.items()}
         files += write_into(out, {**content, "report.html": _page(run, pictures)})
     return Report(files, criteria, run.verdict if run.results.complete else None)
@@ -111,18 +111,22 @@ def write_summary(result_path: Path | str, out_dir: Path | str) -> bool | None:
 
 def drawings(results: Results, statistics: RunStatistics) -> Iterator[Picture]:
     """What makes each picture of a run, in their order."""
-    run = EvaluatedRun(results, statistics, criteria_of(results, statistics))
+    yield from _pictures(EvaluatedRun(results, statistics, criteria_of(results, statistics)))
+
+
+def _pictures(run: EvaluatedRun) -> Iterator[Picture]:
+    """What makes each picture of a run that has been judged, in their order."""
     for section in SECTIONS:
         yield from section(run).pictures
 
 
-def _painted(results: Results, statistics: RunStatistics) -> dict[str, bytes]:
+def _painted(run: EvaluatedRun) -> dict[str, bytes]:
     """The pictures of a run as PNG, without those that cannot be drawn, which is logged."""
     # A summary alone does without Matplotlib.
     from catenary.postproc.report.pictures import figures
 
     painted: dict[str, bytes] = {}
-    for name, _, draw in drawings(results, statistics):
+    for name, _, draw in _pictures(run):
         painted.update(zip([name], figures.painted(f"{name}.png", draw).values(), strict=False))
     return painted
 

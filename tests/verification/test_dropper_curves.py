@@ -313,14 +313,13 @@ def test_energy_is_that_of_the_curve_and_balanced_by_work(name: str) -> None:
     springs.alpha[:] = 0.0
     mass, bare = (without_droppers(model, **{what: 1.0}) for what in ("mass", "stiffness"))
     stored = [stored_by(CURVES[name], own) for own in form.dropper_length]
+    at_first = sum(energy(at) for energy, at in zip(stored, springs.rest, strict=True))
     held, works, allowed, before = [], [0.0], 0.0, None
     for step, (_, state) in enumerate(shown):
         u, v = state["displacement"], state["velocity"]
         e = springs.stretch(u)
-        of_droppers = sum(
-            energy(at + more) - energy(at) - n * more
-            for energy, at, more, n in zip(stored, springs.rest, e, form.dropper_force, strict=True)
-        )
+        now = sum(energy(at) for energy, at in zip(stored, springs.rest + e, strict=True))
+        of_droppers = now - at_first - form.dropper_force @ e
         held.append(0.5 * (v @ mass @ v + u @ bare @ u) + of_droppers)
         tension = springs.tension(u, v)
         load = np.zeros(model.n_dofs)
@@ -348,7 +347,7 @@ def stored_by(curve: tuple[tuple[float, float], ...], length: float) -> Callable
         inside = points[(points > 0.0) & (points < stretch)]
         edges = np.concatenate([[0.0], inside, [max(stretch, 0.0)]])
         # Exact on each piece: the mean of its ends' forces.
-        forces = np.array([law(np.array([at]))[0] for at in edges])
+        forces = law(edges)
         return float((0.5 * (forces[1:] + forces[:-1]) * np.diff(edges)).sum())
 
     return energy

@@ -23,24 +23,56 @@ namespace py = pybind11;
 /// Keeps what arrays and records point to alive.
 using Kept = std::vector<py::object>;
 
-/// Numbers of an array with so many dimensions.
-template <class T>
-T* numbers_of(py::handle given, const std::string& name, int n_dimensions, Kept& kept) {
-    using Number = std::remove_const_t<T>;
-    using Array = py::array_t<Number, py::array::c_style>;
+// Sentences about what is wrong are made here once, not in each function that is offered: they were
+// most of what is compiled of it.
+
+[[gnu::noinline]] inline std::string numbered(size_t i, const std::string& function) {
+    return "argument " + std::to_string(i + 1) + " of " + function;
+}
+[[noreturn, gnu::noinline]] inline void refuse_type(py::handle given, const std::string& name) {
+    throw py::type_error(name +
+                         " has the wrong type: " + std::string(py::str(py::type::of(given))));
+}
+/// An array that fits if it has so many dimensions; `type_of` is what its numbers are to be.
+[[gnu::noinline]] inline py::array array_of(py::handle given, bool is_of_type,
+                                            py::dtype (*type_of)(), const std::string& name,
+                                            int n_dimensions, Kept& kept) {
     if (!py::isinstance<py::array>(given)) throw py::type_error(name + " is no array");
-    if (!py::isinstance<Array>(given))
+    if (!is_of_type)
         throw py::type_error(name + " is no contiguous array of " +
-                             std::string(py::str(py::dtype::of<Number>())));
-    auto array = py::reinterpret_borrow<Array>(given);
+                             std::string(py::str(type_of())));
+    auto array = py::reinterpret_borrow<py::array>(given);
     if (array.ndim() != n_dimensions)
         throw py::value_error(name + " has " + std::to_string(array.ndim()) + " dimensions, not " +
                               std::to_string(n_dimensions));
     kept.push_back(array);
+    return array;
+}
+
+/// Numbers of an array with so many dimensions.
+template <class T>
+T* numbers_of(py::handle given, const std::string& name, int n_dimensions, Kept& kept) {
+    using Number = std::remove_const_t<T>;
+    const bool is_of_type = py::isinstance<py::array_t<Number, py::array::c_style>>(given);
+    py::array array = array_of(given, is_of_type, &py::dtype::of<Number>, name, n_dimensions, kept);
     if constexpr (std::is_const_v<T>)
-        return array.data();
+        return static_cast<T*>(array.data());
     else
-        return array.mutable_data();  // refuses arrays that are read only
+        return static_cast<T*>(array.mutable_data());  // refuses arrays that are read only
+}
+
+/// A value of a record whose names are listed.
+struct Member {
+    py::object value;
+    std::string name;
+};
+/// The value of the first of some names, which is taken off them.
+[[gnu::noinline]] inline Member next_member(py::handle record, std::string_view& names,
+                                            const std::string& name) {
+    const size_t end = std::min(names.find(','), names.size());
+    const std::string own(names.substr(0, end));
+    names.remove_prefix(std::min(end + 2, names.size()));
+    return {record.attr(own.c_str()), name + "." + own};
 }
 
 template <class T>
@@ -56,16 +88,9 @@ struct From {
         if constexpr (Record<T>) {
             T record{};
             std::string_view names = T::kMembers;
-            auto next = [&] {
-                const size_t end = std::min(names.find(','), names.size());
-                const std::string member(names.substr(0, end));
-                names.remove_prefix(std::min(end + 2, names.size()));
-                return member;
-            };
             auto put = [&]<class M>(M& member) {
-                const std::string own = next();
-                py::object value = given.attr(own.c_str());
-                member = From<M>::convert(value, name + "." + own, kept);
+                const Member own = next_member(given, names, name);
+                member = From<M>::convert(own.value, own.name, kept);
             };
             std::apply([&](auto&... member) { (put(member), ...); }, record.members());
             return record;
@@ -73,8 +98,7 @@ struct From {
             try {
                 return py::cast<T>(given);
             } catch (const py::cast_error&) {
-                throw py::type_error(
-                    name + " has the wrong type: " + std::string(py::str(py::type::of(given))));
+                refuse_type(given, name);
             }
         }
     }
@@ -122,9 +146,7 @@ struct From<T*> {
 template <class T>
 struct From<std::reference_wrapper<T>> {
     static T* convert(py::handle given, const std::string& name, Kept&) {
-        if (!py::isinstance<T>(given))
-            throw py::type_error(
-                name + " has the wrong type: " + std::string(py::str(py::type::of(given))));
+        if (!py::isinstance<T>(given)) refuse_type(given, name);
         return given.cast<T*>();
     }
 };
@@ -190,11 +212,10 @@ class BoundFunction : public Bound {
     /// Convert what is given, which are the arguments from `begin` on.
     template <size_t... I>
     void convert(const py::args& given, size_t begin, Kept& kept, std::index_sequence<I...>) {
-        (...,
-         (I >= begin && I < begin + given.size()
-              ? (void)std::get<I>(values_).emplace(From<std::decay_t<A>>::convert(
-                    given[I - begin], "argument " + std::to_string(I + 1) + " of " + name_, kept))
-              : (void)0));
+        (..., (I >= begin && I < begin + given.size()
+                   ? (void)std::get<I>(values_).emplace(
+                         From<std::decay_t<A>>::convert(given[I - begin], numbered(I, name_), kept))
+                   : (void)0));
     }
     std::string too_many(size_t n) const {
         return name_ + " takes " + std::to_string(sizeof...(A)) + " arguments, not " +

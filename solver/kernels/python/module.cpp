@@ -1,14 +1,21 @@
-// The Python module catenary.solver.kernels.native, with what Python calls of arithmetic and
-// curves.
+// The Python module catenary.solver.kernels.native, with what Python calls of arithmetic, of curves
+// and of the line: its motion, its loads, and what is made before a march.
 #include "base/compiler.hpp"
 #include "base/curves.hpp"
 #include "base/flush_to_zero.hpp"
+#include "line/condensing.hpp"
+#include "line/gusts.hpp"
+#include "line/short_columns.hpp"
+#include "loads/fourier.hpp"
+#include "loads/loads.hpp"
+#include "motion/links.hpp"
+#include "motion/shown.hpp"
+#include "motion/window.hpp"
 #include "python/from_python.hpp"
 
 namespace catenary::python {
 
 void offer_stations(py::module_& module);
-void offer_line(py::module_& module);
 void offer_contact(py::module_& module);
 void offer_steps(py::module_& module);
 void offer_heads(py::module_& module);
@@ -23,6 +30,42 @@ void offer_base(py::module_& module) {
     offer(module, "tables_at", tables_at, "Fill in values and slopes of splines over one axis.");
     offer(module, "sines_at", sines_at, "Value and two derivatives of a sum of sines.");
     offer(module, "polyline_at", polyline_at, "Fill in values and slopes of a line at places.");
+}
+
+void offer_line(py::module_& module) {
+    PYBIND11_NUMPY_DTYPE(Reserve, rest, stiffness, damping, place, released, carried);
+    module.attr("RESERVE") = py::dtype::of<Reserve>();
+    offer(module, "predict", predict, "Predictions of Newmark's method in place.");
+    offer(module, "correct", correct, "New displacement and velocity from predictions.");
+    offer(module, "predict_alpha", predict_alpha,
+          "Predictions of the generalized-alpha method in place.");
+    offer(module, "displacements", displacements, "Fill in displacements.");
+    offer(module, "velocities", velocities, "Fill in velocities.");
+    offer(module, "reserves", reserves, "Fill in what is left to each link until it switches [N].");
+    offer(module, "energy_of_switching", energy_of_switching,
+          "What elastic energy lacks where links have switched [J].");
+    module.attr("LEAST_STATIONS") = kLeastStations;
+    offer(module, "turn_to", turn_to, "Let steps of a window take on some stations.");
+    offer(module, "take_in", take_in, "Let a range of stations take in another one.");
+    offer(module, "show", show, "Displacements at arms, and forces of links.");
+
+    PYBIND11_NUMPY_DTYPE(Factor, kind, begin, end, value);
+    PYBIND11_NUMPY_DTYPE(SampledLoad, first, last, times, samples, held);
+    PYBIND11_NUMPY_DTYPE(EndMemory, width, n_steps, levels, past, sums, near, spectra, done, dt);
+    module.attr("FACTOR") = py::dtype::of<Factor>();
+    module.attr("SAMPLED_LOAD") = py::dtype::of<SampledLoad>();
+    module.attr("END_MEMORY") = py::dtype::of<EndMemory>();
+    module.attr("NEAR") = kNear;
+    offer(module, "evaluate", evaluate, "Make the values of loads those at the time of a clock.");
+    offer(module, "recall", recall, "Make up for steps whose accelerations are in the past.");
+    offer(module, "fourier_forth", fourier_forth,
+          "Fourier transform in place, numbers in the order of reversed bits.");
+
+    offer(module, "condense_spans", condense_spans,
+          "Fill in what spans take off the unknowns that they share, at frequencies.");
+    offer(module, "cut_out", cut_out, "Short columns out of answers to unit forces.");
+    offer(module, "bridge", bridge, "Fill in amplitudes of gusts between two posts.");
+    offer(module, "add_waves", add_waves, "Add waves times amplitudes.");
 }
 
 }  // namespace

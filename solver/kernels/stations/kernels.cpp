@@ -4,6 +4,7 @@
 
 #include "stations/known_layouts.hpp"
 #include "stations/line.hpp"
+#include "stations/targets.hpp"
 
 #define CATENARY_DECLARE(target)                                              \
     namespace catenary::target {                                              \
@@ -14,8 +15,7 @@
     std::unique_ptr<Kernels> make_for_scenes(const Layout& rows, const Layout& factors); \
     }
 CATENARY_DECLARE(baseline)
-#if defined(__x86_64__) && !defined(__clang__)
-#define CATENARY_X86 1
+#ifdef CATENARY_AVX2
 CATENARY_DECLARE(avx2)
 CATENARY_DECLARE_FOR_SCENES(avx2)
 #else
@@ -37,7 +37,7 @@ struct Target {
 const std::vector<Target>& of_processor() {
     static const std::vector<Target> found = [] {
         std::vector<Target> targets;
-#ifdef CATENARY_X86
+#ifdef CATENARY_AVX2
         targets.push_back({"baseline", baseline::make, nullptr});
         __builtin_cpu_init();
         if (__builtin_cpu_supports("x86-64-v3"))

@@ -56,9 +56,7 @@ struct SceneBlocks : KnownMasks<K> {
     CATENARY_INLINE static void store(double* to, const X& x) {
         each<W>([&](auto u) CATENARY_HOT { write<L, L>(to + L * u, x.piece[u]); });
     }
-    CATENARY_INLINE static X total_of(const Sums<X>& sums) {
-        return sums.one;
-    }
+    CATENARY_INLINE static X total_of(const Sums<X>& sums) { return sums.one; }
 
     CATENARY_INLINE static void add_own(Sums<X>& sums, const double* numbers, const X& x) {
         add<kOwn>(sums, numbers, x);
@@ -140,12 +138,20 @@ class SceneKernels final : public Kernels {
     Blocks blocks_;
 };
 
+// As of one scene: with checks those of wide stations take too long to compile.
+#if defined(CATENARY_CHECKS)
+constexpr int kWidestOfScenes = 4;
+#else
+constexpr int kWidestOfScenes = kMostUnknowns;
+#endif
+
 /// Kernels of L scenes that were compiled for rows and factors, or null.
 template <int L, int K = 0>
 std::unique_ptr<Kernels> make_for_scenes(const Layout& rows, const Layout& factors) {
     if constexpr (K < std::size(kShipped)) {
         constexpr Shipped s = kShipped[K];
-        if constexpr (s.rows.unknowns * L <= kMostNumbers && s.is_for_scenes)
+        if constexpr (s.rows.unknowns <= kWidestOfScenes && s.rows.unknowns * L <= kMostNumbers &&
+                      s.is_for_scenes)
             if (rows == s.rows && factors == s.factors)
                 return std::make_unique<SceneKernels<SceneBlocks<K, L>>>(rows, factors);
         return make_for_scenes<L, K + 1>(rows, factors);

@@ -19,20 +19,25 @@ std::unique_ptr<Kernels> make_general(const Layout& rows, const Layout& factors)
 
 // Where processors differ much the oldest has the general kernels only.
 #if defined(CATENARY_GENERAL_ONLY)
-constexpr bool kHasKnown = false;
+constexpr int kWidestKnown = 0;
+#elif defined(CATENARY_CHECKS)
+// Products of wide stations, each written out, with checks take a quarter of an hour to compile.
+constexpr int kWidestKnown = 4;
 #else
-constexpr bool kHasKnown = true;
+constexpr int kWidestKnown = kMostUnknowns;
 #endif
 
 /// Kernels that were compiled for both, or null.
 template <int K = 0>
 std::unique_ptr<Kernels> make_quick(const Layout& rows, const Layout& factors) {
-    if constexpr (kHasKnown && K < std::size(kShipped)) {
+    if constexpr (K < std::size(kShipped)) {
         constexpr Shipped s = kShipped[K];
-        using Known = Blocks<s.rows.unknowns, KnownMasks<K>>;
-        if (rows == s.rows && factors == s.factors)
-            return std::make_unique<QuickKernels<Known, s.is_mixed>>(rows, factors,
-                                                                     make_general(rows, factors));
+        if constexpr (s.rows.unknowns <= kWidestKnown) {
+            using Known = Blocks<s.rows.unknowns, KnownMasks<K>>;
+            if (rows == s.rows && factors == s.factors)
+                return std::make_unique<QuickKernels<Known, s.is_mixed>>(
+                    rows, factors, make_general(rows, factors));
+        }
         return make_quick<K + 1>(rows, factors);
     }
     return nullptr;

@@ -101,10 +101,19 @@ BROKEN = {
 }
 
 
+# A file of the user's is looked for by name and never read, so that one content shows it.
 @pytest.mark.process
-@pytest.mark.parametrize("where", ["in the working directory", "of the user"])
+@pytest.mark.parametrize(
+    ("where", "contents"),
+    [("in the working directory", tuple(BROKEN)), ("of the user", ("none", "no text"))],
+    ids=["in the working directory", "of the user"],
+)
 def test_a_matplotlibrc_that_cannot_be_read_changes_no_picture(
-    run_folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, where: str
+    run_folder: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    where: str,
+    contents: tuple[str, ...],
 ) -> None:
     folder, run = tmp_path, tmp_path / "run"
     shutil.copytree(run_folder, run)
@@ -113,7 +122,8 @@ def test_a_matplotlibrc_that_cannot_be_read_changes_no_picture(
         folder = tmp_path / "config" / "matplotlib"
         folder.mkdir(parents=True)
     expected: dict[str, bytes] = {}
-    for what, content in BROKEN.items():
+    for what in contents:
+        content = BROKEN[what]
         (folder / "matplotlibrc").unlink(missing_ok=True)
         if content is None:
             (folder / "matplotlibrc").mkdir()
