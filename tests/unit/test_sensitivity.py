@@ -210,6 +210,8 @@ def test_a_step_follows_from_the_size_of_a_value() -> None:
     assert Parameter("line.contact_wire.tension_N", (2e4,)).step == pytest.approx(20.0)
     assert Parameter("line.dropper.pre_sag_mm", (0.0, 0.0)).step == pytest.approx(0.05)
     assert Parameter("line.damping.beta_per_s", (0.0,)).change == 1.0
+    # A conductor rail has some 100 N, of which a kilonewton is no small change.
+    assert Parameter("line.contact_wire.tension_N", (100.0,)).change == 1.0
 
 
 @pytest.mark.parametrize(

@@ -112,7 +112,7 @@ class Parameter:
         """By how much a table lets it change: a millimetre, kilogram or newton, a kilonewton of
         tension, or a hundredth of itself."""
         for end, by in _CHANGES_OF_FORCES.items():
-            if self.key.endswith(end):
+            if self.key.endswith(end) and by < self.size:
                 return by
         return _CHANGES.get(self.unit, 0.01 * self.size or 1.0)
 
