@@ -31,6 +31,7 @@ class Catenary(PythonPackage):
         depends_on("py-matplotlib@3.7:3.11")
         depends_on("py-xarray@2023.1:2026")
         depends_on("py-pandas@1.5:3")
+        depends_on("py-cma@4:4")
 
     # Its module for Python, gmsh.py, lies beside the library.
     depends_on("gmsh@4.11:4.15 +shared", type=("build", "run"))
