@@ -19,6 +19,7 @@ if __name__ != "catenary":
 if TYPE_CHECKING:
     from catenary.base.errors import CatenaryError, Fault, InputError, RunBroken
     from catenary.line_tables import AtRest, Plan, check, plan, static
+    from catenary.optimising import Optimum, optimise, tolerance
     from catenary.pictures import Pictures
     from catenary.results import Run, open
     from catenary.runs import run, sweep
@@ -30,6 +31,7 @@ __all__ = [
     "CatenaryError",
     "Fault",
     "InputError",
+    "Optimum",
     "Pictures",
     "Plan",
     "Run",
@@ -40,14 +42,17 @@ __all__ = [
     "check",
     "load",
     "open",
+    "optimise",
     "plan",
     "run",
     "static",
     "sweep",
+    "tolerance",
 ]
 
 _FILES = {
     "line_tables": ("AtRest", "Plan", "check", "plan", "static"),
+    "optimising": ("Optimum", "optimise", "tolerance"),
     "pictures": ("Pictures",),
     "results": ("Run", "open"),
     "runs": ("run", "sweep"),

@@ -140,7 +140,7 @@ def _classes(table: VariableTable, n: int, number: int) -> list[tuple[int, ...]]
     if table.entries == "together":
         return [tuple(range(n))]
     if table.entries == "symmetric":
-        pairs = [(i, n - 1 - i) for i in range(n // 2)]
+        pairs: list[tuple[int, ...]] = [(i, n - 1 - i) for i in range(n // 2)]
         is_place = table.key.endswith(_PLACES)  # the one in the middle stays there
         return pairs if is_place or n % 2 == 0 else [*pairs, (n // 2,)]
     given = [entry for own in table.entries for entry in own]

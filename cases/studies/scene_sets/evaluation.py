@@ -39,6 +39,7 @@ class Evaluation:
         self._workers = workers
         self._kept = KeptRows(None) if kept is None else kept
         self._known: dict[str, dict[str, Any]] = {}
+        #: Runs that were made or kept, each once.
         self.n_runs = 0
 
     def of(self, wanted: Sequence[Wanted]) -> list[dict[str, Any]]:
@@ -69,6 +70,7 @@ class Evaluation:
         return [self._known[key] for key in keys]
 
     def _run(self, new: dict[str, Scene]) -> None:
+        self.n_runs += len(new)  # those kept too, so that a study ends the same that was stopped
         for key in list(new):
             if (kept := self._kept.get(key)) is not None:
                 self._known[key] = kept
@@ -81,7 +83,6 @@ class Evaluation:
                 own["supports"] = {"max_uplift_mm": summary["supports"]["max_uplift_mm"]}
             self._known[key] = own
             self._kept.keep(key, own)
-        self.n_runs += len(new)
 
 
 def identity(scene: Scene) -> str:

@@ -40,7 +40,7 @@ class SetTable(Table):
     """The scenes of a study: all combinations of what is given."""
 
     directions: list[Direction] = Field(
-        list(DIRECTIONS), min_length=1, max_length=2, description="forward, backward"
+        ["forward", "backward"], min_length=1, max_length=2, description="forward, backward"
     )
     speeds_km_h: list[Annotated[float, Field(ge=1, le=1000)]] | None = Field(
         None, min_length=1, max_length=100, description="train speeds; the case's if absent"
@@ -105,9 +105,11 @@ def members_of(table: SetTable) -> list[Member]:
         name: [parse_assignment(text, f"train {name}:") for text in texts]
         for name, texts in (table.trains or {"": []}).items()
     }
-    lists = (table.directions, table.speeds_km_h or [None], trains, table.seeds)
+    speeds: Sequence[float | None] = table.speeds_km_h or [None]
+    combined = itertools.product(table.directions, speeds, trains, table.seeds)
     found = [
-        _member(table, *chosen, tuple(trains[chosen[2]])) for chosen in itertools.product(*lists)
+        _member(table, direction, speed, train, seed, tuple(trains[train]))
+        for direction, speed, train, seed in combined
     ]
     if len(found) > MOST_SCENES:
         raise InputError(f"the set has {len(found)} scenes; at most {MOST_SCENES} are allowed")

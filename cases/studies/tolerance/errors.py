@@ -59,11 +59,11 @@ class Group:
             pairs = zip(self.places, own, strict=True)
             return {_HEIGHTS: [[x, length_from_mm(e)] for x, e in pairs]}
         if isinstance(table, TensionErrors):
-            added = [
+            wrong = [
                 {"type": "wrong_tension", "wire": wire, "factor": 1.0 + 0.01 * e}
                 for wire, e in zip(self.places, own, strict=True)
             ]
-            return {"defects": [*self.given, *added]}
+            return {"defects": [*self.given, *wrong]}
         return {table.key: self.given + own[0]}
 
     def random(self, random: np.random.Generator, n_samples: int) -> np.ndarray:
