@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import functools
 import types
 import typing
 from collections.abc import Sequence
@@ -27,11 +28,19 @@ def known_keys(model: type[BaseModel], location: Sequence[int | str] = ()) -> li
     Where there are several kinds of table, the keys of all of them, or only of those that
     ``location``, as pydantic gives it, leads through.
     """
+    return list(_known_keys(model, tuple(location), tuple(effects.registry())))
+
+
+@functools.cache
+def _known_keys(
+    model: type[BaseModel], location: tuple[int | str, ...], registered: tuple[str, ...]
+) -> tuple[str, ...]:
+    """The same, found once for the effects that are ``registered``: studies make many scenes."""
     found: dict[str, None] = {}
     for name, field in model.model_fields.items():
         found[name] = None
         if name == "effects":
-            found |= {f"effects.{effect}": None for effect in effects.registry()}
+            found |= {f"effects.{effect}": None for effect in registered}
             continue
         inner, wildcard = tables_in(field.annotation)
         if inner:
@@ -47,7 +56,7 @@ def known_keys(model: type[BaseModel], location: Sequence[int | str] = ()) -> li
                 found |= {f"{prefix}.{key}": None for key in known_keys(table, below)}
         elif _is_free(field.annotation):
             found[f"{name}.{ANY}"] = None
-    return list(found)
+    return tuple(found)
 
 
 def kind_of(table: type[BaseModel]) -> str:

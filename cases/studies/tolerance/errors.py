@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 
 from catenary.base.errors import InputError
+from catenary.cases.scene.keys.error_sentences import unknown_key
+from catenary.cases.scene.keys.keys import is_known, known_keys
 from catenary.cases.scene.keys.units import length_from_mm, unit_of
 from catenary.cases.scene.problem import line_of, resolved
 from catenary.cases.scene.scene import Scene
@@ -64,7 +66,11 @@ class Group:
                 for wire, e in zip(self.places, own, strict=True)
             ]
             return {"defects": [*self.given, *wrong]}
-        return {table.key: self.given + own[0]}
+        if table.entry is None:
+            return {table.key: self.given + own[0]}
+        found = list(self.given)
+        found[table.entry - 1] += own[0]
+        return {table.key: found}
 
     def random(self, random: np.random.Generator, n_samples: int) -> np.ndarray:
         """Errors over their tolerance, shape (n_samples, n), all within -1 and 1."""
@@ -85,7 +91,10 @@ def groups_of(tables: Sequence[ErrorKind], scene: Scene) -> list[Group]:
     InputError
         If the line has nothing that an error is of, or heights of its own.
     """
-    keys = [one.key if isinstance(one, KeyErrors) else one.kind for one in tables]
+    keys = [
+        f"{one.key} {one.entry or ''}".strip() if isinstance(one, KeyErrors) else one.kind
+        for one in tables
+    ]
     for number, key in enumerate(keys):
         if key in keys[:number]:
             raise InputError(f"errors.{number} are of {key}, of which there are errors before")
@@ -130,8 +139,16 @@ def _group(table: ErrorKind, scene: Scene, where: str) -> Group:
 
 
 def _of_key(table: KeyErrors, tables: dict[str, Any], where: str) -> Group:
+    known = known_keys(Scene)
+    if not is_known(table.key, known):
+        raise InputError(unknown_key(table.key, f"in {where}", known))
     value = value_at(tables, table.key)
-    if not is_number(value):
-        raise InputError(f"{where}.key is {table.key}, which has no number in the scene")
+    number = table.entry
+    own = value
+    if number is not None and isinstance(value, list):
+        own = value[number - 1] if number <= len(value) else None
+    if not is_number(own):
+        at = "" if number is None else f" at entry {number}"
+        raise InputError(f"{where}.key is {table.key}, which has no number{at} in the scene")
     one = np.ones(1, dtype=bool)
-    return Group(table, [table.key], one, unit_of(table.key), [None], float(value))
+    return Group(table, [table.key], one, unit_of(table.key), [None], value)

@@ -58,6 +58,9 @@ class KeyErrors(ErrorTable):
 
     kind: Literal["key"] = Field(description="kind of error")
     key: str = Field(min_length=1, max_length=200, description="dotted key of the scene")
+    entry: Annotated[int, Field(ge=1, le=10_000)] | None = Field(
+        None, description="of a list, the number of its entry, from 1"
+    )
 
 
 ErrorKind = Annotated[
