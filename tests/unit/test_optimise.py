@@ -108,13 +108,12 @@ def test_a_search_finds_the_bottom_of_a_bowl(method: str, evaluated: Any) -> Non
         return summary(20.0 + (first - 8.0) ** 2 + (second - 14.0) ** 2)
 
     evaluated(bowl)
-    task = task_of(set=FORWARD, search={"methods": [method], "precision": 1e-3})
+    task = task_of(set=FORWARD, search={"methods": [method], "precision": 3e-3})
     (found,) = study.optimise(study.make_plan(draft(), task))
-    # Searches end with a gain below 1e-3 of 22 N: within sqrt(0.022) = 0.15 kg of the bottom.
+    # Searches end with a gain below 3e-3 of 22 N: within sqrt(0.066) = 0.26 kg of the bottom.
     # Forward differences of 0.2 kg put the bottom of a parabola 0.1 kg off.
-    within = 0.25 if method == "gradient" else 0.2
-    assert found.values[HEAD] == pytest.approx([8.0, 14.0], abs=within)
-    assert found.found.value < 20.1
+    assert found.values[HEAD] == pytest.approx([8.0, 14.0], abs=0.36)
+    assert found.found.value < 20.14
 
 
 def test_the_worst_of_two_directions_is_made_least(evaluated: Any) -> None:
@@ -166,12 +165,12 @@ def test_constraints_are_kept(method: str, evaluated: Any) -> None:
         set=FORWARD,
         variables=[{"key": HEAD, "entries": [[1]], "change": [-5.0, 5.0]}],
         constraints=[{"statistic": "min_N", "at_least": 5.0}],
-        search={"methods": [method], "precision": 1e-3},
+        search={"methods": [method], "precision": 1e-2},
     )
     (found,) = study.optimise(study.make_plan(draft(), task))
     assert not found.found.violation
-    # A gain of 1e-3 of 29 N at a slope of 6 N/kg is 0.005 kg; the strategy ends earlier.
-    assert found.values[HEAD][0] == pytest.approx(9.0, abs=0.05)
+    # A gain of 1e-2 of 29 N at a slope of 6 N/kg is 0.05 kg; generations end a little earlier.
+    assert found.values[HEAD][0] == pytest.approx(9.0, abs=0.15)
     assert found.values[HEAD][0] <= 9.0 + 1e-4
 
 
