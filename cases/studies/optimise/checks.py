@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 from catenary.base.errors import InputError
 from catenary.cases.scene.load import Draft
+from catenary.cases.scene.problem import line_of
 from catenary.cases.studies.optimise.task import OptimiseTask
 from catenary.cases.studies.scene_sets.evaluate import BROKE
 from catenary.cases.studies.scene_sets.evaluation import Evaluation, Wanted, identity
@@ -41,7 +42,7 @@ class Row(NamedTuple):
     ----------
     check, scene, direction, pantograph : where
     searched : whether the search has seen the direction
-    shipped, optimum : statistics by name
+    shipped, optimum : statistics by name, those that the run gives
     outcome : "done", or why a run has no figures
     """
 
@@ -75,7 +76,7 @@ def checks_of(draft: Draft, task: OptimiseTask) -> list[Check]:
     found = [
         Check(name, SceneSet(draft.assigned(values), members)) for name, values in numerics.items()
     ]
-    if task.checks.n_seeds:
+    if task.checks.n_seeds and line_of(scene).dropper_x.size:
         unseen = both.model_copy(update={"errors": _unseen(task)})
         samples = [one for one in members_of(unseen) if one.seed is not None]
         found.append(Check(UNSEEN, SceneSet(draft, _possible(draft, samples, task))))
@@ -149,7 +150,8 @@ def _rows(
 
 def _figures(summary: Mapping[str, Any], pantograph: Mapping[str, Any]) -> dict[str, float]:
     found = {name: pantograph[name] for name in COMPARED if name in OF_EACH_PANTOGRAPH}
-    return {**found, _OF_LINE: summary["supports"][_OF_LINE]}
+    found[_OF_LINE] = summary["supports"][_OF_LINE]
+    return {name: value for name, value in found.items() if value is not None}
 
 
 def _failed_anew(one: Mapping[str, Any], other: Mapping[str, Any]) -> list[str]:
@@ -162,7 +164,12 @@ def _failed_anew(one: Mapping[str, Any], other: Mapping[str, Any]) -> list[str]:
 
 
 def change(row: Row, statistic: str) -> float:
-    """By how much a statistic changes, over its value as shipped; that of shares as they are."""
+    """By how much a statistic changes, over its value as shipped; that of shares as they are.
+
+    Zero where a run does not give it.
+    """
+    if statistic not in row.shipped or statistic not in row.optimum:
+        return 0.0
     before, after = row.shipped[statistic], row.optimum[statistic]
     by = after - before
     return by / abs(before) if before and not statistic.endswith("_percent") else by

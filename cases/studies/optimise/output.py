@@ -157,8 +157,12 @@ def checks_in_short(rows: Sequence[Row]) -> StudyTable:
         cells["direction"] = direction if own[0].searched else f"{direction} (not searched)"
         for name, sign in COMPARED.items():
             worst = max if sign > 0 else min
-            cells[f"shipped_{name}"] = worst(row.shipped[name] for row in own)
-            cells[f"optimum_{name}"] = worst(row.optimum[name] for row in own)
+            for head, designs in (
+                ("shipped", [row.shipped for row in own]),
+                ("optimum", [row.optimum for row in own]),
+            ):
+                given = [design[name] for design in designs if name in design]
+                cells[f"{head}_{name}"] = worst(given, default=None)
         by = [100.0 * change(row, "std_N") for row in own]
         cells |= {"least": min(by), "most": max(by)}
         table.append(cells)
