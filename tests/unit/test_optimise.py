@@ -15,6 +15,7 @@ from typer.testing import CliRunner
 from catenary.base.errors import InputError
 from catenary.cases.cli.main import app
 from catenary.cases.run.at_rest.static_table import static_table
+from catenary.cases.scene.input.case_files import find_case
 from catenary.cases.scene.load import Draft, read_draft
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.optimise import output, study
@@ -26,6 +27,8 @@ from catenary.cases.studies.optimise.variables import variables_of
 from catenary.cases.studies.scene_sets import evaluation
 from catenary.cases.studies.scene_sets.evaluate import BROKE
 from catenary.cases.studies.scene_sets.task_file import read_task
+from catenary.cases.studies.tolerance.study import make_plan
+from catenary.cases.studies.tolerance.task import ToleranceTask
 
 # Six spans with one element a gap and pre-sag of each dropper.
 TINY: dict[str, Any] = {
@@ -406,3 +409,14 @@ def test_a_wrong_task_is_one_sentence(tmp_path: Path) -> None:
     assert not (tmp_path / "out").exists()
     missing = invoke("optimise", "en50318_2002", str(tmp_path / "no.toml"), "-o", str(tmp_path))
     assert missing.exit_code == 2 and "no.toml" in missing.output
+
+
+def test_shipped_tasks_are_tasks_of_their_case() -> None:
+    folder = find_case("ac_simple").parent
+    case = read_draft("ac_simple")
+    plan = study.make_plan(case, read_task(folder / "droppers.toml", OptimiseTask))
+    assert plan.variables.low.size == 5 and len(plan.scenes.members) == 2
+    tolerances = make_plan(case, read_task(folder / "installation.toml", ToleranceTask))
+    assert len(tolerances.groups[0].names) == 270
+    # Spans 9 to 22 of 30: two beside the ten that are evaluated.
+    assert np.count_nonzero(tolerances.groups[0].near) == 14 * 9

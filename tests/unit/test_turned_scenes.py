@@ -85,6 +85,13 @@ def test_the_run_in_is_as_long_in_both_directions() -> None:
 def test_a_symmetric_line_is_its_own_mirror_image() -> None:
     scene = scene_of()
     assert plain(turned(scene)) == plain(scene)
+    key = "irregularities.dropper_lengths.by_dropper"
+    # Spans 1 to 30 of 9 droppers.
+    here, there = (
+        scene_of(f"{key}=[[2, 3, 1.0], [4, 5, 2.0]]"),
+        f"{key}=[[27, 5, 2.0], [29, 7, 1.0]]",
+    )
+    assert plain(turned(here))["irregularities"] == plain(scene_of(there))["irregularities"]
 
 
 @pytest.mark.parametrize(

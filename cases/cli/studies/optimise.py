@@ -64,13 +64,15 @@ def optimise(
     plan = study.make_plan(draft_of(case, assignments), read_task(task_file, OptimiseTask))
     for sentence in plan.warnings:
         console.warn(sentence)
+    from catenary.cases.result_folder.folder_lock import held
     from catenary.cases.studies.optimise import output
     from catenary.cases.studies.scene_sets.evaluate import workers
 
-    kept = KeptRows(out, force)
-    with workers(processes) as pool:
-        found = study.optimise(plan, pool, kept, console.say)
-    files = output.write(out, plan, found)
-    kept.forget()
+    with held(out, console.alone(), f"catenary optimise {case}"):
+        kept = KeptRows(out, force)
+        with workers(processes) as pool:
+            found = study.optimise(plan, pool, kept, console.say)
+        files = output.write(out, plan, found)
+        kept.forget()
     console.say("\n" + output.as_text(plan, found) + "\n\n" + "\n".join(map(str, files)))
     return console.DONE

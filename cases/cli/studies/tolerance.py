@@ -26,6 +26,7 @@ def tolerance(
     force: Force = False,
 ) -> int:
     """Serial."""
+    from catenary.cases.result_folder.folder_lock import held
     from catenary.cases.studies.kept_rows import KeptRows
     from catenary.cases.studies.scene_sets.evaluate import workers
     from catenary.cases.studies.scene_sets.task_file import read_task
@@ -34,10 +35,11 @@ def tolerance(
 
     refuse_table(out / output.TABLE, force)
     plan = study.make_plan(draft_of(case, assignments), read_task(task_file, ToleranceTask))
-    kept = KeptRows(out, force)
-    with workers(processes) as pool:
-        found = study.find_tolerances(plan, pool, kept, console.say)
-    files = output.write(out, plan, found)
-    kept.forget()
+    with held(out, console.alone(), f"catenary tolerance {case}"):
+        kept = KeptRows(out, force)
+        with workers(processes) as pool:
+            found = study.find_tolerances(plan, pool, kept, console.say)
+        files = output.write(out, plan, found)
+        kept.forget()
     console.say("\n" + output.as_text(plan, found) + "\n\n" + "\n".join(map(str, files)))
     return console.DONE
