@@ -214,6 +214,27 @@ def test_whole_units_are_kept_where_they_are_allowed(evaluated: Any) -> None:
     assert found.values[HEAD][0] == pytest.approx(7.2 + 1.5)
 
 
+def test_whole_units_stay_within_what_is_allowed(evaluated: Any) -> None:
+    """Up to 9.4 kg is allowed, 2.2 kg more; the nearest whole unit of 0.5 kg is 2 kg, of 0.9 kg
+    one of 1.8 kg; 2.7 kg were too many. Units of 3 kg leave nothing but the case as it is."""
+
+    def slope(scene: Scene) -> dict[str, Any]:
+        first, _ = masses(scene)
+        return summary(40.0 - first, min_N=9.4 - first)
+
+    evaluated(slope)
+    for unit, expected in ((0.5, 9.2), (0.9, 9.0), (1.5, 8.7), (3.0, 9.4)):
+        tables: dict[str, Any] = {
+            "set": FORWARD,
+            "constraints": [{"statistic": "min_N", "at_least": 0.0}],
+            "variables": [{"key": HEAD, "entries": [[1]], "change": [-5.0, 5.0], "round_to": unit}],
+        }
+        (found,) = study.optimise(study.make_plan(draft(), task_of(**tables)))
+        assert found.values[HEAD][0] == pytest.approx(expected, abs=1e-3)
+        assert found.is_rounded is (unit < 3.0)
+        assert any("round_to is not kept" in text for text in found.said) is not found.is_rounded
+
+
 # --- variables -----------------------------------------------------------------------------------
 
 

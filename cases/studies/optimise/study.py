@@ -31,6 +31,9 @@ from catenary.cases.studies.scene_sets.evaluation import Evaluation
 from catenary.cases.studies.scene_sets.scene_set import FORWARD, SceneSet, members_of
 from catenary.postproc.report.study_table import StudyTable
 
+# Shares of an optimum's changes that are tried in whole units.
+_SHARES = (1.0, 0.97, 0.94, 0.9, 0.8)
+
 
 @dataclass(frozen=True)
 class Plan:
@@ -56,8 +59,9 @@ class Optimum:
     Attributes
     ----------
     method : "gradient" or "cma"
-    shipped, found : the case as it is and the best point, rounded as the task wants it
+    shipped, found : the case as it is and the best point, rounded as far as that is allowed
     values : the scene's keys at the optimum
+    is_rounded : whether its changes are whole multiples of what the task asks for
     n_runs : runs of the search
     history : all points of the search
     rows : figures under all checks
@@ -68,6 +72,7 @@ class Optimum:
     shipped: Point
     found: Point
     values: Mapping[str, Any]
+    is_rounded: bool
     n_runs: int
     history: Sequence[Point]
     rows: Sequence[Row]
@@ -76,8 +81,10 @@ class Optimum:
     @property
     def said(self) -> list[str]:
         """What it did not improve, the unseen direction first."""
-        first = trap(self.rows)
-        return ([first] if first else []) + not_improved(self.rows)
+        said = [trap(self.rows)] if trap(self.rows) else []
+        if not self.is_rounded:
+            said.append("no changes in whole units keep all constraints: round_to is not kept")
+        return said + not_improved(self.rows)
 
 
 def make_plan(draft: Draft, task: OptimiseTask) -> Plan:
@@ -169,15 +176,24 @@ def _by(method: str, plan: Plan, evaluation: Evaluation, say: Callable[[str], No
     best = search(problem, method, task.search)
     n_runs, history = evaluation.n_runs - first, tuple(problem.history)
     problem.most_runs = None
-    found = problem.points([variables.rounded(best.change)])[0]
-    if found.broke or found.violation > best.violation:
-        found = best  # whole units leave what is allowed
+    found = _rounded(problem, best)
     shipped = problem.shipped
     values = variables.values(found.change)
     say(f"{method}: {shipped.value:.4g} to {found.value:.4g} in {n_runs} runs; checks")
     rows = compare(plan.checks, task.set.directions, variables.shipped, values, evaluation)
     droppers = _cut(plan, values)
-    return Optimum(method, shipped, found, values, n_runs, history, rows, droppers)
+    whole = bool(np.array_equal(variables.rounded(found.change), found.change))
+    return Optimum(method, shipped, found, values, whole, n_runs, history, rows, droppers)
+
+
+def _rounded(problem: Problem, best: Point) -> Point:
+    """The best point in whole units: where these leave what is allowed, a little nearer to the case
+    as shipped; as it is if none is allowed."""
+    for share in _SHARES:
+        point = problem.points([problem.variables.rounded(share * best.change)])[0]
+        if point.violation <= best.violation:
+            return point
+    return best
 
 
 def _cut(plan: Plan, values: Mapping[str, Any]) -> StudyTable:
