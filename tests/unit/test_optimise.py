@@ -235,6 +235,24 @@ def test_whole_units_stay_within_what_is_allowed(evaluated: Any) -> None:
         assert any("round_to is not kept" in text for text in found.said) is not found.is_rounded
 
 
+def test_a_short_search_is_checked_on_the_whole_stretch() -> None:
+    case = read_draft("ac_simple").assigned(
+        [("train.speed_km_h", 290.0, "in the test"), ("line.n_spans", 26, "in the test")]
+    )
+    variables = [{"key": "line.contact_wire.tension_N", "change": [0.0, 5e3]}]
+    plan = study.make_plan(case, task_of(variables=variables, search={"short": True}))
+    (warning, _) = plan.warnings
+    assert "shortened by its [test] table" in warning
+    searched, checked = (
+        scenes.scene(scenes.members[0]) for scenes in (plan.scenes, plan.checks[0].scenes)
+    )
+    whole, short = (one.scene().evaluation for one in (case, read_draft("ac_simple").shortened()))
+    assert (searched.evaluation, checked.evaluation) == (short, whole) and short != whole
+    # What was assigned holds, also where the [test] table has another value.
+    assert searched.line.n_spans == checked.line.n_spans == 26
+    assert searched.train.speed_km_h == 290.0
+
+
 # --- variables -----------------------------------------------------------------------------------
 
 

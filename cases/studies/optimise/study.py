@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from catenary.base.errors import InputError
+from catenary.cases.scene.input.toml_input import REMOVED
 from catenary.cases.scene.load import Draft
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.kept_rows import KeptRows
@@ -29,6 +30,7 @@ from catenary.cases.studies.optimise.task import OptimiseTask
 from catenary.cases.studies.optimise.variables import Variables, variables_of
 from catenary.cases.studies.scene_sets.evaluation import Evaluation
 from catenary.cases.studies.scene_sets.scene_set import FORWARD, SceneSet, members_of
+from catenary.cases.studies.scene_sets.scene_values import value_at
 from catenary.postproc.report.study_table import StudyTable
 
 # Shares of an optimum's changes that are tried in whole units.
@@ -96,7 +98,7 @@ def make_plan(draft: Draft, task: OptimiseTask) -> Plan:
         If a variable is none of the case, or a scene of the set is wrong.
     """
     whole = draft.scene()
-    searched = draft.shortened() if task.search.short else draft
+    searched = _shortened(draft) if task.search.short else draft
     scenes = SceneSet(searched, members_of(task.set)).checked()
     variables = variables_of(task.variables, whole)
     checks = checks_of(draft, task)
@@ -108,6 +110,13 @@ def make_plan(draft: Draft, task: OptimiseTask) -> Plan:
         )
     warnings += _narrow(task, scenes, variables)
     return Plan(whole.case.name, task, scenes, variables, checks, warnings)
+
+
+def _shortened(draft: Draft) -> Draft:
+    """The case with its ``[test]`` table, to which values that were assigned do not give way."""
+    own = [(key, value_at(draft.raw, key), where) for key, where in draft.given]
+    given = ((key, REMOVED if value is None else value, where) for key, value, where in own)
+    return draft.shortened().assigned(given)
 
 
 def _narrow(task: OptimiseTask, scenes: SceneSet, variables: Variables) -> list[str]:
