@@ -74,11 +74,11 @@ class Group:
 
     def random(self, random: np.random.Generator, n_samples: int) -> np.ndarray:
         """Errors over their tolerance, shape (n_samples, n), all within -1 and 1."""
-        from scipy.special import ndtr, ndtri
-
         shares = random.uniform(-1.0, 1.0, (n_samples, len(self.names)))
         if self.table.distribution == "uniform":
             return shares
+        from scipy.special import ndtr, ndtri
+
         within = ndtr(1.0 / _NORMAL) - 0.5
         return np.asarray(_NORMAL * ndtri(0.5 + shares * within))
 

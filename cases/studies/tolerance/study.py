@@ -212,7 +212,10 @@ class _Search:
     def _holds(self, varied: _Varied, level: float, criterion: str) -> bool:
         n = self.samples.number
         allowed = int(np.floor((1.0 - self.samples.probability) * n + 1e-9))
-        return self._failures(varied, level, criterion, allowed) <= allowed
+        holds = self._failures(varied, level, criterion, allowed) <= allowed
+        said = "kept" if holds else "not kept"
+        self.say(f"    {varied.name} +-{level:.3g} {varied.unit}: {criterion} {said}")
+        return holds
 
     def _failures(self, varied: _Varied, level: float, criterion: str, enough: int) -> int:
         """Samples that do not keep a criterion at a level; counting ends above ``enough``."""
