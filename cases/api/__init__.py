@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from catenary.base.errors import CatenaryError, Fault, InputError, RunBroken
     from catenary.estimates import Uncertainty, uncertainty
     from catenary.line_tables import AtRest, Plan, check, plan, static
+    from catenary.optimising import Optimum, optimise, tolerance
     from catenary.pictures import Pictures
     from catenary.results import Run, open
     from catenary.runs import run, sweep
@@ -32,6 +33,7 @@ __all__ = [
     "CatenaryError",
     "Fault",
     "InputError",
+    "Optimum",
     "Pictures",
     "Plan",
     "Run",
@@ -43,17 +45,20 @@ __all__ = [
     "check",
     "load",
     "open",
+    "optimise",
     "plan",
     "run",
     "sensitivity",
     "static",
     "sweep",
+    "tolerance",
     "uncertainty",
 ]
 
 _FILES = {
     "estimates": ("Uncertainty", "uncertainty"),
     "line_tables": ("AtRest", "Plan", "check", "plan", "static"),
+    "optimising": ("Optimum", "optimise", "tolerance"),
     "pictures": ("Pictures",),
     "results": ("Run", "open"),
     "runs": ("run", "sweep"),

@@ -22,7 +22,7 @@ from catenary.cases.terminal import console
 from catenary.solver.effects import all_effects as effects
 
 VERBS = ["run", "restart", "sweep", "list", "plan", "check", "mesh", "static", "pantograph"]
-VERBS += ["report", "compare", "hard", "stability-map", "new", "doctor"]
+VERBS += ["report", "compare", "hard", "stability-map", "new", "doctor", "optimise", "tolerance"]
 SUMMARY = {
     "case": "en50318_2002",
     "speed_km_h": 250.0,

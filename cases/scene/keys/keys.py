@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import difflib
+import functools
 import types
 import typing
 from collections.abc import Sequence
-from functools import lru_cache
 from typing import Annotated, Any
 
 from pydantic import BaseModel
@@ -28,19 +28,19 @@ def known_keys(model: type[BaseModel], location: Sequence[int | str] = ()) -> li
     Where there are several kinds of table, the keys of all of them, or only of those that
     ``location``, as pydantic gives it, leads through.
     """
-    # A sweep asks for every scene.
     return list(_known_keys(model, tuple(location), tuple(effects.registry())))
 
 
-@lru_cache(maxsize=512)
+@functools.cache
 def _known_keys(
-    model: type[BaseModel], location: tuple[int | str, ...], effect_names: tuple[str, ...]
+    model: type[BaseModel], location: tuple[int | str, ...], registered: tuple[str, ...]
 ) -> tuple[str, ...]:
+    """The same, found once for the effects that are ``registered``: studies make many scenes."""
     found: dict[str, None] = {}
     for name, field in model.model_fields.items():
         found[name] = None
         if name == "effects":
-            found |= {f"effects.{effect}": None for effect in effect_names}
+            found |= {f"effects.{effect}": None for effect in registered}
             continue
         inner, wildcard = tables_in(field.annotation)
         if inner:
@@ -53,7 +53,7 @@ def _known_keys(
                 chosen = tuple(table for table in inner if kind_of(table) == below[0])
                 inner, below = chosen or inner, below[1:] if chosen else below
             for table in inner:
-                keys = _known_keys(table, below, effect_names)
+                keys = _known_keys(table, below, registered)
                 found |= {f"{prefix}.{key}": None for key in keys}
         elif _is_free(field.annotation):
             found[f"{name}.{ANY}"] = None

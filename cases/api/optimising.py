@@ -1,0 +1,231 @@
+"""Optimisation and tolerances of scenes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from catenary.cases.studies.optimise.task import OptimiseTask
+from catenary.cases.studies.records import KeptRows
+from catenary.cases.studies.scene_sets.task_file import read_task
+from catenary.cases.studies.tolerance.task import ToleranceTask
+from catenary.runs import _line, _nothing
+from catenary.scenes import Scene, SceneLike, draft_of, plain_value, scene_of
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from catenary.cases.studies.optimise.study import Optimum as Found
+    from catenary.cases.studies.optimise.study import Plan
+
+Task = str | Path | Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Optimum:
+    """What a method of ``optimise`` found: the better scene, and how it compares.
+
+    As text it is what ``catenary optimise`` prints of it.
+
+    Attributes
+    ----------
+    method : str
+        "gradient" or "cma".
+    scene : Scene
+        With the optimum's values.
+    shipped, objective : float
+        The objective over the set as the scene was and at the optimum, in its statistic's unit.
+    constraints_kept : bool
+        Whether all constraints are kept.
+    not_improved : list of str
+        Sentences on what gets worse somewhere; empty if nothing does in any check.
+    checks : pandas.DataFrame
+        A row for each pantograph of each scene under each check, as in ``checks_*.csv``.
+    droppers : pandas.DataFrame
+        A row for each dropper, as in ``droppers_*.csv``: lengths and their changes [mm].
+
+    Examples
+    --------
+    >>> task = {
+    ...     "set": {"directions": ["forward"]},
+    ...     "variables": [{"key": "contact.stiffness_N_per_m", "change": [-2e4, 0.0]}],
+    ...     "search": {"most_runs": 2},
+    ...     "checks": {"n_seeds": 0},
+    ... }
+    >>> (best,) = catenary.optimise(catenary.load("en50318_2002", short=True), task)
+    >>> sorted(set(best.checks.check)), bool((best.droppers.change_mm == 0.0).all())
+    (['as it is', 'mesh x 2', 'step / 2'], True)
+    """
+
+    method: str
+    scene: Scene
+    shipped: float
+    objective: float
+    constraints_kept: bool
+    not_improved: list[str]
+    checks: pd.DataFrame
+    droppers: pd.DataFrame
+    _text: str
+
+    def __str__(self) -> str:
+        return self._text
+
+    def __repr__(self) -> str:
+        return f"<catenary.Optimum {self.method}: {self.shipped:.4g} to {self.objective:.4g}>"
+
+
+def optimise(
+    scene: SceneLike,
+    task: Task,
+    out: str | Path | None = None,
+    *,
+    jobs: int = 1,
+    force: bool = False,
+    progress: bool = False,
+) -> list[Optimum]:
+    """Choose numbers of a scene for the best contact force over a set of scenes. Not collective.
+
+    Parameters
+    ----------
+    scene : Scene, str, Path or mapping
+        What is optimised.
+    task : str, Path or mapping
+        Variables, objective, constraints and scenes: the file that ``catenary optimise`` takes, or
+        its tables.
+    out : str or Path, optional
+        Folder into which all is written that ``catenary optimise -o`` writes. Runs that are kept
+        there are not made again.
+    jobs : int
+        Processes that share the runs, 0 for one on each core. With more than one a script needs
+        ``if __name__ == "__main__":`` about its work.
+    force : bool
+        Whether results in ``out`` are replaced.
+    progress : bool
+        Whether better values are shown on standard error as they are found.
+
+    Returns
+    -------
+    list of Optimum
+        One for each method of the task.
+
+    Raises
+    ------
+    InputError
+        If the task or a scene of it is wrong.
+
+    Examples
+    --------
+    >>> scene = catenary.load("en50318_2002", short=True)
+    >>> task = {
+    ...     "variables": [{"key": "line.contact_wire.tension_N", "change": [0.0, 4000.0]}],
+    ...     "search": {"most_runs": 3},
+    ...     "checks": {"n_seeds": 0},
+    ... }
+    >>> (best,) = catenary.optimise(scene, task)
+    >>> best.objective < best.shipped
+    True
+    """
+    from catenary.cases.result_folder.output_folder import refuse_table
+    from catenary.cases.studies.optimise import output, study
+    from catenary.cases.studies.scene_sets.evaluate import workers
+
+    scene = scene_of(scene)
+    if out is not None:
+        refuse_table(Path(out) / output.RECORD, force)
+    plan = study.make_plan(draft_of(scene), _task(task, OptimiseTask))
+    kept = KeptRows(None if out is None else Path(out), force)
+    with workers(jobs) as pool:
+        found = study.optimise(plan, pool, kept, _line if progress else _nothing)
+    if out is not None:
+        output.write(Path(out), plan, found)
+        kept.forget()
+    return [_optimum(scene, plan, one) for one in found]
+
+
+def _optimum(scene: Scene, plan: Plan, found: Found) -> Optimum:
+    import pandas as pd
+
+    from catenary.cases.studies.optimise import output
+
+    return Optimum(
+        found.method,
+        scene.replace(found.values),
+        found.shipped.value,
+        found.found.value,
+        not found.found.violation,
+        found.said,
+        pd.DataFrame(output.checks_table(found.rows).records()),
+        pd.DataFrame(found.droppers.records()),
+        output.as_text(plan, [found]),
+    )
+
+
+def tolerance(
+    scene: SceneLike,
+    task: Task,
+    out: str | Path | None = None,
+    *,
+    jobs: int = 1,
+    force: bool = False,
+    progress: bool = False,
+) -> pd.DataFrame:
+    """How far an installation may be off for each criterion to hold. Not collective.
+
+    Parameters
+    ----------
+    scene : Scene, str, Path or mapping
+        The line, its train and criteria.
+    task : str, Path or mapping
+        Errors, criteria and scenes: the file that ``catenary tolerance`` takes, or its tables.
+    out, jobs, force, progress
+        As for ``optimise``.
+
+    Returns
+    -------
+    pandas.DataFrame
+        A row for each error and criterion, as in ``tolerance.csv``: the tolerance ``level`` in
+        ``unit``, samples that keep the criterion there, and tolerances in the worst case.
+
+    Raises
+    ------
+    InputError
+        If the task or a scene of it is wrong.
+
+    Examples
+    --------
+    >>> task = {
+    ...     "set": {"directions": ["forward"]},
+    ...     "errors": [{"name": "tension", "kind": "tension", "level": 2.0, "most": 4.0}],
+    ...     "criteria": [{"statistic": "std_N", "at_most": 35.0}],
+    ...     "samples": {"number": 2, "probability": 0.6, "worst_case": False},
+    ... }
+    >>> table = catenary.tolerance(catenary.load("en50318_2002", short=True), task)
+    >>> table.level.tolist()
+    [4.0]
+    """
+    import pandas as pd
+
+    from catenary.cases.result_folder.output_folder import refuse_table
+    from catenary.cases.studies.scene_sets.evaluate import workers
+    from catenary.cases.studies.tolerance import output, study
+
+    if out is not None:
+        refuse_table(Path(out) / output.TABLE, force)
+    plan = study.make_plan(draft_of(scene), _task(task, ToleranceTask))
+    kept = KeptRows(None if out is None else Path(out), force)
+    with workers(jobs) as pool:
+        found = study.find_tolerances(plan, pool, kept, _line if progress else _nothing)
+    if out is not None:
+        output.write(Path(out), plan, found)
+        kept.forget()
+    rows: Sequence[Mapping[str, Any]] = output.table_of(found).records()
+    return pd.DataFrame(rows)
+
+
+def _task(task: Task, model: Any) -> Any:
+    """A checked task."""
+    if isinstance(task, Mapping):
+        return read_task(plain_value(task, "the task"), model)
+    return read_task(Path(task), model)

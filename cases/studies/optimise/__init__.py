@@ -1,0 +1,1 @@
+"""Optimisation of a scene: variables, objective and constraints over a set of scenes."""

@@ -1,0 +1,224 @@
+"""Checks of an optimum: the whole stretch, finer numerics, errors that no search has seen."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+from catenary.base.errors import InputError
+from catenary.cases.scene.load import Draft
+from catenary.cases.scene.problem import line_of
+from catenary.cases.studies.optimise.task import OptimiseTask
+from catenary.cases.studies.scene_sets.evaluate import BROKE
+from catenary.cases.studies.scene_sets.evaluation import Evaluation, Wanted, identity
+from catenary.cases.studies.scene_sets.figures import OF_EACH_PANTOGRAPH
+from catenary.cases.studies.scene_sets.scene_set import (
+    DIRECTIONS,
+    ErrorSamples,
+    Member,
+    SceneSet,
+    members_of,
+)
+
+AS_IS, FINER_MESH, SHORTER_STEP, UNSEEN = "as it is", "mesh x 2", "step / 2", "unseen errors"
+# What is compared, and the direction in which it gets worse.
+COMPARED = {"std_N": 1.0, "max_N": 1.0, "min_N": -1.0, "loss_percent": 1.0, "max_uplift_mm": 1.0}
+# Changes below this share, or this much of a percentage, are no change.
+_SAME = 0.005
+_OF_LINE = "max_uplift_mm"
+
+
+class Check(NamedTuple):
+    """A set of scenes under which designs are compared."""
+
+    name: str
+    scenes: SceneSet
+
+
+class Row(NamedTuple):
+    """A pantograph of a scene under a check: figures as shipped and at the optimum.
+
+    Attributes
+    ----------
+    check, scene, direction, pantograph : where
+    searched : whether the search has seen the direction
+    shipped, optimum : statistics by name, those that the run gives
+    outcome : "done", or why a run has no figures
+    """
+
+    check: str
+    scene: str
+    direction: str
+    searched: bool
+    pantograph: str
+    shipped: Mapping[str, float]
+    optimum: Mapping[str, float]
+    failed: Sequence[str]
+    outcome: str = "done"
+
+
+def checks_of(draft: Draft, task: OptimiseTask) -> list[Check]:
+    """The checks of a task, on the whole stretch of the case and in both directions.
+
+    Raises
+    ------
+    InputError
+        If a scene of them is wrong.
+    """
+    both = task.set.model_copy(update={"directions": list(DIRECTIONS)})
+    scene = draft.scene()
+    numerics: dict[str, list[tuple[str, Any, str]]] = {
+        AS_IS: [],
+        FINER_MESH: [("mesh.elements_per_gap", 2 * scene.mesh.elements_per_gap, FINER_MESH)],
+        SHORTER_STEP: [("numerics.dt_s", 0.5 * scene.numerics.dt_s, SHORTER_STEP)],
+    }
+    members = _possible(draft, members_of(both), task)
+    found = [
+        Check(name, SceneSet(draft.assigned(values), members)) for name, values in numerics.items()
+    ]
+    if task.checks.n_seeds and line_of(scene).dropper_x.size:
+        unseen = both.model_copy(update={"errors": _unseen(task)})
+        samples = [one for one in members_of(unseen) if one.seed is not None]
+        found.append(Check(UNSEEN, SceneSet(draft, _possible(draft, samples, task))))
+    return [Check(one.name, one.scenes.checked()) for one in found]
+
+
+def _possible(draft: Draft, members: Sequence[Member], task: OptimiseTask) -> list[Member]:
+    """The members that can be made; a direction that the task has not may be impossible."""
+    scenes = SceneSet(draft, members)
+    found = []
+    for member in members:
+        if member.direction not in task.set.directions:
+            try:
+                scenes.scene(member)
+            except InputError:
+                continue
+        found.append(member)
+    return found
+
+
+def _unseen(task: OptimiseTask) -> ErrorSamples:
+    given = task.set.errors
+    deviation = task.checks.dropper_lengths_mm if given is None else given.dropper_lengths_mm
+    first = 1 + max([0] if given is None else given.seeds)
+    seeds = list(range(first, first + task.checks.n_seeds))
+    return ErrorSamples(dropper_lengths_mm=deviation, seeds=seeds)
+
+
+def compare(
+    checks: Sequence[Check],
+    searched: Sequence[str],
+    shipped: Mapping[str, Any],
+    optimum: Mapping[str, Any],
+    evaluation: Evaluation,
+) -> list[Row]:
+    """All figures of two designs, as values by dotted keys. Not collective.
+
+    ``searched`` are the directions that the search has seen. All runs are made together.
+    """
+    places = [(check, member) for check in checks for member in check.scenes.members]
+    wanted: list[Wanted] = [
+        (check.scenes, member, values) for values in (shipped, optimum) for check, member in places
+    ]
+    summaries = evaluation.of(wanted)
+    before, after = summaries[: len(places)], summaries[len(places) :]
+    rows: list[Row] = []
+    for (check, member), one, other in zip(places, before, after, strict=True):
+        rows += _rows(check.name, member, member.direction in searched, one, other)
+    return rows
+
+
+def _rows(
+    check: str,
+    member: Member,
+    searched: bool,
+    one: Mapping[str, Any],
+    other: Mapping[str, Any],
+) -> list[Row]:
+    head = check, member.name, member.direction, searched
+    broke = [
+        f"{name}: {s[BROKE]}" for name, s in (("shipped", one), ("optimum", other)) if BROKE in s
+    ]
+    if broke:
+        return [Row(*head, "", {}, {}, [], "; ".join(broke))]
+    failed = _failed_anew(one, other)
+    return [
+        Row(*head, after["name"], _figures(one, before), _figures(other, after), failed)
+        for before, after in zip(one["pantographs"], other["pantographs"], strict=True)
+    ]
+
+
+def _figures(summary: Mapping[str, Any], pantograph: Mapping[str, Any]) -> dict[str, float]:
+    found = {name: pantograph[name] for name in COMPARED if name in OF_EACH_PANTOGRAPH}
+    found[_OF_LINE] = summary["supports"][_OF_LINE]
+    return {name: value for name, value in found.items() if value is not None}
+
+
+def _failed_anew(one: Mapping[str, Any], other: Mapping[str, Any]) -> list[str]:
+    """Acceptance criteria that the optimum fails and the case as shipped does not."""
+    before, after = (
+        {row["criterion"] for row in summary["acceptance"] if row["passed"] is False}
+        for summary in (one, other)
+    )
+    return sorted(after - before)
+
+
+def change(row: Row, statistic: str) -> float:
+    """By how much a statistic changes, over its value as shipped; that of shares as they are.
+
+    Zero where a run does not give it.
+    """
+    if statistic not in row.shipped or statistic not in row.optimum:
+        return 0.0
+    before, after = row.shipped[statistic], row.optimum[statistic]
+    by = after - before
+    return by / abs(before) if before and not statistic.endswith("_percent") else by
+
+
+def not_improved(rows: Sequence[Row]) -> list[str]:
+    """Sentences on what gets worse somewhere, and on runs that broke; none if nothing does."""
+    said = []
+    done = [row for row in rows if row.outcome == "done"]
+    for name, sign in COMPARED.items():
+        worse = [row for row in done if sign * change(row, name) > _SAME]
+        if worse:
+            most = max(worse, key=lambda row: sign * change(row, name))
+            said.append(
+                f"{name} gets worse in {len(worse)} of {len(done)} rows, most with {most.check}, "
+                f"{most.scene}{f', {most.pantograph}' if most.pantograph else ''}: "
+                f"{most.shipped[name]:.4g} to {most.optimum[name]:.4g}"
+            )
+    for criterion in sorted({name for row in done for name in row.failed}):
+        where = [row for row in done if criterion in row.failed]
+        said.append(
+            f"the criterion {criterion} fails in {len(where)} rows where the case as shipped "
+            f"keeps it, first with {where[0].check}, {where[0].scene}"
+        )
+    said += [f"{row.check}, {row.scene}: {row.outcome}" for row in rows if row.outcome != "done"]
+    return said
+
+
+def trap(rows: Sequence[Row]) -> str:
+    """What becomes of the direction that no search has seen; empty if all were seen."""
+    own = [row for row in rows if row.check == AS_IS and row.outcome == "done"]
+    seen, unseen = ([row for row in own if row.searched is side] for side in (True, False))
+    if not seen or not unseen:
+        return ""
+    here, there = (max(change(row, "std_N") for row in rows_) for rows_ in (seen, unseen))
+    return (
+        f"it was searched in the direction {seen[0].direction} alone: std_N changes there by "
+        f"{100 * here:+.1f} % at most, and in the other direction by {100 * there:+.1f} %"
+    )
+
+
+def one_sided(scenes: SceneSet, values: Mapping[str, Any]) -> bool:
+    """Whether the line differs from its mirror image after a change, for the first scene."""
+    member = scenes.members[0]
+    try:
+        here, there = (
+            identity(scenes.scene(member._replace(direction=direction), values))
+            for direction in DIRECTIONS
+        )
+    except InputError:
+        return True
+    return here != there

@@ -1,0 +1,225 @@
+"""What an optimisation leaves: tables for installers and of checks, the scene's keys, a page."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from catenary.cases.scene.keys.units import unit_of
+from catenary.cases.studies.optimise.checks import AS_IS, COMPARED, Row, change
+from catenary.cases.studies.optimise.droppers import of_one_span
+from catenary.cases.studies.optimise.objective import Point
+from catenary.cases.studies.optimise.study import Optimum, Plan
+from catenary.cases.studies.sweep.variants import text_of
+from catenary.postproc.files.csv_text import csv_text
+from catenary.postproc.files.disk import plain, write_all
+from catenary.postproc.report.study_table import Column, StudyTable
+
+RECORD, PAGE, KEYS = "optimise.json", "optimise.md", "optimum.toml"
+DROPPERS, CHECKS, HISTORY = "droppers", "checks", "history"
+
+
+def write(out_dir: Path, plan: Plan, found: Sequence[Optimum]) -> list[Path]:
+    """Write all tables of an optimisation; returns the files. Not collective."""
+    content: dict[str, bytes | str] = {
+        RECORD: json.dumps(plain(record(plan, found)), indent=1, ensure_ascii=False) + "\n",
+        PAGE: markdown(plan, found),
+        KEYS: keys_text(found),
+    }
+    for one in found:
+        content[f"{DROPPERS}_{one.method}.csv"] = one.droppers.csv()
+        content[f"{CHECKS}_{one.method}.csv"] = checks_table(one.rows).csv()
+        content[f"{HISTORY}_{one.method}.csv"] = history_csv(plan, one.history)
+    return write_all(out_dir, content)
+
+
+def record(plan: Plan, found: Sequence[Optimum]) -> dict[str, Any]:
+    """All results as plain values."""
+    return {
+        "case": plan.name,
+        "task": plan.task.model_dump(exclude_none=True),
+        "warnings": list(plan.warnings),
+        "optima": [
+            {
+                "method": one.method,
+                "objective_shipped": one.shipped.value,
+                "objective": one.found.value,
+                "violation_shipped": one.shipped.violation,
+                "violation": one.found.violation,
+                "n_runs": one.n_runs,
+                "values": dict(one.values),
+                "not_improved": one.said,
+                "checks": checks_table(one.rows).records(),
+                "droppers": one.droppers.records(),
+            }
+            for one in found
+        ],
+    }
+
+
+def keys_text(found: Sequence[Optimum]) -> str:
+    """The optima as named variants, which ``catenary sweep --variants`` reads."""
+    lines = []
+    for one in found:
+        texts = [json.dumps(f"{key}={text_of(value)}") for key, value in one.values.items()]
+        lines.append(f"{one.method} = [{', '.join(texts)}]")
+    return "\n".join(["# Keys of the optima, for `catenary sweep CASE --variants`.", *lines, ""])
+
+
+def history_csv(plan: Plan, history: Sequence[Point]) -> str:
+    """All points of a search in their order: objective, violation, changes of the variables."""
+    heads = ["objective", "violation", *(one.name for one in plan.variables.components)]
+    heads.append("broke")
+    rows = (
+        [_finite(point.value), _finite(point.violation), *point.change.tolist(), point.broke]
+        for point in history
+    )
+    return csv_text(heads, rows)
+
+
+def _finite(value: float) -> float | str:
+    return value if np.isfinite(value) else ""
+
+
+def variables_table(plan: Plan, one: Optimum) -> StudyTable:
+    """Values of the variables as shipped and at the optimum."""
+    rows: list[Mapping[str, Any]] = []
+    for part, by in zip(plan.variables.components, one.found.change.tolist(), strict=True):
+        entry = part.entries[0] if part.entries else None
+        before, after = (
+            values[part.key] if entry is None else values[part.key][entry]
+            for values in (plan.variables.shipped, one.values)
+        )
+        at = " (at a bound)" if by in (part.low, part.high) else ""
+        unit = unit_of(part.key)
+        rows.append(
+            {
+                "variable": f"{part.name}{f' [{unit}]' if unit else ''}{at}",
+                "shipped": before,
+                "optimum": after,
+                "change": after - before,
+            }
+        )
+    columns = (
+        Column("variable", "variable"),
+        Column("shipped", "as shipped", ".5g"),
+        Column("optimum", "optimum", ".5g"),
+        Column("change", "change", "+.4g"),
+    )
+    return StudyTable(columns, rows, "Variables")
+
+
+def checks_table(rows: Sequence[Row]) -> StudyTable:
+    """A row for each pantograph of each scene under each check."""
+    columns = [
+        Column("check", "check"),
+        Column("scene", "scene"),
+        Column("pantograph", "pantograph"),
+        Column("searched"),
+        Column("outcome"),
+    ]
+    table: list[dict[str, Any]] = []
+    for row in rows:
+        cells: dict[str, Any] = {"check": row.check, "scene": row.scene, "outcome": row.outcome}
+        cells |= {"pantograph": row.pantograph, "searched": row.searched}
+        for name in COMPARED:
+            cells[f"shipped_{name}"] = row.shipped.get(name)
+            cells[f"optimum_{name}"] = row.optimum.get(name)
+        done = row.outcome == "done"
+        cells["std_change_percent"] = 100.0 * change(row, "std_N") if done else None
+        table.append(cells)
+    for name in COMPARED:
+        columns += [Column(f"shipped_{name}", name, ".4g"), Column(f"optimum_{name}", "->", ".4g")]
+    columns.append(Column("std_change_percent", "std [%]", "+.1f"))
+    return StudyTable(columns, table, "Checks")
+
+
+def checks_in_short(rows: Sequence[Row]) -> StudyTable:
+    """A row for each check and direction: the worst figures of their scenes and pantographs."""
+    columns = [Column("check", "check"), Column("direction", "direction"), Column("n", "rows", "d")]
+    for name, sign in COMPARED.items():
+        word = "max" if sign > 0 else "min"
+        columns.append(Column(f"shipped_{name}", f"{word} {name}", ".4g"))
+        columns.append(Column(f"optimum_{name}", "->", ".4g"))
+    columns.append(Column("least", "std by [%]", "+.1f"))
+    columns.append(Column("most", "to", "+.1f"))
+    groups: dict[tuple[str, str], list[Row]] = {}
+    for row in rows:
+        if row.outcome == "done":
+            groups.setdefault((row.check, row.direction), []).append(row)
+    table: list[dict[str, Any]] = []
+    for (check, direction), own in groups.items():
+        cells: dict[str, Any] = {"check": check, "n": len(own)}
+        cells["direction"] = direction if own[0].searched else f"{direction} (not searched)"
+        for name, sign in COMPARED.items():
+            worst = max if sign > 0 else min
+            for head, designs in (
+                ("shipped", [row.shipped for row in own]),
+                ("optimum", [row.optimum for row in own]),
+            ):
+                given = [design[name] for design in designs if name in design]
+                cells[f"{head}_{name}"] = worst(given, default=None)
+        by = [100.0 * change(row, "std_N") for row in own]
+        cells |= {"least": min(by), "most": max(by)}
+        table.append(cells)
+    return StudyTable(columns, table, "Checks")
+
+
+def sentence(one: Optimum, plan: Plan) -> str:
+    """The result of a method in one sentence."""
+    objective = plan.task.objective
+    kept = "all constraints kept" if plan.task.constraints else "no constraints"
+    if one.found.violation:
+        kept = "constraints NOT kept"
+    share = one.found.value / one.shipped.value - 1.0 if one.shipped.value else 0.0
+    return (
+        f"{plan.name}, {one.method}: {objective.over} {objective.statistic} of the set "
+        f"{one.shipped.value:.4g} to {one.found.value:.4g} ({100 * share:+.1f} %), {kept}, "
+        f"{one.n_runs} runs of the search"
+    )
+
+
+def tables_of(plan: Plan, one: Optimum) -> list[StudyTable]:
+    """The tables that people read: variables, droppers of one span, checks in short."""
+    tables = [variables_table(plan, one)]
+    rows = one.droppers.rows
+    if any(abs(row["change_mm"]) > 1e-6 or abs(row["moved_mm"]) > 1e-6 for row in rows):
+        tables.append(of_one_span(one.droppers, _middle_span(rows)))
+    return [*tables, checks_in_short(one.rows)]
+
+
+def _middle_span(rows: Sequence[Mapping[str, Any]]) -> int:
+    """The span in the middle of those with droppers: those at the ends hang otherwise."""
+    spans = sorted({int(row["span"]) for row in rows})
+    return spans[len(spans) // 2]
+
+
+def as_text(plan: Plan, found: Sequence[Optimum]) -> str:
+    """The results for a terminal."""
+    parts = []
+    for one in found:
+        parts.append(sentence(one, plan))
+        parts += [f"\n{table.title}\n{table.text()}" for table in tables_of(plan, one)]
+        told = one.said or [f"none of {', '.join(COMPARED)} gets worse in any row of the checks"]
+        parts.append("\n" + "\n".join(f"REMARK      {text}" for text in told) + "\n")
+    return "\n".join(parts).rstrip()
+
+
+def markdown(plan: Plan, found: Sequence[Optimum]) -> str:
+    """The results as a page."""
+    parts = [f"# Optimisation of {plan.name}"]
+    parts += [f"**Warning:** {text}" for text in plan.warnings]
+    for one in found:
+        parts += [f"## {one.method}", sentence(one, plan)]
+        parts += [f"### {table.title}\n\n{table.markdown()}" for table in tables_of(plan, one)]
+        told = one.said or [f"None of {', '.join(COMPARED)} gets worse in any row of the checks."]
+        parts.append("### Not improved\n\n" + "\n".join(f"- {text}" for text in told))
+    parts.append(
+        f"A row of checks is a pantograph of a scene; `{AS_IS}` is the case's whole stretch with "
+        "its own mesh and step. CSV files beside this page have all rows."
+    )
+    return "\n\n".join(parts) + "\n"

@@ -1,0 +1,215 @@
+"""An optimisation from its task to its tables: what the command line and Python programs share."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from catenary.base.errors import InputError
+from catenary.cases.scene.input.toml_input import REMOVED
+from catenary.cases.scene.load import Draft
+from catenary.cases.scene.scene import Scene
+from catenary.cases.studies.optimise.checks import (
+    Check,
+    Row,
+    checks_of,
+    compare,
+    not_improved,
+    one_sided,
+    trap,
+)
+from catenary.cases.studies.optimise.droppers import dropper_table
+from catenary.cases.studies.optimise.objective import Point, Problem
+from catenary.cases.studies.optimise.search import search
+from catenary.cases.studies.optimise.task import OptimiseTask
+from catenary.cases.studies.optimise.variables import Variables, variables_of
+from catenary.cases.studies.records import KeptRows
+from catenary.cases.studies.scene_sets.evaluate import Workers
+from catenary.cases.studies.scene_sets.evaluation import Evaluation
+from catenary.cases.studies.scene_sets.scene_set import FORWARD, SceneSet, members_of
+from catenary.cases.studies.scene_sets.scene_values import value_at
+from catenary.postproc.report.study_table import StudyTable
+
+# Shares of an optimum's changes that are tried in whole units.
+_SHARES = (1.0, 0.97, 0.94, 0.9, 0.8)
+
+
+@dataclass(frozen=True)
+class Plan:
+    """An optimisation whose scenes are all checked."""
+
+    name: str
+    task: OptimiseTask
+    scenes: SceneSet
+    variables: Variables
+    checks: Sequence[Check]
+    warnings: Sequence[str]
+
+    @property
+    def scene(self) -> Scene:
+        """The case as shipped, whole."""
+        return self.checks[0].scenes.draft.scene()
+
+
+@dataclass(frozen=True)
+class Optimum:
+    """What a method found.
+
+    Attributes
+    ----------
+    method : "gradient" or "cma"
+    shipped, found : the case as it is and the best point, rounded as far as that is allowed
+    values : the scene's keys at the optimum
+    is_rounded : whether its changes are whole multiples of what the task asks for
+    n_runs : runs of the search
+    history : all points of the search
+    rows : figures under all checks
+    droppers : lengths to which they are cut
+    """
+
+    method: str
+    shipped: Point
+    found: Point
+    values: Mapping[str, Any]
+    is_rounded: bool
+    n_runs: int
+    history: Sequence[Point]
+    rows: Sequence[Row]
+    droppers: StudyTable
+
+    @property
+    def said(self) -> list[str]:
+        """What it did not improve, the unseen direction first."""
+        said = [trap(self.rows)] if trap(self.rows) else []
+        if not self.is_rounded:
+            said.append("no changes in whole units keep all constraints: round_to is not kept")
+        return said + not_improved(self.rows)
+
+
+def make_plan(draft: Draft, task: OptimiseTask) -> Plan:
+    """The plan of a task for a case. Not collective.
+
+    Raises
+    ------
+    InputError
+        If a variable is none of the case, or a scene of the set is wrong.
+    """
+    whole = draft.scene()
+    searched = _shortened(draft) if task.search.short else draft
+    scenes = SceneSet(searched, members_of(task.set)).checked()
+    variables = variables_of(task.variables, whole)
+    checks = checks_of(draft, task)
+    warnings = []
+    if task.search.short:
+        warnings.append(
+            "the search runs the case shortened by its [test] table; figures of the optimum are "
+            "those of the whole stretch"
+        )
+    warnings += _narrow(task, scenes, variables)
+    return Plan(whole.case.name, task, scenes, variables, checks, warnings)
+
+
+def _shortened(draft: Draft) -> Draft:
+    """The case with its ``[test]`` table, to which values that were assigned do not give way."""
+    own = [(key, value_at(draft.raw, key), where) for key, where in draft.given]
+    given = ((key, REMOVED if value is None else value, where) for key, value, where in own)
+    return draft.shortened().assigned(given)
+
+
+def _narrow(task: OptimiseTask, scenes: SceneSet, variables: Variables) -> list[str]:
+    """Warnings of a set that is too narrow to hold elsewhere."""
+    found = []
+    one_way = len(task.set.directions) == 1
+    if one_way and _may_lean(scenes, variables):
+        found.append(
+            f"the set has the direction {task.set.directions[0]} alone: a line that is good one "
+            "way may gain nothing, or lose, the other way; name both in set.directions unless no "
+            "train runs back"
+        )
+    speeds = task.set.speeds_km_h or [0.0]
+    if len(speeds) == 1 and len(task.set.trains) < 2:
+        found.append(
+            "the set has one speed and one train: an optimum may be worse at others; name more in "
+            "set.speeds_km_h or set.trains"
+        )
+    return found
+
+
+def _may_lean(scenes: SceneSet, variables: Variables) -> bool:
+    """Whether some change within bounds makes a line that differs from its mirror image."""
+    random = np.random.default_rng(1).uniform(0.0, 0.1, variables.low.size)
+    change = random * np.where(variables.high > 0.0, variables.high, variables.low)
+    return one_sided(scenes, variables.values(change))
+
+
+def optimise(
+    plan: Plan,
+    workers: Workers | None = None,
+    kept: KeptRows | None = None,
+    say: Callable[[str], None] = lambda line: None,
+) -> list[Optimum]:
+    """Search by each method of the task and check what it finds. Not collective.
+
+    Parameters
+    ----------
+    workers : processes that share the runs, None for this one
+    kept : runs that are not made again
+    say : called with lines on the way
+
+    Raises
+    ------
+    InputError
+        If the case as shipped has no figures to begin with.
+    """
+    evaluation = Evaluation(workers, kept)
+    return [_by(method, plan, evaluation, say) for method in plan.task.search.methods]
+
+
+def _by(method: str, plan: Plan, evaluation: Evaluation, say: Callable[[str], None]) -> Optimum:
+    task, variables = plan.task, plan.variables
+    say(f"{method}: {variables.low.size} variables, {len(plan.scenes.members)} scenes")
+    first = evaluation.n_runs
+    problem = Problem(
+        plan.scenes,
+        variables,
+        task.objective,
+        task.constraints,
+        task.least_dropper_force_N,
+        evaluation,
+        task.search.most_runs,
+        say,
+    )
+    best = search(problem, method, task.search)
+    n_runs, history = evaluation.n_runs - first, tuple(problem.history)
+    problem.most_runs = None
+    found = _rounded(problem, best)
+    shipped = problem.shipped
+    values = variables.values(found.change)
+    say(f"{method}: {shipped.value:.4g} to {found.value:.4g} in {n_runs} runs; checks")
+    rows = compare(plan.checks, task.set.directions, variables.shipped, values, evaluation)
+    droppers = _cut(plan, values)
+    whole = bool(np.array_equal(variables.rounded(found.change), found.change))
+    return Optimum(method, shipped, found, values, whole, n_runs, history, rows, droppers)
+
+
+def _rounded(problem: Problem, best: Point) -> Point:
+    """The best point in whole units: where these leave what is allowed, a little nearer to the case
+    as shipped; as it is if none is allowed."""
+    for share in _SHARES:
+        point = problem.points([problem.variables.rounded(share * best.change)])[0]
+        if point.violation <= best.violation:
+            return point
+    return best
+
+
+def _cut(plan: Plan, values: Mapping[str, Any]) -> StudyTable:
+    """Lengths of the whole line's droppers, before and after."""
+    scenes = plan.checks[0].scenes
+    member = scenes.members[0]._replace(direction=FORWARD)
+    try:
+        return dropper_table(scenes.scene(member), scenes.scene(member, values))
+    except InputError as error:
+        raise InputError(f"the line of the optimum cannot hang: {error}") from error

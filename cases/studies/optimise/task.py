@@ -1,0 +1,106 @@
+"""The task of an optimisation: what FILE.toml may hold."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from catenary.cases.scene.keys.table import Table
+from catenary.cases.scene.line.imperfections import Seed
+from catenary.cases.studies.scene_sets.bounds import BoundTable, Statistic
+from catenary.cases.studies.scene_sets.scene_set import SetTable
+
+GRADIENT, CMA = "gradient", "cma"
+Bounds = Annotated[list[float], Field(min_length=2, max_length=2)]
+Number = Annotated[int, Field(ge=1, le=10_000)]
+
+
+class VariableTable(Table):
+    """A key of the scene that is varied: a number, or the entries of a list."""
+
+    key: str = Field(min_length=1, max_length=200, description="dotted key of the scene")
+    entries: Literal["symmetric", "free", "together"] | list[list[Number]] = Field(
+        "symmetric",
+        description="of a list: symmetric entries about its middle change alike, each is free, all "
+        "change together, or lists of the numbers, from 1, of entries that change alike",
+    )
+    change: Bounds | None = Field(
+        None, description="least and greatest change from the case's value, in the key's unit"
+    )
+    bounds: Bounds | None = Field(None, description="in place of it, bounds of the value itself")
+    step: float | None = Field(
+        None, gt=0, description="of finite differences; a fiftieth of the bounds' width if absent"
+    )
+    round_to: float | None = Field(
+        None, gt=0, description="the optimum's changes are whole multiples of it"
+    )
+
+    @model_validator(mode="after")
+    def _bounded(self) -> VariableTable:
+        if (self.change is None) == (self.bounds is None):
+            raise ValueError("needs change or bounds, one of both")
+        low, high = self.change or self.bounds or (0.0, 0.0)
+        if high <= low:
+            raise ValueError(f"must have a greater second bound, but has {low:g} and {high:g}")
+        if self.change is not None and not low <= 0.0 <= high:
+            raise ValueError(
+                f"must have 0 within change, which is the case as it stands, but has {low:g} and "
+                f"{high:g}"
+            )
+        return self
+
+
+class ObjectiveTable(Table):
+    """What is made as small as can be."""
+
+    statistic: Statistic = Field("std_N", description="statistic of a run")
+    over: Literal["worst", "mean"] = Field(
+        "worst", description="the greatest value of all pantographs of all scenes, or their mean"
+    )
+
+
+class SearchTable(Table):
+    """How the optimum is searched."""
+
+    methods: list[Literal["gradient", "cma"]] = Field(
+        ["gradient"],
+        min_length=1,
+        max_length=2,
+        description="sequential quadratic programming on finite differences, evolution strategy",
+    )
+    most_runs: int = Field(
+        2000, ge=1, le=10**6, description="runs of each method after which it ends with the best"
+    )
+    precision: float = Field(
+        1e-3, gt=0, le=0.1, description="relative change of the objective that ends a search"
+    )
+    short: bool = Field(
+        False, description="search on the case shortened by its [test] table, and check on all"
+    )
+    seed: Seed = Field(1, description="of the evolution strategy")
+
+
+class ChecksTable(Table):
+    """Errors with which each optimum is run that no search has seen."""
+
+    dropper_lengths_mm: float = Field(
+        5.0, gt=0, le=200, description="standard deviation of errors of dropper lengths"
+    )
+    n_seeds: int = Field(3, ge=0, le=1000, description="number of lines with such errors")
+
+
+class OptimiseTask(Table):
+    """Variables, objective and constraints, and the scenes over which they are meant."""
+
+    set: SetTable = Field(default_factory=SetTable, description="the scenes")
+    variables: list[VariableTable] = Field(min_length=1, max_length=100, description="variables")
+    objective: ObjectiveTable = Field(default_factory=ObjectiveTable, description="objective")
+    constraints: list[BoundTable] = Field(
+        default_factory=list, max_length=100, description="constraints"
+    )
+    least_dropper_force_N: float = Field(
+        10.0, ge=0, le=1000, description="tension that every dropper of the line keeps at rest"
+    )
+    search: SearchTable = Field(default_factory=SearchTable, description="the search")
+    checks: ChecksTable = Field(default_factory=ChecksTable, description="checks of the optimum")

@@ -1,0 +1,1 @@
+"""Sets of scenes of one case, evaluated together: directions, speeds, trains, errors."""

@@ -1,0 +1,1 @@
+"""Tolerances of an installation: how far a line may be off for criteria to hold."""

@@ -1,0 +1,154 @@
+"""Errors of an installation: how many there are, and what they make of a scene."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from catenary.base.errors import InputError
+from catenary.cases.scene.keys.error_sentences import unknown_key
+from catenary.cases.scene.keys.keys import is_known, known_keys
+from catenary.cases.scene.keys.units import length_from_mm, unit_of
+from catenary.cases.scene.problem import line_of, resolved
+from catenary.cases.scene.scene import Scene
+from catenary.cases.studies.scene_sets.scene_values import is_number, value_at
+from catenary.cases.studies.tolerance.task import (
+    DropperErrors,
+    ErrorKind,
+    HeightErrors,
+    KeyErrors,
+    TensionErrors,
+)
+
+_LENGTHS = "irregularities.dropper_lengths.by_dropper"
+_HEIGHTS = "irregularities.contact_wire_height.by_place"
+# Errors so many spans before and behind the evaluated stretch no longer move its statistics.
+_SPANS_BESIDE = 2
+# Normal errors have this share of the tolerance as standard deviation.
+_NORMAL = 0.5
+
+
+@dataclass(frozen=True)
+class Group:
+    """Errors of one kind on a line.
+
+    Attributes
+    ----------
+    table : as the task has them
+    names : of each error, n of them
+    near : which of them are near the evaluated stretch, shape (n,)
+    unit : of errors and tolerances
+    given : what the scene has of its own under the key that the errors are written to
+    """
+
+    table: ErrorKind
+    names: Sequence[str]
+    near: np.ndarray
+    unit: str
+    places: Sequence[Any]
+    given: Any
+
+    def values(self, errors: np.ndarray) -> dict[str, Any]:
+        """Values of a scene by dotted keys, with errors, shape (n,), in their unit."""
+        table, own = self.table, errors.tolist()
+        if isinstance(table, DropperErrors):
+            added = [[*place, e] for place, e in zip(self.places, own, strict=True)]
+            return {_LENGTHS: [*self.given, *added]}
+        if isinstance(table, HeightErrors):
+            pairs = zip(self.places, own, strict=True)
+            return {_HEIGHTS: [[x, length_from_mm(e)] for x, e in pairs]}
+        if isinstance(table, TensionErrors):
+            wrong = [
+                {"type": "wrong_tension", "wire": wire, "factor": 1.0 + 0.01 * e}
+                for wire, e in zip(self.places, own, strict=True)
+            ]
+            return {"defects": [*self.given, *wrong]}
+        if table.entry is None:
+            return {table.key: self.given + own[0]}
+        found = list(self.given)
+        found[table.entry - 1] += own[0]
+        return {table.key: found}
+
+    def random(self, random: np.random.Generator, n_samples: int) -> np.ndarray:
+        """Errors over their tolerance, shape (n_samples, n), all within -1 and 1."""
+        shares = random.uniform(-1.0, 1.0, (n_samples, len(self.names)))
+        if self.table.distribution == "uniform":
+            return shares
+        from scipy.special import ndtr, ndtri
+
+        within = ndtr(1.0 / _NORMAL) - 0.5
+        return np.asarray(_NORMAL * ndtri(0.5 + shares * within))
+
+
+def groups_of(tables: Sequence[ErrorKind], scene: Scene) -> list[Group]:
+    """The errors of a task on a line. Not collective.
+
+    Raises
+    ------
+    InputError
+        If the line has nothing that an error is of, or heights of its own.
+    """
+    keys = [
+        f"{one.key} {one.entry or ''}".strip() if isinstance(one, KeyErrors) else one.kind
+        for one in tables
+    ]
+    for number, key in enumerate(keys):
+        if key in keys[:number]:
+            raise InputError(f"errors.{number} are of {key}, of which there are errors before")
+    return [_group(table, scene, f"errors.{number}") for number, table in enumerate(tables)]
+
+
+def _group(table: ErrorKind, scene: Scene, where: str) -> Group:
+    line, tables = line_of(scene), resolved(scene)
+    masts = line.support_positions
+    span = float(np.mean(np.diff(masts)))
+    low = min(scene.evaluation.from_m, masts[-1] - scene.evaluation.to_m)
+    high = max(scene.evaluation.to_m, masts[-1] - scene.evaluation.from_m)
+    low, high = low - _SPANS_BESIDE * span, high + _SPANS_BESIDE * span
+    irregular = tables.get("irregularities", {})
+    if isinstance(table, DropperErrors):
+        places = [
+            (s + 1, d + 1)
+            for s in range(line.n_spans)
+            for d in range(line.droppers_of_span(s).size)
+        ]
+        if not places:
+            raise InputError(f"{where} are of dropper lengths, but the line has no droppers")
+        names = [f"span {s}, dropper {d}" for s, d in places]
+        x = np.concatenate([line.droppers_of_span(s) for s in range(line.n_spans)])
+        given = irregular.get("dropper_lengths", {}).get("by_dropper", [])
+        return Group(table, names, (x > low) & (x < high), "mm", places, given)
+    if isinstance(table, HeightErrors):
+        if irregular.get("contact_wire_height", {}).get("by_place"):
+            raise InputError(f"{where} are heights, but the scene has {_HEIGHTS} of its own")
+        names = [f"support {i}" for i in range(masts.size)]
+        return Group(table, names, (masts > low) & (masts < high), "mm", masts.tolist(), None)
+    if isinstance(table, TensionErrors):
+        known = [wire.name for wire in line.wires]
+        for wire in table.wires:
+            if wire not in known:
+                raise InputError(
+                    f"{where}.wires has {wire}, which the line has not; it has {', '.join(known)}"
+                )
+        near = np.ones(len(table.wires), dtype=bool)
+        return Group(table, table.wires, near, "%", table.wires, tables.get("defects", []))
+    return _of_key(table, tables, where)
+
+
+def _of_key(table: KeyErrors, tables: dict[str, Any], where: str) -> Group:
+    known = known_keys(Scene)
+    if not is_known(table.key, known):
+        raise InputError(unknown_key(table.key, f"in {where}", known))
+    value = value_at(tables, table.key)
+    number = table.entry
+    own = value
+    if number is not None and isinstance(value, list):
+        own = value[number - 1] if number <= len(value) else None
+    if not is_number(own):
+        at = "" if number is None else f" at entry {number}"
+        raise InputError(f"{where}.key is {table.key}, which has no number{at} in the scene")
+    one = np.ones(1, dtype=bool)
+    return Group(table, [table.key], one, unit_of(table.key), [None], value)

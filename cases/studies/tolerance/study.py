@@ -1,0 +1,290 @@
+"""Tolerances: by samples at levels that are bisected, and by slopes in the worst case."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from catenary.base.errors import InputError
+from catenary.cases.scene.load import Draft
+from catenary.cases.studies.records import KeptRows
+from catenary.cases.studies.scene_sets.evaluate import Workers
+from catenary.cases.studies.scene_sets.evaluation import Evaluation, Wanted
+from catenary.cases.studies.scene_sets.scene_set import SceneSet, members_of
+from catenary.cases.studies.tolerance.criteria import Margins, least, margins_of, names_of
+from catenary.cases.studies.tolerance.errors import Group, groups_of
+from catenary.cases.studies.tolerance.task import SamplesTable, ToleranceTask
+
+ALL = "all together"
+# Slopes are those of errors of this share of the tolerance from which all are scaled.
+_STEP = 0.1
+# Samples are run in parts, so that a level at which many fail is left early.
+_PART = 25
+# Of the lower bound of a share that is told beside it.
+CONFIDENCE = 0.95
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """A tolerance of an error for a criterion.
+
+    Attributes
+    ----------
+    criterion, error, unit : which
+    level : largest tolerance at which enough samples keep the criterion, in the error's unit, or
+        of all together in tolerances of the task; 0 if the line without errors does not keep it
+    at_most : whether that is the greatest that was looked at
+    kept, n_samples : samples that keep it at that level, of how many
+    linear : tolerance in the worst case by slopes, infinite without slopes; None if not asked for
+    checked : largest tolerance at which the line with that worst case keeps the criterion
+    """
+
+    criterion: str
+    error: str
+    unit: str
+    level: float
+    at_most: bool
+    kept: int
+    n_samples: int
+    linear: float | None = None
+    checked: float | None = None
+
+    @property
+    def least_share(self) -> float:
+        """Lower bound of the share of lines that keep it, at 95 % (C. Clopper, E. Pearson,
+        Biometrika 26, 1934)."""
+        from scipy.stats import beta
+
+        if not self.kept:
+            return 0.0
+        return float(beta.ppf(1.0 - CONFIDENCE, self.kept, self.n_samples - self.kept + 1))
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A study of tolerances whose scenes are all checked."""
+
+    name: str
+    task: ToleranceTask
+    scenes: SceneSet
+    groups: Sequence[Group]
+
+
+def make_plan(draft: Draft, task: ToleranceTask) -> Plan:
+    """The plan of a task for a case. Not collective.
+
+    Raises
+    ------
+    InputError
+        If the line has nothing that an error is of, or a scene of the set, or one with the largest
+        errors, is wrong.
+    """
+    scene = draft.scene()
+    scenes = SceneSet(draft, members_of(task.set)).checked()
+    groups = groups_of(task.errors, scene)
+    for group in groups:
+        if group.table.level > group.table.most:
+            raise InputError(
+                f"errors {group.table.name}: level is {group.table.level:g} {group.unit}; it must "
+                f"be at most {group.table.most:g}, which is most"
+            )
+        for sign in (1.0, -1.0):
+            largest = group.values(np.full(len(group.names), sign * group.table.most))
+            try:
+                scenes.scene(scenes.members[0], largest)
+            except InputError as error:
+                raise InputError(
+                    f"errors {group.table.name} at {group.table.most:g}: {error}"
+                ) from error
+    return Plan(scene.case.name, task, scenes, groups)
+
+
+def find_tolerances(
+    plan: Plan,
+    workers: Workers | None = None,
+    kept: KeptRows | None = None,
+    say: Callable[[str], None] = lambda line: None,
+) -> list[Tolerance]:
+    """The tolerances of all errors for all criteria. Not collective.
+
+    Parameters
+    ----------
+    workers : processes that share the runs, None for this one
+    kept : runs that are not made again
+    say : called with lines on the way
+
+    Raises
+    ------
+    InputError
+        If a run of the line without errors broke, or nothing is judged.
+    """
+    search = _Search(plan, Evaluation(workers, kept), say)
+    found: list[Tolerance] = []
+    for varied in search.varied:
+        for criterion in search.criteria:
+            one = search.tolerance(varied, criterion)
+            say(f"{one.error}, {one.criterion}: {one.level:.3g} {one.unit}")
+            found.append(one)
+    return found
+
+
+@dataclass(frozen=True)
+class _Varied:
+    """Errors that are varied together: groups, and the random numbers of each, (n_samples, n).
+
+    A level is a factor on ``scales``, the tolerance of each group at level 1.
+    """
+
+    name: str
+    unit: str
+    groups: Sequence[Group]
+    random: Sequence[np.ndarray]
+    scales: Sequence[float]
+    most: float
+
+    def values(self, level: float, errors: Sequence[np.ndarray]) -> dict[str, Any]:
+        """Values of a scene with errors, over their tolerances, of each group."""
+        found: dict[str, Any] = {}
+        for group, scale, own in zip(self.groups, self.scales, errors, strict=True):
+            found |= group.values(level * scale * own)
+        return found
+
+    def sample(self, number: int) -> list[np.ndarray]:
+        """The errors of a sample, of each group (n,)."""
+        return [own[number] for own in self.random]
+
+
+@dataclass
+class _Search:
+    plan: Plan
+    evaluation: Evaluation
+    say: Callable[[str], None]
+    varied: list[_Varied] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        task = self.plan.task
+        self.nominal = self._margins([{}])[0]
+        self.criteria = names_of(self.nominal)
+        random = [
+            group.random(np.random.default_rng([task.samples.seed, number]), task.samples.number)
+            for number, group in enumerate(self.plan.groups)
+        ]
+        for group, own in zip(self.plan.groups, random, strict=True):
+            table = group.table
+            self.varied.append(_Varied(table.name, group.unit, [group], [own], [1.0], table.most))
+        if len(self.plan.groups) > 1:
+            tables = [group.table for group in self.plan.groups]
+            scales = [table.level for table in tables]
+            most = min(table.most / table.level for table in tables)
+            unit = "of the task's levels"
+            self.varied.append(_Varied(ALL, unit, self.plan.groups, random, scales, most))
+
+    @property
+    def samples(self) -> SamplesTable:
+        return self.plan.task.samples
+
+    def tolerance(self, varied: _Varied, criterion: str) -> Tolerance:
+        """The tolerance of some errors for a criterion."""
+        n = self.samples.number
+        head = criterion, varied.name, varied.unit
+        if least(self.nominal, criterion) < 0.0:
+            return Tolerance(*head, 0.0, False, 0, n)
+        level, at_most = self._bisect(varied.most, lambda s: self._holds(varied, s, criterion))
+        kept = n - self._failures(varied, level, criterion, n) if level else n
+        linear = checked = None
+        if self.samples.worst_case:
+            linear, checked = self._worst_case(varied, criterion)
+        return Tolerance(*head, level, at_most, kept, n, linear, checked)
+
+    def _bisect(self, most: float, holds: Callable[[float], bool]) -> tuple[float, bool]:
+        """The largest level that holds, 0 always does; whether that is the greatest of all."""
+        if holds(most):
+            return most, True
+        low, high = 0.0, most
+        while high - low > self.samples.resolution * most:
+            middle = 0.5 * (low + high)
+            low, high = (middle, high) if holds(middle) else (low, middle)
+        return low, False
+
+    def _holds(self, varied: _Varied, level: float, criterion: str) -> bool:
+        n = self.samples.number
+        allowed = int(np.floor((1.0 - self.samples.probability) * n + 1e-9))
+        holds = self._failures(varied, level, criterion, allowed) <= allowed
+        said = "kept" if holds else "not kept"
+        self.say(f"    {varied.name} +-{level:.3g} {varied.unit}: {criterion} {said}")
+        return holds
+
+    def _failures(self, varied: _Varied, level: float, criterion: str, enough: int) -> int:
+        """Samples that do not keep a criterion at a level; counting ends above ``enough``."""
+        failed = 0
+        for first in range(0, self.samples.number, _PART):
+            numbers = range(first, min(first + _PART, self.samples.number))
+            margins = self._margins([varied.values(level, varied.sample(i)) for i in numbers])
+            failed += sum(least(own, criterion) < 0.0 for own in margins)
+            if failed > enough:
+                break
+        return failed
+
+    def _margins(self, lines: Sequence[Mapping[str, Any]]) -> list[list[Margins]]:
+        """Margins of the runs of all scenes of the set, for each line."""
+        members = self.plan.scenes.members
+        wanted: list[Wanted] = [
+            (self.plan.scenes, member, values) for values in lines for member in members
+        ]
+        criteria = self.plan.task.criteria
+        found = [margins_of(summary, criteria) for summary in self.evaluation.of(wanted)]
+        n = len(members)
+        return [found[i * n : (i + 1) * n] for i in range(len(lines))]
+
+    def _worst_case(self, varied: _Varied, criterion: str) -> tuple[float, float]:
+        """Tolerance by slopes, and the largest one that the line with that worst case keeps.
+
+        To first order the margin of a run falls from m by the sum of |slope| times tolerance. The
+        errors that make it fall so are run then.
+        """
+        base, slopes = self._slopes(varied, criterion)
+        falls = np.abs(slopes).sum(axis=1)
+        with np.errstate(divide="ignore"):
+            levels = np.where(falls > 0.0, base / falls, np.inf)
+        first = int(np.argmin(levels))
+        worst, begin = [], 0
+        for own in varied.random:
+            n = own.shape[1]
+            worst.append(-np.sign(slopes[first, begin : begin + n]))
+            begin += n
+
+        def holds(level: float) -> bool:
+            margins = self._margins([varied.values(level, worst)])[0]
+            return least(margins, criterion) >= 0.0
+
+        return float(levels[first]), self._bisect(varied.most, holds)[0]
+
+    def _slopes(self, varied: _Varied, criterion: str) -> tuple[np.ndarray, np.ndarray]:
+        """Margins without errors, (n_margins,), and their slopes by each error over its tolerance
+        at level 1, (n_margins, n); zero for errors far from the evaluated stretch."""
+        base = _flat(self.nominal, criterion)
+        sizes = [own.shape[1] for own in varied.random]
+        slopes = np.zeros((base.size, sum(sizes)))
+        lines, columns, steps = [], [], []
+        for number, group in enumerate(varied.groups):
+            step = _STEP * group.table.level / varied.scales[number]
+            for i in np.flatnonzero(group.near):
+                one = [np.zeros(size) for size in sizes]
+                one[number][i] = 1.0
+                lines.append(varied.values(step, one))
+                columns.append(sum(sizes[:number]) + int(i))
+                steps.append(step)
+        for margins, column, step in zip(self._margins(lines), columns, steps, strict=True):
+            moved = _flat(margins, criterion)
+            if moved.size == base.size and np.isfinite(moved).all():
+                slopes[:, column] = (moved - base) / step
+        return base, slopes
+
+
+def _flat(margins: Sequence[Margins], criterion: str) -> np.ndarray:
+    """Margins of a criterion of all runs and pantographs."""
+    found = [own for one in margins for own in one.get(criterion, one.get("", []))]
+    return np.array(found)

@@ -1,0 +1,285 @@
+"""Tolerances: errors as lines have them, samples and worst cases against closed forms."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from catenary.base.errors import InputError
+from catenary.cases.cli.main import app
+from catenary.cases.run.at_rest.static_table import static_table
+from catenary.cases.scene.load import Draft, read_draft
+from catenary.cases.scene.problem import line_of
+from catenary.cases.scene.scene import Scene
+from catenary.cases.studies.scene_sets import evaluation
+from catenary.cases.studies.scene_sets.bounds import BoundTable
+from catenary.cases.studies.scene_sets.evaluate import BROKE
+from catenary.cases.studies.scene_sets.task_file import read_task
+from catenary.cases.studies.tolerance.criteria import least, margins_of
+from catenary.cases.studies.tolerance.errors import Group, groups_of
+from catenary.cases.studies.tolerance.output import as_text, installer_table
+from catenary.cases.studies.tolerance.study import ALL, find_tolerances, make_plan
+from catenary.cases.studies.tolerance.task import ToleranceTask
+
+# Six spans with one element a gap.
+TINY: dict[str, Any] = {
+    "line.n_spans": 6,
+    "mesh.elements_per_gap": 1,
+    "train.start_m": 65.0,
+    "train.end_m": 257.0,
+    "train.raise_time_s": 0.2,
+    "numerics.dt_s": 0.005,
+    "evaluation.from_m": 120.0,
+    "evaluation.to_m": 240.0,
+}
+DROPPERS = {"name": "droppers", "kind": "dropper_lengths", "level": 5.0, "most": 20.0}
+SPEED = {"name": "speed", "kind": "key", "key": "train.speed_km_h", "level": 10.0, "most": 40.0}
+TENSION = {"name": "tension", "kind": "tension", "level": 2.0, "most": 10.0}
+FORWARD = {"directions": ["forward"]}
+AT_MOST = {"statistic": "std_N", "at_most": 30.0}
+
+
+def tiny() -> Draft:
+    return read_draft("en50318_2002").assigned((k, v, "in the test") for k, v in TINY.items())
+
+
+def task_of(*errors: dict[str, Any], **tables: Any) -> ToleranceTask:
+    usual: dict[str, Any] = {"set": FORWARD, "errors": list(errors), "criteria": [AT_MOST]}
+    return read_task(usual | tables, ToleranceTask)
+
+
+def group_of(error: dict[str, Any], scene: Scene) -> Group:
+    (group,) = groups_of(task_of(error).errors, scene)
+    return group
+
+
+def with_errors(group: Group, errors: np.ndarray) -> Scene:
+    values = group.values(errors)
+    return tiny().assigned((k, v, "in the test") for k, v in values.items()).scene()
+
+
+# --- errors --------------------------------------------------------------------------------------
+
+
+def test_a_dropper_that_is_too_long_carries_less() -> None:
+    scene = tiny().scene()
+    group = group_of(DROPPERS, scene)
+    assert len(group.names) == 54 and group.names[11] == "span 2, dropper 3"
+    errors = np.zeros(54)
+    errors[11] = 2.0  # [mm]
+    before = static_table(with_errors(group, np.zeros(54)))["dropper_force"]
+    after = static_table(with_errors(group, errors))["dropper_force"]
+    assert before == pytest.approx(static_table(scene)["dropper_force"], abs=1e-5)
+    assert np.argmin(after - before) == 11 and after[11] < before[11] - 1.0
+    # Its neighbours take over what it does not carry.
+    assert (after[[10, 12]] > before[[10, 12]]).all()
+    # 120 to 240 m forward and backward of 360 m, and 120 m beside: the whole line.
+    assert group.near.all()
+
+
+def test_heights_are_those_of_the_wire_at_supports() -> None:
+    scene = tiny().scene()
+    group = group_of({**DROPPERS, "kind": "contact_wire_height"}, scene)
+    errors = np.array([0.0, 3.0, -4.0, 5.0, 0.0, 2.0, 0.0])
+    masts = line_of(scene).support_positions
+    tables = [static_table(own) for own in (scene, with_errors(group, errors))]
+    before, after = (np.interp(masts, own["contact_x"], own["contact_height"]) for own in tables)
+    # The wire hangs between the droppers beside a support, which stand 5 m off, where the spline
+    # has left the height of the support by a tenth or so.
+    assert 1e3 * (after - before)[1:-1] == pytest.approx(errors[1:-1], abs=1.0)
+
+
+def test_tensions_are_wrong_by_shares() -> None:
+    scene = tiny().scene()
+    wrong = with_errors(group_of(TENSION, scene), np.array([10.0, -5.0]))
+    assert [(own.wire, own.factor) for own in wrong.defects] == [  # type: ignore[union-attr]
+        ("contact_wire", pytest.approx(1.1)),
+        ("messenger_wire", pytest.approx(0.95)),
+    ]
+    assert with_errors(group_of(SPEED, scene), np.array([-7.5])).train.speed_km_h == 242.5
+    mass = {**SPEED, "key": "pantographs.reference.masses_kg", "entry": 2}
+    heavier = with_errors(group_of(mass, scene), np.array([0.5]))
+    assert heavier.pantographs["reference"].masses_kg == [7.2, 15.5]
+
+
+@pytest.mark.parametrize("distribution", ["uniform", "normal"])
+def test_errors_stay_within_their_tolerance(distribution: str) -> None:
+    group = group_of({**DROPPERS, "distribution": distribution}, tiny().scene())
+    drawn = group.random(np.random.default_rng(1), 400)
+    assert drawn.shape == (400, 54) and np.abs(drawn).max() <= 1.0
+    # Variances: 1/3, and 1/4 of a normal one cut off at two deviations, 0.7737. Of 21600 numbers
+    # the variance scatters by 1 %.
+    expected = {"uniform": 1.0 / 3.0, "normal": 0.25 * 0.7737}[distribution]
+    assert drawn.var() == pytest.approx(expected, rel=0.04)
+
+
+# --- samples against a closed form ---------------------------------------------------------------
+
+
+@pytest.fixture
+def evaluated(monkeypatch: pytest.MonkeyPatch) -> Callable[[Callable[[Scene], float]], None]:
+    """Puts a formula of the standard deviation in the place of runs."""
+
+    def use(formula: Callable[[Scene], float]) -> None:
+        def evaluate(scenes: Sequence[Scene], workers: Any = None) -> list[dict[str, Any]]:
+            return [summary(formula(scene)) for scene in scenes]
+
+        monkeypatch.setattr(evaluation, "evaluate", evaluate)
+
+    return use
+
+
+def summary(std: float) -> dict[str, Any]:
+    row = {"criterion": "deviation, one", "value": std, "limit": 30.0, "relation": "<="}
+    return {
+        "pantographs": [{"name": "one", "std_N": std}],
+        "supports": {"max_uplift_mm": 50.0},
+        "droppers": {},
+        "acceptance": [row | {"passed": std <= 30.0}],
+    }
+
+
+def by_speed(scene: Scene) -> float:
+    """26 N, and a newton for each 5 km/h above 250 km/h."""
+    return 26.0 + 0.2 * (scene.train.speed_km_h - 250.0)
+
+
+def test_a_tolerance_is_that_of_the_samples_themselves(evaluated: Any) -> None:
+    """Errors e of +-L fail above 20 km/h. Of the same random numbers those fail that are above
+    20/L: the tolerance is 20 over the fourth largest of 60, of which three may fail."""
+    evaluated(by_speed)
+    samples = {"number": 60, "probability": 0.95, "resolution": 0.02, "seed": 4}
+    plan = make_plan(tiny(), task_of(SPEED, samples=samples))
+    (found,) = find_tolerances(plan)
+    drawn = plan.groups[0].random(np.random.default_rng([4, 0]), 60)[:, 0]
+    exact = 20.0 / np.sort(drawn)[-4]
+    assert exact - 0.02 * 40.0 <= found.level <= exact
+    assert (found.kept, found.n_samples, found.at_most) == (57, 60, False)
+    # Of all lines a share of (1 + 20/L)/2 keeps it; 95 % do at 22.2 km/h. 60 samples tell the
+    # quantile to 2.8 %, which is 6 % of the level.
+    assert found.level == pytest.approx(20.0 / 0.9, rel=3 * 0.06)
+    # SciPy's own interval of the same counts.
+    from scipy.stats import binomtest
+
+    interval = binomtest(57, 60, alternative="greater").proportion_ci(0.95, "exact")
+    assert found.least_share == pytest.approx(interval.low)
+    # The slope is 0.2 N per km/h, the margin 4 N.
+    assert found.linear == pytest.approx(20.0)
+    assert 20.0 - 0.8 <= (found.checked or 0.0) <= 20.0
+
+
+def test_errors_together_are_scaled_together(evaluated: Any) -> None:
+    """Speed and tension alone may be off by 20 km/h and 8 %; in the worst case together at the
+    scale at which 0.2 10 s + 0.5 2 s is 4 N: 4/3."""
+
+    def formula(scene: Scene) -> float:
+        tension = sum(50.0 * (own.factor - 1.0) for own in scene.defects)  # type: ignore[union-attr]
+        return by_speed(scene) + tension
+
+    evaluated(formula)
+    tension = {**TENSION, "wires": ["contact_wire"]}
+    task = task_of(SPEED, tension, samples={"number": 20, "probability": 0.9})
+    plan = make_plan(tiny(), task)
+    speed, pull, both = find_tolerances(plan)
+    assert [one.error for one in (speed, pull, both)] == ["speed", "tension", ALL]
+    assert (speed.linear, pull.linear) == (pytest.approx(20.0), pytest.approx(8.0))
+    assert both.linear == pytest.approx(4.0 / 3.0)
+    assert (both.checked or 0.0) == pytest.approx(4.0 / 3.0, abs=0.04 * 4.0)
+    # The scale at which a sample fails is 4 N over 2 N and 1 N times its errors; two of 20 may.
+    draws = [g.random(np.random.default_rng([1, i]), 20)[:, 0] for i, g in enumerate(plan.groups)]
+    exact = 4.0 / np.sort(2.0 * draws[0] + draws[1])[-3]
+    assert exact - 0.04 * 4.0 <= both.level <= exact
+    table = {row["error"]: row for row in installer_table(plan, [speed, pull, both]).rows}
+    assert float(table["speed"]["together"]) == pytest.approx(10.0 * both.level, rel=1e-2)
+    assert pull.at_most and table["tension"]["alone"] == "at least 10"
+
+
+def test_what_is_never_lost_and_what_is_lost_already(evaluated: Any) -> None:
+    samples = {"number": 4, "probability": 0.7}
+    evaluated(lambda scene: 29.0)
+    plan = make_plan(tiny(), task_of(SPEED, criteria=[], samples=samples))
+    (safe,) = find_tolerances(plan)
+    assert safe.criterion == "deviation"  # the standard's own, of all pantographs
+    assert safe.at_most and safe.level == 40.0 and safe.linear == np.inf
+    assert "at least 40" in as_text(plan, [safe])
+    evaluated(lambda scene: 31.0)
+    (lost,) = find_tolerances(plan)
+    assert lost.level == 0.0 and lost.kept == 0
+    assert "not kept without errors" in as_text(plan, [lost])
+
+
+def test_a_line_that_breaks_keeps_no_criterion(evaluated: Any, monkeypatch: Any) -> None:
+    def breaks(scenes: Sequence[Scene], workers: Any = None) -> list[dict[str, Any]]:
+        fast = [scene.train.speed_km_h > 270.0 for scene in scenes]
+        return [{BROKE: "it broke"} if one else summary(20.0) for one in fast]
+
+    monkeypatch.setattr(evaluation, "evaluate", breaks)
+    samples = {"number": 20, "probability": 0.9, "resolution": 0.01}
+    plan = make_plan(tiny(), task_of(SPEED, samples=samples))
+    (found,) = find_tolerances(plan)
+    drawn = plan.groups[0].random(np.random.default_rng([1, 0]), 20)[:, 0]
+    assert found.level == pytest.approx(20.0 / np.sort(drawn)[-3], abs=0.4)
+
+
+def test_margins_have_the_sign_of_their_bounds() -> None:
+    run = {**summary(20.0), "pantographs": [{"name": "one", "std_N": 20.0, "min_N": 12.0}]}
+    bounds = [BoundTable(statistic="min_N", at_least=15.0), BoundTable(**AT_MOST)]
+    margins = margins_of(run, bounds)
+    assert margins == {"min_N >= 15": [-3.0], "std_N <= 30": [10.0]}
+    assert least([margins, {"": [-np.inf]}], "std_N <= 30") == -np.inf
+    run["acceptance"].append(
+        {"criterion": "least", "value": 5.0, "limit": 0.0, "relation": ">", "passed": True}
+    )
+    assert margins_of(run, []) == {"deviation": [10.0], "least": [5.0]}
+
+
+# --- the verb ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("errors", "says"),
+    [
+        ([SPEED, {**SPEED, "name": "again"}], "of which there are errors before"),
+        ([SPEED, {**TENSION, "name": "speed"}], "a name of its own"),
+        ([{**SPEED, "key": "line.topology"}], "no number"),
+        ([{**SPEED, "level": 50.0}], "at most 40"),
+        ([{**SPEED, "most": 5000.0}], "train.speed_km_h is 5250"),
+        ([{**TENSION, "wires": ["wire"]}], "it has contact_wire, messenger_wire"),
+    ],
+)
+def test_errors_that_cannot_be_are_refused(errors: list[dict[str, Any]], says: str) -> None:
+    with pytest.raises(InputError, match=says):
+        make_plan(tiny(), task_of(*errors))
+
+
+def test_the_verb_writes_what_it_says(
+    tmp_path: Path, evaluated: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys, "excepthook", sys.excepthook)
+    evaluated(by_speed)
+    file = tmp_path / "task.toml"
+    file.write_text(
+        '[set]\ndirections = ["forward"]\n[[errors]]\nname = "speed"\nkind = "key"\n'
+        'key = "train.speed_km_h"\nlevel = 10.0\nmost = 40.0\n'
+        '[[criteria]]\nstatistic = "std_N"\nat_most = 30.0\n[samples]\nnumber = 20\n'
+    )
+    words = ["tolerance", "en50318_2002", str(file), "-o", str(tmp_path / "out")]
+    for key, value in TINY.items():
+        words += ["--set", f"{key}={value}"]
+    done = CliRunner().invoke(app, words)
+    assert done.exit_code == 0, done.output
+    record = json.loads((tmp_path / "out" / "tolerance.json").read_text())
+    (row,) = record["tolerances"]
+    assert row["linear"] == pytest.approx(20.0) and 20.0 < row["level"] < 30.0
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {
+        "tolerance.csv",
+        "tolerance.json",
+        "tolerance.md",
+    }

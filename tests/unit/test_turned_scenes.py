@@ -1,0 +1,107 @@
+"""A train that runs the other way: the mirror image of a line hangs, and is run on, as it must."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from catenary.base.errors import InputError
+from catenary.cases.run.at_rest.static_table import static_table
+from catenary.cases.scene.load import load_scene
+from catenary.cases.scene.problem import line_of, resolved
+from catenary.cases.scene.scene import Scene
+from catenary.cases.scene.turned import turned
+
+# Spans of two lengths in an order of their own, droppers that are no mirror image of themselves.
+ONE_SIDED = (
+    "line.n_spans=5",
+    "line.span_m=[55.0, 50.0, 55.0, 55.0, 50.0]",
+    "line.dropper.positions_m=",
+    "line.dropper.pre_sag_mm=",
+    "line.dropper.patterns=[{span_m = 50.0, positions_m = [5.0, 25.0, 44.0], "
+    "pre_sag_mm = [0.0, 35.0, 0.0]}, {span_m = 55.0, positions_m = [4.5, 16.0, 30.0, 50.5], "
+    "pre_sag_mm = [0.0, 30.0, 41.0, 5.0]}]",
+    'line.fittings=[{kind = "splice", at_m = 120.0, mass_kg = 2.0}]',
+    'line.ends.start.kind="absorbing_layer"',
+    "line.ends.start.spans=1",
+    "irregularities.dropper_lengths.standard_deviation_mm=4",
+    "irregularities.dropper_lengths.by_dropper=[[2, 1, 3.0]]",
+    'defects=[{type = "missing_dropper", span = 3, dropper = 2}, '
+    '{type = "kink", at_m = 90.0, angle_deg = 0.1}]',
+    "mesh.elements_per_gap=2",
+    "train.start_m=60",
+    "evaluation.from_m=120",
+    "evaluation.to_m=200",
+)
+
+
+def scene_of(*assignments: str) -> Scene:
+    return load_scene("ac_simple", assignments)
+
+
+def plain(scene: Scene) -> dict[str, Any]:
+    raw = resolved(scene)
+    return {key: value for key, value in raw.items() if key not in ("output", "test")}
+
+
+def test_a_line_that_is_turned_hangs_as_its_mirror_image() -> None:
+    scene = scene_of(*ONE_SIDED)
+    here, there = static_table(scene), static_table(turned(scene))
+    length = line_of(scene).support_positions[-1]
+    # Places are rounded to a nanometre; forces are those of two solves of one equilibrium, whose
+    # matrices have a condition of 1e7.
+    for name, sign in (("dropper_x", -1.0), ("dropper_length", 1.0), ("dropper_force", 1.0)):
+        mirrored = there[name][::-1] * sign + (length if sign < 0 else 0.0)
+        assert mirrored == pytest.approx(here[name], rel=1e-7, abs=1e-6), name
+    # The middle span is the same one in both directions: what a force lifts there.
+    assert there["elasticity"][::-1] == pytest.approx(here["elasticity"], rel=1e-7)
+    assert not np.allclose(here["elasticity"], there["elasticity"], rtol=1e-2)
+    assert np.ptp(here["dropper_force"]) > 50.0  # droppers differ, so that an order shows
+    assert not np.allclose(here["dropper_force"], there["dropper_force"], rtol=1e-2)
+
+
+def test_turning_twice_gives_the_scene_that_was() -> None:
+    scene = scene_of(*ONE_SIDED)
+    once, twice = turned(scene), turned(turned(scene))
+    assert plain(twice) == plain(turned(turned(twice)))
+    again = plain(twice)
+    assert again != plain(once)
+    # Random errors are written out, dropper by dropper, from the first turn on.
+    for part in ("line", "train", "evaluation", "defects"):
+        assert again[part] == plain(scene)[part], part
+
+
+def test_the_run_in_is_as_long_in_both_directions() -> None:
+    scene = scene_of("evaluation.from_m=330", "evaluation.to_m=1100")
+    other = turned(scene)
+    assert (other.evaluation.from_m, other.evaluation.to_m) == (550.0, 1320.0)
+    assert other.train.start_m == 330.0
+    near = turned(scene_of("evaluation.from_m=1100", "evaluation.to_m=1500"))
+    assert near.train.start_m == 0.0  # 990 m of run-in do not fit
+
+
+def test_a_symmetric_line_is_its_own_mirror_image() -> None:
+    scene = scene_of()
+    assert plain(turned(scene)) == plain(scene)
+    key = "irregularities.dropper_lengths.by_dropper"
+    # Spans 1 to 30 of 9 droppers.
+    here, there = (
+        scene_of(f"{key}=[[2, 3, 1.0], [4, 5, 2.0]]"),
+        f"{key}=[[27, 5, 2.0], [29, 7, 1.0]]",
+    )
+    assert plain(turned(here))["irregularities"] == plain(scene_of(there))["irregularities"]
+
+
+@pytest.mark.parametrize(
+    ("assignment", "key"),
+    [
+        ("irregularities.contact_wire_height.standard_deviation_mm=5", "contact_wire_height"),
+        ("line.overlap={first_span = 5, rise_m = 0.2, distance_m = 0.4}", "line.overlap"),
+    ],
+)
+def test_what_has_no_mirror_image_is_refused(assignment: str, key: str) -> None:
+    scene = scene_of(assignment)
+    with pytest.raises(InputError, match=rf"{key}.* has no mirror image"):
+        turned(scene)
