@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from catenary.estimates import Uncertainty, uncertainty
     from catenary.line_tables import AtRest, Plan, check, plan, static
     from catenary.pictures import Pictures
+    from catenary.questions import highest_speeds
     from catenary.results import Run, open
     from catenary.runs import run, sweep
     from catenary.scenes import Scene, load
@@ -41,6 +42,7 @@ __all__ = [
     "Uncertainty",
     "__version__",
     "check",
+    "highest_speeds",
     "load",
     "open",
     "plan",
@@ -55,6 +57,7 @@ _FILES = {
     "estimates": ("Uncertainty", "uncertainty"),
     "line_tables": ("AtRest", "Plan", "check", "plan", "static"),
     "pictures": ("Pictures",),
+    "questions": ("highest_speeds",),
     "results": ("Run", "open"),
     "runs": ("run", "sweep"),
     "scenes": ("Scene", "load"),
