@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from catenary.estimates import Uncertainty, uncertainty
     from catenary.line_tables import AtRest, Plan, check, plan, static
     from catenary.pictures import Pictures
-    from catenary.questions import highest_speeds
+    from catenary.questions import highest_speeds, separations
     from catenary.results import Run, open
     from catenary.runs import run, sweep
     from catenary.scenes import Scene, load
@@ -48,6 +48,7 @@ __all__ = [
     "plan",
     "run",
     "sensitivity",
+    "separations",
     "static",
     "sweep",
     "uncertainty",
@@ -57,7 +58,7 @@ _FILES = {
     "estimates": ("Uncertainty", "uncertainty"),
     "line_tables": ("AtRest", "Plan", "check", "plan", "static"),
     "pictures": ("Pictures",),
-    "questions": ("highest_speeds",),
+    "questions": ("highest_speeds", "separations"),
     "results": ("Run", "open"),
     "runs": ("run", "sweep"),
     "scenes": ("Scene", "load"),

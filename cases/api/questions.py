@@ -80,3 +80,63 @@ def highest_speeds(
         except Interrupted as stopped:
             raise KeyboardInterrupt from stopped
     return pd.DataFrame(table_of_criteria(found).records())
+
+
+def separations(
+    scene: SceneLike,
+    nearest: float = 31.0,
+    farthest: float = 400.0,
+    *,
+    step: float = 1.0,
+    jobs: int = 1,
+) -> pd.DataFrame:
+    """Statistics of two pantographs over their distance, and of one alone.
+
+    Both are of the kind of the scene's first pantograph. The trailing one, or the one alone, starts
+    at ``train.start_m``. One process marches them, or ``jobs`` of them: not collective.
+
+    Parameters
+    ----------
+    scene : Scene, str, Path or mapping
+        The scene, or whatever ``load`` takes for one; its own pantographs are replaced.
+    nearest, farthest, step : float
+        Distances [m]: from ``nearest`` on, ``step`` apart, ``farthest`` at most.
+    jobs : int
+        Processes that march, 0 for one on each core.
+
+    Returns
+    -------
+    pandas.DataFrame
+        A row for one pantograph alone, whose ``separation_m`` is NaN, then one for each distance,
+        with the columns of ``separation.csv``.
+
+    Raises
+    ------
+    InputError
+        If the range is none, or if nothing can be run.
+    KeyboardInterrupt
+        If a signal ended it.
+
+    Examples
+    --------
+    >>> scene = catenary.load("en50318_2002", short=True)
+    >>> table = catenary.separations(scene, 50, 90, step=40)
+    >>> table.separation_m.tolist()[1:], bool(table.std_trailing_N[2] > table.std_trailing_N[1])
+    ([50.0, 90.0], True)
+    """
+    import pandas as pd
+
+    own, comm = checked(scene), alone()
+    from catenary.cases.process.interrupts import Interrupted
+    from catenary.cases.studies.questions.separation import Distances, find_separations
+    from catenary.cases.studies.questions.separation_output import table_of
+    from catenary.cases.studies.sweep.jobs import RunOptions
+
+    distances = Distances(float(nearest), float(farthest), float(step))
+    with options_of(own.petsc.given()) as options:
+        plan = RunOptions(petsc=options, n_jobs=jobs)
+        try:
+            found = find_separations(draft_of(scene), own, (), distances, None, comm, plan)
+        except Interrupted as stopped:
+            raise KeyboardInterrupt from stopped
+    return pd.DataFrame(table_of(found).records())
