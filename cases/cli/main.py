@@ -29,7 +29,8 @@ def all_verbs() -> typer.Typer:
     # Each of these files adds its verbs, in this order of --help.
     # isort: off
     from catenary.cases.cli import plan, line, results  # noqa: F401
-    from catenary.cases.cli.studies import sweep, uncertainty, speed, separation, what_if  # noqa: F401
+    from catenary.cases.cli.studies import sweep, uncertainty, speed, separation  # noqa: F401
+    from catenary.cases.cli.studies import what_if, worst  # noqa: F401
     from catenary.cases.cli.studies import accuracy, hard  # noqa: F401
     from catenary.cases.cli import pantograph  # noqa: F401
     from catenary.cases.cli.studies import sensitivity, stability, waves, scaling  # noqa: F401
