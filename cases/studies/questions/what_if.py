@@ -109,7 +109,7 @@ def differences(changes: Sequence[str], ended: Sequence[Ended], out: Path) -> Di
         )
 
 
-def _figures(name: str, first: float, second: float) -> dict[str, float | None]:
+def _figures(name: str, first: float, second: float) -> dict[str, Any]:
     """Two values and their difference as columns; None for what is not known."""
     values = {AS_IT_IS: first, CHANGED: second, "difference": second - first}
     return {
@@ -127,7 +127,7 @@ def _columns(name: str, head: str, form: str) -> list[Column]:
 
 
 def _statistics(a: RunStatistics, b: RunStatistics) -> StudyTable:
-    rows = [
+    rows: list[dict[str, Any]] = [
         {"of": p.name, "statistic": label}
         | _figures("", factor * getattr(p, name), factor * getattr(q, name))
         for p, q in zip(a.pantographs, b.pantographs, strict=False)
