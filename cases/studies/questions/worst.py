@@ -31,7 +31,7 @@ class Passage(NamedTuple):
     std, maximum, minimum : of the contact force, 20 Hz low-pass [N]
     loss : share of time without contact [%]
     median : of the deviations of this pantograph in all spans [N]
-    stands_out : whether the deviation is far above it
+    stands_out : whether the deviation is far above it, None where there are too few others
     """
 
     span: int
@@ -43,7 +43,7 @@ class Passage(NamedTuple):
     minimum: float
     loss: float
     median: float
-    stands_out: bool
+    stands_out: bool | None
 
 
 class Spot(NamedTuple):
@@ -55,14 +55,14 @@ class Spot(NamedTuple):
     x : where it is [m]
     value : uplift of an arm [mm], largest force of a dropper [N], or its time slack [s]
     median : of its likes
-    stands_out : whether the value is far above it
+    stands_out : whether the value is far above it, None where there are too few others
     """
 
     number: int
     x: float
     value: float
     median: float
-    stands_out: bool
+    stands_out: bool | None
 
 
 class WorstPlaces(NamedTuple):
@@ -132,21 +132,21 @@ def _passages(results: Results) -> list[Passage]:
             extremes = float(part.max()), float(part.min())
             own.append(Passage(span, start, end, p, float(part.std()), *extremes, loss, 0.0, False))
         values = np.array([one.std for one in own])
-        out = stands_out(values)
         found += [
-            one._replace(median=float(np.median(values)), stands_out=bool(is_out))
-            for one, is_out in zip(own, out, strict=True)
+            one._replace(median=float(np.median(values)), stands_out=is_out)
+            for one, is_out in zip(own, stands_out(values), strict=True)
         ]
     return found
 
 
-def stands_out(values: np.ndarray) -> np.ndarray:
-    """Which of some likes are far above their median, (n,) bool."""
+def stands_out(values: np.ndarray) -> list[bool | None]:
+    """Which of some likes (n,) are far above their median; None of all where they are too few."""
     if values.size < _FEWEST:
-        return np.zeros(values.size, dtype=bool)
+        return [None] * values.size
     median = float(np.median(values))
     scatter = _NORMAL * float(np.median(np.abs(values - median)))
-    return np.asarray(values > median + max(_DEVIATIONS * scatter, _SHARE * abs(median)))
+    beyond = values > median + max(_DEVIATIONS * scatter, _SHARE * abs(median))
+    return [bool(one) for one in beyond]
 
 
 def dropper_likes(results: Results) -> np.ndarray:
@@ -172,6 +172,6 @@ def _spots(
     for group in np.unique(likes[known]):
         (own,) = np.nonzero(known & (likes == group))
         median = float(np.median(values[own]))
-        for number, is_out in zip(own.tolist(), stands_out(values[own]).tolist(), strict=True):
+        for number, is_out in zip(own.tolist(), stands_out(values[own]), strict=True):
             spots.append(Spot(number, float(x[number]), float(values[number]), median, is_out))
     return sorted(spots, key=lambda one: -one.value)

@@ -121,7 +121,9 @@ def _told(said: Sequence[str]) -> list[str]:
     return [*lines, f"    and {more} more (-o)"] if more > 0 else lines
 
 
-def _out(is_out: bool) -> str:
+def _out(is_out: bool | None) -> str:
+    if is_out is None:
+        return "; too few others to compare"
     return "; stands out" if is_out else "; within the scatter of the others"
 
 
@@ -167,7 +169,7 @@ def _droppers_table(places: WorstPlaces, causes: Causes) -> StudyTable:
                 "usual_max_N": one.median,
                 "min_N": float(places.least[one.number]),
                 "slack_s": 0.0 if times is None else times.value,
-                "stands_out": one.stands_out or (times is not None and times.stands_out),
+                "stands_out": (times is not None and times.stands_out) or one.stands_out,
                 "causes": causes.at(one.x),
             }
         )
