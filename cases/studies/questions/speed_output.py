@@ -79,6 +79,13 @@ def as_text(study: SpeedStudy) -> str:
     lines += [table_of_criteria(study).text(), ""]
     if study.not_judged:
         lines.append(f"Not judged: {'; '.join(study.not_judged)}.")
+    refused = [one for one in study.ended if not one.done]
+    if refused:
+        slowest, fastest = refused[0].variant.varied[KEY], refused[-1].variant.varied[KEY]
+        lines.append(
+            f"{len(refused)} speeds from {slowest} to {fastest} km/h could not be run and count as "
+            f"failed; the first: {refused[0].outcome}"
+        )
     lines.append(
         "Trains run in the direction of the scene alone. Stretches narrower than "
         f"{speeds.step:g} km/h may be missed."
