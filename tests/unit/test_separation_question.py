@@ -12,7 +12,13 @@ from typer.testing import CliRunner
 
 import catenary
 from catenary.cases.cli.main import app
-from catenary.cases.studies.questions.separation import Distances, Pair, SeparationStudy
+from catenary.cases.scene.load import load_scene
+from catenary.cases.studies.questions.separation import (
+    Distances,
+    Pair,
+    SeparationStudy,
+    _variant,
+)
 from catenary.cases.studies.questions.separation_output import as_text
 
 CASE = "en50318_2002"
@@ -38,6 +44,13 @@ def test_distances_are_even_and_end_in_the_range() -> None:
 def test_what_is_no_range_is_refused(words: list[str], told: str) -> None:
     done = CliRunner().invoke(app, ["separation", CASE, *words])
     assert done.exit_code == 2 and told in done.output
+
+
+def test_the_train_ends_as_much_later_as_it_is_longer() -> None:
+    scene = load_scene(CASE, ["train.end_m=900"])
+    assert _variant(scene, "reference", 50.0).assignments[:2] == (
+        "train.start_m=140", "train.end_m=950",
+    )  # fmt: skip
 
 
 def pair(at: float, std: tuple[float, float], *failed: str, outcome: str = "done") -> Pair:

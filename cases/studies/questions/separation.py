@@ -99,16 +99,20 @@ class SeparationStudy(NamedTuple):
         return [pair for pair in self.pairs if pair.outcome == "done"]
 
     def best(self) -> Pair | None:
-        """The pair whose larger deviation is least; None if no distance could be run."""
-        return min(self.done, key=_larger, default=None)
+        """The pair whose larger deviation is least; None if no deviation is known."""
+        return min(self._known, key=_larger, default=None)
 
     def worst(self) -> Pair | None:
-        """The pair whose larger deviation is largest; None if no distance could be run."""
-        return max(self.done, key=_larger, default=None)
+        """The pair whose larger deviation is largest; None if no deviation is known."""
+        return max(self._known, key=_larger, default=None)
+
+    @property
+    def _known(self) -> list[Pair]:
+        return [pair for pair in self.done if None not in pair.std]
 
 
 def _larger(pair: Pair) -> float:
-    return max((value for value in pair.std if value is not None), default=float("nan"))
+    return max(value for value in pair.std if value is not None)
 
 
 def find_separations(
@@ -149,8 +153,10 @@ def _variant(scene: Scene, kind: str, separation: float | None) -> Variant:
         train = text_of([{"name": kind}])
         return Variant("alone", (f"train.pantographs={train}",))
     train = text_of([{"name": kind}, {"name": kind, "behind_m": separation}])
-    start = f"train.start_m={scene.train.start_m + separation:.10g}"
-    return Variant(f"{separation:g}m", (start, f"train.pantographs={train}"))
+    ahead = [f"train.start_m={scene.train.start_m + separation:.10g}"]
+    if scene.train.end_m is not None:  # of the leading one, too
+        ahead.append(f"train.end_m={scene.train.end_m + separation:.10g}")
+    return Variant(f"{separation:g}m", (*ahead, f"train.pantographs={train}"))
 
 
 def _pair(separation: float | None, one: Ended) -> Pair:

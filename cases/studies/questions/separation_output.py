@@ -52,15 +52,12 @@ def as_text(study: SeparationStudy) -> str:
     lines = [f"{study.case}: two pantographs {study.kind} at {study.speed:g} km/h."]
     best, worst = study.best(), study.worst()
     if best is None or worst is None:
-        lines.append(f"No distance could be run: {study.pairs[0].outcome}")
+        lines.append(f"At no distance there are statistics of both: {study.pairs[0].outcome}")
         return "\n".join(lines)
     if study.alone.std:
-        lines.append(f"One alone: {_deviations(study.alone)}, uplift {study.alone.uplift:.1f} mm.")
+        lines.append(f"One alone: {_deviations(study.alone)}.")
     for word, pair in (("Least", best), ("Largest", worst)):
-        lines.append(
-            f"{word} deviation at {pair.separation:g} m: {_deviations(pair)}, uplift "
-            f"{pair.uplift:.1f} mm."
-        )
+        lines.append(f"{word} deviation at {pair.separation:g} m: {_deviations(pair)}.")
     lines += _failing(study)
     refused = [pair for pair in study.pairs if pair.outcome != "done"]
     if refused:
@@ -80,9 +77,11 @@ def as_text(study: SeparationStudy) -> str:
 
 def _deviations(pair: Pair) -> str:
     told = ["not known" if value is None else f"{value:.1f} N" for value in pair.std]
+    uplift = "" if pair.uplift is None else f", uplift {pair.uplift:.1f} mm"
     if len(told) == 1:
-        return f"deviation {told[0]}"
-    return " and ".join(f"{place} {value}" for place, value in zip(PLACES, told, strict=True))
+        return f"deviation {told[0]}{uplift}"
+    both = (f"{place} {value}" for place, value in zip(PLACES, told, strict=True))
+    return f"{' and '.join(both)}{uplift}"
 
 
 def _failing(study: SeparationStudy) -> list[str]:
