@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from catenary.line_tables import AtRest, Plan, check, plan, static
     from catenary.optimising import Optimum, optimise, tolerance
     from catenary.pictures import Pictures
+    from catenary.questions import highest_speeds, separations
     from catenary.results import Run, open
     from catenary.runs import run, sweep
     from catenary.scenes import Scene, load
@@ -43,12 +44,14 @@ __all__ = [
     "Uncertainty",
     "__version__",
     "check",
+    "highest_speeds",
     "load",
     "open",
     "optimise",
     "plan",
     "run",
     "sensitivity",
+    "separations",
     "static",
     "sweep",
     "tolerance",
@@ -60,6 +63,7 @@ _FILES = {
     "line_tables": ("AtRest", "Plan", "check", "plan", "static"),
     "optimising": ("Optimum", "optimise", "tolerance"),
     "pictures": ("Pictures",),
+    "questions": ("highest_speeds", "separations"),
     "results": ("Run", "open"),
     "runs": ("run", "sweep"),
     "scenes": ("Scene", "load"),

@@ -70,8 +70,9 @@ def test_no_backend_is_loaded_for_an_answer_or_a_refusal() -> None:
 
 
 def test_help_loads_no_arrays() -> None:
-    lines = ["--help", "run --help", "sweep --help", "uncertainty --help", "merge --help"]
-    lines += ["optimise --help", "tolerance --help"]
+    verbs = ("run", "sweep", "uncertainty", "merge", "optimise", "tolerance")
+    verbs += ("speed", "separation", "what-if", "worst")
+    lines = ["--help", *(f"{verb} --help" for verb in verbs)]
     for line, (code, loaded) in zip(lines, run_all(lines), strict=True):
         assert code == 0, line
         assert "numpy" not in loaded, line

@@ -79,7 +79,7 @@ def ensemble_of(
 
 
 def run_ensemble(
-    ensemble: Ensemble, out: Path, comm: Any, options: RunOptions, part: Part | None = None
+    ensemble: Ensemble, out: Path | None, comm: Any, options: RunOptions, part: Part | None = None
 ) -> list[Ended]:
     """March what is not done yet, and say how variants ended, in their order. Collective.
 
@@ -88,7 +88,7 @@ def run_ensemble(
 
     Parameters
     ----------
-    out : folder in which pieces of work are kept
+    out : folder in which pieces of work are kept, None to keep none
     part : of the pieces of work, all if None
     """
     size = max(_LEAST, min(_MOST, -(-len(ensemble.variants) // _PIECES)))

@@ -1,0 +1,1 @@
+"""Everyday questions: highest speed, distance of pantographs, changes, worst places."""

@@ -1,0 +1,217 @@
+"""Candidates for why a place of a line is bad, with figures; nearness proves none."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from catenary.cases.studies.questions.worst import Passage, dropper_likes, spans_in_stretch
+from catenary.postproc.read.results import Results
+
+# Frequencies so close are near each other, lengths so far apart differ [-].
+_NEAR, _LONGER = 0.1, 0.05
+# A reflection that keeps less of its amplitude is no candidate [-].
+_FELT = 0.01
+# Elasticity beyond that of other spans [-], height beyond them [m] and rest force of droppers
+# beyond their likes [-] from which on these are candidates.
+_SOFTER, _HIGHER, _HEAVIER = 0.1, 5e-3, 0.5
+_POINTS = 101  # at which profiles of spans are compared
+_FEWEST = 3
+
+
+class Causes:
+    """Looks for causes in what a result file says of its line.
+
+    Parameters
+    ----------
+    results : of the run, open
+    passages : of all spans of the evaluated stretch
+    elasticity : places (n,) [m] and lift under a unit force (n,) [m/N] along the stretch; None if
+        it is not known
+    """
+
+    def __init__(
+        self,
+        results: Results,
+        passages: Sequence[Passage],
+        elasticity: tuple[np.ndarray, np.ndarray] | None,
+    ) -> None:
+        self._results, self._passages, self._elasticity = results, passages, elasticity
+        self._masts = results.line("support_x")
+
+    def of_passage(self, passage: Passage) -> list[str]:
+        """Sentences on a pantograph in a span, none if there is no candidate."""
+        return [
+            *self._near(passage.start, passage.end),
+            *self._reflections(passage),
+            *self._pantograph_ahead(passage),
+            *self._length(passage.span),
+            *self._elastic(passage.span),
+            *self._profile(passage.span),
+            *self._droppers_at_rest(passage.start, passage.end),
+        ]
+
+    def at(self, x: float) -> list[str]:
+        """Sentences on an arm or a dropper at a place [m]; its own span is looked at."""
+        span = int(np.clip(np.searchsorted(self._masts, x, "right") - 1, 0, self._masts.size - 2))
+        reach = 0.5 * float(self._masts[span + 1] - self._masts[span])
+        return [
+            *self._near(x - reach, x + reach),
+            *self._elastic(span),
+            *self._droppers_at_rest(x - reach, x + reach),
+        ]
+
+    def of_line(self) -> list[str]:
+        """Sentences on what acts on all spans alike."""
+        said = [
+            f"known of the line, at no single place: {defect['says']}"
+            for defect in self._results.attributes.get("defects", [])
+            if "at_m" not in defect
+        ]
+        speed = self._results.fact("speed")
+        wave = self._results.attributes.get("arrivals", {}).get("wave_speed_m_per_s")
+        span = float(np.median(np.diff(self._masts)))
+        if wave and abs(2.0 * speed / wave - 1.0) <= _NEAR:
+            said.append(
+                f"spans are passed at {speed / span:.2f} Hz, near their lowest natural frequency "
+                f"c / 2 L = {wave / (2.0 * span):.2f} Hz"
+            )
+        return said
+
+    def _near(self, start: float, end: float) -> Iterator[str]:
+        """Defects and ends of contact wires, up to half a stretch before and behind it."""
+        reach = 0.5 * (end - start)
+        low, high = start - reach, end + reach
+        for defect in self._results.attributes.get("defects", []):
+            if "at_m" in defect:
+                first = float(defect["at_m"])
+                if first <= high and self._defect_end(defect) >= low:
+                    yield f"defect: {defect['says']}"
+        for name, profile in self._results.contact_profiles().items():
+            ends = [profile.x[0], *profile.x[profile.breaks], *profile.x[profile.breaks - 1],
+                    profile.x[-1]]  # fmt: skip
+            for x in sorted(set(map(float, ends))):
+                if low <= x <= high:
+                    yield f"the contact wire {name} begins or ends at {x:.0f} m (overlap, section)"
+
+    def _defect_end(self, defect: dict[str, Any]) -> float:
+        """Where a defect ends along the track [m]: worn wires have a length."""
+        at = float(defect["at_m"])
+        for table in self._results.attributes.get("config", {}).get("defects", []):
+            if table.get("type") == defect["type"] and table.get("from_m") == at:
+                return float(table.get("to_m", at))
+        return at
+
+    def _reflections(self, passage: Passage) -> Iterator[str]:
+        of_pantographs = self._results.attributes.get("arrivals", {}).get("pantographs", [])
+        if passage.pantograph >= len(of_pantographs):
+            return
+        facts = of_pantographs[passage.pantograph]
+        length = passage.end - passage.start
+        for end in ("far", "near"):
+            met, share = facts.get(f"{end}_end_met_at_m"), facts.get(f"{end}_end_share")
+            if met is None or not passage.start - length <= met <= passage.end:
+                continue
+            if share is None or share >= _FELT:
+                kept = "" if share is None else f", with up to {100 * share:.2g} % of its amplitude"
+                yield f"the reflection from the {end} end of the line arrives at {met:.0f} m{kept}"
+
+    def _pantograph_ahead(self, passage: Passage) -> Iterator[str]:
+        leading = next(
+            (o for o in self._passages if o.span == passage.span and o.pantograph == 0), None
+        )
+        if passage.pantograph and leading is not None and passage.std > 1.25 * leading.std:
+            yield (
+                f"it runs in the waves of the pantograph ahead, which has {leading.std:.1f} N in "
+                "the same span"
+            )
+
+    def _length(self, span: int) -> Iterator[str]:
+        lengths = np.diff(self._masts)
+        own, usual = float(lengths[span]), float(np.median(lengths))
+        if abs(own / usual - 1.0) > _LONGER:
+            yield f"the span is {own:.1f} m long, others {usual:.1f} m"
+
+    def _elastic(self, span: int) -> Iterator[str]:
+        """Softest and stiffest place of a span against those of the others."""
+        table = self._elasticities
+        if span not in table or len(table) < _FEWEST:
+            return
+        for word, column in (("softest", 0), ("stiffest", 1)):
+            at, own = table[span][column]
+            usual = float(np.median([row[column][1] for row in table.values()]))
+            if abs(own / usual - 1.0) > _SOFTER:
+                yield (
+                    f"elasticity: {1e3 * own:.3f} mm/N at the {word} place ({at:.0f} m), usual are "
+                    f"{1e3 * usual:.3f} mm/N"
+                )
+
+    @cached_property
+    def _elasticities(self) -> dict[int, tuple[tuple[float, float], tuple[float, float]]]:
+        """Place and value of largest and smallest elasticity of each span of the stretch."""
+        if self._elasticity is None:
+            return {}
+        x, lift = self._elasticity
+        found = {}
+        for span in spans_in_stretch(self._results):
+            (own,) = np.nonzero(
+                (x >= self._masts[span]) & (x <= self._masts[span + 1]) & np.isfinite(lift)
+            )
+            if own.size:
+                soft, stiff = own[np.argmax(lift[own])], own[np.argmin(lift[own])]
+                found[span] = (
+                    (float(x[soft]), float(lift[soft])),
+                    (float(x[stiff]), float(lift[stiff])),
+                )
+        return found
+
+    def _profile(self, span: int) -> Iterator[str]:
+        """Height of the contact wire at rest against that of other spans."""
+        table = self._profiles
+        if span not in table or len(table) < _FEWEST:
+            return
+        away = table[span] - np.median(np.array(list(table.values())), axis=0)
+        worst = int(np.argmax(np.abs(away)))
+        if abs(away[worst]) > _HIGHER:
+            start, end = self._masts[span], self._masts[span + 1]
+            x = start + worst / (_POINTS - 1) * (end - start)
+            yield (
+                f"the contact wire at rest is {1e3 * abs(away[worst]):.0f} mm "
+                f"{'higher' if away[worst] > 0 else 'lower'} at {x:.0f} m than in other spans"
+            )
+
+    @cached_property
+    def _profiles(self) -> dict[int, np.ndarray]:
+        """Height over the share of each span of the stretch, (_POINTS,) [m]; of single wires."""
+        profiles = list(self._results.contact_profiles().values())
+        if len(profiles) > 1 or profiles[0].breaks.size:
+            return {}
+        x, height = profiles[0].x, profiles[0].height
+        share = np.linspace(0.0, 1.0, _POINTS)
+        return {
+            span: np.interp(
+                self._masts[span] + share * (self._masts[span + 1] - self._masts[span]), x, height
+            )
+            for span in spans_in_stretch(self._results)
+        }
+
+    def _droppers_at_rest(self, start: float, end: float) -> Iterator[str]:
+        """Droppers that carry much more or less at rest than those at the same place of a span."""
+        x, force = self._results.line("dropper_x"), self._results.static("dropper_force")
+        likes = self._likes
+        first, last = self._results.evaluation
+        for number in np.flatnonzero((x >= start) & (x <= end)):
+            others = force[(likes == likes[number]) & (x >= first) & (x <= last)]
+            usual = float(np.median(others)) if others.size >= _FEWEST else 0.0
+            if usual > 0.0 and abs(force[number] / usual - 1.0) > _HEAVIER:
+                yield (
+                    f"the dropper at {x[number]:.1f} m carries {force[number]:.0f} N at rest, "
+                    f"usual are {usual:.0f} N"
+                )
+
+    @cached_property
+    def _likes(self) -> np.ndarray:
+        return dropper_likes(self._results)

@@ -1,0 +1,187 @@
+"""The worst places of a run as text and tables, each with candidates for its cause."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from catenary.base.errors import CatenaryError
+from catenary.cases.run.scene_mesh import mesh_of
+from catenary.cases.scene.input.faults import Origin
+from catenary.cases.scene.load import scene_from
+from catenary.cases.scene.problem import problem_of
+from catenary.cases.studies.questions.causes import Causes
+from catenary.cases.studies.questions.worst import Passage, Spot, WorstPlaces, worst_places
+from catenary.postproc.files.disk import write_all
+from catenary.postproc.read.results import Results
+from catenary.postproc.report.study_table import Column, StudyTable
+from catenary.solver.statics.elasticity import elasticity
+from catenary.solver.statics.line_at_rest import line_at_rest
+
+NONE = "no cause found"
+_MOST_CAUSES = 4  # of a place in the text; tables have all
+
+
+class Answer(NamedTuple):
+    """The tables of spans, supports and droppers, whole, and a text about the worst of each."""
+
+    spans: StudyTable
+    supports: StudyTable
+    droppers: StudyTable
+    text: str
+
+
+def answer_of(results: Results, count: int) -> Answer:
+    """Find the worst places of a run and candidates for their causes. Not collective.
+
+    Parameters
+    ----------
+    count : places of each kind in the text
+    """
+    places = worst_places(results)
+    along, unknown = _elasticity(results)
+    causes = Causes(results, places.passages, along)
+    names = results.pantograph_names()
+    lines = [_head(results)]
+    if not places.passages:
+        lines.append("No span lies whole within the evaluated stretch and the record.")
+    lines += _of_spans(places.passages, causes, names, count)
+    for title, spots, words in (
+        ("Supports by uplift", places.arms, "{x:.0f} m: {v:.1f} mm, median {m:.1f} mm"),
+        ("Droppers by largest force", places.forces, "{x:.1f} m: {v:.0f} N, usual {m:.0f} N"),
+        ("Droppers by time slack", places.slack, "{x:.1f} m: {v:.2f} s, usual {m:.2f} s"),
+    ):
+        lines += _of_spots(title, spots[:count], words, causes)
+    everywhere = causes.of_line()
+    if everywhere:
+        lines += ["", "Of the line as a whole:", *(f"  {text}" for text in everywhere)]
+    if unknown:
+        lines += ["", f"Elasticity along the line is not known: {unknown}"]
+    text = "\n".join([*lines, "", "Candidates are near in place or frequency; none is proved."])
+    return Answer(
+        _spans_table(places.passages, causes, names),
+        _supports_table(places.arms, causes),
+        _droppers_table(places, causes),
+        text,
+    )
+
+
+def _head(results: Results) -> str:
+    start, end = results.evaluation
+    return (
+        f"{results.attributes['case']} at {3.6 * results.fact('speed'):.0f} km/h, evaluated from "
+        f"{start:.0f} to {end:.0f} m"
+    )
+
+
+def _elasticity(results: Results) -> tuple[Any, str]:
+    """Elasticity along the evaluated stretch from the scene of a run, and why it is not known."""
+    try:
+        origin = Origin(str(results.path), recorded=True)
+        scene = scene_from(results.attributes["config"], origin)
+        at_rest = line_at_rest(problem_of(scene), mesh_of(scene))
+        found = elasticity(at_rest.model, *results.evaluation)
+    except CatenaryError as error:
+        return None, str(error)
+    return (found.x, found.lift), ""
+
+
+def _of_spans(
+    passages: Sequence[Passage], causes: Causes, names: Sequence[str], count: int
+) -> list[str]:
+    """The worst passage of each of the worst spans."""
+    lines = ["", "Spans by standard deviation"] if passages else []
+    worst: dict[int, Passage] = {}
+    for one in passages:
+        worst.setdefault(one.span, one)
+    for one in list(worst.values())[:count]:
+        who = f", {names[one.pantograph]}" if len(names) > 1 else ""
+        lines.append(
+            f"  span {one.span + 1}, {one.start:.0f} to {one.end:.0f} m{who}: {one.std:.1f} N, "
+            f"median {one.median:.1f} N, force {one.minimum:.0f} to {one.maximum:.0f} N"
+            f"{_out(one.stands_out)}"
+        )
+        lines += _told(causes.of_passage(one))
+    return lines
+
+
+def _of_spots(title: str, spots: Sequence[Spot], words: str, causes: Causes) -> list[str]:
+    lines = ["", title] if spots else []
+    for one in spots:
+        lines.append("  " + words.format(x=one.x, v=one.value, m=one.median) + _out(one.stands_out))
+        lines += _told(causes.at(one.x))
+    return lines
+
+
+def _told(said: Sequence[str]) -> list[str]:
+    """Lines for the candidates of a place."""
+    lines = [f"    {text}" for text in said[:_MOST_CAUSES] or [NONE]]
+    more = len(said) - _MOST_CAUSES
+    return [*lines, f"    and {more} more (-o)"] if more > 0 else lines
+
+
+def _out(is_out: bool | None) -> str:
+    if is_out is None:
+        return "; too few others to compare"
+    return "; stands out" if is_out else "; within the scatter of the others"
+
+
+def _spans_table(passages: Sequence[Passage], causes: Causes, names: Sequence[str]) -> StudyTable:
+    fields = ("std_N", "max_N", "min_N", "loss_percent", "median_std_N", "stands_out")
+    rows = [
+        {
+            "span": one.span + 1,
+            "from_m": one.start,
+            "to_m": one.end,
+            "pantograph": names[one.pantograph],
+            **dict(zip(fields, one[4:], strict=True)),
+            "causes": causes.of_passage(one),
+        }
+        for one in passages
+    ]
+    return _table(("span", "from_m", "to_m", "pantograph", *fields, "causes"), rows)
+
+
+def _supports_table(arms: Sequence[Spot], causes: Causes) -> StudyTable:
+    rows = [
+        {
+            "x_m": one.x,
+            "max_uplift_mm": one.value,
+            "median_mm": one.median,
+            "stands_out": one.stands_out,
+            "causes": causes.at(one.x),
+        }
+        for one in arms
+    ]
+    return _table(("x_m", "max_uplift_mm", "median_mm", "stands_out", "causes"), rows)
+
+
+def _droppers_table(places: WorstPlaces, causes: Causes) -> StudyTable:
+    slack = {one.number: one for one in places.slack}
+    rows = []
+    for one in places.forces:
+        times = slack.get(one.number)
+        rows.append(
+            {
+                "x_m": one.x,
+                "max_N": one.value,
+                "usual_max_N": one.median,
+                "min_N": float(places.least[one.number]),
+                "slack_s": 0.0 if times is None else times.value,
+                "stands_out": (times is not None and times.stands_out) or one.stands_out,
+                "causes": causes.at(one.x),
+            }
+        )
+    names = ("x_m", "max_N", "usual_max_N", "min_N", "slack_s", "stands_out", "causes")
+    return _table(names, rows)
+
+
+def _table(names: Sequence[str], rows: Sequence[dict[str, Any]]) -> StudyTable:
+    return StudyTable([Column(name) for name in names], rows)
+
+
+def write(folder: Path, answer: Answer) -> list[Path]:
+    """Write the three tables; returns the files. Not collective."""
+    tables = {"spans": answer.spans, "supports": answer.supports, "droppers": answer.droppers}
+    return write_all(folder, {f"worst_{name}.csv": own.csv() for name, own in tables.items()})

@@ -1,0 +1,128 @@
+"""``catenary separation``: the same figures as runs by hand, and as the published table."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import catenary
+from catenary.cases.cli.main import app
+from catenary.cases.scene.load import load_scene
+from catenary.cases.studies.questions.separation import (
+    Distances,
+    Pair,
+    SeparationStudy,
+    _variant,
+)
+from catenary.cases.studies.questions.separation_output import as_text
+
+CASE = "en50318_2002"
+
+
+def test_distances_are_even_and_end_in_the_range() -> None:
+    assert Distances(31, 41, 4).values() == [31, 35, 39]
+    assert Distances(31, 32, 0.1).values() == pytest.approx(np.linspace(31, 32, 11))
+    assert len(Distances().values()) == 370
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["--from", "50", "--to", "40"], "is no range of distances"),
+        (["--to", "1500"], "is no range of distances"),
+        (["--step", "0"], "above 0 m"),
+        (["--step", "0.01"], "more than 2000"),
+        (["--from", "nan"], "is no range of distances"),
+        (["--step", "nan"], "above 0 m"),
+    ],
+)
+def test_what_is_no_range_is_refused(words: list[str], told: str) -> None:
+    done = CliRunner().invoke(app, ["separation", CASE, *words])
+    assert done.exit_code == 2 and told in done.output
+
+
+def test_the_train_ends_as_much_later_as_it_is_longer() -> None:
+    scene = load_scene(CASE, ["train.end_m=900"])
+    assert _variant(scene, "reference", 50.0).assignments[:2] == (
+        "train.start_m=140", "train.end_m=950",
+    )  # fmt: skip
+
+
+def pair(at: float, std: tuple[float, float], *failed: str, outcome: str = "done") -> Pair:
+    return Pair(at, outcome, std, (1.0, 1.0), (0.0, 0.0), 50.0, failed, ())
+
+
+def test_the_worse_pantograph_decides_and_failing_stretches_are_joined() -> None:
+    alone = Pair(None, "done", (20.0,), (1.0,), (0.0,), 50.0, (), ())
+    pairs = (
+        pair(30, (20.0, 40.0), "arcing"),
+        pair(40, (20.0, 41.0), "arcing"),
+        pair(50, (39.0, 10.0)),
+        pair(60, (70.0, 20.0), "arcing"),
+        pair(70, (0.0, 0.0), outcome="is too far"),
+    )
+    study = SeparationStudy("case", "kind", 250.0, alone, pairs)
+    best, worst = study.best(), study.worst()
+    assert best is not None and worst is not None
+    assert (best.separation, worst.separation) == (50, 60)
+    text = as_text(study)
+    assert "arcing: at 30-40, 60 m" in text
+    assert "1 of 5 distances could not be run, the first is 70 m: is too far" in text
+
+
+def test_the_command_agrees_with_runs_by_hand(tmp_path: Path) -> None:
+    """300 m is refused there: the leading one would start in the evaluated stretch."""
+    words = ["separation", CASE, "--short", "--from", "60", "--to", "300", "--step", "120"]
+    done = CliRunner().invoke(app, [*words, "-o", str(tmp_path)])
+    assert done.exit_code == 0, done.output
+    assert "could not be run, the first is 300 m: evaluation.from_m" in done.output
+    alone, near, far, refused = csv.DictReader(
+        (tmp_path / "separation.csv").read_text().splitlines()
+    )
+    assert refused["outcome"] != "done" and not refused["std_leading_N"]
+    scene = catenary.load(CASE, short=True)
+    start = scene["train.start_m"]
+    single = catenary.run(scene)
+    # Lanes leave round-off alone.
+    std = single.statistics.std_N.iloc[0]
+    assert float(alone["std_leading_N"]) == pytest.approx(std, abs=1e-8)
+    for row, distance in ((near, 60.0), (far, 180.0)):
+        both = [{"name": "reference"}, {"name": "reference", "behind_m": distance}]
+        run = catenary.run(scene.replace(train={"start_m": start + distance, "pantographs": both}))
+        for place, name in enumerate(("leading", "trailing")):
+            by_hand = run.statistics.iloc[place]
+            assert float(row[f"std_{name}_N"]) == pytest.approx(by_hand.std_N, abs=1e-8)
+            assert float(row[f"min_{name}_N"]) == pytest.approx(by_hand.min_N, abs=1e-8)
+        uplift = run.summary["supports"]["max_uplift_mm"]
+        assert float(row["max_uplift_mm"]) == pytest.approx(uplift, abs=1e-8)
+    record = json.loads((tmp_path / "separation.json").read_text())
+    worse = {float(r["separation_m"]): float(r["std_trailing_N"]) for r in (near, far)}
+    assert record["worst_separation_m"] == max(worse, key=lambda at: worse[at])
+    assert (tmp_path / "separation.png").is_file()
+
+
+@pytest.mark.study
+@pytest.mark.parametrize(
+    ("alpha", "published"),
+    [
+        (0.00275, {31: 43.7, 67: 101.2, 175: 45.2, 211: 92.3}),
+        (0.0275, {31: 51.3, 67: 90.1, 175: 61.8, 211: 73.8}),
+    ],
+)
+def test_the_papers_line_gives_what_the_page_on_waves_shows(
+    alpha: float, published: dict[int, float]
+) -> None:
+    """Deviation of the trailing pantograph; printed to 0.1 N."""
+    changes = {
+        "line.damping.alpha_s": alpha, "line.n_spans": 46, "train.start_m": 400,
+        "evaluation.from_m": 1126, "evaluation.to_m": 1558,
+    }  # fmt: skip
+    scene = catenary.load("ambrosio2012").replace(changes)
+    table = catenary.separations(scene, 31, 211, step=36).set_index("separation_m")
+    for distance, sigma in published.items():
+        assert table.std_trailing_N[distance] == pytest.approx(sigma, abs=0.051)

@@ -1,0 +1,173 @@
+"""``catenary worst``: three planted defects are found with figures, and sound spans show none."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from catenary.cases.cli.main import app
+from catenary.cases.studies.questions.causes import Causes
+from catenary.cases.studies.questions.worst import Passage, stands_out, worst_places
+from catenary.postproc.evaluate.statistics import contact_statistics
+from catenary.postproc.read.results import Results
+
+# Three missing droppers, a mass, three droppers cut too short, in spans of 60 m.
+PLANTED = {9: "missing", 13: "hard spot of 10 kg", 16: "higher at 930 m"}
+CHANGES = (
+    "line.n_spans=24",
+    "evaluation.to_m=1080",
+    "defects=["
+    + ",".join(f'{{type="missing_dropper",span=9,dropper={n}}}' for n in (4, 5, 6))
+    + ',{type="hard_spot",at_m=750,mass_kg=10}]',
+    "irregularities.dropper_lengths.by_dropper=[[16,4,-40],[16,5,-40],[16,6,-40]]",
+    "output.field_every_s=0",
+)
+
+
+def invoke(*words: str) -> str:
+    done = CliRunner().invoke(app, list(words))
+    assert done.exit_code == 0, done.output
+    return done.output
+
+
+@pytest.fixture(scope="module")
+def run_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("planted")
+    invoke("run", "en50318_2002", "-q", "-o", str(out), *(w for c in CHANGES for w in ("--set", c)))
+    return out
+
+
+@pytest.fixture(scope="module")
+def tables(run_folder: Path) -> dict[str, list[dict[str, str]]]:
+    """The tables of all places, and what was said as a row."""
+    out = run_folder / "worst"
+    said = invoke("worst", str(run_folder), "-o", str(out))
+    found = {
+        name: list(csv.DictReader((out / f"worst_{name}.csv").read_text().splitlines()))
+        for name in ("spans", "supports", "droppers")
+    }
+    return found | {"said": [{"text": said}]}
+
+
+@pytest.mark.process
+def test_the_three_worst_spans_are_those_with_defects(tables: dict[str, Any]) -> None:
+    worst = tables["spans"][:3]
+    assert {int(row["span"]) for row in worst} == set(PLANTED)
+    for row in worst:
+        assert PLANTED[int(row["span"])] in row["causes"]
+    stand_out = {int(row["span"]) for row in tables["spans"] if row["stands_out"] == "true"}
+    assert {9, 13} <= stand_out <= set(PLANTED)
+    text = tables["said"][0]["text"]
+    assert "span 9, 480 to 540 m" in text and "errors of the droppers' lengths" in text
+
+
+@pytest.mark.process
+def test_spans_away_from_defects_have_no_cause(tables: dict[str, Any]) -> None:
+    """Spans 11 and 17 lie a span and more away; in span 18 the reflection arrives, at 1070 m."""
+    by_span = {int(row["span"]): row["causes"] for row in tables["spans"]}
+    assert by_span[11] == ""
+    assert by_span[18].startswith("the reflection from the far end of the line arrives at 1070 m")
+    assert "no cause found" in tables["said"][0]["text"]
+
+
+@pytest.mark.process
+def test_softer_without_droppers(tables: dict[str, Any]) -> None:
+    (row,) = (row for row in tables["spans"] if row["span"] == "9")
+    assert "elasticity: " in row["causes"] and "softest place (510 m)" in row["causes"]
+
+
+@pytest.mark.process
+def test_droppers_beside_missing_ones_and_short_ones_stand_out(tables: dict[str, Any]) -> None:
+    rows = {float(row["x_m"]): row for row in tables["droppers"]}
+    assert float(tables["droppers"][0]["x_m"]) in (497.0, 523.0)
+    for x in (497.0, 523.0, 936.5, 943.0):
+        assert rows[x]["stands_out"] == "true", x
+    assert "dropper at 943.0 m carries" in rows[943.0]["causes"]
+    # Those that are missing carry nothing, and are not slack at times.
+    assert float(rows[510.0]["max_N"]) == float(rows[510.0]["slack_s"]) == 0.0
+
+
+def test_figures_of_a_span_are_statistics_of_that_stretch(run_folder: Path) -> None:
+    with Results(run_folder) as results:
+        places = worst_places(results)
+        assert len(places.passages) == 12
+        columns = [results.column(name, 0) for name in ("contact_position", "contact_force",
+                                                        "wire_height")]  # fmt: skip
+        for one in places.passages:
+            alone = contact_statistics("p", *columns, results.dt, (one.start, one.end))
+            assert one.std == pytest.approx(alone.std)
+            assert (one.maximum, one.minimum) == (alone.maximum, alone.minimum)
+            assert one.loss == pytest.approx(alone.loss_percent)
+        uplift = results.extremes("arm_uplift")[1]
+        x = results.line("arm_x")
+        inside = (x >= 360) & (x <= 1080)
+        assert places.arms[0].value == pytest.approx(1e3 * uplift[inside].max())
+
+
+def test_what_stands_out_is_far_above_its_likes() -> None:
+    likes = np.array([10.0, 10.1, 9.9, 10.0, 10.05, 12.0])
+    assert stands_out(likes) == [False] * 5 + [True]
+    # Median 10, median absolute deviation 1: three standard deviations are 4.4.
+    wide = np.array([8.0, 9.0, 10.0, 11.0, 14.3])
+    assert not any(stands_out(wide))
+    assert stands_out(np.array([8.0, 9.0, 10.0, 11.0, 14.5])) == [False] * 4 + [True]
+    assert stands_out(np.array([1.0, 100.0])) == [None, None]
+
+
+class _Line:
+    """What `Causes` reads of results, of six spans of 50 m."""
+
+    evaluation = (0.0, 300.0)
+
+    def __init__(self, speed: float, arrivals: dict[str, Any]) -> None:
+        self.attributes = {"arrivals": arrivals}
+        self._speed = speed
+
+    def line(self, name: str) -> np.ndarray:
+        return {"support_x": np.arange(0.0, 301.0, 50.0)}.get(name, np.zeros(0))
+
+    def fact(self, name: str) -> float:
+        return {"speed": self._speed}[name]
+
+
+@pytest.mark.parametrize(("speed", "is_told"), [(50.0, True), (54.0, True), (57.0, False)])
+def test_spans_passed_at_their_natural_frequency(speed: float, is_told: bool) -> None:
+    """Waves of 100 m/s: spans of 50 m have c / 2 L = 1 Hz, and are passed so at 50 m/s."""
+    line: Any = _Line(speed, {"wave_speed_m_per_s": 100.0})
+    said = Causes(line, [], None).of_line()
+    assert bool(said) == is_told
+    assert not said or f"{speed / 50:.2f} Hz, near" in said[0] and "= 1.00 Hz" in said[0]
+
+
+@pytest.mark.parametrize(
+    ("met", "share", "is_told"),
+    [(120.0, 0.5, True), (60.0, 0.5, True), (40.0, 0.5, False), (160.0, 0.5, False),
+     (120.0, 0.005, False), (None, 0.5, False)],
+)  # fmt: skip
+def test_reflections_are_told_where_they_arrive(
+    met: float | None, share: float, is_told: bool
+) -> None:
+    line: Any = _Line(50.0, {"pantographs": [{"far_end_met_at_m": met, "far_end_share": share}]})
+    passage = Passage(2, 100.0, 150.0, 0, 20.0, 200.0, 50.0, 0.0, 20.0, False)
+    said = list(Causes(line, [], None)._reflections(passage))
+    assert bool(said) == is_told
+
+
+def test_the_pantograph_ahead_is_told_where_it_is_better() -> None:
+    line: Any = _Line(50.0, {})
+    leading = Passage(2, 100.0, 150.0, 0, 20.0, 200.0, 50.0, 0.0, 20.0, False)
+    worse, alike = (leading._replace(pantograph=1, std=std) for std in (26.0, 24.0))
+    causes = Causes(line, [leading, worse], None)
+    assert "20.0 N" in "".join(causes._pantograph_ahead(worse))
+    assert not list(causes._pantograph_ahead(alike)) and not list(causes._pantograph_ahead(leading))
+
+
+def test_what_is_no_run_is_refused(tmp_path: Path) -> None:
+    for folder in (tmp_path / "nowhere", tmp_path):
+        done = CliRunner().invoke(app, ["worst", str(folder)])
+        assert done.exit_code == 2 and len(done.output.strip().splitlines()) == 1
