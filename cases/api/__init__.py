@@ -18,6 +18,7 @@ if __name__ != "catenary":
 
 if TYPE_CHECKING:
     from catenary.base.errors import CatenaryError, Fault, InputError, RunBroken
+    from catenary.identifications import Identified, identify
     from catenary.line_tables import AtRest, Plan, check, plan, static
     from catenary.pictures import Pictures
     from catenary.results import Run, open
@@ -30,6 +31,7 @@ __all__ = [
     "AtRest",
     "CatenaryError",
     "Fault",
+    "Identified",
     "InputError",
     "Pictures",
     "Plan",
@@ -39,6 +41,7 @@ __all__ = [
     "Simulation",
     "__version__",
     "check",
+    "identify",
     "load",
     "open",
     "plan",
@@ -49,6 +52,7 @@ __all__ = [
 ]
 
 _FILES = {
+    "identifications": ("Identified", "identify"),
     "line_tables": ("AtRest", "Plan", "check", "plan", "static"),
     "pictures": ("Pictures",),
     "results": ("Run", "open"),

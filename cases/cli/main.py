@@ -28,7 +28,8 @@ def all_verbs() -> typer.Typer:
     from catenary.cases.cli import plan, line, results  # noqa: F401
     from catenary.cases.cli.studies import sweep, accuracy, hard  # noqa: F401
     from catenary.cases.cli import pantograph  # noqa: F401
-    from catenary.cases.cli.studies import sensitivity, stability, waves, scaling  # noqa: F401
+    from catenary.cases.cli.studies import sensitivity, identify  # noqa: F401
+    from catenary.cases.cli.studies import stability, waves, scaling  # noqa: F401
     from catenary.cases.cli import lists, first_steps  # noqa: F401
 
     # isort: on

@@ -16,7 +16,7 @@ from catenary.solver.tangents.set_up import Change, set_up_of
 from catenary.solver.tangents.tangent_steps import TangentSteps
 from catenary.solver.time_loop.march import March
 
-_CHANNELS = ("contact_position", "contact_force", "arm_uplift")
+_CHANNELS = ("contact_position", "contact_force", "arm_uplift", "head_height")
 
 
 @dataclass(frozen=True)
@@ -34,6 +34,8 @@ class Tangents:
     by_force : (n, m, n_pantographs) derivatives of contact forces per unit of each parameter
     by_uplift : (n, m, n_arms) those of uplifts
     by_position : (n, m) those of all positions [m]
+    head_height : (n, n_pantographs) heights of the pan heads above top of rail [m]
+    by_head_height : (n, m, n_pantographs) those of these
     open_steps : steps in which a contact carried nothing
     contact_switches : steps in which contacts opened or closed
     link_switches : steps in which droppers slackened or tightened, or other links switched
@@ -48,6 +50,8 @@ class Tangents:
     by_force: np.ndarray
     by_uplift: np.ndarray
     by_position: np.ndarray
+    head_height: np.ndarray
+    by_head_height: np.ndarray
     open_steps: int
     contact_switches: int
     link_switches: int
@@ -84,7 +88,7 @@ def march_with_tangents(comm: Any, at_rest: LineAtRest, changes: Sequence[Change
         first, last = at_rest.problem.evaluation
         evaluated = np.flatnonzero((first <= arms) & (arms <= last))
         n = scheme.pantographs.n
-        kept_results = np.concatenate([np.arange(n), n + evaluated])
+        kept_results = np.r_[np.arange(n), n + evaluated, n + arms.size + np.arange(n)]
         with flushed():
             while step < march.n_steps:
                 left = march.n_steps - step
@@ -93,7 +97,7 @@ def march_with_tangents(comm: Any, at_rest: LineAtRest, changes: Sequence[Change
                     kept.append(steps.rows[steps.block, part].copy())
                 results.append(steps.results[steps.block][..., kept_results])
                 step += steps.taken
-    position, force, uplift = (np.concatenate(kept) for kept in rows)
+    position, force, uplift, height = (np.concatenate(kept) for kept in rows)
     found = np.concatenate(results)
     time = dt * np.arange(1, len(force) + 1)
     moved = [change.start.mean() if change.start.size else 0.0 for change in changes]
@@ -105,8 +109,10 @@ def march_with_tangents(comm: Any, at_rest: LineAtRest, changes: Sequence[Change
         arm_x=arms[evaluated],
         speed=float(at_rest.problem.train.speed),
         by_force=found[..., :n],
-        by_uplift=found[..., n:],
+        by_uplift=found[..., n:-n],
         by_position=moved + np.outer(time, [change.speed for change in changes]),
+        head_height=height,
+        by_head_height=found[..., -n:],
         open_steps=int(steps.switches[0]),
         contact_switches=int(steps.switches[1]),
         link_switches=int(steps.switches[2]),

@@ -53,7 +53,7 @@ ROOMS = {
         "result_folder", "run",
         "studies.kept_rows", "studies.sweep", "studies.pantograph_response", "studies.accuracy",
         "studies.hard", "studies.scaling",
-        "studies.sensitivity", "studies.stability", "studies.effect_cost", "studies.waves",
+        "studies.sensitivity", "studies.identification", "studies.stability", "studies.effect_cost", "studies.waves",
         "studies.case_study", "studies.paper",
         "ambrosio2012", "cli", FACE,
     ),
