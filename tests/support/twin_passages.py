@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -27,10 +28,17 @@ def passage(scene: Scene) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
 
 def filtered_noise(rng: np.random.Generator, n: int, deviation: float, dt: float) -> np.ndarray:
     """Noise (n,) below 20 Hz of this deviation, from white noise through the filter."""
-    # Longer at both ends by what the filter remembers, and scaled by the spread of a long record.
-    margin, spread = int(0.5 / dt), filters.low_pass(rng.normal(size=400_000), dt).std()
+    margin = int(0.5 / dt)  # what the filter remembers, at both ends
     white = rng.normal(size=n + 2 * margin)
-    return deviation / spread * filters.low_pass(white, dt)[margin : margin + n]
+    return deviation / _left_of_one(dt) * filters.low_pass(white, dt)[margin : margin + n]
+
+
+@cache
+def _left_of_one(dt: float) -> float:
+    """What the filter leaves of a deviation of one: the norm of its impulse response."""
+    impulse = np.zeros(2 * int(0.5 / dt) + 1)
+    impulse[impulse.size // 2] = 1.0
+    return float(np.linalg.norm(filters.low_pass(impulse, dt)))
 
 
 def write_measurement(
@@ -39,19 +47,23 @@ def write_measurement(
     rng: np.random.Generator,
     force_noise: float,
     height_noise: float,
-    every: int = 5,
+    *,
+    is_filtered: bool = True,
 ) -> None:
-    """The passage of a scene as a CSV file: x_m, force_N below 20 Hz and height_mm below 20 Hz,
-    with filtered noise [N] and [m]; every so many steps."""
+    """The passage of a scene as a CSV file, every 5 steps: x_m, force_N, height_mm.
+
+    Values and noise [N] and [m] are below 20 Hz, or, if they are not filtered, the noise of samples
+    is independent.
+    """
     position, force, height, dt = passage(scene)
     n = len(position)
-    rows = np.stack(
-        [
-            position,
-            filters.low_pass(force, dt) + filtered_noise(rng, n, force_noise, dt),
-            1e3 * (filters.low_pass(height, dt) + filtered_noise(rng, n, height_noise, dt)),
-        ],
-        axis=1,
-    )[::every]
+
+    def measured(values: np.ndarray, noise: float) -> np.ndarray:
+        if is_filtered:
+            return filters.low_pass(values, dt) + filtered_noise(rng, n, noise, dt)
+        return values + noise * rng.normal(size=n)
+
+    columns = [position, measured(force, force_noise), 1e3 * measured(height, height_noise)]
+    rows = np.stack(columns, axis=1)[::5]
     lines = [",".join(f"{value:.9g}" for value in row) for row in rows]
     path.write_text("\n".join(["x_m,force_N,height_mm", *lines]) + "\n", encoding="utf-8")

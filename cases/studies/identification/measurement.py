@@ -81,24 +81,31 @@ class Measurement:
     ) -> None:
         self.pantograph = task.pantograph - 1
         self._cut_off, self._is_filtered = task.filter_Hz, task.is_filtered
-        self._places = self._placed(table, path, task, speed, start)
-        n = len(self._places)
-        dt = float(self._places[-1] - self._places[0]) / ((n - 1) * speed)
+        places = self._placed(table, path, task, speed, start)
+        dt = float(places[-1] - places[0]) / ((len(places) - 1) * speed)
         self._dt = None if task.is_filtered else dt
         begin = stretch[0] if task.from_m is None else task.from_m
         end = stretch[1] if task.to_m is None else task.to_m
-        within = np.flatnonzero((begin <= self._places) & (self._places <= end))
+        within = np.flatnonzero((begin <= places) & (places <= end))
+        margin = 0
         if not task.is_filtered:
             if dt * 2.0 * task.filter_Hz >= 1.0:
                 raise InputError(
                     f"{path} has {1.0 / dt:.4g} samples a second, too few for the filter of "
                     f"measured.filter_Hz = {task.filter_Hz:g}"
                 )
-            settled = int(np.ceil(_SETTLED / (task.filter_Hz * dt)))
-            within = within[(within >= settled) & (within < n - settled)]
+            margin = int(np.ceil(_SETTLED / (task.filter_Hz * dt)))
+            within = within[(within >= margin) & (within < len(places) - margin)]
         # A signal of this bandwidth is known from samples half a period of it apart.
-        self._kept = within[:: max(1, int(0.5 / (task.filter_Hz * dt) + 1e-6))]
-        self._check_number(path, begin, end)
+        kept = within[:: max(1, int(0.5 / (task.filter_Hz * dt) + 1e-6))]
+        if not _LEAST_SAMPLES <= kept.size <= _MOST_SAMPLES:
+            raise InputError(
+                f"{path} has {kept.size} samples between {begin:g} and {end:g} m, half a period of "
+                f"the filter apart; an identification takes {_LEAST_SAMPLES} to {_MOST_SAMPLES}"
+            )
+        # Rows of the file from the first sample to the last, and of a filter's reach beside them.
+        self._rows = slice(int(kept[0]) - margin, int(kept[-1]) + margin + 1)
+        self._places, self._kept = places[self._rows], kept - self._rows.start
         self.place = self._places[self._kept]
         lags = (self.place - self.place[0]) / speed
         self.signals = [
@@ -106,14 +113,6 @@ class Measurement:
             for name, column in ((FORCE, task.force), (HEIGHT, task.head_height))
             if column is not None
         ]
-
-    def _check_number(self, path: str, begin: float, end: float) -> None:
-        n = len(self._kept)
-        if not _LEAST_SAMPLES <= n <= _MOST_SAMPLES:
-            raise InputError(
-                f"{path} has {n} samples between {begin:g} and {end:g} m, half a period of the "
-                f"filter apart; an identification takes {_LEAST_SAMPLES} to {_MOST_SAMPLES}"
-            )
 
     def _placed(
         self, table: pd.DataFrame, path: str, task: Measured, speed: float, start: float
@@ -138,7 +137,8 @@ class Measurement:
     def _signal(
         self, table: pd.DataFrame, path: str, name: str, column: Force | Height, lags: np.ndarray
     ) -> Signal:
-        values = self._sampled(_column(table, path, column.column) * column.factor)
+        values = _column(table, path, column.column)[self._rows] * column.factor
+        values = self._sampled(values)
         deviation = column.noise * column.factor
         if self._dt is not None:
             deviation *= np.sqrt(kept_variance(self._cut_off, self._dt))

@@ -26,8 +26,9 @@ def parameters_table(found: Identification) -> StudyTable:
         Column("unit", "unit"),
         Column("prior", "prior", ".6g"),
         Column("prior_deviation", "+-", ".3g"),
-        Column("found", "found", ".6g"),
-        Column("deviation", "+-", ".3g"),
+        Column("shown", "found", ">", in_files=False),
+        Column("found"),
+        Column("deviation", "+-", ".2g"),
         Column("of_prior", "of prior", ".0%"),
     ]
     return StudyTable(
@@ -38,6 +39,7 @@ def parameters_table(found: Identification) -> StudyTable:
                 "unit": one.unit,
                 "prior": one.mean,
                 "prior_deviation": one.deviation,
+                "shown": _rounded(float(value), float(width)),
                 "found": float(value),
                 "deviation": float(width),
                 "of_prior": float(width / one.deviation),
@@ -45,6 +47,13 @@ def parameters_table(found: Identification) -> StudyTable:
             for one, value, width in zip(found.unknowns, found.values, found.widths, strict=True)
         ],
     )
+
+
+def _rounded(value: float, width: float) -> str:
+    """A value with the digits that two of its deviation let it have."""
+    digits = max(0, 1 - int(np.floor(np.log10(width))))
+    text = f"{value:.{digits}f}" if digits < 7 else f"{value:.3g}"
+    return text.removeprefix("-") if not text.strip("-0.") else text
 
 
 def correlation_table(found: Identification) -> StudyTable:
@@ -144,16 +153,13 @@ def _correlated(found: Identification) -> list[str]:
 
 
 def _sentence(name: str, one: Judged) -> str:
-    if not one.autocorrelation.size:
-        return (
-            f"Residual of {name}: chi-square {one.reduced:.3f} per degree of freedom, "
-            f"of {one.n} (probability {one.probability:.2g})"
-        )
-    return (
-        f"Residual of {name}: chi-square {one.reduced:.3f} per degree of freedom, of {one.n} "
-        f"(probability {one.probability:.2g}); autocorrelation {one.autocorrelation[0]:+.2f} "
-        f"at the first lag (white with probability {one.whiteness_probability:.2g})"
+    size = (
+        f"chi-square {one.reduced:.3f} per degree of freedom ({one.n}, p = {one.probability:.2g})"
     )
+    if not one.autocorrelation.size:
+        return f"Residual of {name}: {size}"
+    colour = f"{one.autocorrelation[0]:+.2f} (white with p = {one.whiteness_probability:.2g})"
+    return f"Residual of {name}: {size}; autocorrelation {colour}"
 
 
 def verdict(found: Identification) -> str:

@@ -30,9 +30,10 @@ from catenary.cases.studies.identification.task import Task
 from catenary.cases.studies.sensitivity.parameters import ChangedScenes, Parameter
 from catenary.postproc.evaluate.filters import check_sampling
 
-# The search ends when a step changes the sum of squares, which is near the number of samples, by
-# less than this part: the parameters then move by some hundredths of their posterior deviations.
-_TOLERANCE = 1e-5
+# The search ends when a step makes the sum of squares, which is near the number n of samples, less
+# by less than this part. What is left of the sum is the squared distance to the best parameters in
+# posterior deviations: some 0.01 of n = 100.
+_TOLERANCE = 1e-4
 _MOST_MARCHES = 60
 
 
