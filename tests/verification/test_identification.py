@@ -21,7 +21,7 @@ from catenary.cases.scene.problem import problem_of
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.identification.fitted_march import FittedMarch
 from catenary.cases.studies.identification.measurement import Measurement, read_table
-from catenary.cases.studies.identification.output import verdict
+from catenary.cases.studies.identification.output import as_text, verdict
 from catenary.cases.studies.identification.posterior import posterior_of
 from catenary.cases.studies.identification.residuals import innovations_of, judge
 from catenary.cases.studies.identification.study import Identification, identify
@@ -244,3 +244,29 @@ def test_a_wrong_model_is_told_by_its_residual(tmp_path: Path, wrong: list[str],
             f"white {one.whiteness_probability:.1g}"
         )
     assert verdict(found).startswith("The model does not fit")
+
+
+def test_what_a_passage_cannot_tell_is_told(tmp_path: Path) -> None:
+    """Height of the wire and sag of all droppers move it alike: no passage tells one from the other."""
+    words = [*SMALL, "evaluation.from_m=90"]
+    priors = {
+        "line.contact_height_m": 0.02,
+        "line.dropper.pre_sag_mm": 5.0,
+        "line.dropper.pre_sag_mm.4": 5.0,
+        "pantographs.three_masses.static_force_N": 5.0,
+    }
+    scene, file = load_scene("ac_simple", words), tmp_path / "measured.csv"
+    rng = np.random.default_rng(25)
+    write_measurement(file, scene, rng, FORCE_NOISE, HEIGHT_NOISE)
+    found = identified(scene, file, priors)
+    assert found.posterior.n_known == 3 and found.posterior.information[-1] < 0.01
+    unknown = found.posterior.directions[:, -1]
+    # A millimetre higher and a millimetre more sag: 1/20 and 1/5 of the priors' deviations.
+    alike = np.array([1.0 / 20.0, 1.0 / 5.0, 0.0, 0.0])
+    check("direction", abs(float(unknown @ alike)), float(np.linalg.norm(alike)), within=1e-6)
+    assert unknown[0] * unknown[1] > 0.0
+    assert found.posterior.correlation[0, 1] > 0.9
+    text = as_text(found)
+    assert "Not known from these data, where the prior says more:" in text
+    (line,) = [one for one in text.splitlines() if "(information" in one]
+    assert "line.dropper.pre_sag_mm" in line and "line.contact_height_m" in line
