@@ -247,7 +247,7 @@ def test_a_wrong_model_is_told_by_its_residual(tmp_path: Path, wrong: list[str],
 
 
 def test_what_a_passage_cannot_tell_is_told(tmp_path: Path) -> None:
-    """Height of the wire and sag of all droppers move it alike: no passage tells one from the other."""
+    """Height of the wire and sag of all droppers move it alike."""
     words = [*SMALL, "evaluation.from_m=90"]
     priors = {
         "line.contact_height_m": 0.02,
