@@ -85,7 +85,8 @@ class TangentSteps(CompiledSteps):
     Attributes
     ----------
     results : (most, n_changes, 2 n_pantographs + n_arms) derivatives after the steps of the latest
-        block of contact forces [N], uplifts [m] and heights of heads [m], per unit of each parameter
+        block of contact forces [N], uplifts [m] and heights of heads [m], per unit of each
+        parameter
     switches : as in ``MarchTangents``
 
     Parameters
