@@ -224,6 +224,14 @@ def test_tables_with_semicolons_and_decimal_commas_are_read(tmp_path: Path) -> N
     assert table.x.tolist() == [0.5, 1.0] and table.F.tolist() == [100.25, 99.75]
 
 
+def test_a_file_that_is_no_table_is_told_in_one_sentence(tmp_path: Path) -> None:
+    file = tmp_path / "m.csv"
+    file.write_text("x,F\n1,2\n1,2,3\n", encoding="utf-8")
+    with pytest.raises(InputError) as raised:
+        read_table(file)
+    assert str(raised.value) == f"{file} is no table of CSV: Expected 2 fields in line 3, saw 3"
+
+
 @pytest.mark.parametrize(
     ("change", "told"),
     [

@@ -191,7 +191,8 @@ def read_table(path: Path) -> pd.DataFrame:
             skipinitialspace=True,
         )
     except ValueError as error:  # pandas' ParserError is one
-        raise InputError(f"{path} is no table of CSV: {plain(str(error), 200)}") from error
+        why = str(error).strip().removeprefix("Error tokenizing data. C error: ")
+        raise InputError(f"{path} is no table of CSV: {plain(why, 200)}") from error
 
 
 def _column(table: pd.DataFrame, path: str, name: str) -> np.ndarray:
