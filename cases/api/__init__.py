@@ -19,6 +19,7 @@ if __name__ != "catenary":
 if TYPE_CHECKING:
     from catenary.base.errors import CatenaryError, Fault, InputError, RunBroken
     from catenary.estimates import Uncertainty, uncertainty
+    from catenary.identifications import Identified, identify
     from catenary.line_tables import AtRest, Plan, check, plan, static
     from catenary.optimising import Optimum, optimise, tolerance
     from catenary.pictures import Pictures
@@ -33,6 +34,7 @@ __all__ = [
     "AtRest",
     "CatenaryError",
     "Fault",
+    "Identified",
     "InputError",
     "Optimum",
     "Pictures",
@@ -45,6 +47,7 @@ __all__ = [
     "__version__",
     "check",
     "highest_speeds",
+    "identify",
     "load",
     "open",
     "optimise",
@@ -60,6 +63,7 @@ __all__ = [
 
 _FILES = {
     "estimates": ("Uncertainty", "uncertainty"),
+    "identifications": ("Identified", "identify"),
     "line_tables": ("AtRest", "Plan", "check", "plan", "static"),
     "optimising": ("Optimum", "optimise", "tolerance"),
     "pictures": ("Pictures",),

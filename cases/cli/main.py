@@ -33,7 +33,8 @@ def all_verbs() -> typer.Typer:
     from catenary.cases.cli.studies import speed, separation, what_if, worst  # noqa: F401
     from catenary.cases.cli.studies import accuracy, hard  # noqa: F401
     from catenary.cases.cli import pantograph  # noqa: F401
-    from catenary.cases.cli.studies import sensitivity, stability, waves, scaling  # noqa: F401
+    from catenary.cases.cli.studies import sensitivity, identify  # noqa: F401
+    from catenary.cases.cli.studies import stability, waves, scaling  # noqa: F401
     from catenary.cases.cli import lists, first_steps  # noqa: F401
 
     # isort: on

@@ -17,7 +17,7 @@ from catenary.solver.tangents.set_up import Change, set_up_of
 from catenary.solver.tangents.tangent_steps import TangentSteps
 from catenary.solver.time_loop.march import March
 
-_CHANNELS = ("contact_position", "contact_force", "arm_uplift")
+_CHANNELS = ("contact_position", "contact_force", "arm_uplift", "head_height")
 
 
 @dataclass(frozen=True)
@@ -35,6 +35,8 @@ class Tangents:
     by_force : (n, m, n_pantographs) derivatives of contact forces per unit of each parameter
     by_uplift : (n, m, n_arms) those of uplifts
     by_position : (n, m, n_pantographs) those of positions [m]
+    head_height : (n, n_pantographs) heights of the pan heads above top of rail [m]
+    by_head_height : (n, m, n_pantographs) those of these
     open_steps : steps in which a contact carried nothing
     contact_switches : steps in which contacts opened or closed
     link_switches : steps in which droppers slackened or tightened, or other links switched
@@ -49,6 +51,8 @@ class Tangents:
     by_force: np.ndarray
     by_uplift: np.ndarray
     by_position: np.ndarray
+    head_height: np.ndarray
+    by_head_height: np.ndarray
     open_steps: int
     contact_switches: int
     link_switches: int
@@ -87,7 +91,7 @@ def march_with_tangents(comm: Any, at_rest: LineAtRest, changes: Sequence[Change
         n = scheme.pantographs.n
         moved = np.array([_moved(change, scheme.pantographs) for change in changes])
         moved = moved.reshape(len(changes), n)
-        kept_results = np.concatenate([np.arange(n), n + evaluated])
+        kept_results = np.r_[np.arange(n), n + evaluated, n + arms.size + np.arange(n)]
         with flushed():
             while step < march.n_steps:
                 left = march.n_steps - step
@@ -96,7 +100,7 @@ def march_with_tangents(comm: Any, at_rest: LineAtRest, changes: Sequence[Change
                     kept.append(steps.rows[steps.block, part].copy())
                 results.append(steps.results[steps.block][..., kept_results])
                 step += steps.taken
-    position, force, uplift = (np.concatenate(kept) for kept in rows)
+    position, force, uplift, height = (np.concatenate(kept) for kept in rows)
     found = np.concatenate(results)
     time = dt * np.arange(1, len(force) + 1)
     return Tangents(
@@ -107,8 +111,10 @@ def march_with_tangents(comm: Any, at_rest: LineAtRest, changes: Sequence[Change
         arm_x=arms[evaluated],
         speed=float(at_rest.problem.train.speed),
         by_force=found[..., :n],
-        by_uplift=found[..., n:],
+        by_uplift=found[..., n:-n],
         by_position=moved + np.outer(time, [change.speed for change in changes])[..., None],
+        head_height=height,
+        by_head_height=found[..., -n:],
         open_steps=int(steps.switches[0]),
         contact_switches=int(steps.switches[1]),
         link_switches=int(steps.switches[2]),

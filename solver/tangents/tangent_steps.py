@@ -84,8 +84,9 @@ class TangentSteps(CompiledSteps):
 
     Attributes
     ----------
-    results : (most, n_changes, n_pantographs + n_arms) derivatives after the steps of the latest
-        block of contact forces [N] and uplifts [m], per unit of each parameter
+    results : (most, n_changes, 2 n_pantographs + n_arms) derivatives after the steps of the latest
+        block of contact forces [N], uplifts [m] and heights of heads [m], per unit of each
+        parameter
     switches : as in ``MarchTangents``
 
     Parameters
@@ -107,7 +108,7 @@ class TangentSteps(CompiledSteps):
         super().__init__(scheme, showing, dt, shows=True)
         make_room(scheme)
         line, pantographs = scheme.interaction.line, scheme.pantographs
-        n_results = pantographs.n + showing.shown.arms.size
+        n_results = 2 * pantographs.n + showing.shown.arms.size
         self._by_tangent = np.zeros((len(changes), self.most, n_results))
         n, first = pantographs.n_contacts, np.zeros(1, dtype=np.int64)
         self.switches = np.zeros(3, dtype=np.int64)

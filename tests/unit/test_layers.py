@@ -55,8 +55,9 @@ ROOMS = {
         "studies.records", "studies.ensemble", "studies.sweep", "studies.sampling",
         "studies.uncertainty", "studies.merged_sweeps", "studies.scene_sets", "studies.optimise",
         "studies.tolerance", "studies.pantograph_response", "studies.accuracy", "studies.hard",
-        "studies.scaling", "studies.sensitivity", "studies.stability", "studies.effect_cost",
-        "studies.waves", "studies.case_study", "studies.questions", "studies.paper",
+        "studies.scaling", "studies.sensitivity", "studies.identification", "studies.stability",
+        "studies.effect_cost", "studies.waves", "studies.case_study", "studies.questions",
+        "studies.paper",
         "ambrosio2012", "cli", FACE,
     ),
 }  # fmt: skip

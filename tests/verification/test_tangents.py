@@ -188,10 +188,12 @@ def test_tangents_are_those_of_dense_matrices() -> None:
         start[:, -2:] = change.states[0].reshape(3, 2)
         tangents.append(DenseTangent(sides, step, start))
     forces, sets = np.zeros((len(marched.force), len(CHANGES))), set()
-    for row, x in zip(forces, marched.position[:, 0], strict=True):
+    heights = np.zeros_like(forces)
+    for row, own, x in zip(forces, heights, marched.position[:, 0], strict=True):
         line.step(x)
         matrices = line.matrices_of(line.acting, x)
         row[:] = [tangent.follow(line, x, matrices) for tangent in tangents]
+        own[:] = [tangent.tangent[0, -2] for tangent in tangents]  # the upper one of two masses
         sets.add(line.acting)
     print(f"{len(sets)} sets; {marched.contact_switches} switches of contact")
     assert len(sets) > 5 and marched.open_steps > 40 and marched.link_switches > 5
@@ -201,6 +203,9 @@ def test_tangents_are_those_of_dense_matrices() -> None:
         # over steps of 1e-4 to 5e-4 of them: 1e-8 to 1e-7 of the derivative.
         limit = 1e-6 * np.abs(expected).max()
         check(f"by {name}", marched.by_force[:, number, 0], expected, within=limit)
+        expected = heights[:, number]
+        limit = 1e-6 * np.abs(expected).max()
+        check(f"height by {name}", marched.by_head_height[:, number, 0], expected, within=limit)
 
 
 def test_a_march_is_the_same_with_and_without_tangents() -> None:
@@ -320,6 +325,7 @@ def marched_scene(
         own,
         by_force=own.by_force * sizes[:, None],
         by_uplift=own.by_uplift * sizes[:, None],
+        by_head_height=own.by_head_height * sizes[:, None],
     )
     return scaled, again
 
@@ -331,7 +337,11 @@ def is_difference(case: str, words: list[str], steps: dict[str, float]) -> None:
         high, low = again(key, part), again(key, -part)
         n = min(len(high.force), len(low.force), len(own.force))
         # Round-off of a march of thousands of steps, [N] and [m], over the step of the difference.
-        for what, by, noise in (("force", "by_force", 1e-9), ("uplift", "by_uplift", 1e-13)):
+        for what, by, noise in (
+            ("force", "by_force", 1e-9),
+            ("uplift", "by_uplift", 1e-13),
+            ("head_height", "by_head_height", 1e-13),
+        ):
             expected = (getattr(high, what)[:n] - getattr(low, what)[:n]) / (2.0 * part)
             limit = noise / part + 1e-6 * np.abs(expected).max()
             check(f"{what} by {key}", getattr(own, by)[:n, number], expected, within=limit)

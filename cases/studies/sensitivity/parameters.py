@@ -96,6 +96,11 @@ class Parameter:
         return max(map(abs, self.values))
 
     @property
+    def is_dropper(self) -> bool:
+        """Whether it is the length of a single dropper."""
+        return _OF_DROPPER.fullmatch(self.key) is not None
+
+    @property
     def is_of_train(self) -> bool:
         """Whether it leaves the line at rest as it is."""
         return self.key.split(".")[0] in _OF_TRAIN
@@ -141,18 +146,13 @@ class ChangedScenes:
 
     def changed(self, parameter: Parameter, by: float) -> Scene:
         """The scene with all values of a parameter changed ``by`` a number."""
+        return self.all_changed([(parameter, by)])
+
+    def all_changed(self, changes: Sequence[tuple[Parameter, float]]) -> Scene:
+        """The scene with several parameters changed, each by a number."""
         raw = copy.deepcopy(self._raw)
-        if dropper := _OF_DROPPER.fullmatch(parameter.key):
-            span, number = map(int, dropper.groups())
-            _lengthen(raw, span, number, parameter.values[0] + by)
-            return self._checked(raw)
-        holder, place = _found(raw, parameter.key)
-        if place == _FORCE and holder.get(_BY_SPEED):
-            holder[_BY_SPEED] = [[speed, force + by] for speed, force in holder[_BY_SPEED]]
-        elif isinstance(holder[place], list):
-            holder[place] = (np.array(holder[place]) + by).tolist()
-        else:
-            holder[place] += by
+        for parameter, by in changes:
+            _change(raw, parameter, by)
         return self._checked(raw)
 
     def parameter(self, key: str) -> Parameter:
@@ -195,6 +195,24 @@ class ChangedScenes:
                 if evaluation.from_m <= x <= evaluation.to_m:
                     key = f"{_LENGTHS}.{span + 1}.{number + 1}"
                     found.append(self._length_of(key, span + 1, number + 1))
+        return found
+
+    def droppers_of(self, spans: Sequence[int]) -> list[Parameter]:
+        """The length of each dropper in some spans, counted from 1.
+
+        Raises
+        ------
+        InputError
+            If the line has no such span, or no droppers in it.
+        """
+        line, found = line_of(self.scene), []
+        for span in dict.fromkeys(spans):
+            if span > line.n_spans:
+                raise InputError(f"there is no span {span}: the line has {line.n_spans}")
+            for number in range(1, len(line.droppers_of_span(span - 1)) + 1):
+                found.append(self._length_of(f"{_LENGTHS}.{span}.{number}", span, number))
+        if not found:
+            raise InputError("there are no droppers in the spans whose droppers are looked for")
         return found
 
     def _length_of(self, key: str, span: int, number: int) -> Parameter:
@@ -258,6 +276,21 @@ class ChangedScenes:
     @staticmethod
     def _checked(raw: dict[str, Any]) -> Scene:
         return scene_from(raw, Origin("the scene", (), recorded=True), folder=Path.cwd())
+
+
+def _change(raw: dict[str, Any], parameter: Parameter, by: float) -> None:
+    """Change all values of a parameter."""
+    if dropper := _OF_DROPPER.fullmatch(parameter.key):
+        span, number = map(int, dropper.groups())
+        _lengthen(raw, span, number, parameter.values[0] + by)
+        return
+    holder, place = _found(raw, parameter.key)
+    if place == _FORCE and holder.get(_BY_SPEED):
+        holder[_BY_SPEED] = [[speed, force + by] for speed, force in holder[_BY_SPEED]]
+    elif isinstance(holder[place], list):
+        holder[place] = (np.array(holder[place]) + by).tolist()
+    else:
+        holder[place] += by
 
 
 def _lengthen(raw: dict[str, Any], span: int, number: int, error: float) -> None:

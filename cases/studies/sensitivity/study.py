@@ -117,7 +117,7 @@ def sensitivity_of(
             left_out[parameter.key] = str(error)
         else:
             kept.append(parameter)
-    n_results = len(now.heads) + at_rest.mesh.steady_arms.size
+    n_results = 2 * len(now.heads) + at_rest.mesh.steady_arms.size
     most = max(1, _BYTES // (8 * n_steps * n_results))
     found: Sensitivity | None = None
     for first in range(0, max(1, len(kept)), most):

@@ -495,6 +495,18 @@ void TangentSteps::show(const Tangent& tangent, int64_t number) const {
     const auto arms = parts().shown.arms;
     for (int64_t i = 0; i < size(arms); ++i)
         row[n_pantographs + i] = displacement_at(arms[i], tangent.free->parts().arrays.motion);
+    for (int64_t p = 0; p < n_pantographs; ++p)
+        row[n_pantographs + size(arms) + p] =
+            head_height(*parts().heads[p], tangent.heads[p].state);
+}
+
+/// The mean of what a head's state, or a derivative of it, is worth at its strips.
+double TangentSteps::head_height(const Head& head, std::span<const double> state) const {
+    const auto& touch = head.arrays().touch;
+    double sum = 0.0;
+    for (int64_t j = 0; j < head.n_strips(); ++j)
+        for (int64_t k = 0; k < head.n(); ++k) sum += touch(0, j, k) * state[k];
+    return sum / static_cast<double>(head.n_strips());
 }
 
 }  // namespace catenary

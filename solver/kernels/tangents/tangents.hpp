@@ -69,8 +69,8 @@ struct Tangent {
     LawChange law;
     std::span<const double> start;  ///< of the places of contacts at the start (n,)
     double speed;                   ///< of the train's speed
-    Array2<double> results;         ///< (n, n_pantographs + n_arms) of each step of a block:
-                                    ///< contact forces, displacements at arms
+    Array2<double> results;         ///< (n, 2 n_pantographs + n_arms) of each step of a block:
+                                    ///< contact forces, displacements at arms, heights of heads
     CATENARY_RECORD(free, loads, matrices, rest, links, heads, drives, law, start, speed, results)
 };
 
@@ -123,6 +123,7 @@ class TangentSteps : public Steps {
     void move(const Tangent& tangent, const Contacts& contacts);
     void remember(const Tangent& tangent) const;
     void show(const Tangent& tangent, int64_t number) const;
+    double head_height(const Head& head, std::span<const double> state) const;
 
     std::span<const double> force() const { return parts().problem.unknowns.solution; }
     int64_t n_contacts() const { return size(parts().problem.found.depth); }

@@ -1,0 +1,140 @@
+"""Parameters of a scene from a measured passage."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from catenary.base.lone_process import alone
+from catenary.scenes import SceneLike, checked
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+@dataclass(frozen=True)
+class Identified:
+    """What ``identify`` finds. As text it is what the program prints.
+
+    Attributes
+    ----------
+    parameters : pandas.DataFrame
+        A row for each parameter, by its key: prior, found value, posterior deviation, in ``unit``.
+    correlation : pandas.DataFrame
+        Posterior correlations.
+    directions : pandas.DataFrame
+        Directions in the space of parameters, in deviations of their priors, with their
+        ``information``: below 1 the prior says more than the data.
+    residuals : pandas.DataFrame
+        By place, what was measured and what the found parameters give.
+    summary : dict
+        As ``identification.json``: chi-square and whiteness of the residuals, the verdict.
+
+    Examples
+    --------
+    >>> scene = catenary.load("en50318_2002", short=True)
+    >>> measured = catenary.run(scene).force.isel(pantograph=0)
+    >>> task = {
+    ...     "measured": {
+    ...         "time": {"column": "time"},
+    ...         "force": {"column": "contact_force", "noise": 10.0},
+    ...         "is_filtered": False,
+    ...     },
+    ...     "parameters": [{"key": "pantographs.reference.static_force_N", "deviation": 2.0}],
+    ... }
+    >>> found = catenary.identify(scene, measured.to_series().reset_index(), task)
+    >>> found.summary["verdict"].partition(":")[0]  # the run has none
+    'The noise that the task states is too large'
+    """
+
+    parameters: pd.DataFrame
+    correlation: pd.DataFrame
+    directions: pd.DataFrame
+    residuals: pd.DataFrame
+    summary: dict[str, Any]
+    _text: str
+
+    def __str__(self) -> str:
+        return self._text
+
+
+def identify(
+    scene: SceneLike,
+    measured: str | Path | pd.DataFrame,
+    task: str | Path | Mapping[str, Any],
+) -> Identified:
+    """Find parameters of a scene from a measured contact force, head height, or both.
+
+    The most probable parameters under normal distributions of noise and priors, by
+    Levenberg-Marquardt with the derivatives of the march. One process computes them, under mpirun
+    too: not collective.
+
+    Parameters
+    ----------
+    scene : Scene, str, Path or mapping
+        The scene, or whatever ``load`` takes for one.
+    measured : str, Path or pandas.DataFrame
+        A CSV file, or its table: a row for each sample, at even steps of place or time.
+    task : str, Path or mapping
+        The TOML file, or its tables: columns, units and noise of the measurement, parameters that
+        are looked for and their priors; see ``docs/guide/identification.md``.
+
+    Returns
+    -------
+    Identified
+
+    Raises
+    ------
+    InputError
+        If scene, measurement and task do not fit together, or if the march has no derivatives.
+    RunBroken
+        If a march breaks.
+
+    Examples
+    --------
+    >>> scene = catenary.load("en50318_2002", short=True)
+    >>> measured = catenary.run(scene).force.isel(pantograph=0).to_series().reset_index()
+    >>> task = {
+    ...     "measured": {
+    ...         "time": {"column": "time"},
+    ...         "force": {"column": "contact_force", "noise": 10.0},
+    ...         "is_filtered": False,
+    ...     },
+    ...     "parameters": [
+    ...         {"key": "pantographs.reference.static_force_N", "deviation": 5.0, "mean": 117.0}
+    ...     ],
+    ... }
+    >>> found = catenary.identify(scene, measured, task).parameters
+    >>> found.found.round().tolist()
+    [120.0]
+    """
+    import pandas as pd
+
+    own = checked(scene)
+    comm = alone()  # starts MPI as one process, before anything imports it
+    from catenary.cases.studies.identification import output
+    from catenary.cases.studies.identification.study import identify as identified
+    from catenary.cases.studies.identification.task import read_task, task_of
+
+    wanted = task_of(dict(task), "the task") if isinstance(task, Mapping) else read_task(Path(task))
+    samples = measured if isinstance(measured, pd.DataFrame) else Path(measured)
+    found = identified(own, samples, wanted, comm)
+    tables = [
+        pd.DataFrame(table.records())
+        for table in (
+            output.parameters_table(found),
+            output.correlation_table(found),
+            output.directions_table(found),
+            output.residuals_table(found),
+        )
+    ]
+    return Identified(
+        tables[0].set_index("parameter"),
+        tables[1].set_index("parameter"),
+        tables[2].set_index("direction"),
+        tables[3],
+        output.summary_of(found),
+        output.as_text(found),
+    )

@@ -1,0 +1,208 @@
+"""A measurement: samples of contact force and head height at places, from a CSV file."""
+
+from __future__ import annotations
+
+import io
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from scipy.interpolate import CubicSpline
+
+from catenary.base.errors import InputError
+from catenary.cases.scene.input.plain_text import decode, plain, read_whole
+from catenary.cases.studies.identification.noise import Whitening, kept_variance
+from catenary.cases.studies.identification.task import Force, Height, Measured
+from catenary.postproc.evaluate import filters
+
+FORCE, HEIGHT = "force", "head height"
+UNITS = {FORCE: "N", HEIGHT: "m"}
+_MOST_SAMPLES = 8000  # their covariance takes half a gigabyte
+_LEAST_SAMPLES = 20
+# Samples are equidistant if their spacings differ by less than this part.
+_EVEN = 0.02
+# A filter leaves 1e-4 of what is beyond a record's end after so many periods of its cut-off.
+_SETTLED = 6.0
+
+
+@dataclass(frozen=True)
+class Signal:
+    """Samples of a quantity.
+
+    Attributes
+    ----------
+    name : FORCE or HEIGHT
+    values : (n,) as far as they are compared [N or m]
+    whitening : makes them independent
+    deviation : standard deviation of their noise
+    bias : standard deviation of an unknown constant in them, zero if there is none
+    """
+
+    name: str
+    values: np.ndarray
+    whitening: Whitening
+    deviation: float
+    bias: float
+
+
+class Measurement:
+    """Samples of a passage, and the same samples of a march.
+
+    Attributes
+    ----------
+    place : (n,) of the samples that are compared [m]
+    signals : what was measured there
+    pantograph : its number on the train, from 0
+
+    Parameters
+    ----------
+    table : of a CSV file, see ``read_table``
+    path : what sentences call it
+    task : what its columns are
+    speed : of the train [m/s]
+    start : place of the pantograph at time zero [m]
+    stretch : begin and end of the scene's evaluation [m]
+
+    Raises
+    ------
+    InputError
+        If the file is no table with these columns, or its samples are not equidistant or too few.
+    """
+
+    def __init__(
+        self,
+        table: pd.DataFrame,
+        path: str,
+        task: Measured,
+        speed: float,
+        start: float,
+        stretch: tuple[float, float],
+    ) -> None:
+        self.pantograph = task.pantograph - 1
+        self._cut_off, self._is_filtered = task.filter_Hz, task.is_filtered
+        places = self._placed(table, path, task, speed, start)
+        dt = float(places[-1] - places[0]) / ((len(places) - 1) * speed)
+        self._dt = None if task.is_filtered else dt
+        begin = stretch[0] if task.from_m is None else task.from_m
+        end = stretch[1] if task.to_m is None else task.to_m
+        within = np.flatnonzero((begin <= places) & (places <= end))
+        margin = 0
+        if not task.is_filtered:
+            if dt * 2.0 * task.filter_Hz >= 1.0:
+                raise InputError(
+                    f"{path} has {1.0 / dt:.4g} samples a second, too few for the filter of "
+                    f"measured.filter_Hz = {task.filter_Hz:g}"
+                )
+            margin = int(np.ceil(_SETTLED / (task.filter_Hz * dt)))
+            within = within[(within >= margin) & (within < len(places) - margin)]
+        # A signal of this bandwidth is known from samples half a period of it apart.
+        kept = within[:: max(1, int(0.5 / (task.filter_Hz * dt) + 1e-6))]
+        if not _LEAST_SAMPLES <= kept.size <= _MOST_SAMPLES:
+            raise InputError(
+                f"{path} has {kept.size} samples between {begin:g} and {end:g} m, half a period of "
+                f"the filter apart; an identification takes {_LEAST_SAMPLES} to {_MOST_SAMPLES}"
+            )
+        # Rows of the file from the first sample to the last, and of a filter's reach beside them.
+        self._rows = slice(int(kept[0]) - margin, int(kept[-1]) + margin + 1)
+        self._places, self._kept = places[self._rows], kept - self._rows.start
+        self.place = self._places[self._kept]
+        lags = (self.place - self.place[0]) / speed
+        self.signals = [
+            self._signal(table, path, name, column, lags)
+            for name, column in ((FORCE, task.force), (HEIGHT, task.head_height))
+            if column is not None
+        ]
+
+    def _placed(
+        self, table: pd.DataFrame, path: str, task: Measured, speed: float, start: float
+    ) -> np.ndarray:
+        """Places of all samples of the file, evened out."""
+        if task.place is not None:
+            places = _column(table, path, task.place.column) * task.place.factor
+        else:
+            assert task.time is not None
+            places = start + speed * task.time.factor * _column(table, path, task.time.column)
+        if len(places) < _LEAST_SAMPLES:
+            raise InputError(f"{path} has {len(places)} rows; at least {_LEAST_SAMPLES} are needed")
+        even = np.linspace(places[0], places[-1], len(places))
+        spacing = even[1] - even[0]
+        if spacing <= 0.0 or np.abs(np.diff(places) - spacing).max() > _EVEN * spacing + 1e-4:
+            raise InputError(
+                f"{path} must have equidistant samples in ascending order; resample it at even "
+                "steps of place or time"
+            )
+        return even
+
+    def _signal(
+        self, table: pd.DataFrame, path: str, name: str, column: Force | Height, lags: np.ndarray
+    ) -> Signal:
+        values = _column(table, path, column.column)[self._rows] * column.factor
+        values = self._sampled(values)
+        deviation = column.noise * column.factor
+        if self._dt is not None:
+            deviation *= np.sqrt(kept_variance(self._cut_off, self._dt))
+        whitening = Whitening(lags, deviation, self._cut_off, self._dt)
+        return Signal(name, values, whitening, deviation, column.bias * column.factor)
+
+    def _sampled(self, values: np.ndarray) -> np.ndarray:
+        """Of values (n, ...) at the file's places the filtered ones that are compared."""
+        if self._dt is not None:
+            values = filters.low_pass(values, self._dt, self._cut_off)
+        return np.asarray(values[self._kept])
+
+    def of_march(self, position: np.ndarray, values: np.ndarray, dt: float) -> np.ndarray:
+        """Of a march's values (n_steps, ...) at positions (n_steps,) [m], ``dt`` [s] apart, those
+        that are compared: filtered, and at the places of the samples.
+
+        Raises
+        ------
+        InputError
+            If the march does not cover the samples.
+        """
+        needed = self.place if self._is_filtered else self._places
+        if not position[0] <= needed[0] <= needed[-1] <= position[-1]:
+            raise InputError(
+                f"the measurement is compared from {needed[0]:.1f} to {needed[-1]:.1f} m, and the "
+                f"pantograph of the scene runs from {position[0]:.1f} to {position[-1]:.1f} m: "
+                "give measured.from_m and to_m, or cut the file"
+            )
+        if self._is_filtered:
+            values = filters.low_pass(values, dt, self._cut_off)
+            return np.asarray(CubicSpline(position, values)(needed))
+        return self._sampled(np.asarray(CubicSpline(position, values)(needed)))
+
+
+def read_table(path: Path) -> pd.DataFrame:
+    """The table of a CSV file, with commas or with semicolons and decimal commas or points.
+
+    Raises
+    ------
+    InputError
+        If it is none.
+    """
+    text = decode(read_whole(path, str(path)), str(path))
+    semicolons = ";" in text
+    try:
+        return pd.read_csv(
+            io.StringIO(text.replace(",", ".") if semicolons else text),
+            sep=";" if semicolons else ",",
+            comment="#",
+            skipinitialspace=True,
+        )
+    except ValueError as error:  # pandas' ParserError is one
+        why = str(error).strip().removeprefix("Error tokenizing data. C error: ")
+        raise InputError(f"{path} is no table of CSV: {plain(why, 200)}") from error
+
+
+def _column(table: pd.DataFrame, path: str, name: str) -> np.ndarray:
+    if name not in table:
+        there = ", ".join(plain(str(column), 40) for column in table.columns[:12])
+        raise InputError(f'{path} has no column "{plain(name, 100)}": it has {there}')
+    values = pd.to_numeric(table[name], errors="coerce").to_numpy(dtype=float)
+    wrong = np.flatnonzero(~np.isfinite(values))
+    if wrong.size:
+        raise InputError(
+            f'{path} has in row {wrong[0] + 1} of column "{plain(name, 100)}" no finite number'
+        )
+    return np.asarray(values)

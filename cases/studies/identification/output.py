@@ -1,0 +1,219 @@
+"""An identification as tables, as text, and as files."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+
+from catenary.cases.studies.identification.residuals import RARE, Judged
+from catenary.cases.studies.identification.study import Identification
+from catenary.postproc.report.study_table import Column, StudyTable
+
+PARAMETERS, CORRELATION = "parameters.csv", "correlation.csv"
+DIRECTIONS, RESIDUALS, SUMMARY = "directions.csv", "residuals.csv", "identification.json"
+_MOST_DIRECTIONS, _MOST_PAIRS, _MOST_PARTS = 5, 5, 4
+_CORRELATED, _LEAST_PART = 0.5, 0.2
+# A posterior that is this part of its prior or more comes from the prior.
+_UNCHANGED = 0.9
+
+
+def parameters_table(found: Identification) -> StudyTable:
+    """A row for each unknown: prior, found value, posterior deviation, part of the prior left."""
+    columns = [
+        Column("parameter", "parameter"),
+        Column("unit", "unit"),
+        Column("prior", "prior", ".6g"),
+        Column("prior_deviation", "+-", ".3g"),
+        Column("shown", "found", ">", in_files=False),
+        Column("found"),
+        Column("deviation", "+-", ".2g"),
+        Column("of_prior", "of prior", ".0%"),
+    ]
+    return StudyTable(
+        columns,
+        [
+            {
+                "parameter": one.name,
+                "unit": one.unit,
+                "prior": one.mean,
+                "prior_deviation": one.deviation,
+                "shown": _rounded(float(value), float(width)),
+                "found": float(value),
+                "deviation": float(width),
+                "of_prior": float(width / one.deviation),
+            }
+            for one, value, width in zip(found.unknowns, found.values, found.widths, strict=True)
+        ],
+    )
+
+
+def _rounded(value: float, width: float) -> str:
+    """A value with the digits that two of its deviation let it have."""
+    digits = max(0, 1 - int(np.floor(np.log10(width))))
+    text = f"{value:.{digits}f}" if digits < 7 else f"{value:.3g}"
+    return text.removeprefix("-") if not text.strip("-0.") else text
+
+
+def correlation_table(found: Identification) -> StudyTable:
+    """The posterior correlations, a row and a column for each unknown."""
+    names = [one.name for one in found.unknowns]
+    columns = [Column("parameter"), *(Column(name) for name in names)]
+    rows = [
+        {"parameter": name, **dict(zip(names, map(float, row), strict=True))}
+        for name, row in zip(names, found.posterior.correlation, strict=True)
+    ]
+    return StudyTable(columns, rows)
+
+
+def directions_table(found: Identification) -> StudyTable:
+    """Directions of the parameters, in deviations of their priors, the best known first."""
+    names = [one.name for one in found.unknowns]
+    columns = [Column("direction"), Column("information"), *(Column(name) for name in names)]
+    rows = [
+        {
+            "direction": number + 1,
+            "information": float(information),
+            **dict(zip(names, map(float, direction), strict=True)),
+        }
+        for number, (information, direction) in enumerate(
+            zip(found.posterior.information, found.posterior.directions.T, strict=True)
+        )
+    ]
+    return StudyTable(columns, rows)
+
+
+def residuals_table(found: Identification) -> StudyTable:
+    """Places, and of each signal what was measured and what the found parameters give, with the
+    bias that was found."""
+    columns, values = [Column("place_m")], [found.place]
+    biases = {one.name: value for one, value in zip(found.unknowns, found.values, strict=True)}
+    for signal, modelled in zip(found.signals, found.modelled, strict=True):
+        name = signal.name.replace(" ", "_")
+        unit = "N" if signal.name == "force" else "m"
+        columns += [Column(f"measured_{name}_{unit}"), Column(f"modelled_{name}_{unit}")]
+        values += [signal.values, modelled + biases.get(f"bias of {signal.name}", 0.0)]
+    names = [column.name for column in columns]
+    return StudyTable(
+        columns,
+        [dict(zip(names, map(float, row), strict=True)) for row in zip(*values, strict=True)],
+    )
+
+
+def as_text(found: Identification) -> str:
+    """What is printed: parameters, what data say of them, and whether the model fits."""
+    posterior, m = found.posterior, len(found.unknowns)
+    lines = [parameters_table(found).text(), ""]
+    lines.append(
+        f"Data say more than the prior of {posterior.n_known} of {m} directions, and determine "
+        f"{posterior.n_found:.1f} parameters; condition {posterior.condition:.2g}."
+    )
+    lines += _unknown_directions(found)
+    lines += _correlated(found)
+    lines += ["", *(_sentence(name, one) for name, one in found.judged.items())]
+    lines.append(verdict(found))
+    if not found.has_converged:
+        lines.append(f"The search has not converged after {found.n_marches} marches.")
+    return "\n".join(lines)
+
+
+def _unknown_directions(found: Identification) -> list[str]:
+    posterior = found.posterior
+    unknown = np.flatnonzero(posterior.information <= 1.0)[::-1]
+    if not unknown.size:
+        return []
+    lines = ["Not known from these data, where the prior says more:"]
+    for number in unknown[:_MOST_DIRECTIONS]:
+        direction = posterior.directions[:, number]
+        order = np.argsort(-np.abs(direction))[:_MOST_PARTS]
+        parts = " ".join(
+            f"{direction[place]:+.2f} {found.unknowns[place].name}"
+            for place in order
+            if abs(direction[place]) > _LEAST_PART * np.abs(direction).max()
+        )
+        lines.append(f"  {parts} (information {posterior.information[number]:.2g})")
+    if unknown.size > _MOST_DIRECTIONS:
+        lines.append(f"  and {unknown.size - _MOST_DIRECTIONS} more, see {DIRECTIONS}")
+    return lines
+
+
+def _correlated(found: Identification) -> list[str]:
+    correlation = found.posterior.correlation
+    rows, columns = np.triu_indices(len(found.unknowns), 1)
+    values = correlation[rows, columns]
+    order = [k for k in np.argsort(-np.abs(values)) if abs(values[k]) > _CORRELATED]
+    lines = [
+        f"  {values[k]:+.2f} {found.unknowns[rows[k]].name} and {found.unknowns[columns[k]].name}"
+        for k in order[:_MOST_PAIRS]
+    ]
+    if len(order) > _MOST_PAIRS:
+        lines.append(f"  and {len(order) - _MOST_PAIRS} more, see {CORRELATION}")
+    return ["Correlated:", *lines] if lines else []
+
+
+def _sentence(name: str, one: Judged) -> str:
+    size = (
+        f"chi-square {one.reduced:.3f} per degree of freedom ({one.n}, p = {one.probability:.2g})"
+    )
+    if not one.autocorrelation.size:
+        return f"Residual of {name}: {size}"
+    colour = f"{one.autocorrelation[0]:+.2f} (white with p = {one.whiteness_probability:.2g})"
+    return f"Residual of {name}: {size}; autocorrelation {colour}"
+
+
+def verdict(found: Identification) -> str:
+    """Whether the residuals are those of noise as it was stated."""
+    judged = found.judged
+    large = [name for name, one in judged.items() if one.is_too_large]
+    coloured = [name for name, one in judged.items() if one.is_coloured]
+    small = [name for name, one in judged.items() if one.is_too_small]
+    wrong = []
+    if large:
+        wrong.append(f"the residual of {' and '.join(large)} is larger than noise and priors allow")
+    if coloured:
+        wrong.append(f"the residual of {' and '.join(coloured)} is not white")
+    if wrong:
+        return (
+            f"The model does not fit: {'; '.join(wrong)} (each less probable than {RARE:g}). Found "
+            "values and deviations are not to be trusted."
+        )
+    if small:
+        return f"The noise that the task states is too large: residual of {' and '.join(small)}."
+    return "The model fits: residuals are those of the stated noise."
+
+
+def summary_of(found: Identification) -> dict[str, Any]:
+    """Parameters, what is known of them, residuals and verdict."""
+    return {
+        "parameters": parameters_table(found).records(),
+        "directions_known": found.posterior.n_known,
+        "parameters_determined": found.posterior.n_found,
+        "condition": found.posterior.condition if np.isfinite(found.posterior.condition) else None,
+        "residuals": {
+            name: {
+                "n": one.n,
+                "chi_square": one.chi_square,
+                "chi_square_per_degree_of_freedom": one.reduced,
+                "probability": one.probability,
+                "autocorrelation": one.autocorrelation.tolist(),
+                "whiteness_probability": one.whiteness_probability,
+            }
+            for name, one in found.judged.items()
+        },
+        "verdict": verdict(found),
+        "converged": found.has_converged,
+        "n_marches": found.n_marches,
+        "n_jacobians": found.n_jacobians,
+    }
+
+
+def files_of(found: Identification) -> dict[str, str]:
+    """Content of all files by name."""
+    return {
+        PARAMETERS: parameters_table(found).csv(),
+        CORRELATION: correlation_table(found).csv(),
+        DIRECTIONS: directions_table(found).csv(),
+        RESIDUALS: residuals_table(found).csv(),
+        SUMMARY: json.dumps(summary_of(found), indent=2) + "\n",
+    }

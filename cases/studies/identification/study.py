@@ -1,0 +1,259 @@
+"""Parameters of a case from a measurement: least squares with priors, by Levenberg-Marquardt.
+
+The sum of squares of data residuals, made independent, and of the parameters' distances from the
+means of their priors in deviations of these is made least: the most probable parameters under
+normal distributions. The Jacobian is that of the march's tangents.
+
+Source: A. Tarantola, *Inverse Problem Theory* (2005), section 3.2; J. J. Moré, *The
+Levenberg-Marquardt algorithm* (1978), which SciPy's MINPACK follows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+from scipy.optimize import least_squares
+
+from catenary.base.errors import InputError
+from catenary.cases.scene.problem import problem_of
+from catenary.cases.scene.scene import Scene
+from catenary.cases.studies.identification.fitted_march import FittedMarch
+from catenary.cases.studies.identification.measurement import UNITS, Measurement, Signal, read_table
+from catenary.cases.studies.identification.posterior import Posterior, posterior_of
+from catenary.cases.studies.identification.residuals import Judged, innovations_of, judge
+from catenary.cases.studies.identification.task import Task
+from catenary.cases.studies.sensitivity.parameters import ChangedScenes, Parameter
+from catenary.postproc.evaluate.filters import check_sampling
+
+# The search ends when a step makes the sum of squares, which is near the number n of samples, less
+# by less than this part. What is left of the sum is the squared distance to the best parameters in
+# posterior deviations: some 0.01 of n = 100.
+_TOLERANCE = 1e-4
+_MOST_MARCHES = 60
+
+
+class Unknown(NamedTuple):
+    """What is looked for, with its prior.
+
+    Attributes
+    ----------
+    name : a key of the scene, or "bias of ..."
+    unit : of the values
+    mean, deviation : of the prior
+    """
+
+    name: str
+    unit: str
+    mean: float
+    deviation: float
+
+
+@dataclass(frozen=True)
+class Identification:
+    """Parameters found from a measurement.
+
+    Attributes
+    ----------
+    unknowns : (m) parameters of the scene, then biases of signals
+    values : (m,) found
+    posterior : their uncertainty, in deviations of the priors
+    place : (n,) of the samples of each signal [m]
+    signals : what was measured
+    modelled : of each signal the samples (n,) of the march that was found, without biases
+    judged : the residuals of each signal and of "all"
+    n_marches, n_jacobians : how many were made
+    has_converged : whether the search ended by itself
+    """
+
+    unknowns: list[Unknown]
+    values: np.ndarray
+    posterior: Posterior
+    place: np.ndarray
+    signals: list[Signal]
+    modelled: list[np.ndarray]
+    judged: dict[str, Judged]
+    n_marches: int
+    n_jacobians: int
+    has_converged: bool
+
+    @property
+    def widths(self) -> np.ndarray:
+        """Posterior standard deviations (m,) in the units of the unknowns."""
+        return self.posterior.widths * np.array([one.deviation for one in self.unknowns])
+
+
+class _Compared:
+    """Residuals and Jacobians by what is looked for, in deviations of noise and priors."""
+
+    def __init__(
+        self,
+        march: FittedMarch,
+        signals: Sequence[Signal],
+        unknowns: Sequence[Unknown],
+        offsets: np.ndarray,
+    ) -> None:
+        self._march, self._signals, self._offsets = march, signals, offsets
+        self._deviations = np.array([one.deviation for one in unknowns[: offsets.size]])
+        self._n = len(unknowns)
+        self.n_marches, self.n_jacobians = 0, 0
+        self._latest: tuple[bytes, np.ndarray] | None = None
+        self.modelled: list[np.ndarray] = []
+
+    def residual(self, at: np.ndarray) -> np.ndarray:
+        """Measured less modelled samples of all signals, made independent."""
+        self.n_marches += 1
+        self.modelled = self._march.values(self._by(at))
+        biases = iter(at[self._offsets.size :])
+        return np.concatenate(
+            [
+                one.whitening.of(
+                    one.values - modelled - (one.bias * next(biases) if one.bias else 0.0)
+                )
+                for one, modelled in zip(self._signals, self.modelled, strict=True)
+            ]
+        )
+
+    def jacobian(self, at: np.ndarray) -> np.ndarray:
+        """Derivatives of the modelled samples, made independent."""
+        if self._latest is None or self._latest[0] != at.tobytes():
+            self.n_jacobians += 1
+            self._latest = at.tobytes(), self._made_jacobian(at)
+        return self._latest[1]
+
+    def _made_jacobian(self, at: np.ndarray) -> np.ndarray:
+        found = self._march.derivatives(self._by(at)) if self._offsets.size else []
+        rows, bias = [], self._offsets.size
+        for number, one in enumerate(self._signals):
+            own = np.zeros((one.values.size, self._n))
+            if found:
+                own[:, : self._offsets.size] = found[number] * self._deviations
+            if one.bias:
+                own[:, bias] = one.bias
+                bias += 1
+            rows.append(one.whitening.of(own))
+        return np.concatenate(rows)
+
+    def _by(self, at: np.ndarray) -> list[float]:
+        """By how much the parameters of the scene are changed, in their units."""
+        return list(self._offsets + self._deviations * at[: self._offsets.size])
+
+
+def identify(
+    scene: Scene,
+    measured: Path | pd.DataFrame,
+    task: Task,
+    comm: Any,
+    progress: Callable[[str], None] = lambda line: None,
+) -> Identification:
+    """Find parameters of a scene from a measurement. Not collective: one process.
+
+    Parameters
+    ----------
+    scene : checked
+    measured : CSV file, or the table of one
+    task : what its columns are, and what is looked for
+    comm : mpi4py communicator of this process alone
+    progress : called with a line for each parameter and march
+
+    Raises
+    ------
+    InputError
+        If file, task and scene do not fit together, or if a march has no derivatives.
+    RunBroken
+        If a march breaks.
+    """
+    check_sampling(scene.numerics.dt_s, task.measured.filter_Hz)
+    scenes = ChangedScenes(scene)
+    parameters, unknowns = _sought(scenes, task)
+    measurement = _measurement(scene, measured, task)
+    offsets = np.array(
+        [one.mean - _origin(own) for own, one in zip(parameters, unknowns, strict=True)]
+    )
+    biases = [
+        Unknown(f"bias of {one.name}", UNITS[one.name], 0.0, one.bias)
+        for one in measurement.signals
+        if one.bias
+    ]
+    unknowns += biases
+    march = FittedMarch(scenes, parameters, measurement, comm, progress)
+    compared = _Compared(march, measurement.signals, unknowns, offsets)
+    m = len(unknowns)
+    found = least_squares(
+        lambda at: np.concatenate([compared.residual(at), at]),
+        np.zeros(m),
+        lambda at: np.concatenate([-compared.jacobian(at), np.eye(m)]),
+        method="lm",
+        ftol=_TOLERANCE,
+        xtol=_TOLERANCE,
+        gtol=_TOLERANCE,
+        max_nfev=_MOST_MARCHES,
+    )
+    residual, jacobian = compared.residual(found.x), compared.jacobian(found.x)
+    n = measurement.place.size
+    return Identification(
+        unknowns,
+        np.array([one.mean for one in unknowns])
+        + found.x * np.array([one.deviation for one in unknowns]),
+        posterior_of(jacobian),
+        measurement.place,
+        measurement.signals,
+        compared.modelled,
+        judge(
+            innovations_of(residual, jacobian, found.x),
+            {one.name: slice(k * n, (k + 1) * n) for k, one in enumerate(measurement.signals)},
+        ),
+        compared.n_marches,
+        compared.n_jacobians,
+        bool(found.status > 0),
+    )
+
+
+def _measurement(scene: Scene, measured: Path | pd.DataFrame, task: Task) -> Measurement:
+    problem = problem_of(scene)
+    train, number = problem.train, task.measured.pantograph
+    if number > len(train.placements):
+        raise InputError(
+            f"measured.pantograph is {number}, and the train of the scene has "
+            f"{len(train.placements)}"
+        )
+    start = train.start - train.placements[number - 1].behind
+    table, name = measured, "the measurement"
+    if isinstance(measured, Path):
+        table, name = read_table(measured), str(measured)
+    return Measurement(table, name, task.measured, train.speed, start, problem.evaluation)
+
+
+def _origin(parameter: Parameter) -> float:
+    """The value from which a parameter is counted: its own, of a list zero."""
+    return parameter.values[0] if len(parameter.values) == 1 else 0.0
+
+
+def _sought(scenes: ChangedScenes, task: Task) -> tuple[list[Parameter], list[Unknown]]:
+    """The parameters of the scene that are looked for, and their priors."""
+    parameters, unknowns = [], []
+    for one in task.parameters:
+        parameter = scenes.parameter(one.key)
+        own = _origin(parameter)
+        if one.mean is not None and len(parameter.values) > 1:
+            raise InputError(
+                f"{one.key} is a list whose entries change together: its prior has no mean, and "
+                "the scene's values are it"
+            )
+        mean = own if one.mean is None else one.mean
+        parameters.append(parameter)
+        unknowns.append(Unknown(one.key, parameter.unit, mean, one.deviation))
+    if task.droppers is not None:
+        for parameter in scenes.droppers_of(task.droppers.spans):
+            own = parameter.values[0]
+            parameters.append(parameter)
+            unknowns.append(Unknown(parameter.key, parameter.unit, own, task.droppers.deviation_mm))
+    keys = [one.name for one in unknowns]
+    for key in keys:
+        if keys.count(key) > 1:
+            raise InputError(f"{key} is looked for twice; take one away")
+    return parameters, unknowns

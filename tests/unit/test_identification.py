@@ -1,0 +1,372 @@
+"""``catenary identify``: noise, posterior, residuals, and what is read and refused."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from measuring import check
+from scipy import stats
+from scipy.optimize import least_squares
+from twin_passages import filtered_noise, write_measurement
+from typer.testing import CliRunner
+
+import catenary
+from catenary.base.errors import InputError
+from catenary.cases.cli.main import app
+from catenary.cases.scene.load import load_scene
+from catenary.cases.studies.identification.measurement import Measurement, read_table
+from catenary.cases.studies.identification.noise import Whitening, correlation, kept_variance
+from catenary.cases.studies.identification.posterior import posterior_of
+from catenary.cases.studies.identification.residuals import innovations_of, judge
+from catenary.cases.studies.identification.task import Measured, task_of
+from catenary.postproc.evaluate import filters
+
+CASE = "en50318_2002"
+# Six spans with two elements a gap, run through in 1152 steps.
+TINY = (
+    "line.n_spans=6", "mesh.elements_per_gap=2", "train.start_m=65", "train.end_m=225",
+    "train.raise_time_s=0.2", "numerics.dt_s=0.002", "evaluation.from_m=80",
+    "evaluation.to_m=220",
+)  # fmt: skip
+FORCE = "pantographs.reference.static_force_N"
+TASK = f"""
+[measured]
+place = {{ column = "x_m" }}
+force = {{ column = "force_N", noise = 5.0 }}
+head_height = {{ column = "height_mm", unit = "mm", noise = 5.0, bias = 20.0 }}
+
+[[parameters]]
+key = "{FORCE}"
+deviation = 4.0
+mean = 117.0
+"""
+
+
+@pytest.fixture(autouse=True)
+def own_hook(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The command line installs an exception hook; it goes with the test."""
+    monkeypatch.setattr(sys, "excepthook", sys.excepthook)
+
+
+# --- noise --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("dt", [1e-3, 0.01])
+def test_filtered_noise_has_the_correlation_of_the_filters_impulse(dt: float) -> None:
+    """The impulse response of the filter itself: its correlation is a finite sum."""
+    impulse = np.zeros(4001)
+    impulse[2000] = 1.0
+    response = filters.low_pass(impulse, dt)
+    lags = np.arange(0, 60)
+    sums = np.array([response[lag:] @ response[: len(response) - lag] for lag in lags])
+    # Trapezoids over a smooth spectrum that ends at a gain of 6e-8: 1e-6 of the whole.
+    check("variance", kept_variance(20.0, dt), sums[0], within=1e-5 * sums[0])
+    check("correlation", correlation(lags * dt, 20.0, dt), sums / sums[0], within=1e-5)
+
+
+def test_dense_samples_have_the_correlation_of_no_samples() -> None:
+    lags = np.linspace(0.0, 2.0, 81)
+    # tan(x)/x differs from 1 by x^2/3, with x = pi 20 Hz 1e-4 s: 1e-5 of the frequencies.
+    check("limit", correlation(lags, 20.0, 1e-4), correlation(lags, 20.0), within=1e-4)
+
+
+def test_whitened_noise_is_white() -> None:
+    """2000 records of 40 samples at 25 ms: covariances spread by 1/sqrt(2000), 5 deviations."""
+    rng = np.random.default_rng(3)
+    every, n = 25, 40
+    record = filtered_noise(rng, 2000 * n * every, 5.0, 1e-3)
+    records = record[::every].reshape(2000, n).T
+    white = Whitening(0.025 * np.arange(n), 5.0, 20.0, None).of(records)
+    check("covariance", white @ white.T / 2000.0, np.eye(n), within=5.0 * np.sqrt(2.0 / 2000.0))
+
+
+# --- posterior and residuals --------------------------------------------------------------------
+
+
+def test_the_posterior_is_the_inverse_of_the_information() -> None:
+    rng = np.random.default_rng(5)
+    jacobian = rng.normal(size=(30, 4)) * [3.0, 1.0, 0.3, 0.0]
+    found = posterior_of(jacobian)
+    expected = np.linalg.inv(np.eye(4) + jacobian.T @ jacobian)
+    check("covariance", found.covariance, expected, within=1e-13)
+    # The data do not depend on the last parameter: its prior remains, its direction is told.
+    assert found.widths[-1] == pytest.approx(1.0) and found.condition > 1e10
+    assert abs(found.directions[-1, -1]) == pytest.approx(1.0)
+    assert found.information[-1] < 1e-20 < found.information[0]
+
+
+def test_parameters_that_act_alike_are_known_as_a_sum_only() -> None:
+    """Both columns are alike: the sum is measured, the difference keeps its prior."""
+    column = np.full((50, 1), 2.0)
+    found = posterior_of(np.hstack([column, column]))
+    assert found.information == pytest.approx([400.0, 0.0], abs=1e-12)
+    assert abs(found.directions[:, 1] @ [1.0, -1.0]) == pytest.approx(np.sqrt(2.0))
+    assert found.n_known == 1 and found.n_found == pytest.approx(400.0 / 401.0)
+    assert found.correlation[0, 1] < -0.99
+
+
+def test_a_posterior_with_fewer_data_than_parameters() -> None:
+    found = posterior_of(np.array([[3.0, 0.0, 4.0]]))
+    assert found.information == pytest.approx([25.0, 0.0, 0.0])
+    assert np.diag(found.covariance)[1] == pytest.approx(1.0)
+
+
+def test_the_innovations_have_the_sum_of_squares_that_was_minimised() -> None:
+    rng = np.random.default_rng(6)
+    jacobian, before = rng.normal(size=(25, 3)), rng.normal(size=25)
+    found = least_squares(
+        lambda at: np.concatenate([before - jacobian @ at, at]), np.zeros(3), xtol=1e-15
+    )
+    innovations = innovations_of(before - jacobian @ found.x, jacobian, found.x)
+    check("sum", float(innovations @ innovations), 2.0 * found.cost, within=1e-9)
+    covariance = np.eye(25) + jacobian @ jacobian.T
+    check("form", 2.0 * found.cost, float(before @ np.linalg.inv(covariance) @ before), within=1e-9)
+
+
+def test_residuals_are_called_wrong_as_rarely_as_said() -> None:
+    """400 right models: probabilities are uniform, by Kolmogorov and Smirnov at one in 10^4."""
+    rng = np.random.default_rng(8)
+    n = 120
+    found = [judge(rng.normal(size=n), {"force": slice(0, n)}) for _ in range(400)]
+    for name in ("probability", "whiteness_probability"):
+        seen = [getattr(one["force"], name) for one in found]
+        assert stats.kstest(seen, "uniform").pvalue > 1e-4, name
+    assert np.isnan(found[0]["all"].whiteness) and not found[0]["all"].is_coloured
+
+
+def test_wrong_residuals_are_told_by_size_and_by_colour() -> None:
+    rng = np.random.default_rng(9)
+    white, n = rng.normal(size=201), 200
+    of = {"force": slice(0, n)}
+    assert judge(1.5 * white[:n], of)["force"].is_too_large
+    assert judge(0.5 * white[:n], of)["force"].is_too_small
+    coloured = judge((white[1:] + 0.8 * white[:-1]) / np.sqrt(1.64), of)["force"]
+    assert coloured.is_coloured
+    # The first autocorrelation of a moving average of 0.8 is 0.8/1.64; 4 deviations.
+    assert coloured.autocorrelation[0] == pytest.approx(0.8 / 1.64, abs=4.0 / np.sqrt(n))
+
+
+# --- measurements -------------------------------------------------------------------------------
+
+
+def measurement(table: pd.DataFrame, **changes: Any) -> Measurement:
+    keys = {
+        "place": {"column": "x"},
+        "force": {"column": "F", "noise": 5.0},
+        "filter_Hz": 20.0,
+        **changes,
+    }
+    task = Measured.model_validate({key: one for key, one in keys.items() if one is not None})
+    return Measurement(table, "m.csv", task, 50.0, 100.0, (150.0, 250.0))
+
+
+def samples(n: int = 1001) -> pd.DataFrame:
+    x = np.linspace(100.0, 300.0, n)
+    return pd.DataFrame({"x": x, "t": (x - 100.0) / 50.0, "F": 100.0 + np.sin(x)})
+
+
+def test_samples_are_half_a_period_of_the_filter_apart() -> None:
+    found = measurement(samples())
+    # 0.2 m at 50 m/s are 4 ms: every sixth, 24 ms of 25.
+    assert np.diff(found.place) == pytest.approx(1.2)
+    assert found.place[0] == pytest.approx(150.0) and found.place[-1] <= 250.0
+    (signal,) = found.signals
+    assert signal.values == pytest.approx(100.0 + np.sin(found.place))
+    by_time = measurement(samples(), place=None, time={"column": "t"})
+    assert by_time.place == pytest.approx(found.place)
+
+
+def test_units_of_columns_are_converted() -> None:
+    table = samples()
+    table["kN"], table["km"] = table.F / 1e3, table.x / 1e3
+    found = measurement(
+        table,
+        place={"column": "km", "unit": "km"},
+        force={"column": "kN", "unit": "kN", "noise": 0.005, "bias": 0.001},
+    )
+    (signal,) = found.signals
+    assert signal.values == pytest.approx(100.0 + np.sin(found.place))
+    assert (signal.deviation, signal.bias) == (pytest.approx(5.0), pytest.approx(1.0))
+
+
+def test_raw_samples_and_the_march_pass_the_same_filter() -> None:
+    """A wave of 30 Hz and one of 2 Hz, 250 samples a second: both as the filter leaves them."""
+    table = samples()
+    t = table.t.to_numpy()
+    table["F"] = 100.0 + 10.0 * np.sin(4.0 * np.pi * t) + 10.0 * np.sin(60.0 * np.pi * t)
+    found = measurement(table, is_filtered=False)
+    (signal,) = found.signals
+    times = (found.place - 100.0) / 50.0
+    gain = 1.0 / (1.0 + (np.tan(30.0 * np.pi * 0.004) / np.tan(20.0 * np.pi * 0.004)) ** 12)
+    expected = 100.0 + 10.0 * np.sin(4.0 * np.pi * times)
+    expected += gain * 10.0 * np.sin(60.0 * np.pi * times)
+    # The record's ends have left 1e-4 of 20 N.
+    check("filtered", signal.values, expected, within=5e-3)
+    dense = np.arange(0.0, 4.0 + 1e-9, 1e-3)
+    values = 100.0 + 10.0 * np.sin(4.0 * np.pi * dense) + 10.0 * np.sin(60.0 * np.pi * dense)
+    # Cubic splines through 33 samples a wave of 10 N: (2 pi/33)^4/384, 3e-5 N, times some.
+    modelled = found.of_march(100.0 + 50.0 * dense, values, 1e-3)
+    check("as the march", modelled, signal.values, within=1e-3)
+    # Of 5 N white noise at 250 Hz the filter leaves the root of 0.148.
+    assert signal.deviation == pytest.approx(5.0 * np.sqrt(kept_variance(20.0, 0.004)))
+
+
+def test_tables_with_semicolons_and_decimal_commas_are_read(tmp_path: Path) -> None:
+    file = tmp_path / "m.csv"
+    file.write_text("# a passage\nx;F\n0,5;100,25\n1,0;99,75\n", encoding="utf-8")
+    table = read_table(file)
+    assert table.x.tolist() == [0.5, 1.0] and table.F.tolist() == [100.25, 99.75]
+
+
+def test_a_file_that_is_no_table_is_told_in_one_sentence(tmp_path: Path) -> None:
+    file = tmp_path / "m.csv"
+    file.write_text("x,F\n1,2\n1,2,3\n", encoding="utf-8")
+    with pytest.raises(InputError) as raised:
+        read_table(file)
+    assert str(raised.value) == f"{file} is no table of CSV: Expected 2 fields in line 3, saw 3"
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        ({"force": {"column": "Q", "noise": 1.0}}, 'm.csv has no column "Q": it has x, t, F'),
+        ({"from_m": 290.0, "to_m": 300.0}, "takes 20 to 8000"),
+        ({"is_filtered": False, "filter_Hz": 200.0}, "samples a second, too few for the filter"),
+    ],
+)
+def test_a_measurement_that_does_not_do_is_told(change: dict[str, Any], told: str) -> None:
+    with pytest.raises(InputError, match=told):
+        measurement(samples(), **change)
+
+
+def test_gaps_and_holes_are_told() -> None:
+    with pytest.raises(InputError, match="must have equidistant samples in ascending order"):
+        measurement(samples().drop(index=[500, 501]))
+    with pytest.raises(InputError, match="must have equidistant samples in ascending order"):
+        measurement(samples()[::-1])
+    holed = samples()
+    holed.loc[7, "F"] = np.nan
+    with pytest.raises(InputError, match='has in row 8 of column "F" no finite number'):
+        measurement(holed)
+    found = measurement(samples())
+    with pytest.raises(InputError, match=r"compared from 150.0 to 249.6 m, and the pantograph"):
+        found.of_march(np.linspace(160.0, 260.0, 2001), np.zeros(2001), 1e-3)
+
+
+# --- the task -----------------------------------------------------------------------------------
+
+MEASURED = {"place": {"column": "x_m"}, "force": {"column": "force_N", "noise": 5.0}}
+SOUGHT = [{"key": FORCE, "deviation": 4.0}]
+
+
+@pytest.mark.parametrize(
+    ("task", "told"),
+    [
+        ({"measured": MEASURED}, "parameters"),
+        ({"parameters": SOUGHT}, "measured"),
+        ({"measured": {**MEASURED, "time": {"column": "t"}}, "parameters": SOUGHT},
+         "must name the column of one of place and time"),
+        ({"measured": {"place": {"column": "x"}}, "parameters": SOUGHT},
+         "must name the column of force, of head_height, or of both"),
+        ({"measured": {**MEASURED, "filter_hz": 20.0}, "parameters": SOUGHT},
+         "measured.filter_hz in t.toml is unknown: did you mean filter_Hz?"),
+        ({"measured": MEASURED, "parameters": [{"key": FORCE, "sigma": 4.0}]},
+         "parameters.0.sigma in t.toml is unknown: it takes key, deviation, mean"),
+        ({"measured": MEASURED, "parameters": [{"key": FORCE, "deviation": 0.0}]},
+         "parameters.0.deviation is 0.0 in t.toml; it must be greater than 0"),
+        ({"measured": MEASURED, "droppers": {"spans": [], "deviation_mm": 2.0}}, "droppers.spans"),
+        ({"measured": {**MEASURED, "force": {"column": "F", "noise": 1.0, "unit": "kg"}},
+          "parameters": SOUGHT}, "measured.force.unit"),
+    ],
+)  # fmt: skip
+def test_a_wrong_task_is_told_in_one_sentence(task: dict[str, Any], told: str) -> None:
+    with pytest.raises(InputError) as raised:
+        task_of(task, "t.toml")
+    assert told in str(raised.value) and "\n" not in str(raised.value)
+    assert "t.toml" in str(raised.value)
+
+
+# --- the verb -----------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a task and the passage of the tiny scene itself, with noise."""
+    folder = tmp_path_factory.mktemp("identification")
+    (folder / "task.toml").write_text(TASK, encoding="utf-8")
+    rng = np.random.default_rng(11)
+    write_measurement(folder / "measured.csv", load_scene(CASE, TINY), rng, 5.0, 5e-3)
+    return folder
+
+
+def invoke(files: Path, *words: str) -> Any:
+    given = [CASE, str(files / "measured.csv"), str(files / "task.toml")]
+    return CliRunner().invoke(app, ["identify", *given, *words, "--set", *TINY])
+
+
+def test_the_verb_finds_a_force_and_writes_its_tables_once(files: Path) -> None:
+    out = files / "out"
+    result = invoke(files, "-o", str(out))
+    assert result.exit_code == 0, result.output
+    assert "The model fits" in result.output
+    table = pd.read_csv(out / "parameters.csv").set_index("parameter")
+    assert table.index.tolist() == [FORCE, "bias of head height"]
+    row = table.loc[FORCE]
+    assert (row.prior, row.prior_deviation, row.unit) == (117.0, 4.0, "N")
+    # The scene has 120 N; four posterior deviations, and these are far below the prior's.
+    assert abs(row.found - 120.0) < 4.0 * row.deviation < 4.0
+    assert abs(table.loc["bias of head height"].found) < 4.0 * 0.002
+    names = {path.name for path in out.iterdir()}
+    assert names == {"parameters.csv", "correlation.csv", "directions.csv", "residuals.csv",
+                     "identification.json"}  # fmt: skip
+    summary = json.loads((out / "identification.json").read_text())
+    assert summary["converged"] and set(summary["residuals"]) == {"force", "head height", "all"}
+    residuals = pd.read_csv(out / "residuals.csv")
+    left = residuals.measured_force_N - residuals.modelled_force_N
+    # Two hundred samples, of which noise is 5 N.
+    assert left.std() == pytest.approx(5.0, rel=0.3)
+    again = invoke(files, "-o", str(out))
+    assert again.exit_code == 2 and "is there already" in again.output
+
+
+def test_python_gives_the_same(files: Path) -> None:
+    scene = catenary.load(CASE).replace(
+        dict(
+            pair for word in TINY for pair in [(word.split("=")[0], json.loads(word.split("=")[1]))]
+        )
+    )
+    found = catenary.identify(scene, files / "measured.csv", files / "task.toml")
+    assert found.summary["verdict"].startswith("The model fits")
+    assert found.parameters.loc[FORCE, "deviation"] < 1.0
+    assert found.correlation.loc[FORCE, FORCE] == pytest.approx(1.0)
+    assert len(found.directions) == 2 and "chi-square" in str(found)
+
+
+@pytest.mark.parametrize(
+    ("task", "told"),
+    [
+        (TASK.replace("static_force_N", "statik_force_N"), "did you mean"),
+        (TASK.replace(FORCE, "train.speed_km_h").replace("117.0", "250.0"), "moves the pantograph"),
+        (TASK.replace("[measured]", "[measured]\npantograph = 2"), "train of the scene has 1"),
+        (TASK + f'\n[[parameters]]\nkey = "{FORCE}"\ndeviation = 1.0', "is looked for twice"),
+        (TASK + "\n[droppers]\nspans = [9]\ndeviation_mm = 2.0", "no span 9: the line has 6"),
+        (TASK.replace("117.0", "-1e7"), "comes to a value that the scene refuses"),
+        (TASK.replace(FORCE, "pantographs.reference.masses_kg"), "its prior has no mean"),
+    ],
+)
+def test_a_task_that_does_not_fit_is_told(
+    files: Path, tmp_path: Path, task: str, told: str
+) -> None:
+    wrong = tmp_path / "task.toml"
+    wrong.write_text(task, encoding="utf-8")
+    given = [CASE, str(files / "measured.csv"), str(wrong), "-o", str(tmp_path / "out")]
+    result = CliRunner().invoke(app, ["identify", *given, "--set", *TINY])
+    assert result.exit_code == 2, result.output
+    assert told in result.output and result.output.count("\n") == 1
+    assert not (tmp_path / "out").exists()
