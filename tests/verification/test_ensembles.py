@@ -15,6 +15,7 @@ import catenary
 from catenary.cases.scene.input.toml_input import REMOVED
 from catenary.cases.scene.load import read_draft
 from catenary.cases.scene.scene import Scene
+from catenary.cases.studies.ensemble import scenes_on_lines
 from catenary.cases.studies.ensemble.scenes_on_lines import Marched, Marches
 from catenary.postproc.files.disk import plain
 from catenary.solver.ensemble.shared_line import N_LANES
@@ -157,3 +158,15 @@ def test_a_scene_that_breaks_stops_no_other() -> None:
     assert [one.outcome == "done" for one in found] == [True, False, True]
     assert "would have to pull" in found[1].outcome
     assert differences(plain(found[2].summary), own_run("en50318_2002", changes[2])) == []
+
+
+def test_unusual_scenes_are_marched_again_under_a_watch(monkeypatch: pytest.MonkeyPatch) -> None:
+    changes = [{"train.speed_km_h": 240.0}, {"train.speed_km_h": 250.0}]
+    usual, _ = marched(scenes_of("en50318_2002", changes))
+    uplifts = sorted(one.summary["supports"]["max_uplift_mm"] for one in usual)
+    monkeypatch.setattr(scenes_on_lines, "_UPLIFT", 0.5e-3 * sum(uplifts))
+    found, together = marched(scenes_of("en50318_2002", changes))
+    assert together
+    assert sorted(bool(one.summary["watched"]) for one in found) == [False, True]
+    for one, other in zip(usual, found, strict=True):
+        assert differences(plain(one.summary), plain(other.summary)) == []

@@ -48,6 +48,10 @@ from catenary.solver.time_loop.march import March
 _OF_THE_TRAIN = ("case", "train", "pantographs", "contact", "evaluation", "output", "test")
 # What changes the line at rest, but not how it moves about that.
 _OF_THE_REST = "dropper_lengths"
+# Lanes have no watch of energies and motions. A march by itself is watched, and is made of scenes
+# where that may have something to say: of an uplift at an arm [m], a contact force [N], a share of
+# the time without contact.
+_UPLIFT, _FORCE, _LOST = 0.25, 1000.0, 0.1
 # How far columns of a shared line reach beyond runs [m]: trains that come later may be longer.
 _BEYOND = 60.0
 
@@ -120,7 +124,7 @@ class Marches:
         if line.shared is not None:
             for ended in march_side_by_side(line.shared, together()):
                 # A march by itself says why a step has no forces, or a train no place.
-                if isinstance(ended, SceneHistory) and not ended.is_left:
+                if isinstance(ended, SceneHistory) and not (ended.is_left or _is_unusual(ended)):
                     del left[ended.number]
                     head = line.header(scenes[ended.number], ended.at_rest)
                     yield Marched(ended.number, DONE, _summary(head, *_tables(ended), DONE))
@@ -253,6 +257,16 @@ class _Line:
 def _of_train(problem: Problem) -> dict[str, Any]:
     names = ("train", "contact", "evaluation")
     return {name: getattr(problem, name) for name in names}
+
+
+def _is_unusual(history: SceneHistory) -> bool:
+    """Whether a watch may have something to say of a march."""
+    force = history.contact_force
+    return (
+        float(history.uplift.max(initial=0.0)) > _UPLIFT
+        or float(force.max()) > _FORCE
+        or float((force <= 0.0).mean(axis=0).max()) > _LOST
+    )
 
 
 def _begin_of(problem: Problem) -> float:
