@@ -28,7 +28,7 @@ def serve(connection_number: int, life_number: int) -> None:
     library_settings.choose()
     matplotlib_setup.choose_folder()
     matplotlib_setup.leave_out_settings()
-    # A signal that comes amid the work of Pydantic's serializer is an error to it, of which it warns.
+    # A signal amid the work of Pydantic's serializer is an error to it, of which it warns.
     warnings.filterwarnings("ignore", message="Pydantic serializer warnings")
     interrupts.install(several_ranks=False)
     threading.Thread(target=_end_with, args=(life_number,), daemon=True).start()
