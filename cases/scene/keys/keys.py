@@ -146,7 +146,7 @@ def _is_free(annotation: Any) -> bool:
 def is_known(key: str, known: list[str]) -> bool:
     """Whether a dotted key matches one of ``known``."""
     parts = key.split(".")
-    return any(_matches(parts, candidate.split(".")) for candidate in known)
+    return key in known or any(_matches(parts, candidate.split(".")) for candidate in known)
 
 
 def _matches(parts: list[str], pattern: list[str]) -> bool:
