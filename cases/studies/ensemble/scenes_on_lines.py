@@ -125,9 +125,10 @@ class Marches:
             for ended in march_side_by_side(line.shared, together()):
                 # A march by itself says why a step has no forces, or a train no place.
                 if isinstance(ended, SceneHistory) and not (ended.is_left or _is_unusual(ended)):
-                    del left[ended.number]
-                    head = line.header(scenes[ended.number], ended.at_rest)
-                    yield Marched(ended.number, DONE, _summary(head, *_tables(ended), DONE))
+                    number = ended.number
+                    del left[number]
+                    head = line.header(scenes[number], problems[number], ended.at_rest)
+                    yield Marched(number, DONE, _summary(head, *_tables(ended), DONE))
         yield from refused
         for number in left:
             yield _alone(line, number, scenes[number], problems[number])
@@ -218,9 +219,9 @@ class _Line:
         hung = self._rest.problem
         return self._rest._replace(problem=replace(hung, **_of_train(problem)))
 
-    def header(self, scene: Scene, at_rest: LineAtRest) -> Header:
-        """The head of a scene's results."""
-        problem, mesh, form = problem_of(scene), at_rest.mesh, at_rest.form
+    def header(self, scene: Scene, problem: Problem, at_rest: LineAtRest) -> Header:
+        """The head of the results of a scene, of its problem and its line at rest."""
+        mesh, form = at_rest.mesh, at_rest.form
         points = mesh.points.copy()
         points[:, 2] = form.height
         if form.lateral is not None:
@@ -301,7 +302,7 @@ def _alone(line: _Line, number: int, scene: Scene, problem: Problem) -> Marched:
         return Marched(number, str(error), {})
     if outcome.outcome != DONE:
         return Marched(number, outcome.outcome, {})
-    head = line.header(scene, rest)
+    head = line.header(scene, problem, rest)
     head = replace(head, attributes={**head.attributes, "watched": watch.facts()})
     summary = _summary(head, keeper.tables(), keeper.extremes(), outcome.outcome)
     return Marched(number, outcome.outcome, summary)

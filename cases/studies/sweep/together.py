@@ -105,12 +105,15 @@ def run_ensemble(
         return [case, *ensemble.overrides, assignments]
 
     march = _March(ensemble.draft, list(ensemble.overrides))
+    n_at_once = at_once(options.n_jobs, comm)
+    if comm.size > 1:  # a march is one rank's: all without -j would do the same
+        n_at_once = comm.size
     begin, ended = time.perf_counter(), list[Ended]()
     outcomes = kept.each(
         march,
         pieces,
         depends_on,
-        at_once(options.n_jobs, comm),
+        n_at_once,
         comm,
         partial(start_petsc, list(options.petsc)),
     )

@@ -16,7 +16,9 @@ class Ensemble {
   public:
     /// `passes` are kept by reference.
     Ensemble(ScenePasses& passes, LineExtremes extremes)
-        : passes_(passes), extremes_(std::move(extremes)) {}
+        : passes_(passes), extremes_(std::move(extremes)) {
+        passes_.make_room(extremes_.droppers.law.size());
+    }
 
     /// Let a scene begin in a lane, whose line is at rest, with n steps of its block.
     void begin(int lane, Steps& steps, int64_t n);

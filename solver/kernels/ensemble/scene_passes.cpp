@@ -113,7 +113,11 @@ void ScenePasses::track(const TrackedLinks& tracked, Array2<const double> rest,
     tracked_ = tracked;
     rest_ = rest;
     reserves_ = std::move(reserves);
-    found_.assign(tracked.links.law.size() * kScenes, 0.0);
+    make_room(tracked.links.law.size());
+}
+
+void ScenePasses::make_room(size_t n_links) {
+    found_.resize(std::max(found_.size(), n_links * kScenes));
 }
 
 void ScenePasses::step() {
@@ -140,11 +144,10 @@ void ScenePasses::take(const LineExtremes& extremes, const std::array<bool, kSce
         none[s] = moves[s] ? 0.0 : std::numeric_limits<double>::infinity();
     const Motion& motion = parts_.arrays.motion;
     take_uplift(motion, extremes.arms, none, extremes.uplift.data);
-    const int64_t n = size(extremes.droppers.law);
-    found_.resize(std::max<size_t>(found_.size(), n * kScenes));
-    catenary::find_reserves(motion, extremes.droppers, extremes.rest.data, 0, n, found_.data());
-    take_forces(extremes.droppers.law, found_.data(), none, extremes.least.data,
-                extremes.largest.data);
+    const auto laws = extremes.droppers.law;
+    catenary::find_reserves(motion, extremes.droppers, extremes.rest.data, 0, size(laws),
+                            found_.data());
+    take_forces(laws, found_.data(), none, extremes.least.data, extremes.largest.data);
 }
 
 void ScenePasses::rest(int scene) const {

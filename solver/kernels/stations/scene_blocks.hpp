@@ -1,7 +1,7 @@
 #pragma once
 // Products of packed blocks with the unknowns of a station in several scenes, which share matrices
 // and factors. Unknown u of scene s stands at u L + s: a lane is a scene, and a number of a block
-// is multiplied with all of them. Sums are those of `Blocks`, in the same order.
+// is multiplied with all of them.
 #include "stations/passes.hpp"
 
 namespace catenary::CATENARY_TARGET {
