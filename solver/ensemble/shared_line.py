@@ -98,6 +98,7 @@ class SharedLine:
         self.steps_together = (
             passes is not None
             and not model.loads
+            and not model.droppers_bend  # extremes of forces know one slope
             and all(map(native.are_compiled_for_scenes, passes.rows, passes.columns))
         )
         if passes is None or not self.steps_together:

@@ -127,6 +127,20 @@ def test_scenes_with_loads_march_one_by_one() -> None:
     assert differences(plain(found[1].summary), own_run("windy_viaduct", changes[1])) == []
 
 
+def test_droppers_with_a_curve_march_one_by_one() -> None:
+    curve = [[0.0, 0.0], [1e-4, 20.0], [1e-3, 400.0]]
+    changes: list[dict[str, Any]] = [
+        {
+            "line.dropper.curve": curve,
+            "line.dropper.stiffness_N_per_m": REMOVED,
+            "train.speed_km_h": speed,
+        }
+        for speed in (240.0, 250.0)
+    ]
+    found, together = marched(scenes_of("en50318_2002", changes))
+    assert not together and [one.outcome for one in found] == ["done"] * 2
+
+
 def test_where_no_kernels_take_several_scenes_they_march_one_by_one() -> None:
     changes = [{"train.speed_km_h": 240.0}, {"train.speed_km_h": 250.0}]
     best = native.targets()[-1]
