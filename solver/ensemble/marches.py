@@ -28,7 +28,7 @@ from catenary.solver.schemes.one_solve import OneSolve
 from catenary.solver.schemes.scheme import find_crossings
 from catenary.solver.statics.line_at_rest import LineAtRest
 from catenary.solver.time_loop.compiled_steps import Block, KeptMotions, StepParts
-from catenary.solver.time_loop.prepared_line import make_room
+from catenary.solver.time_loop.prepared_line import make_room, stepped_by_kernels
 from catenary.solver.time_loop.views.step_views import Shown
 from catenary.solver.window.moving_columns import Columns
 
@@ -79,7 +79,8 @@ def march_side_by_side(
 ) -> Iterator[SceneHistory | tuple[int, CatenaryError]]:
     """March scenes to their ends, in the order in which they come there. Not collective.
 
-    A scene whose train cannot be placed on the line gives its number and the error.
+    A scene whose train cannot be placed on the line, or which Python steps, gives its number and
+    the error.
 
     Parameters
     ----------
@@ -120,6 +121,8 @@ def _begin(shared: SharedLine, lane: Lane, number: int, at_rest: LineAtRest) -> 
     shared.hang(lane, at_rest)
     height = nominal_height_rule(lane.wires, lift, air_speed, problem.contact)
     pantographs = Pantographs(shared.comm, problem, laws, lane.wires, height)
+    for one in pantographs.models:
+        stepped_by_kernels(one)  # an error of another would end a step of all lanes
     interaction = ForcesOnLine(
         shared.comm,
         model,

@@ -12,12 +12,14 @@ from typing import Any
 import pytest
 
 import catenary
+from catenary.base.errors import InputError
 from catenary.cases.scene.input.toml_input import REMOVED
 from catenary.cases.scene.load import read_draft
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.ensemble import scenes_on_lines
 from catenary.cases.studies.ensemble.scenes_on_lines import Marched, Marches
 from catenary.postproc.files.disk import plain
+from catenary.solver.ensemble import marches
 from catenary.solver.ensemble.shared_line import N_LANES
 from catenary.solver.kernels import native
 
@@ -37,13 +39,13 @@ def scenes_of(case: str, changes: Sequence[Mapping[str, Any]]) -> list[Scene]:
 
 def marched(scenes: Sequence[Scene]) -> tuple[list[Marched], bool]:
     """How scenes ended, and whether they marched side by side."""
-    marches = Marches()
+    own = Marches()
     try:
-        found = sorted(marches.of(scenes))
-        line = marches._line
+        found = sorted(own.of(scenes))
+        line = own._line
         return found, line is not None and line.shared is not None
     finally:
-        marches.destroy()
+        own.destroy()
 
 
 def own_run(case: str, change: Mapping[str, Any]) -> dict[str, Any]:
@@ -139,6 +141,21 @@ def test_droppers_with_a_curve_march_one_by_one() -> None:
     ]
     found, together = marched(scenes_of("en50318_2002", changes))
     assert not together and [one.outcome for one in found] == ["done"] * 2
+
+
+def test_pantographs_that_python_steps_march_one_by_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    """An error in one of them would end a step of all lanes."""
+    refused: list[str] = []
+
+    def refuse(model: object) -> None:
+        refused.append(type(model).__name__)
+        raise InputError("a pantograph has all its bodies in the time loop, which Python steps")
+
+    monkeypatch.setattr(marches, "stepped_by_kernels", refuse)
+    changes = [{"train.speed_km_h": 240.0}, {"train.speed_km_h": 250.0}]
+    found, _ = marched(scenes_of("en50318_2002", changes))
+    assert len(refused) == 2 and [one.outcome for one in found] == ["done"] * 2
+    assert all(one.summary["watched"] for one in found)
 
 
 def test_where_no_kernels_take_several_scenes_they_march_one_by_one() -> None:
