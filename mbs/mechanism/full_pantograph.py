@@ -19,10 +19,10 @@ from catenary.mbs.head.newmark_head import Raising
 from catenary.mbs.head.wire_crossing import CrossingPath
 from catenary.mbs.interface import HeadState
 from catenary.mbs.mechanism.pantograph_data import MultibodyData, stand
-from catenary.mbs.rigid.arrays import body_products
+from catenary.mbs.rigid.arrays import ORIGIN, body_products
 from catenary.mbs.rigid.bodies import SPACE, Motion
-from catenary.mbs.rigid.forces import Force, Gravity, PointForce
-from catenary.mbs.rigid.joints import ORIGIN, PrescribedPoint, constant, steady
+from catenary.mbs.rigid.forces import Force, Gravity, OffLine, PointForce
+from catenary.mbs.rigid.joints import PrescribedPoint, constant, steady
 from catenary.mbs.rigid.kinematics import point
 from catenary.mbs.rigid.spin_locks import without_spins
 from catenary.mbs.rigid.statics import equilibrium, held_force
@@ -38,7 +38,7 @@ PLACED = 1e-10
 
 
 @dataclass
-class _HoldDown:
+class _HoldDown(OffLine):
     """What holds the arm down until the pantograph is raised: ``force`` [N] less and less.
 
     ``part(time)`` of the lift is let act; where it is negative, the arm is pulled down.
@@ -60,7 +60,7 @@ class _HoldDown:
 
 
 @dataclass(frozen=True)
-class _Carried:
+class _Carried(OffLine):
     """What bodies feel of a base that is accelerated up and sideways."""
 
     name: str
@@ -80,7 +80,7 @@ class _Carried:
 
 
 @dataclass(frozen=True)
-class _Blown:
+class _Blown(OffLine):
     """A ``force`` of the air as it acts at a time: times ``column`` of the numbers of ``air``."""
 
     name: str

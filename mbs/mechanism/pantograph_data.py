@@ -19,9 +19,10 @@ from catenary.mbs.air import Uplift
 from catenary.mbs.head.laws import Law
 from catenary.mbs.head.strips import ONE_STRIP, Strips
 from catenary.mbs.mechanism.reduction import ReducedMechanism, reduce_mechanism
+from catenary.mbs.rigid.arrays import Joint
 from catenary.mbs.rigid.bodies import Motion
 from catenary.mbs.rigid.forces import Force, Gravity, PointForce, SpringDamper
-from catenary.mbs.rigid.joints import Joint, PrescribedPoint, constant
+from catenary.mbs.rigid.joints import PrescribedPoint, constant
 from catenary.mbs.rigid.statics import calibrate_actuator, equilibrium, held_force, unheld_force
 from catenary.mbs.rigid.system import Miss, System
 

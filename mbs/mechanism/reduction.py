@@ -17,9 +17,10 @@ from scipy.interpolate import CubicSpline
 
 from catenary.base.errors import InputError, RunBroken
 from catenary.mbs.head.head_arrays import SplineTables
+from catenary.mbs.rigid.arrays import ORIGIN
 from catenary.mbs.rigid.bodies import Motion, Vector
 from catenary.mbs.rigid.forces import Force
-from catenary.mbs.rigid.joints import ORIGIN, PrescribedPoint
+from catenary.mbs.rigid.joints import PrescribedPoint
 from catenary.mbs.rigid.kinematics import Law, point
 from catenary.mbs.rigid.least_squares import least_squares
 from catenary.mbs.rigid.statics import at_rest
@@ -192,8 +193,7 @@ class _Raised:
     ) -> None:
         self._system, self._height, self._blowing = system, 0.0, tuple(blowing)
         # Its law reads the height of the moment, so that the system is made once.
-        self._holder = PrescribedPoint("height", body, self._law, at)
-        self._held = system.with_joints(self._holder)
+        self._held = system.with_joints(PrescribedPoint("height", body, self._law, at))
 
     def _law(self, time: float) -> Law:
         return Law(self._height, 0.0, 0.0)
@@ -209,8 +209,7 @@ class _Raised:
         """The system at rest with the point at a height [m], assembled from a motion near by."""
         system, self._height = self._system, float(height)
         motion, _ = at_rest(self._held, near)
-        rows = self._holder.rows(motion, 0.0)
-        jacobian = np.vstack([system.constraints(motion, 0.0).jacobian, rows.jacobian])
+        jacobian = self._held.constraints(motion, 0.0).jacobian
         # Of all velocities with unit speed of the point those of least kinetic energy.
         root = np.sqrt(system.inverse_mass)
         unit_speed = np.append(np.zeros(len(jacobian) - 1), 1.0)

@@ -90,7 +90,7 @@ def pressed_at_rest(data: MultibodyData) -> tuple[System, Motion, float]:
         held = system.with_joints(holder)
         rest = equilibrium(held, motion, tolerance=1e-11)
         motion = rest.motion
-        (left,) = rest.multipliers[held.row_ranges(motion)[HELD]]
+        (left,) = rest.multipliers[held.row_ranges[HELD]]
         if abs(left) <= 1e-6:
             return system, motion, force
         force += float(left)

@@ -16,8 +16,9 @@ from scipy import linalg
 from catenary.base.errors import InputError, RunBroken
 from catenary.mbs.head.strips import Strips
 from catenary.mbs.lumped_data import LumpedData
+from catenary.mbs.rigid.arrays import ORIGIN
 from catenary.mbs.rigid.bodies import Motion, Vector
-from catenary.mbs.rigid.joints import ORIGIN, unit
+from catenary.mbs.rigid.joints import unit
 from catenary.mbs.rigid.kinematics import point
 from catenary.mbs.rigid.least_squares import least_squares, null_space
 from catenary.mbs.rigid.system import System

@@ -1,4 +1,4 @@
-"""Joints and forces of a system as arrays, so that kernels evaluate all of them at once.
+"""Rows of joints and pulls of forces as arrays, so that kernels evaluate all of them at once.
 
 Nearly all joints are made of scalar products of a vector fixed on one body with a vector between
 points of two others, or fixed on another; nearly all forces act along the line between two points.
@@ -8,33 +8,19 @@ Joints and forces that are not made like that are evaluated by their own methods
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import singledispatch
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
 from catenary.base.errors import InputError
-from catenary.mbs.rigid.bodies import SPACE, Motion, Vector, rotation_matrix
-from catenary.mbs.rigid.forces import Actuator, BumpStop, Force, SpringDamper
-from catenary.mbs.rigid.joints import (
-    AXES,
-    ORIGIN,
-    Constant,
-    Fixed,
-    Joint,
-    PointOnLine,
-    PrescribedAngle,
-    PrescribedPoint,
-    Prismatic,
-    Revolute,
-    RevolutePrismatic,
-    Spherical,
-    TimeLaw,
-    across,
-    unit,
-)
-from catenary.mbs.rigid.kinematics import Quantity, cross, number_of
+from catenary.mbs.rigid.bodies import SPACE, Motion, Vector
+from catenary.mbs.rigid.kinematics import Law, Quantity, number_of, part_of, stacked
 from catenary.solver.kernels import native
+
+ORIGIN = (0.0, 0.0, 0.0)
+
+# A prescribed number [m or rad] with its rates at a time [s].
+TimeLaw = Callable[[float], Law]
 
 
 class Product(NamedTuple):
@@ -53,88 +39,24 @@ class Product(NamedTuple):
     law: TimeLaw | None = None
 
 
-@singledispatch
-def products_of(joint: object) -> list[Product] | None:
-    """What rows a joint is made of, None for one that is not made of scalar products alone."""
-    return None
+class Joint(Protocol):
+    """Interface of a joint to a system of bodies."""
 
+    @property
+    def name(self) -> str: ...
 
-def _same_point(i: str, at_i: Vector, j: str, at_j: Vector) -> list[Product]:
-    return [Product(SPACE, axis, i, at_i, j, at_j) for axis in AXES]
+    @property
+    def n_lengths(self) -> int: ...
 
+    @property
+    def n_rows(self) -> int | None:
+        """Number of its rows; None if these are its products."""
 
-def _across_gap(
-    i: str, normals: Sequence[Vector], end: str, at_end: Vector, start: str, at_start: Vector
-) -> list[Product]:
-    return [Product(i, normal, end, at_end, start, at_start) for normal in normals]
+    def products(self) -> list[Product]:
+        """The scalar products that its rows are made of."""
 
-
-def _across_axis(i: str, normals: Sequence[Vector], j: str, axis: Vector) -> list[Product]:
-    return [Product(i, normal, j, axis) for normal in normals]
-
-
-@products_of.register
-def _(joint: Spherical) -> list[Product]:
-    return _same_point(joint.i, joint.at_i, joint.j, joint.at_j)
-
-
-@products_of.register
-def _(joint: Revolute) -> list[Product]:
-    return [
-        *_same_point(joint.i, joint.at_i, joint.j, joint.at_j),
-        *_across_axis(joint.i, across(joint.axis_i), joint.j, unit(joint.axis_j)),
-    ]
-
-
-@products_of.register
-def _(joint: PointOnLine) -> list[Product]:
-    normals = across(joint.axis_i)
-    return _across_gap(joint.i, normals, joint.j, joint.at_j, joint.i, joint.at_i)
-
-
-@products_of.register
-def _(joint: Prismatic) -> list[Product]:
-    i, j, normals = joint.i, joint.j, across(joint.axis_i)
-    side = cross(unit(joint.axis_i), unit(joint.normal_i))
-    return [
-        *_across_gap(i, normals, j, joint.at_j, i, joint.at_i),
-        *_across_axis(i, normals, j, unit(joint.axis_j)),
-        Product(i, side, j, joint.normal_j),
-    ]
-
-
-@products_of.register
-def _(joint: RevolutePrismatic) -> list[Product]:
-    i, j = joint.i, joint.j
-    return [
-        *_across_gap(j, across(joint.slide_axis_j), i, joint.at_i, j, joint.at_j),
-        *_across_axis(j, across(joint.turn_axis_j), i, unit(joint.turn_axis_i)),
-    ]
-
-
-@products_of.register
-def _(joint: Fixed) -> list[Product]:
-    axes_i = rotation_matrix(np.asarray(joint.parameters)).T
-    return [
-        *_same_point(joint.j, joint.at_j, joint.i, joint.at_i),
-        *(Product(joint.i, axes_i[k], joint.j, AXES[k - 2]) for k in range(3)),
-    ]
-
-
-@products_of.register
-def _(joint: PrescribedPoint) -> list[Product]:
-    way = unit(joint.along)
-    return [Product(SPACE, way, joint.body, joint.at, SPACE, ORIGIN, joint.law)]
-
-
-@products_of.register
-def _(joint: PrescribedAngle) -> list[Product] | None:
-    if not isinstance(joint.law, Constant):
-        return None
-    angle, forward = joint.law.number, unit(joint.normal_i)
-    side = cross(unit(joint.axis_i), forward)
-    normal = np.cos(angle) * side - np.sin(angle) * forward
-    return [Product(joint.i, normal, joint.j, unit(joint.normal_j))]
+    def rows(self, products: Quantity, time: float) -> Quantity:
+        """Phi with its derivatives at ``time`` [s], made of its products."""
 
 
 def body_products(motion: Motion, rows: np.ndarray) -> Quantity:
@@ -162,15 +84,18 @@ class FlatRows:
 
     def __init__(self, joints: Sequence[Joint], start: Motion) -> None:
         flat: list[Product] = []
-        self._odd: list[tuple[int, Joint]] = []  # and before which flat row it stands
-        self._laws: list[tuple[int, TimeLaw]] = []
+        self.ranges: dict[str, slice] = {}  # rows of each joint, by its name
+        self._made: list[tuple[slice, Joint]] = []  # rows that are made of these products
+        begin = 0
         for joint in joints:
-            rows = products_of(joint)
-            if rows is None:
-                self._odd.append((len(flat), joint))
-                continue
-            self._laws += [(len(flat) + k, row.law) for k, row in enumerate(rows) if row.law]
-            flat += rows
+            products = joint.products()
+            if joint.n_rows is not None:
+                self._made.append((slice(len(flat), len(flat) + len(products)), joint))
+            flat += products
+            end = begin + (len(products) if joint.n_rows is None else joint.n_rows)
+            self.ranges[joint.name] = slice(begin, end)
+            begin = end
+        self._laws = [(k, row.law) for k, row in enumerate(flat) if row.law]
         self._rows = np.zeros(len(flat), dtype=native.BODY_PRODUCT)
         self._rows["body"] = [number_of(start, row.body) for row in flat]
         self._rows["start"] = [number_of(start, row.start or SPACE) for row in flat]
@@ -186,17 +111,14 @@ class FlatRows:
         for row, law in self._laws:
             for part, number in zip((found.value, found.rate, found.drift), law(time), strict=True):
                 part[row] -= number
-        if not self._odd:
+        if not self._made:
             return found
-        return self._with_odd(found, motion, time)
-
-    def _with_odd(self, found: Quantity, motion: Motion, time: float) -> Quantity:
         parts, begin = [], 0
-        for end, joint in self._odd:
-            parts += [Quantity(*(x[begin:end] for x in found)), joint.rows(motion, time)]
-            begin = end
-        parts.append(Quantity(*(x[begin:] for x in found)))
-        return Quantity(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
+        for products, joint in self._made:
+            parts.append(part_of(found, slice(begin, products.start)))
+            parts.append(joint.rows(part_of(found, products), time))
+            begin = products.stop
+        return stacked([*parts, part_of(found, slice(begin, None))])
 
 
 def _vectors(rows: Sequence[Vector]) -> np.ndarray:
@@ -222,34 +144,6 @@ class Line(NamedTuple):
     pull: Callable[[float, float, float], float] | None = None
 
 
-@singledispatch
-def line_of(force: object) -> Line | None:
-    """The line along which a force acts, None for one that acts otherwise."""
-    return None
-
-
-@line_of.register
-def _(force: SpringDamper) -> Line:
-    ends = force.i, force.at_i, force.j, force.at_j
-    if callable(force.stiffness) or callable(force.damping):
-        return Line(*ends, pull=lambda length, rate, time: force.pull_at(length, rate))
-    return Line(*ends, force.stiffness, force.free_length, force.damping)
-
-
-@line_of.register
-def _(force: Actuator) -> Line:
-    ends, push = (force.i, force.at_i, force.j, force.at_j), force.force
-    if callable(push):
-        return Line(*ends, pull=lambda length, rate, time: -push(time))
-    return Line(*ends, preload=-push)
-
-
-@line_of.register
-def _(force: BumpStop) -> Line:
-    ends = force.i, force.at_i, force.j, force.at_j
-    return Line(*ends, pull=lambda length, rate, time: force.pull_at(length, rate))
-
-
 # Differences of length [m] and of its rate [m/s] for slopes of pulls that are given as functions.
 LENGTH_STEP, RATE_STEP = 1e-7, 1e-6
 
@@ -262,6 +156,16 @@ class LineGeometry(NamedTuple):
     gradient: np.ndarray
 
 
+class LineForce(Protocol):
+    """Interface of a force: the line along which it acts, if it does."""
+
+    @property
+    def name(self) -> str: ...
+
+    def on_line(self) -> Line | None:
+        """The line along which it acts; None for a force that acts otherwise."""
+
+
 class FlatLines:
     """Those of several forces that act along lines, evaluated together.
 
@@ -269,8 +173,8 @@ class FlatLines:
     is not.
     """
 
-    def __init__(self, forces: Sequence[Force], start: Motion) -> None:
-        found = [(force.name, line_of(force)) for force in forces]
+    def __init__(self, forces: Sequence[LineForce], start: Motion) -> None:
+        found = [(force.name, force.on_line()) for force in forces]
         lines = [line for _, line in found if line is not None]
         self.names = tuple(name for name, line in found if line is not None)
         self._rows = np.zeros(len(lines), dtype=native.BODY_LINE)

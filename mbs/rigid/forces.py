@@ -8,16 +8,17 @@ Source: P. E. Nikravesh, Computer-aided analysis of mechanical systems, 1988, ch
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from scipy.interpolate import BSpline, make_interp_spline
 
 from catenary.base.errors import InputError
+from catenary.mbs.rigid.arrays import ORIGIN, Line
 from catenary.mbs.rigid.bodies import Motion, Vector
-from catenary.mbs.rigid.joints import ORIGIN
 from catenary.mbs.rigid.kinematics import difference, point
 
 
@@ -32,6 +33,9 @@ class Force(Protocol):
 
     def energy(self, motion: Motion) -> float:
         """Energy stored [J], zero for a force that stores none."""
+
+    def on_line(self) -> Line | None:
+        """The line along which it acts; None for a force that acts otherwise."""
 
 
 class Table:
@@ -85,7 +89,7 @@ class _Line(NamedTuple):
 
 
 @dataclass(frozen=True)
-class _BetweenPoints:
+class _BetweenPoints(ABC):
     """Something that acts along the line between a point of body i and a point of body j."""
 
     name: str
@@ -103,6 +107,18 @@ class _BetweenPoints:
         way = between.value / length
         return _Line(length, float(way @ between.rate), way @ between.jacobian)
 
+    @abstractmethod
+    def pull_at(self, length: float, rate: float, time: float) -> float:
+        """Force [N] that pulls the points together, at a length [m], its rate [m/s] and a time."""
+
+    def generalised(self, motion: Motion, time: float) -> np.ndarray:
+        """Generalised forces (6 n,)."""
+        line = self.line(motion)
+        return -self.pull_at(line.length, line.rate, time) * line.gradient
+
+    def _line(self, **what: Any) -> Line:
+        return Line(self.i, self.at_i, self.j, self.at_j, **what)
+
 
 @dataclass(frozen=True)
 class SpringDamper(_BetweenPoints):
@@ -116,20 +132,18 @@ class SpringDamper(_BetweenPoints):
     free_length: float = 0.0
     damping: Characteristic = 0.0
 
-    def pull(self, motion: Motion) -> float:
-        """Force with which it pulls its points together [N]."""
-        line = self.line(motion)
-        return self.pull_at(line.length, line.rate)
-
-    def pull_at(self, length: float, rate: float) -> float:
+    def pull_at(self, length: float, rate: float, time: float) -> float:
         """The pull [N] at a length [m] and its rate [m/s]."""
         elastic = _force_of(self.stiffness, length - self.free_length)
         return elastic + _force_of(self.damping, rate)
 
-    def generalised(self, motion: Motion, time: float) -> np.ndarray:
-        """Generalised forces (6 n,)."""
-        line = self.line(motion)
-        return -self.pull_at(line.length, line.rate) * line.gradient
+    def on_line(self) -> Line:
+        """Constants, or the pull if one of them is a function."""
+        if callable(self.stiffness) or callable(self.damping):
+            return self._line(pull=self.pull_at)
+        return self._line(
+            stiffness=self.stiffness, free_length=self.free_length, damping=self.damping
+        )
 
     def energy(self, motion: Motion) -> float:
         """Elastic energy [J]; of a function that is not a `Table` by quadrature."""
@@ -152,10 +166,15 @@ class Actuator(_BetweenPoints):
 
     force: float | Callable[[float], float] = 0.0
 
-    def generalised(self, motion: Motion, time: float) -> np.ndarray:
-        """Generalised forces (6 n,)."""
-        push = self.force(time) if callable(self.force) else self.force
-        return push * self.line(motion).gradient
+    def pull_at(self, length: float, rate: float, time: float) -> float:
+        """Minus its push [N]."""
+        return -(self.force(time) if callable(self.force) else self.force)
+
+    def on_line(self) -> Line:
+        """A constant, or the pull if the force is a function."""
+        if callable(self.force):
+            return self._line(pull=self.pull_at)
+        return self._line(preload=-self.force)
 
     def energy(self, motion: Motion) -> float:
         """Stores none."""
@@ -180,26 +199,32 @@ class BumpStop(_BetweenPoints):
             return self.shortest - length, 1.0
         return max(length - self.longest, 0.0), -1.0
 
-    def pull_at(self, length: float, rate: float) -> float:
-        """Force [N] that pulls the points together, at a length [m] and its rate [m/s]."""
+    def pull_at(self, length: float, rate: float, time: float) -> float:
+        """The pull [N] at a length [m] and its rate [m/s]."""
         depth, way_back = self._depth(length)
         if depth == 0.0:
             return 0.0
         # A stop does not hold back what is leaving it.
         return -way_back * max(self.stiffness * depth - way_back * self.damping * rate, 0.0)
 
-    def generalised(self, motion: Motion, time: float) -> np.ndarray:
-        """Generalised forces (6 n,)."""
-        line = self.line(motion)
-        return -self.pull_at(line.length, line.rate) * line.gradient
+    def on_line(self) -> Line:
+        """Its pull."""
+        return self._line(pull=self.pull_at)
 
     def energy(self, motion: Motion) -> float:
         """Elastic energy [J]."""
         return 0.5 * self.stiffness * self._depth(self.line(motion).length)[0] ** 2
 
 
+class OffLine:
+    """A force that does not act along a line between two points."""
+
+    def on_line(self) -> None:
+        """None."""
+
+
 @dataclass(frozen=True)
-class PointForce:
+class PointForce(OffLine):
     """A force on a point of a body, its direction fixed in space.
 
     ``force`` (3,) [N], or a function of time [s] that gives it.
@@ -221,7 +246,7 @@ class PointForce:
 
 
 @dataclass(frozen=True)
-class Gravity:
+class Gravity(OffLine):
     """Weight of all bodies, downward.
 
     ``masses`` (n,) [kg] in the order of the bodies; ``acceleration`` [m/s^2].

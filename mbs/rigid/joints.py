@@ -1,58 +1,39 @@
 """Joints between bodies: constraints Phi(q, t) = 0 with Jacobian and right side of accelerations.
 
-Each joint has a name and gives its rows as a `Quantity`: Phi itself, Phi_q, d Phi/dt, and the
-drift, of which gamma in Phi_q dv/dt = gamma is the negative. The first ``n_lengths`` rows are in
-metres, the others are cosines of angles that are right ones when the joint is closed.
+Each joint has a name and the scalar products that its rows are made of; these come as a `Quantity`:
+Phi itself, Phi_q, d Phi/dt, and the drift, of which gamma in Phi_q dv/dt = gamma is the negative.
+The first ``n_lengths`` rows are in metres, the others are cosines of angles that are right ones
+when the joint is closed.
 
 Source: P. E. Nikravesh, Computer-aided analysis of mechanical systems, 1988, chapter 7.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import ClassVar, Protocol
+from typing import ClassVar
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 
 from catenary.base.errors import InputError
-from catenary.mbs.rigid.bodies import SPACE, Motion, Vector, rotation_matrix
+from catenary.mbs.rigid.arrays import ORIGIN, Product, TimeLaw
+from catenary.mbs.rigid.bodies import SPACE, Vector, rotation_matrix
 from catenary.mbs.rigid.kinematics import (
     Law,
     Quantity,
-    along,
     applied_to,
     cross,
     difference,
-    direction,
-    dot,
-    point,
+    part_of,
     scaled,
-    shifted,
     stacked,
     total,
 )
 
-ORIGIN = (0.0, 0.0, 0.0)
 AXES = np.eye(3)
-
-# A prescribed number [m or rad] with its rates at a time [s].
-TimeLaw = Callable[[float], Law]
-
-
-class Joint(Protocol):
-    """Interface of a joint to a system of bodies."""
-
-    @property
-    def name(self) -> str: ...
-
-    @property
-    def n_lengths(self) -> int: ...
-
-    def rows(self, motion: Motion, time: float) -> Quantity:
-        """Phi with its derivatives at ``time`` [s], one number a row."""
 
 
 def across(axis: Vector) -> tuple[np.ndarray, np.ndarray]:
@@ -108,18 +89,35 @@ def tabulated(times: Vector, values: Vector) -> TimeLaw:
     return lambda time: Law(*(float(spline(time, k)) for k in range(3)))
 
 
-def same_point(motion: Motion, i: str, at_i: Vector, j: str, at_j: Vector) -> Quantity:
+def same_point(i: str, at_i: Vector, j: str, at_j: Vector) -> list[Product]:
     """Three rows: a point of body i is at a point of body j."""
-    return difference(point(motion, i, at_i), point(motion, j, at_j))
+    return [Product(SPACE, axis, i, at_i, j, at_j) for axis in AXES]
 
 
-def right_angles(motion: Motion, i: str, normals: tuple[Vector, ...], axis: Quantity) -> Quantity:
-    """A row for each vector of body i that must be perpendicular to ``axis``."""
-    return stacked([dot(direction(motion, i, normal), axis) for normal in normals])
+def across_gap(
+    i: str, normals: Sequence[Vector], end: str, at_end: Vector, start: str, at_start: Vector
+) -> list[Product]:
+    """A row for each vector of body i that a way between points must be perpendicular to."""
+    return [Product(i, normal, end, at_end, start, at_start) for normal in normals]
+
+
+def across_axis(i: str, normals: Sequence[Vector], j: str, axis: Vector) -> list[Product]:
+    """A row for each vector of body i that an axis of body j must be perpendicular to."""
+    return [Product(i, normal, j, axis) for normal in normals]
+
+
+class _RowsAreProducts:
+    """A joint each row of which is one scalar product."""
+
+    n_rows: ClassVar[int | None] = None
+
+    def rows(self, products: Quantity, time: float) -> Quantity:
+        """Phi with its derivatives."""
+        return products
 
 
 @dataclass(frozen=True)
-class Spherical:
+class Spherical(_RowsAreProducts):
     """A point of body i is a point of body j: three rows."""
 
     name: str
@@ -129,13 +127,13 @@ class Spherical:
     at_j: Vector = ORIGIN
     n_lengths: ClassVar[int] = 3
 
-    def rows(self, motion: Motion, time: float) -> Quantity:
-        """Phi with its derivatives."""
-        return same_point(motion, self.i, self.at_i, self.j, self.at_j)
+    def products(self) -> list[Product]:
+        """Scalar products of its rows."""
+        return same_point(self.i, self.at_i, self.j, self.at_j)
 
 
 @dataclass(frozen=True)
-class Revolute:
+class Revolute(_RowsAreProducts):
     """Bodies i and j turn about a common axis through a common point: five rows."""
 
     name: str
@@ -147,19 +145,16 @@ class Revolute:
     axis_j: Vector = (0.0, 1.0, 0.0)
     n_lengths: ClassVar[int] = 3
 
-    def rows(self, motion: Motion, time: float) -> Quantity:
-        """Phi with its derivatives."""
-        axis = direction(motion, self.j, unit(self.axis_j))
-        return stacked(
-            [
-                same_point(motion, self.i, self.at_i, self.j, self.at_j),
-                right_angles(motion, self.i, across(self.axis_i), axis),
-            ]
-        )
+    def products(self) -> list[Product]:
+        """Scalar products of its rows."""
+        return [
+            *same_point(self.i, self.at_i, self.j, self.at_j),
+            *across_axis(self.i, across(self.axis_i), self.j, unit(self.axis_j)),
+        ]
 
 
 @dataclass(frozen=True)
-class PointOnLine:
+class PointOnLine(_RowsAreProducts):
     """A point of body j stays on a line fixed in body i: two rows."""
 
     name: str
@@ -170,14 +165,13 @@ class PointOnLine:
     axis_i: Vector = (1.0, 0.0, 0.0)
     n_lengths: ClassVar[int] = 2
 
-    def rows(self, motion: Motion, time: float) -> Quantity:
-        """Phi with its derivatives."""
-        gap = same_point(motion, self.j, self.at_j, self.i, self.at_i)
-        return right_angles(motion, self.i, across(self.axis_i), gap)
+    def products(self) -> list[Product]:
+        """Scalar products of its rows."""
+        return across_gap(self.i, across(self.axis_i), self.j, self.at_j, self.i, self.at_i)
 
 
 @dataclass(frozen=True)
-class Prismatic:
+class Prismatic(_RowsAreProducts):
     """Body j slides along an axis of body i without turning: five rows.
 
     ``normal_i`` and ``normal_j`` are across the axis and point the same way in both bodies.
@@ -194,22 +188,19 @@ class Prismatic:
     normal_j: Vector = (0.0, 0.0, 1.0)
     n_lengths: ClassVar[int] = 2
 
-    def rows(self, motion: Motion, time: float) -> Quantity:
-        """Phi with its derivatives."""
+    def products(self) -> list[Product]:
+        """Scalar products of its rows."""
         normals = across(self.axis_i)
-        gap = same_point(motion, self.j, self.at_j, self.i, self.at_i)
         side = cross(unit(self.axis_i), unit(self.normal_i))
-        return stacked(
-            [
-                right_angles(motion, self.i, normals, gap),
-                right_angles(motion, self.i, normals, direction(motion, self.j, unit(self.axis_j))),
-                right_angles(motion, self.i, (side,), direction(motion, self.j, self.normal_j)),
-            ]
-        )
+        return [
+            *across_gap(self.i, normals, self.j, self.at_j, self.i, self.at_i),
+            *across_axis(self.i, normals, self.j, unit(self.axis_j)),
+            Product(self.i, side, self.j, self.normal_j),
+        ]
 
 
 @dataclass(frozen=True)
-class RevolutePrismatic:
+class RevolutePrismatic(_RowsAreProducts):
     """Body j slides along its own axis and turns about an axis of body i: four rows.
 
     A massless piece between both turns on body i about ``turn_axis_i`` and lets body j slide along
@@ -226,20 +217,17 @@ class RevolutePrismatic:
     slide_axis_j: Vector = (0.0, 0.0, 1.0)
     n_lengths: ClassVar[int] = 2
 
-    def rows(self, motion: Motion, time: float) -> Quantity:
-        """Phi with its derivatives."""
-        gap = same_point(motion, self.i, self.at_i, self.j, self.at_j)
-        turn_axis = direction(motion, self.i, unit(self.turn_axis_i))
-        return stacked(
-            [
-                right_angles(motion, self.j, across(self.slide_axis_j), gap),
-                right_angles(motion, self.j, across(self.turn_axis_j), turn_axis),
-            ]
-        )
+    def products(self) -> list[Product]:
+        """Scalar products of its rows."""
+        slide, turn = across(self.slide_axis_j), across(self.turn_axis_j)
+        return [
+            *across_gap(self.j, slide, self.i, self.at_i, self.j, self.at_j),
+            *across_axis(self.j, turn, self.i, unit(self.turn_axis_i)),
+        ]
 
 
 @dataclass(frozen=True)
-class Fixed:
+class Fixed(_RowsAreProducts):
     """Body j is held by body i, or in space: six rows.
 
     ``parameters`` are the unit Euler parameters (4,) of body j as seen from body i.
@@ -253,15 +241,13 @@ class Fixed:
     parameters: Vector = (1.0, 0.0, 0.0, 0.0)
     n_lengths: ClassVar[int] = 3
 
-    def rows(self, motion: Motion, time: float) -> Quantity:
-        """Phi with its derivatives."""
+    def products(self) -> list[Product]:
+        """Scalar products of its rows."""
         axes_i = rotation_matrix(np.asarray(self.parameters)).T
-        angles = [
-            right_angles(motion, self.i, (axes_i[k],), direction(motion, self.j, AXES[k - 2]))
-            for k in range(3)
+        return [
+            *same_point(self.j, self.at_j, self.i, self.at_i),
+            *(Product(self.i, axes_i[k], self.j, AXES[k - 2]) for k in range(3)),
         ]
-        gap = same_point(motion, self.j, self.at_j, self.i, self.at_i)
-        return stacked([gap, *angles])
 
 
 @dataclass(frozen=True)
@@ -279,6 +265,7 @@ class PointOnCurve:
     z: Vector
     at: Vector = ORIGIN
     n_lengths: ClassVar[int] = 2
+    n_rows: ClassVar[int] = 2
     _splines: tuple[CubicSpline, CubicSpline] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -287,19 +274,22 @@ class PointOnCurve:
         splines = tuple(CubicSpline(self.x, c, bc_type="natural") for c in (self.y, self.z))
         object.__setattr__(self, "_splines", splines)
 
-    def rows(self, motion: Motion, time: float) -> Quantity:
+    def products(self) -> list[Product]:
+        """Coordinates of the point."""
+        return same_point(self.body, self.at, SPACE, ORIGIN)
+
+    def rows(self, products: Quantity, time: float) -> Quantity:
         """Phi with its derivatives."""
-        place = point(motion, self.body, self.at)
-        x = along(AXES[0], place)
+        x, y, z = (part_of(products, slice(k, k + 1)) for k in range(3))
         curves = []
-        for axis, spline in zip(AXES[1:], self._splines, strict=True):
+        for coordinate, spline in zip((y, z), self._splines, strict=True):
             law = Law(*(float(spline(x.value[0], k)) for k in range(3)))
-            curves.append(difference(along(axis, place), applied_to(x, law)))
+            curves.append(difference(coordinate, applied_to(x, law)))
         return stacked(curves)
 
 
 @dataclass(frozen=True)
-class PrescribedPoint:
+class PrescribedPoint(_RowsAreProducts):
     """A point of a body has a prescribed coordinate along a direction in space: one row.
 
     The coordinate [m] is measured from the origin; ``along`` need not have length one.
@@ -312,9 +302,9 @@ class PrescribedPoint:
     along: Vector = (0.0, 0.0, 1.0)
     n_lengths: ClassVar[int] = 1
 
-    def rows(self, motion: Motion, time: float) -> Quantity:
-        """Phi with its derivatives."""
-        return shifted(along(unit(self.along), point(motion, self.body, self.at)), self.law(time))
+    def products(self) -> list[Product]:
+        """The scalar product of its row."""
+        return [Product(SPACE, unit(self.along), self.body, self.at, SPACE, ORIGIN, self.law)]
 
 
 @dataclass(frozen=True)
@@ -334,17 +324,27 @@ class PrescribedAngle:
     normal_j: Vector = (1.0, 0.0, 0.0)
     n_lengths: ClassVar[int] = 0
 
-    def rows(self, motion: Motion, time: float) -> Quantity:
-        """Phi with its derivatives."""
+    @property
+    def n_rows(self) -> int | None:
+        """One row, which is a product where the angle is constant."""
+        return None if isinstance(self.law, Constant) else 1
+
+    def products(self) -> list[Product]:
+        """The turned normal across ``normal_i``; its components if the angle changes."""
+        forward = unit(self.normal_i)
+        normals = [cross(unit(self.axis_i), forward), forward]
+        if isinstance(self.law, Constant):
+            angle = self.law.number
+            normals = [np.cos(angle) * normals[0] - np.sin(angle) * normals[1]]
+        return across_axis(self.i, normals, self.j, unit(self.normal_j))
+
+    def rows(self, products: Quantity, time: float) -> Quantity:
+        """Phi with its derivatives: cos(angle) of the first less sin(angle) of the second."""
+        if isinstance(self.law, Constant):
+            return products
         angle, rate, acceleration = self.law(time)
         sine, cosine = np.sin(angle), np.cos(angle)
-        forward = unit(self.normal_i)
-        side = cross(unit(self.axis_i), forward)
-        # The normal of the turned body: cos(angle) side - sin(angle) forward.
         by_side = Law(cosine, -sine * rate, -cosine * rate**2 - sine * acceleration)
         by_forward = Law(-sine, -cosine * rate, sine * rate**2 - cosine * acceleration)
-        normal = total(
-            scaled(direction(motion, self.i, side), by_side),
-            scaled(direction(motion, self.i, forward), by_forward),
-        )
-        return dot(normal, direction(motion, self.j, unit(self.normal_j)))
+        side, forward = part_of(products, slice(0, 1)), part_of(products, slice(1, 2))
+        return total(scaled(side, by_side), scaled(forward, by_forward))

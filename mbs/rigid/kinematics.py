@@ -1,7 +1,6 @@
 """Points and directions on moving bodies with what their first and second time derivatives need.
 
-Joints and forces are built from these by sums, products and chain rules, so that Jacobians and
-acceleration terms follow from one definition each.
+Sums and chain rules of them give Jacobians and acceleration terms from one definition each.
 """
 
 from __future__ import annotations
@@ -55,30 +54,21 @@ def number_of(motion: Motion, body: str) -> int:
     return motion.numbers[body]
 
 
-def _on_body(motion: Motion, body: str, local: Vector, origin: bool) -> Quantity:
+def point(motion: Motion, body: str, local: Vector) -> Quantity:
+    """A point fixed on a body, given in its axes [m], in space."""
     i = number_of(motion, body)
     fixed = np.asarray(local, dtype=float)
     rotation, spin = motion.rotation[i], motion.spin[i]
-    arm = rotation @ fixed
     turning = cross(spin, fixed)
     jacobian = np.zeros((3, 6 * motion.n_bodies + 6))
+    jacobian[:, 6 * i : 6 * i + 3] = np.eye(3)
     jacobian[:, 6 * i + 3 : 6 * i + 6] = -rotation @ cross_matrix(fixed)
-    value, rate = arm, rotation @ turning
-    if origin:
-        jacobian[:, 6 * i : 6 * i + 3] = np.eye(3)
-        value, rate = arm + motion.position[i], rate + motion.velocity[i]
-    drift = rotation @ cross(spin, turning)
-    return Quantity(value, jacobian[:, :-6], rate, drift)
-
-
-def point(motion: Motion, body: str, local: Vector) -> Quantity:
-    """A point fixed on a body, given in its axes [m], in space."""
-    return _on_body(motion, body, local, origin=True)
-
-
-def direction(motion: Motion, body: str, local: Vector) -> Quantity:
-    """A vector fixed on a body, given in its axes, in space."""
-    return _on_body(motion, body, local, origin=False)
+    return Quantity(
+        motion.position[i] + rotation @ fixed,
+        jacobian[:, :-6],
+        motion.velocity[i] + rotation @ turning,
+        rotation @ cross(spin, turning),
+    )
 
 
 def difference(a: Quantity, b: Quantity) -> Quantity:
@@ -91,22 +81,6 @@ def total(a: Quantity, b: Quantity) -> Quantity:
     return Quantity(*(x + y for x, y in zip(a, b, strict=True)))
 
 
-def dot(a: Quantity, b: Quantity) -> Quantity:
-    """The scalar product of two vectors."""
-    return Quantity(
-        np.array([a.value @ b.value]),
-        (a.value @ b.jacobian + b.value @ a.jacobian)[None, :],
-        np.array([a.value @ b.rate + b.value @ a.rate]),
-        np.array([a.value @ b.drift + 2.0 * (a.rate @ b.rate) + b.value @ a.drift]),
-    )
-
-
-def along(fixed: Vector, a: Quantity) -> Quantity:
-    """Component of a vector along a direction fixed in space."""
-    n = np.asarray(fixed, dtype=float)[None, :]
-    return Quantity(n @ a.value, n @ a.jacobian, n @ a.rate, n @ a.drift)
-
-
 def scaled(a: Quantity, by: Law) -> Quantity:
     """c(t) a for a given number c with its time derivatives."""
     return Quantity(
@@ -115,11 +89,6 @@ def scaled(a: Quantity, by: Law) -> Quantity:
         by.value * a.rate + by.first * a.value,
         by.value * a.drift + 2.0 * by.first * a.rate + by.second * a.value,
     )
-
-
-def shifted(a: Quantity, by: Law) -> Quantity:
-    """a - c(t) of one number a, for a given number c with its time derivatives."""
-    return Quantity(a.value - by.value, a.jacobian, a.rate - by.first, a.drift - by.second)
 
 
 def applied_to(a: Quantity, f: Law) -> Quantity:
@@ -135,3 +104,8 @@ def applied_to(a: Quantity, f: Law) -> Quantity:
 def stacked(parts: list[Quantity]) -> Quantity:
     """All numbers of several quantities, one after the other."""
     return Quantity(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
+
+
+def part_of(a: Quantity, numbers: slice) -> Quantity:
+    """Some of the numbers of a quantity."""
+    return Quantity(*(x[numbers] for x in a))

@@ -13,9 +13,10 @@ from typing import Any
 
 import numpy as np
 
+from catenary.mbs.rigid.arrays import Joint
 from catenary.mbs.rigid.bodies import SPACE, Body, Vector, quaternion_product
 from catenary.mbs.rigid.forces import Force, PointForce
-from catenary.mbs.rigid.joints import Fixed, Joint, PointOnCurve, PrescribedPoint
+from catenary.mbs.rigid.joints import Fixed, PointOnCurve, PrescribedPoint
 from catenary.mbs.rigid.system import System
 
 _HALF_TURN = np.array([0.0, 0.0, 0.0, 1.0])

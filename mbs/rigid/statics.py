@@ -12,9 +12,10 @@ import numpy as np
 from scipy import linalg
 
 from catenary.base.errors import InputError, RunBroken
+from catenary.mbs.rigid.arrays import ORIGIN, Joint
 from catenary.mbs.rigid.bodies import Motion, Vector
 from catenary.mbs.rigid.forces import Actuator
-from catenary.mbs.rigid.joints import ORIGIN, Joint, unit
+from catenary.mbs.rigid.joints import unit
 from catenary.mbs.rigid.kinematics import point
 from catenary.mbs.rigid.least_squares import least_squares, null_space
 from catenary.mbs.rigid.system import System
@@ -131,7 +132,7 @@ def held_force(system: System, holder: Joint, start: Motion, time: float = 0.0) 
     """
     held = system.with_joints(holder)
     rest = equilibrium(held, start, time)
-    rows = held.row_ranges(rest.motion, time)[holder.name]
+    rows = held.row_ranges[holder.name]
     (multiplier,) = rest.multipliers[rows]
     return float(multiplier)
 

@@ -20,10 +20,9 @@ import numpy as np
 from scipy import linalg
 
 from catenary.base.errors import InputError, RunBroken
-from catenary.mbs.rigid.arrays import FlatLines, FlatRows, line_of
+from catenary.mbs.rigid.arrays import FlatLines, FlatRows, Joint
 from catenary.mbs.rigid.bodies import Body, Motion, initial_motion
 from catenary.mbs.rigid.forces import Force
-from catenary.mbs.rigid.joints import Joint
 from catenary.mbs.rigid.kinematics import Quantity
 from catenary.mbs.rigid.least_squares import least_squares
 from catenary.solver.kernels import native
@@ -145,7 +144,7 @@ class System:
     @cached_property
     def other_forces(self) -> tuple[Force, ...]:
         """The forces that do not."""
-        return tuple(force for force in self.forces if line_of(force) is None)
+        return tuple(force for force in self.forces if force.on_line() is None)
 
     @cached_property
     def _inertia(self) -> np.ndarray:
@@ -199,20 +198,16 @@ class System:
             )
         return Accelerations(acceleration, multipliers)
 
-    def row_ranges(self, motion: Motion, time: float = 0.0) -> dict[str, slice]:
+    @property
+    def row_ranges(self) -> dict[str, slice]:
         """Which rows belong to which joint."""
-        ranges, begin = {}, 0
-        for joint in self.joints:
-            end = begin + len(joint.rows(motion, time).value)
-            ranges[joint.name] = slice(begin, end)
-            begin = end
-        return ranges
+        return self._rows.ranges
 
     def reaction(
         self, joint: str, body: str, motion: Motion, time: float, multipliers: np.ndarray
     ) -> Reaction:
         """What a joint does to a body, of multipliers (m,) of all joints."""
-        rows = self.row_ranges(motion, time)[joint]
+        rows = self.row_ranges[joint]
         jacobian = self.constraints(motion, time).jacobian[rows]
         force = -(jacobian.T @ multipliers[rows]).reshape(-1, 6)[motion.numbers[body]]
         return Reaction(force[:3], force[3:])
@@ -223,7 +218,7 @@ class System:
         kept = set(independent_rows(jacobian))
         counts = {
             name: sum(row not in kept for row in range(rows.start, rows.stop))
-            for name, rows in self.row_ranges(motion, time).items()
+            for name, rows in self.row_ranges.items()
         }
         return tuple(f"{name} ({count})" for name, count in counts.items() if count)
 
@@ -233,9 +228,9 @@ class System:
 
     def misses(self, motion: Motion, time: float = 0.0) -> tuple[Miss, ...]:
         """By how much each joint is open."""
-        result = []
+        found, result = self.constraints(motion, time).value, []
         for joint in self.joints:
-            error = joint.rows(motion, time).value
+            error = found[self.row_ranges[joint.name]]
             gap, tilt = error[: joint.n_lengths], error[joint.n_lengths :]
             result.append(Miss(joint.name, float(np.linalg.norm(gap)), float(np.linalg.norm(tilt))))
         return tuple(result)

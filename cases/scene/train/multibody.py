@@ -15,6 +15,7 @@ from catenary.cases.scene.train import mechanism as schema
 from catenary.cases.scene.train.head import strips_of
 from catenary.cases.scene.train.pantograph import MultibodyTable, wanted_force
 from catenary.mbs.mechanism.pantograph_data import AllBodies, MultibodyData
+from catenary.mbs.rigid.arrays import Joint
 from catenary.mbs.rigid.bodies import Body
 from catenary.mbs.rigid.forces import (
     Actuator,
@@ -27,7 +28,6 @@ from catenary.mbs.rigid.forces import (
 )
 from catenary.mbs.rigid.joints import (
     Fixed,
-    Joint,
     PointOnCurve,
     PointOnLine,
     PrescribedAngle,

@@ -68,8 +68,8 @@ def test_spring_and_damper_pull_together() -> None:
     force = spring.generalised(two_points(2.0, rate=3.0), 0.0).reshape(2, 6)
     check("on a and b [N]", force[:, 0], (71.0, -71.0), within=71 * EPS)
     table = SpringDamper("s", "a", "b", damping=Table((-1, 0, 1), (-30, 0, 10)))
-    check("rebound [N]", table.pull(two_points(2.0, 2.0)), 20.0, within=20 * EPS)
-    check("bump [N]", table.pull(two_points(2.0, -2.0)), -60.0, within=60 * EPS)
+    check("rebound [N]", table.pull_at(2.0, 2.0, 0.0), 20.0, within=20 * EPS)
+    check("bump [N]", table.pull_at(2.0, -2.0, 0.0), -60.0, within=60 * EPS)
 
 
 def test_actuator_pushes_apart_with_its_force_at_the_time() -> None:

@@ -8,6 +8,7 @@ from measuring import check
 from scipy.spatial.transform import Rotation
 
 from catenary.base.errors import InputError
+from catenary.mbs.rigid.arrays import FlatRows, Joint
 from catenary.mbs.rigid.bodies import (
     SPACE,
     Body,
@@ -19,7 +20,6 @@ from catenary.mbs.rigid.bodies import (
 )
 from catenary.mbs.rigid.joints import (
     Fixed,
-    Joint,
     PointOnCurve,
     PointOnLine,
     PrescribedAngle,
@@ -32,6 +32,7 @@ from catenary.mbs.rigid.joints import (
     steady,
     tabulated,
 )
+from catenary.mbs.rigid.kinematics import Quantity
 
 EPS = np.finfo(float).eps
 TIME = 0.7
@@ -62,6 +63,10 @@ def some_motion(seed: int = 5) -> Motion:
     return start.moved(random.uniform(-1, 1, 12)).with_velocities(random.uniform(-1, 1, 12))
 
 
+def rows_of(joint: Joint, motion: Motion, time: float) -> Quantity:
+    return FlatRows((joint,), motion)(motion, time)
+
+
 @pytest.mark.parametrize(
     ("joint", "n_rows"),
     list(zip(JOINTS, N_ROWS, strict=True)),
@@ -76,12 +81,12 @@ def test_jacobian_rate_and_drift_are_derivatives_of_the_constraint(
     """
     motion, h = some_motion(), 1e-5
     within = 100 * h**2 + 100 * EPS / h
-    rows = joint.rows(motion, TIME)
+    rows = rows_of(joint, motion, TIME)
     assert rows.value.shape == rows.rate.shape == rows.drift.shape == (n_rows,)
     differences = [
         (
-            joint.rows(motion.moved(+h * e), TIME).value
-            - joint.rows(motion.moved(-h * e), TIME).value
+            rows_of(joint, motion.moved(+h * e), TIME).value
+            - rows_of(joint, motion.moved(-h * e), TIME).value
         )
         / (2 * h)
         for e in np.eye(12)
@@ -92,11 +97,11 @@ def test_jacobian_rate_and_drift_are_derivatives_of_the_constraint(
     # accelerations.
     def later(s: float) -> np.ndarray:
         moved = motion.moved(s * motion.velocities)
-        return joint.rows(moved, TIME + s).value
+        return rows_of(joint, moved, TIME + s).value
 
     def rate_later(s: float) -> np.ndarray:
         moved = motion.moved(s * motion.velocities)
-        return joint.rows(moved, TIME + s).rate
+        return rows_of(joint, moved, TIME + s).rate
 
     check("rate", rows.rate, (later(h) - later(-h)) / (2 * h), within=within)
     check("drift", rows.drift, (rate_later(h) - rate_later(-h)) / (2 * h), within=within)
@@ -141,9 +146,9 @@ def test_bodies_and_joints_that_cannot_be_are_refused() -> None:
     with pytest.raises(InputError, match="different names"):
         initial_motion([Body("a", 1.0, (1, 1, 1))] * 2)
     with pytest.raises(InputError, match="no body 'c'; there are a, b, space"):
-        Spherical("s", "a", "c").rows(some_motion(), 0.0)
+        rows_of(Spherical("s", "a", "c"), some_motion(), 0.0)
     with pytest.raises(InputError, match="zero length"):
-        Revolute("r", "a", "b", axis_i=(0, 0, 0)).rows(some_motion(), 0.0)
+        rows_of(Revolute("r", "a", "b", axis_i=(0, 0, 0)), some_motion(), 0.0)
     with pytest.raises(InputError, match="'track': x of the curve"):
         PointOnCurve("track", "a", (0.0, 0.0), (0, 1), (0, 1))
 
