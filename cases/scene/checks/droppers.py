@@ -13,7 +13,7 @@ from catenary.cases.scene.line.line_data import numbered
 from catenary.meshgen.geometry import find_cuts
 from catenary.meshgen.topologies.all_topologies import make_line
 from catenary.meshgen.topologies.line_data import SHORTEST_GAP, LineData
-from catenary.meshgen.topologies.twin import TWIN
+from catenary.meshgen.topologies.named import TWIN
 from catenary.postproc.evaluate.wording import counted
 from catenary.solver.problem.problem import Problem
 

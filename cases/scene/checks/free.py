@@ -26,14 +26,18 @@ from catenary.cases.scene.line.line_data import (
     stretches_of,
 )
 from catenary.cases.scene.problem import line_data_of
-from catenary.meshgen.division import divisions_of
-from catenary.meshgen.geometry import SAME_CUT, Cuts
+from catenary.meshgen.geometry import SAME_CUT, Cuts, divisions_of
 from catenary.meshgen.hardware import Clamps
 from catenary.meshgen.mesh import ANCHORS
 from catenary.meshgen.topologies.all_topologies import make_line
 from catenary.meshgen.topologies.free import carriers, hung, in_order
-from catenary.meshgen.topologies.free_data import FreeDroppers, FreeLink, FreeWire
-from catenary.meshgen.topologies.line_data import SHORTEST_GAP, LineData
+from catenary.meshgen.topologies.line_data import (
+    SHORTEST_GAP,
+    FreeDroppers,
+    FreeLink,
+    FreeWire,
+    LineData,
+)
 
 if TYPE_CHECKING:
     from catenary.cases.scene.scene import Scene

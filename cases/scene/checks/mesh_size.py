@@ -17,8 +17,7 @@ from catenary.cases.scene.line.free import FreeDroppersTable
 from catenary.cases.scene.line.line import LineTable, TransitionTable
 from catenary.cases.scene.line.line_data import free_wires, overlaps_of, span_lengths
 from catenary.cases.scene.problem import line_of
-from catenary.meshgen.division import divisions_of
-from catenary.meshgen.geometry import find_cuts
+from catenary.meshgen.geometry import divisions_of, find_cuts
 from catenary.meshgen.line import Line
 from catenary.meshgen.wires import Wire
 from catenary.solver.effects import all_effects as effects
