@@ -275,13 +275,11 @@ def _wire(data: LineData, free: FreeWire, made: dict[str, Wire], loads: Loads) -
         z = _straight(free, x, ends, clamps)
         z -= 0.0 if free.drawn else sag_between(x, held, loads, free.conductor)
     kinds = [End.CLAMPED if clamp else End.HELD for clamp in clamps]
-    pieces = tuple(
-        Piece(*map(tuple, points.tolist()), (kinds[0], kinds[1]), free.tensioned)
-        for points in (
-            np.array([x, y, z])[:, first : last + 1] for first, last in np.searchsorted(x, ends)
-        )
-    )
-    return Wire.of(free.conductor, free.name, free.role, pieces, profile)
+    pieces = []
+    for first, last in np.searchsorted(x, ends):
+        along, left, up = (tuple(row[first : last + 1].tolist()) for row in (x, y, z))
+        pieces.append(Piece(along, left, up, (kinds[0], kinds[1]), free.tensioned))
+    return Wire.of(free.conductor, free.name, free.role, tuple(pieces), profile)
 
 
 def _straight(
