@@ -3,23 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from catenary.cases.scene.input.faults import Fault
 from catenary.cases.scene.line.droppers import HangingTable, hung_in
 from catenary.cases.scene.line.line_data import numbered
+from catenary.cases.scene.scene import Scene
 from catenary.meshgen.geometry import find_cuts
 from catenary.meshgen.topologies.all_topologies import make_line
 from catenary.meshgen.topologies.line_data import SHORTEST_GAP, LineData
 from catenary.meshgen.topologies.named import TWIN
 from catenary.postproc.evaluate.wording import counted
 from catenary.solver.problem.problem import Problem
-
-if TYPE_CHECKING:
-    from catenary.cases.scene.scene import Scene
-
 
 # As many span lengths are named in a sentence.
 _SOME = 6
@@ -49,7 +45,7 @@ def droppers_inside(
             f"{table}.patterns.{numbers[beyond]}.spans",
             f"the line has {counted(scene.line.n_spans, 'span')}",
         )
-        yield scene.refused(key, beyond, why)
+        yield scene.refused(key, why, value=beyond)
         return
     if kind.positions_m is not None and len(set(spans.values())) > 1:
         key = f"{table}.positions_m"
@@ -69,12 +65,11 @@ def droppers_inside(
             continue
         if kind.count is not None and not outside:
             why = f"droppers must be at least {SHORTEST_GAP:g} m apart"
-            yield scene.refused(f"{table}.spacing_m", kind.spacing_m, why)
+            yield scene.refused(f"{table}.spacing_m", why)
             return
         if kind.count is not None:
             yield scene.refused(
                 f"{table}.count",
-                kind.count,
                 f"at a spacing of {kind.spacing_m:g} m these do not fit into a span of {span:g} m",
             )
             return
@@ -141,7 +136,6 @@ def check_dropper_lengths(scene: Scene, line: LineData) -> Iterator[Fault]:
     if shortest[span] <= 0:
         yield scene.refused(
             "line.encumbrance_m",
-            line.encumbrance,
             f"the messenger wire would hang {-shortest[span]:.2f} m below the {below} wire in span "
             f"{span + 1}: raise it, raise line.messenger_wire.tension_N or shorten the span",
         )

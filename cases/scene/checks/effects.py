@@ -5,16 +5,13 @@ from __future__ import annotations
 import difflib
 import functools
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 from catenary.cases.scene.input.faults import Fault, shown
 from catenary.cases.scene.line.line_data import hanging_table
+from catenary.cases.scene.problem import problem_of
+from catenary.cases.scene.scene import Scene
 from catenary.solver.effects import all_effects as effects
 from catenary.solver.effects.effect import Limit
-
-if TYPE_CHECKING:
-    from catenary.cases.scene.scene import Scene
-
 
 # Effects that are off by default and need a value in the scene: the key that holds it.
 _DATA_OF = {"residual_dropper_stiffness": "line.dropper.residual_stiffness_ratio"}
@@ -30,7 +27,7 @@ def check_effect_names(scene: Scene) -> Iterator[Fault]:
             hint = f"did you mean effects.{near[0]}?" if near else f"known are {', '.join(known)}"
             yield Fault(key, f"{shown(key)[1:-1]} {scene.origin.of(key)} is unknown; {hint}")
         elif known[name].always and not on:
-            yield scene.refused(key, on, "it is part of every scene and cannot be left out")
+            yield scene.refused(key, "it is part of every scene and cannot be left out")
 
 
 def check_requirements_of_chosen(scene: Scene) -> Iterator[Fault]:
@@ -45,8 +42,6 @@ def check_chosen_act(scene: Scene) -> Iterator[Fault]:
     One that lifts a limit is a permission, of which a scene need not make use. In a calm, such as
     a variant of a sweep, effects of the wind may stay on.
     """
-    from catenary.cases.scene.problem import problem_of
-
     if scene.origin.recorded:
         return
     problem = functools.cache(lambda: problem_of(scene))
@@ -57,7 +52,7 @@ def check_chosen_act(scene: Scene) -> Iterator[Fault]:
         if needs and not effect.applies(problem()):
             lacking = f"it acts only with {effect.data}; give that, or leave the effect out"
             why = effect.instead(problem()) or lacking
-            yield scene.refused(f"effects.{name}", True, why)
+            yield scene.refused(f"effects.{name}", why)
 
 
 def _calmed(scene: Scene) -> set[str]:
@@ -70,8 +65,6 @@ def _calmed(scene: Scene) -> set[str]:
 
 def check_requirements_of_defaults(scene: Scene) -> Iterator[Fault]:
     """Of effects that are on by default, unless the scene holds nothing for them to act on."""
-    from catenary.cases.scene.problem import problem_of
-
     problem = functools.cache(lambda: problem_of(scene))
     for name, effect in effects.registry().items():
         if name in scene.effects:
@@ -101,13 +94,11 @@ def check_effect_data(scene: Scene) -> Iterator[Fault]:
     for name, value in values.items():
         key = _DATA_OF[name]
         if switches.get(name) and value == 0:
-            yield scene.refused(
-                key, value, f"effects.{name} is on and needs a value greater than 0"
-            )
+            yield scene.refused(key, f"effects.{name} is on and needs a value greater than 0")
         if value > 0 and name not in scene.effects and switches.get(name) is False:
-            yield scene.needs_effect(key, value, name)
+            yield scene.needs_effect(key, name)
     n = len(scene.train.pantographs)
     if n > 1 and scene.holds(Limit.ONE_PANTOGRAPH):
         key = "effects.several_pantographs"
         why = f"train.pantographs has {n} entries; leave one or switch it on"
-        yield scene.refused(key, False, why)
+        yield scene.refused(key, why)

@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 from catenary.cases.scene.input.faults import Fault
 from catenary.cases.scene.run.incidents import DropperBreakTable, TensionLossTable
+from catenary.cases.scene.scene import Scene
 from catenary.meshgen.topologies.line_data import LineData
-
-if TYPE_CHECKING:
-    from catenary.cases.scene.scene import Scene
-
 
 # Lengths of spans that differ by less are one [m].
 _TINY = 1e-6
@@ -32,7 +28,7 @@ def _goes_on(scene: Scene, line: LineData, side: str) -> Iterator[Fault]:
     key = f"line.ends.{side}.kind"
 
     def refused(why: str) -> Fault:
-        return scene.refused(key, "periodic", why)
+        return scene.refused(key, why)
 
     numerics, n = scene.numerics, line.n_spans
     if numerics.scheme == "ts_alpha2":
@@ -82,7 +78,7 @@ def _layers(scene: Scene, line: LineData) -> Iterator[Fault]:
             continue
         key = f"line.ends.{side}.spans"
         if end.spans >= n:
-            yield scene.refused(key, end.spans, f"the line has {n} spans (line.n_spans) with it")
+            yield scene.refused(key, f"the line has {n} spans (line.n_spans) with it")
             continue
         inner = float(masts[end.spans] if side == "start" else masts[n - end.spans])
         reaches = stretch.from_m < inner if side == "start" else stretch.to_m > inner
@@ -94,7 +90,6 @@ def _layers(scene: Scene, line: LineData) -> Iterator[Fault]:
             )
             yield scene.refused(
                 key,
-                end.spans,
                 f"the absorbing layer reaches to {inner:g} m, into the evaluated stretch "
                 f"({given}); give the line more spans (line.n_spans) or the layer fewer",
             )

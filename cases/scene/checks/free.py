@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable, Iterator
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -26,6 +25,7 @@ from catenary.cases.scene.line.line_data import (
     stretches_of,
 )
 from catenary.cases.scene.problem import line_data_of
+from catenary.cases.scene.scene import Scene
 from catenary.meshgen.geometry import SAME_CUT, Cuts, divisions_of
 from catenary.meshgen.hardware import Clamps
 from catenary.meshgen.mesh import ANCHORS
@@ -38,10 +38,6 @@ from catenary.meshgen.topologies.line_data import (
     FreeWire,
     LineData,
 )
-
-if TYPE_CHECKING:
-    from catenary.cases.scene.scene import Scene
-
 
 # Names that mean something else in files and among ends.
 TAKEN = (ANCHORS, "droppers", "clamps", "steady_arms", "masts", "pantographs", TENSIONER, FIXED)
@@ -76,12 +72,11 @@ def check_free_tables(scene: Scene) -> Iterator[Fault]:
         key = f"line.links.{i}"
         joined = ("upper", "lower", "wire", "holds")
         for end in joined:
-            name = getattr(link, end, None)
-            if name is not None:
-                yield from _known(scene, f"{key}.{end}", name, wires)
+            if getattr(link, end, None) is not None:
+                yield from scene.among(f"{key}.{end}", wires, "line.wires has")
         if isinstance(link, FreeDroppersTable | FreeClampsTable) and link.upper == link.lower:
             why = "a link joins two wires, and lower is this one too"
-            yield scene.refused(f"{key}.upper", link.upper, why)
+            yield scene.refused(f"{key}.upper", why)
         yield from _numbers(scene, key, link)
     yield from _circles(scene)
     yield from _lifted(scene)
@@ -96,23 +91,15 @@ def _names(scene: Scene) -> Iterator[Fault]:
     for key, name in [*entries, *links]:
         if name in TAKEN and key.startswith("line.wires"):
             why = "this name means something else; take another one"
-            yield scene.refused(f"{key}.name", name, why)
+            yield scene.refused(f"{key}.name", why)
         if name in seen:
             why = f"{seen[name]} has this name too; each wire and each link needs one of its own"
-            yield scene.refused(f"{key}.name", name, why)
+            yield scene.refused(f"{key}.name", why)
         seen.setdefault(name, key)
     for _, name in entries:
         if f"{name}_clamps" in seen:
             why = f"the clamps at the ends of {name} have this name"
-            yield scene.refused(f"{seen[f'{name}_clamps']}.name", f"{name}_clamps", why)
-
-
-def _known(scene: Scene, key: str, name: str, wires: Iterable[str]) -> Iterator[Fault]:
-    if name not in wires:
-        near = difflib.get_close_matches(name, list(wires), n=1)
-        meant = f"did you mean {near[0]}? " if near else ""
-        why = f"{meant}line.wires has {', '.join(wires)}"
-        yield scene.refused(key, name, why)
+            yield scene.refused(f"{seen[f'{name}_clamps']}.name", why)
 
 
 def _wire(
@@ -131,23 +118,23 @@ def _wire(
     beyond = [number for number in table.supports or [] if number > n]
     if beyond:
         why = f"the line has the supports 0 to {n}"
-        yield scene.refused(f"{key}.supports", beyond[0], why)
+        yield scene.refused(f"{key}.supports", why, value=beyond[0])
         return
     which = "stretches_m" if table.stretches_m is not None else "from_supports_m"
     stretches = stretches_of(table, masts)
     if not stretches:
         why = "the line has no inner support"
-        yield scene.refused(f"{key}.{which}", table.from_supports_m, why)
+        yield scene.refused(f"{key}.{which}", why)
         return
     if stretches[0][0] < -_TINY or stretches[-1][1] > length + _TINY:
         outside = stretches[0] if stretches[0][0] < -_TINY else stretches[-1]
         why = f"a piece would run from {outside[0]:g} to {outside[1]:g} m, and the line from 0 to"
-        yield scene.refused(f"{key}.{which}", given_of(table, which), f"{why} {length:g} m")
+        yield scene.refused(f"{key}.{which}", f"{why} {length:g} m")
         return
     for one, other in zip(stretches, stretches[1:], strict=False):
         if other[0] < one[1] + _TINY:
             why = f"pieces would overlap from {other[0]:g} to {one[1]:g} m"
-            yield scene.refused(f"{key}.{which}", given_of(table, which), why)
+            yield scene.refused(f"{key}.{which}", why)
             return
     for side in ("start", "end"):
         yield from _end(scene, f"{key}.{side}", table, getattr(table, side), wires)
@@ -161,30 +148,25 @@ def _wire(
         )
 
 
-def given_of(table: FreeWireTable, key: str) -> object:
-    """The value of a key of a table."""
-    return getattr(table, key)
-
-
 def _end(
     scene: Scene, key: str, table: FreeWireTable, given: str | None, wires: dict[str, FreeWireTable]
 ) -> Iterator[Fault]:
     if given is None or given in (TENSIONER, FIXED):
         return
     if given == table.name:
-        yield scene.refused(key, given, "a wire cannot be clamped to itself")
+        yield scene.refused(key, "a wire cannot be clamped to itself")
     elif given not in wires:
         near = difflib.get_close_matches(given, [*wires, TENSIONER, FIXED], n=1)
         meant = f"did you mean {near[0]}? " if near else ""
         why = f"{meant}it must be {TENSIONER}, {FIXED} or a wire of {', '.join(wires)}"
-        yield scene.refused(key, given, why)
+        yield scene.refused(key, why)
     elif {table.start, table.end} <= wires.keys() and table.start != table.end:
         if key.endswith("end"):
             why = (
                 f"it starts on {table.start}: both ends must be clamped to one wire, or one be "
                 f"{TENSIONER} or {FIXED}, for it to be known whose tension the wire takes"
             )
-            yield scene.refused(key, given, why)
+            yield scene.refused(key, why)
 
 
 def _numbers(
@@ -198,7 +180,7 @@ def _numbers(
         beyond = [number for number in getattr(link, name, None) or [] if number > n]
         if beyond:
             yield scene.refused(
-                f"{key}.{name}", beyond[0], f"the line has the {what} {first} to {n}"
+                f"{key}.{name}", f"the line has the {what} {first} to {n}", value=beyond[0]
             )
 
 
@@ -241,7 +223,7 @@ def _lifted(scene: Scene) -> Iterator[Fault]:
                 f"no clamp joins it to {link.wire}, which the supports carry, and droppers are cut "
                 f"for its height: it must be one of {', '.join(sorted(moved))}"
             )
-            yield scene.refused(f"line.links.{i}.holds", link.holds, why)
+            yield scene.refused(f"line.links.{i}.holds", why)
 
 
 def _slack(scene: Scene) -> Iterator[Fault]:
@@ -256,7 +238,7 @@ def _slack(scene: Scene) -> Iterator[Fault]:
             first = getattr(links[0][1], name)
             if getattr(link, name) != first:
                 why = f"it must be the {first} of line.links.{links[0][0]}, as for all droppers"
-                yield scene.refused(f"line.links.{i}.{name}", getattr(link, name), why)
+                yield scene.refused(f"line.links.{i}.{name}", why)
 
 
 def _many(scene: Scene) -> Iterator[Fault]:
@@ -359,7 +341,7 @@ def _on_wires(
             runs = ", ".join(f"{start:g} to {stop:g}" for start, stop in wire.stretches[:3])
             more = " and so on" if len(wire.stretches) > 3 else ""
             why = f"{wire.name} does not pass {out:g} m, only {runs} m{more}"
-            yield scene.refused(f"{key}.{end}", wire.name, why)
+            yield scene.refused(f"{key}.{end}", why)
 
 
 def _clamped_on(
@@ -369,7 +351,7 @@ def _clamped_on(
         out = [] if not name else [s[end] for s in wire.stretches if not wires[name].passes(s[end])]
         if out:
             why = f"{name} does not pass {out[0]:g} m, where this wire would be clamped to it"
-            yield scene.refused(f"{key}.{('start', 'end')[end]}", name, why)
+            yield scene.refused(f"{key}.{('start', 'end')[end]}", why)
 
 
 def _heights(scene: Scene, key: str, wire: FreeWire, line: LineData) -> Iterator[Fault]:
@@ -405,7 +387,7 @@ def _twice(scene: Scene, line: LineData) -> Iterator[Fault]:
             j = seen.setdefault((link.lower, round(x / SHORTEST_GAP)), i)
             if j != i:
                 why = f"line.links.{j} has a dropper of {link.lower} at {x:g} m already"
-                yield scene.refused(f"line.links.{i}.lower", link.lower, why)
+                yield scene.refused(f"line.links.{i}.lower", why)
                 return
 
 
@@ -422,7 +404,7 @@ def _carried(scene: Scene, key: str, wire: FreeWire, line: LineData) -> Iterator
                 f"it hangs on nothing from {a:g} to {b:g} m, and the longest span is {longest:g} "
                 "m: give it droppers, clamps or supports there"
             )
-            yield scene.refused(f"{key}.name", wire.name, why)
+            yield scene.refused(f"{key}.name", why)
             return
 
 
@@ -439,7 +421,7 @@ def _left(scene: Scene, key: str, wire: FreeWire, line: LineData) -> Iterator[Fa
                 f"it must be more than the {taken:g} N that {' and '.join(o.name for o in own)} "
                 f"take of it at {x:g} m"
             )
-            yield scene.refused(f"{key}.tension_N", wire.conductor.tension, why)
+            yield scene.refused(f"{key}.tension_N", why)
             return
 
 
@@ -459,5 +441,5 @@ def _crossing(scene: Scene, line: LineData) -> Iterator[Fault]:
                 f"{link.lower}, which hangs from it: raise its height_m or its tension_N, or let "
                 "the other wire hang lower"
             )
-            yield scene.refused(f"line.links.{i}.upper", link.upper, why)
+            yield scene.refused(f"line.links.{i}.upper", why)
             return

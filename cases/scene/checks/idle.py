@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 from catenary.cases.scene.input.faults import Fault
 from catenary.cases.scene.keys.table import TAKE_AWAY
 from catenary.cases.scene.line.droppers import FEWEST_SAGGING
 from catenary.cases.scene.line.line_data import arm_tables, dropper_tables
+from catenary.cases.scene.scene import Scene
 from catenary.meshgen.topologies.all_topologies import make_line
 from catenary.meshgen.topologies.line_data import LineData
 from catenary.postproc.evaluate.wording import counted
-
-if TYPE_CHECKING:
-    from catenary.cases.scene.scene import Scene
 
 
 def check_idle(scene: Scene, line: LineData) -> Iterator[Fault]:
@@ -38,7 +35,7 @@ def _arms(scene: Scene) -> Iterator[Fault]:
     for key, arm in arm_tables(scene.line).items():
         if arm.mass_kg_per_m and not arm.length_m and scene.effects.get("arm_inertia") is not False:
             why = f"an arm of length 0 has no mass by it: give {key}.length_m, or clamp_kg alone"
-            yield scene.refused(f"{key}.mass_kg_per_m", arm.mass_kg_per_m, why + TAKE_AWAY)
+            yield scene.refused(f"{key}.mass_kg_per_m", why + TAKE_AWAY)
 
 
 def _clamps(scene: Scene) -> Iterator[Fault]:
@@ -54,7 +51,7 @@ def _clamps(scene: Scene) -> Iterator[Fault]:
                     f"{wire.name} has no clamp: neither start nor end names a wire to which it is "
                     f"clamped{TAKE_AWAY}"
                 )
-                yield scene.refused(f"line.wires.{i}.{name}", getattr(wire, name), why)
+                yield scene.refused(f"line.wires.{i}.{name}", why)
 
 
 def _lateral_places(scene: Scene) -> Iterator[Fault]:
@@ -82,8 +79,7 @@ def _lateral_places(scene: Scene) -> Iterator[Fault]:
         else:
             continue
         for name in set(idle) & wire.model_fields_set:
-            given = getattr(wire, name)
-            yield scene.refused(f"line.wires.{i}.{name}", given, why + TAKE_AWAY)
+            yield scene.refused(f"line.wires.{i}.{name}", why + TAKE_AWAY)
 
 
 def _dropper_lengths(scene: Scene, line: LineData) -> Iterator[Fault]:
@@ -112,7 +108,7 @@ def _sagging(scene: Scene) -> Iterator[Fault]:
                 f"there is none: spans have {counted(most, 'dropper')}"
             )
             at = f"{key}.pre_sag_mid_mm"
-            yield scene.refused(at, table.pre_sag_mid_mm, why + TAKE_AWAY)
+            yield scene.refused(at, why + TAKE_AWAY)
 
 
 # What says how irregularities are drawn at random.
@@ -127,7 +123,7 @@ def _random(scene: Scene) -> Iterator[Fault]:
             if part in table.model_fields_set:
                 key = f"irregularities.{name}.{part}"
                 why = f"nothing is random without irregularities.{name}.standard_deviation_mm"
-                yield scene.refused(key, getattr(table, part), why + TAKE_AWAY)
+                yield scene.refused(key, why + TAKE_AWAY)
 
 
 def _further_overlaps(scene: Scene, line: LineData) -> Iterator[Fault]:
@@ -142,4 +138,4 @@ def _further_overlaps(scene: Scene, line: LineData) -> Iterator[Fault]:
             f"which one may begin is {last}"
         )
         key = "line.overlap.repeat_every_spans"
-        yield scene.refused(key, table.repeat_every_spans, why + TAKE_AWAY)
+        yield scene.refused(key, why + TAKE_AWAY)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
+from catenary.cases.scene.checks.defects import dropper_faults, taken_faults
 from catenary.cases.scene.checks.pantographs import reaches_below
 from catenary.cases.scene.input.faults import Fault
 from catenary.cases.scene.problem import end_of
@@ -15,6 +15,7 @@ from catenary.cases.scene.run.incidents import (
     LoweringTable,
     TensionLossTable,
 )
+from catenary.cases.scene.scene import Scene
 from catenary.meshgen.line import Line
 from catenary.meshgen.slowest_wave import slowest_wave_of
 from catenary.meshgen.topologies.all_topologies import make_line
@@ -22,9 +23,6 @@ from catenary.meshgen.topologies.line_data import LineData
 from catenary.meshgen.wires import Role, Wire
 from catenary.postproc.evaluate.wording import counted
 from catenary.solver.effects.effect import Limit
-
-if TYPE_CHECKING:
-    from catenary.cases.scene.scene import Scene
 
 
 def check_incidents(scene: Scene, line: LineData) -> Iterator[Fault]:
@@ -35,7 +33,7 @@ def check_incidents(scene: Scene, line: LineData) -> Iterator[Fault]:
         key, what = _what(scene, table)
         if what in seen:
             why = f"this happens in incidents.{seen[what]} already; take one of them away"
-            yield _refusal(scene, i, key, getattr(table, key), why)
+            yield scene.refused(f"incidents.{i}.{key}", why)
             continue
         seen[what] = i
         yield from _time(scene, i, table, duration)
@@ -79,67 +77,46 @@ def _tensions_fall(scene: Scene) -> Iterator[Fault]:
                     f"it must be less than the {before.share:g} that incidents.{latest[table.wire]}"
                     f" leaves at {before.at_s:g} s: both are shares of the tension at the start"
                 )
-                yield _refusal(scene, i, "share", table.share, why)
+                yield scene.refused(f"incidents.{i}.share", why)
         latest[table.wire] = i
-
-
-def _refusal(scene: Scene, i: int, key: str, value: object, why: str) -> Fault:
-    return scene.refused(f"incidents.{i}.{key}", value, why)
 
 
 def _time(scene: Scene, i: int, table: IncidentTable, duration: float) -> Iterator[Fault]:
     dt = scene.numerics.dt_s
     if round(table.at_s / dt) >= math.floor(duration / dt + 1e-9):
         why = f"it must be less than the {duration:.4g} s that the run lasts"
-        yield _refusal(scene, i, "at_s", table.at_s, why)
+        yield scene.refused(f"incidents.{i}.at_s", why)
 
 
-def _hangs(scene: Scene, i: int, table: DropperBreakTable | TensionLossTable) -> Iterator[Fault]:
+def _hangs(scene: Scene, i: int) -> Iterator[Fault]:
     if not scene.switches().get("gravity", True):
         why = "effects.gravity is off: a line that does not hang has no balance to lose"
-        yield _refusal(scene, i, "type", table.type, why)
+        yield scene.refused(f"incidents.{i}.type", why)
 
 
 def _dropper(scene: Scene, i: int, table: DropperBreakTable, line: LineData) -> Iterator[Fault]:
-    yield from _hangs(scene, i, table)
-    if table.span > line.n_spans:
-        yield _refusal(
-            scene, i, "span", table.span, f"the line has {counted(line.n_spans, 'span')}"
-        )
-        return
-    n = len(make_line(line).droppers_of_span(table.span - 1))
-    if table.dropper > n:
-        why = f"span {table.span} has {counted(n, 'dropper')}"
-        yield _refusal(scene, i, "dropper", table.dropper, why)
+    yield from _hangs(scene, i)
+    yield from dropper_faults(scene, make_line(line), f"incidents.{i}", table.span, table.dropper)
 
 
 def _tension(scene: Scene, i: int, table: TensionLossTable, line: LineData) -> Iterator[Fault]:
-    yield from _hangs(scene, i, table)
-    whole = make_line(line)
+    yield from _hangs(scene, i)
+    whole, key = make_line(line), f"incidents.{i}.share"
     wire = whole.wire(table.wire)
-    most = wire.most_taken
-    if table.share * wire.tension <= most:
-        why = (
-            f"wires that are clamped to {wire.name} take {most:g} N of its {wire.tension:g} N: it "
-            f"must be greater than {most / wire.tension:.3g}"
-        )
-        yield _refusal(scene, i, "share", table.share, why)
-        return
-    if wire.role is not Role.CONTACT or not scene.holds(Limit.WAVE_SPEED):
+    taken = list(taken_faults(scene, wire, key, table.share))
+    yield from taken
+    if taken or wire.role is not Role.CONTACT or not scene.holds(Limit.WAVE_SPEED):
         return
     speed = scene.train.speed_km_h / 3.6
     wave = slowest_wave_of(whole, wire, table.share)
     if speed >= wave:
         least = _least_share(whole, wire, speed)
-        yield _refusal(
-            scene,
-            i,
-            "share",
-            table.share,
+        why = (
             f"the wave speed of the contact wire would fall to {3.6 * wave:.1f} "
             f"km/h: it must be greater than {least:.3g} at train.speed_km_h = "
-            f"{scene.train.speed_km_h:g} unless effects.supercritical_speed = true",
+            f"{scene.train.speed_km_h:g} unless effects.supercritical_speed = true"
         )
+        yield scene.refused(key, why)
 
 
 def _least_share(line: Line, wire: Wire, speed: float) -> float:
@@ -157,7 +134,7 @@ def _lowering(scene: Scene, i: int, table: LoweringTable, line: LineData) -> Ite
     n = len(scene.train.pantographs)
     if table.pantograph > n:
         noun = counted(n, "pantograph")
-        yield _refusal(scene, i, "pantograph", table.pantograph, f"the train has {noun}")
+        yield scene.refused(f"incidents.{i}.pantograph", f"the train has {noun}")
         return
     why = ""
     if scene.contact.law == "kinematic":
@@ -165,9 +142,9 @@ def _lowering(scene: Scene, i: int, table: LoweringTable, line: LineData) -> Ite
     elif not scene.switches().get("contact_loss", True):
         why = "effects.contact_loss is off: the wire would hold the head"
     if why:
-        yield _refusal(scene, i, "type", table.type, why)
+        yield scene.refused(f"incidents.{i}.type", why)
         return
     name = scene.train.pantographs[table.pantograph - 1].name
     if not reaches_below(scene, name, line, table.drop_m):
         why = f"the mechanism of pantographs.{name} does not reach down so far; take a smaller one"
-        yield _refusal(scene, i, "drop_m", table.drop_m, why)
+        yield scene.refused(f"incidents.{i}.drop_m", why)

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from catenary.base.errors import InputError, RunBroken
 from catenary.cases.scene.input.faults import Fault, shown
+from catenary.cases.scene.scene import Scene
 from catenary.cases.scene.train.mechanism import ActuatorTable
 from catenary.cases.scene.train.pantograph import LumpedTable, MultibodyTable, wanted_force
 from catenary.mbs.frame import SPACE
 from catenary.meshgen.topologies.line_data import LineData
 
 if TYPE_CHECKING:
-    from catenary.cases.scene.scene import Scene
     from catenary.mbs.mechanism.pantograph_data import MultibodyData
 
 
@@ -59,7 +58,6 @@ def _heights(scene: Scene, line: LineData) -> Iterator[Fault]:
                 continue
             yield scene.refused(
                 f"pantographs.{name}.nominal_height_m",
-                table.nominal_height_m,
                 f"the contact wire hangs at {lowest:.4g} to {line.contact_height:.4g} m, where its "
                 f"head would be {height - table.nominal_height_m:+.4g} m away from there, beyond "
                 "the reach of its mechanism",
@@ -112,17 +110,17 @@ def _names(scene: Scene, kind: str, table: MultibodyTable) -> Iterator[Fault]:
             scene, f"{key}.bodies.{SPACE}", "is the name of the frame at rest; choose another"
         )
     for role in ("head", "arm"):
-        yield from _known(scene, f"{key}.{role}", getattr(table, role), bodies)
+        yield from scene.among(f"{key}.{role}", bodies)
     if table.head == table.arm:
         yield _refusal(
             scene, f"{key}.head", f"is {shown(table.head)} as the arm is; they are two bodies"
         )
     if table.actuator is not None:
-        yield from _known(scene, f"{key}.actuator", table.actuator, list(table.forces))
-    for place, name in _uses(table):
+        yield from scene.among(f"{key}.actuator", list(table.forces))
+    for place in _uses(table):
         # What is on one body alone would be without effect on what is at rest.
         on_one = place.endswith(".body")
-        yield from _known(scene, f"{key}.{place}", name, bodies if on_one else [*bodies, SPACE])
+        yield from scene.among(f"{key}.{place}", bodies if on_one else [*bodies, SPACE])
     for what in ("joints", "forces"):
         for label, one in getattr(table, what).items():
             if getattr(one, "i", None) == getattr(one, "j", SPACE):
@@ -132,21 +130,13 @@ def _names(scene: Scene, kind: str, table: MultibodyTable) -> Iterator[Fault]:
             yield _refusal(scene, f"{key}.forces.{label}", "has the name of a joint or of gravity")
 
 
-def _uses(table: MultibodyTable) -> Iterator[tuple[str, str]]:
-    """Where names of bodies stand in joints and forces, and the names."""
+def _uses(table: MultibodyTable) -> Iterator[str]:
+    """Keys of joints and forces that hold names of bodies."""
     for what in ("joints", "forces"):
         for label, one in getattr(table, what).items():
             for end in ("i", "j", "body"):
                 if hasattr(one, end):
-                    yield f"{what}.{label}.{end}", getattr(one, end)
-
-
-def _known(scene: Scene, key: str, name: str, known: list[str]) -> Iterator[Fault]:
-    if name in known:
-        return
-    near = difflib.get_close_matches(name, known, n=1)
-    hint = f"did you mean {near[0]}?" if near else f"it must be one of {', '.join(known)}"
-    yield _refusal(scene, key, f"is {shown(name)}", hint)
+                    yield f"{what}.{label}.{end}"
 
 
 def _actuator(scene: Scene, kind: str, table: MultibodyTable) -> Iterator[Fault]:
@@ -155,15 +145,10 @@ def _actuator(scene: Scene, kind: str, table: MultibodyTable) -> Iterator[Fault]
     force = table.forces[table.actuator]
     key = f"pantographs.{kind}.actuator"
     if not isinstance(force, ActuatorTable):
-        hint = f"that is a {force.type}, no actuator"
-        yield _refusal(scene, key, f"is {shown(table.actuator)}", hint)
+        yield scene.refused(key, f"that is a {force.type}, no actuator")
     elif force.force_N is None:
-        yield _refusal(
-            scene,
-            key,
-            f"is {shown(table.actuator)}",
-            "its force is a table, so that it cannot be calibrated; write calibrate = false",
-        )
+        why = "its force is a table, so that it cannot be calibrated; write calibrate = false"
+        yield scene.refused(key, why)
 
 
 def _static_forces(scene: Scene, on_the_train: set[str]) -> Iterator[Fault]:
@@ -190,8 +175,8 @@ def _mechanism(scene: Scene, name: str, table: MultibodyTable) -> Iterator[Fault
         yield scene.fault(key, f"cannot be built: {error}")
 
 
-def _refusal(scene: Scene, key: str, says: str, hint: str = "") -> Fault:
-    return Fault(key, f"{key} {says} {scene.origin.of(key)}{f'; {hint}' if hint else ''}")
+def _refusal(scene: Scene, key: str, says: str) -> Fault:
+    return Fault(key, f"{key} {says} {scene.origin.of(key)}")
 
 
 def check_laws(scene: Scene) -> Iterator[Fault]:
@@ -203,21 +188,17 @@ def check_laws(scene: Scene) -> Iterator[Fault]:
         for number, law in enumerate(table.laws):
             if law.at_mass is not None and law.at_mass > n:
                 has = f"{n} masses" if lumped else "2, the head and the arm"
-                yield scene.refused(
-                    f"{key}.laws.{number}.at_mass", law.at_mass, f"the pantograph has {has}"
-                )
+                yield scene.refused(f"{key}.laws.{number}.at_mass", f"the pantograph has {has}")
         whole = not isinstance(table, LumpedTable) and table.motion == "all_bodies"
         for part, given in (("laws", table.laws), ("regulation", table.regulation)):
             if whole and given:
                 yield scene.refused(
                     f"{key}.motion",
-                    "all_bodies",
                     f"{key}.{part} acts on mechanisms that are reduced to tables only",
                 )
         regulation = table.regulation
         if regulation is not None and regulation.sample_s < scene.numerics.dt_s:
             yield scene.refused(
                 f"{key}.regulation.sample_s",
-                regulation.sample_s,
                 f"a sample takes at least a step, numerics.dt_s = {scene.numerics.dt_s:g}",
             )

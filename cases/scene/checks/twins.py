@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 from catenary.cases.scene.input.faults import Fault
+from catenary.cases.scene.problem import problem_of
+from catenary.cases.scene.scene import Scene
 from catenary.meshgen.line import Line
 from catenary.solver.effects import all_effects as effects
 from catenary.solver.problem.contact_laws import KinematicLaw
 from catenary.solver.problem.problem import Damping, Problem
-
-if TYPE_CHECKING:
-    from catenary.cases.scene.scene import Scene
-
 
 RELATIVE_MOTION = "relative_motion"
 # Effects that treat both wires of a pair alike, whatever their data.
@@ -56,14 +53,12 @@ def needs_relative_motion(problem: Problem, effect: str) -> bool:
 
 def check_twins(scene: Scene) -> Iterator[Fault]:
     """Scenes without the relative motion of twin wires in which they would move differently."""
-    from catenary.cases.scene.problem import problem_of
-
     if scene.switches()[RELATIVE_MOTION]:
         return
     problem = problem_of(scene)
     why = _why_not(problem) if problem.line.twins else ""
     if why:
-        yield scene.refused(f"effects.{RELATIVE_MOTION}", False, why)
+        yield scene.refused(f"effects.{RELATIVE_MOTION}", why)
 
 
 def _why_not(problem: Problem) -> str:

@@ -5,20 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from catenary.cases.scene.input.faults import Fault
 from catenary.cases.scene.problem import end_of, pantograph_of, strips_ahead
+from catenary.cases.scene.scene import Scene
 from catenary.cases.scene.train.pantograph import LumpedTable, MultibodyTable
 from catenary.cases.scene.train.train import MotionTable, vehicle_of
 from catenary.mbs.roll import roll_of
 from catenary.meshgen.topologies.line_data import LineData
-
-if TYPE_CHECKING:
-    from catenary.cases.scene.scene import Scene
-
 
 # A wave of an irregular track takes at least so many steps.
 STEPS_PER_WAVE = 8
@@ -72,7 +68,7 @@ def _roll_acts(scene: Scene) -> Iterator[Fault]:
             why = (
                 f"it needs pantographs.{name}.strips.length_m, the strip that the wire moves along"
             )
-            yield scene.refused("effects.head_roll", True, why)
+            yield scene.refused("effects.head_roll", why)
 
 
 def _idle(scene: Scene, key: str, effect: str) -> Fault:
@@ -93,7 +89,6 @@ def _multibody_strips(scene: Scene) -> Iterator[Fault]:
         if kind.strips.mass >= mass:
             yield scene.refused(
                 f"pantographs.{name}.strips.mass_kg",
-                kind.strips.mass_kg,
                 f"strips are part of the head, which weighs {mass:.3g} kg",
             )
 
@@ -133,7 +128,6 @@ def _waves(scene: Scene) -> Iterator[Fault]:
     if shortest < STEPS_PER_WAVE * step:
         yield scene.refused(
             "vehicle.irregularity.shortest_m",
-            shortest,
             f"the train runs {step:.3g} m in a step of numerics.dt_s; a wave must take "
             f"{STEPS_PER_WAVE} of these",
         )
@@ -153,7 +147,6 @@ def _strip_lengths(scene: Scene, line: LineData) -> Iterator[Fault]:
             needed = math.ceil(2e3 * abs(far) - 1e-6) / 1e3
             yield scene.refused(
                 f"pantographs.{place.name}.strips.length_m",
-                length,
                 f"at {x:.4g} m the wire is {abs(far):.3g} m beside the strips' middle ({keys}), so "
                 f"that they must be at least {needed:g} m long",
             )
