@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
 from catenary.base.errors import InputError
-from catenary.cases.scene.checks.droppers import droppers_inside
 from catenary.cases.scene.input.faults import Fault
+from catenary.cases.scene.line.droppers import HangingTable, hung_in
 from catenary.cases.scene.line.free import (
     FreeArmsTable,
     FreeClampsTable,
@@ -29,7 +29,6 @@ from catenary.cases.scene.scene import Scene
 from catenary.meshgen.geometry import SAME_CUT, Cuts, divisions_of
 from catenary.meshgen.hardware import Clamps
 from catenary.meshgen.mesh import ANCHORS
-from catenary.meshgen.topologies.all_topologies import make_line
 from catenary.meshgen.topologies.free import carriers, hung, in_order
 from catenary.meshgen.topologies.line_data import (
     SHORTEST_GAP,
@@ -38,6 +37,7 @@ from catenary.meshgen.topologies.line_data import (
     FreeWire,
     LineData,
 )
+from catenary.postproc.evaluate.wording import counted
 
 # Names that mean something else in files and among ends.
 TAKEN = (ANCHORS, "droppers", "clamps", "steady_arms", "masts", "pantographs", TENSIONER, FIXED)
@@ -260,6 +260,66 @@ def _many(scene: Scene) -> Iterator[Fault]:
                 return
 
 
+# As many span lengths are named in a sentence.
+_SOME = 6
+
+
+def droppers_inside(
+    scene: Scene, table: str, kind: HangingTable, spans: Mapping[int, float]
+) -> Iterator[Fault]:
+    """The first of some spans in which droppers of a table are outside or too close together.
+
+    ``spans`` are lengths [m] by numbers, from 1. Numbers of spans beyond the line are faults too.
+    """
+    numbers = {n: i for i, pattern in enumerate(kind.patterns or ()) for n in pattern.spans or ()}
+    beyond = max(numbers, default=0)
+    if beyond > scene.line.n_spans:
+        key, why = (
+            f"{table}.patterns.{numbers[beyond]}.spans",
+            f"the line has {counted(scene.line.n_spans, 'span')}",
+        )
+        yield scene.refused(key, why, value=beyond)
+        return
+    if kind.positions_m is not None and len(set(spans.values())) > 1:
+        key = f"{table}.positions_m"
+        lengths = ", ".join(f"{span:g}" for span in sorted(set(spans.values()))[:_SOME])
+        yield scene.fault(
+            key,
+            f"holds for one span length, but the spans are "
+            f"{lengths} m long; give {table}.patterns or count and spacing_m",
+        )
+        return
+    for number, (positions, _) in hung_in(scene.origin, table, kind, spans).items():
+        span = spans[number]
+        outside = [x for x in positions if not SHORTEST_GAP <= x <= span - SHORTEST_GAP]
+        close = [pair for pair in zip(positions, positions[1:], strict=False)
+                 if pair[1] - pair[0] < SHORTEST_GAP]  # fmt: skip
+        if not outside and not close:
+            continue
+        if kind.count is not None and not outside:
+            why = f"droppers must be at least {SHORTEST_GAP:g} m apart"
+            yield scene.refused(f"{table}.spacing_m", why)
+            return
+        if kind.count is not None:
+            yield scene.refused(
+                f"{table}.count",
+                f"at a spacing of {kind.spacing_m:g} m these do not fit into a span of {span:g} m",
+            )
+            return
+        which = "positions_m" if kind.positions_m is not None else "patterns"
+        key = f"{table}.{which}"
+        of = f" of span {number}" if number in numbers else ""
+        if outside:
+            what = f"a dropper{of} at {outside[0]:g} m; it must lie inside the span, between 0 and "
+            what += f"{span:g} m"
+        else:
+            left, right = close[0]
+            what = f"droppers{of} at {left:.10g} and {right:.10g} m; they must be at least "
+            what += f"{SHORTEST_GAP:g} m apart"
+        yield scene.fault(key, f"puts {what}")
+        return
+
+
 # A wire may hang on nothing over so many times the longest span.
 MOST_SPANS = 1.5
 
@@ -274,7 +334,7 @@ def check_free_droppers(scene: Scene, line: LineData) -> Iterator[Fault]:
 
 
 def check_free_places(scene: Scene, line: LineData) -> Iterator[Fault]:
-    """Links where a wire is not, places too close, wires that hang on nothing or cross."""
+    """Links where a wire is not, places too close, wires that hang on nothing."""
     assert line.wires is not None and line.links is not None
     wires = {wire.name: wire for wire in line.wires}
     found = [
@@ -290,7 +350,7 @@ def check_free_places(scene: Scene, line: LineData) -> Iterator[Fault]:
     for i, wire in enumerate([] if found else line.wires):
         found += _carried(scene, f"line.wires.{i}", wire, line)
         found += _left(scene, f"line.wires.{i}", wire, line)
-    yield from found or _crossing(scene, line)
+    yield from found
 
 
 def places_of(line: LineData) -> np.ndarray:
@@ -422,24 +482,4 @@ def _left(scene: Scene, key: str, wire: FreeWire, line: LineData) -> Iterator[Fa
                 f"take of it at {x:g} m"
             )
             yield scene.refused(f"{key}.tension_N", why)
-            return
-
-
-def _crossing(scene: Scene, line: LineData) -> Iterator[Fault]:
-    """Droppers whose upper wire is expected to hang below the lower one."""
-    assert line.links is not None
-    made = make_line(line)
-    for i, link in enumerate(line.links):
-        if not isinstance(link, FreeDroppers):
-            continue
-        x = np.array(link.lower_x)
-        upper, lower = (made.wire(name).points(x)[:, 2] for name in (link.upper, link.lower))
-        worst = int(np.argmin(upper - lower))
-        if not upper[worst] > lower[worst]:
-            why = (
-                f"at {x[worst]:g} m it is expected {lower[worst] - upper[worst]:.3f} m below "
-                f"{link.lower}, which hangs from it: raise its height_m or its tension_N, or let "
-                "the other wire hang lower"
-            )
-            yield scene.refused(f"line.links.{i}.upper", why)
             return

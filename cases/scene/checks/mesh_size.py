@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from catenary.base.errors import InputError
+from catenary.cases.scene.checks.effects import RELATIVE_MOTION
 from catenary.cases.scene.checks.free import free_counts
-from catenary.cases.scene.checks.twins import RELATIVE_MOTION
 from catenary.cases.scene.cost_model import estimate_memory, estimate_start
 from catenary.cases.scene.input.faults import Fault, SceneError
 from catenary.cases.scene.line.free import FreeDroppersTable

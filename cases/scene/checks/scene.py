@@ -20,31 +20,38 @@ from catenary.cases.scene.checks.air import (
     check_wind,
     has_front,
 )
-from catenary.cases.scene.checks.defects import check_defects
-from catenary.cases.scene.checks.droppers import check_dropper_lengths, check_droppers_inside_spans
+from catenary.cases.scene.checks.defects import check_defects, check_incidents
 from catenary.cases.scene.checks.effects import (
     check_chosen_act,
     check_effect_data,
     check_effect_names,
+    check_idle,
     check_requirements_of_chosen,
     check_requirements_of_defaults,
+    check_twins,
 )
-from catenary.cases.scene.checks.ends import check_ends
 from catenary.cases.scene.checks.free import check_free_droppers
-from catenary.cases.scene.checks.idle import check_idle
-from catenary.cases.scene.checks.incidents import check_incidents
+from catenary.cases.scene.checks.line import (
+    check_dropper_lengths,
+    check_droppers_inside_spans,
+    check_names,
+    check_parts,
+    check_topology,
+)
 from catenary.cases.scene.checks.mesh_size import size_faults
-from catenary.cases.scene.checks.motion import check_along, check_lateral
+from catenary.cases.scene.checks.motion import check_along, check_ends, check_lateral
 from catenary.cases.scene.checks.numerics import (
     check_contact,
     check_iterations,
     check_scheme,
     check_window,
 )
-from catenary.cases.scene.checks.pantographs import check_laws, check_mechanisms, check_pantographs
-from catenary.cases.scene.checks.topology import check_names, check_parts, check_topology
-from catenary.cases.scene.checks.twins import check_twins
-from catenary.cases.scene.checks.vehicle import check_vehicle
+from catenary.cases.scene.checks.train import (
+    check_laws,
+    check_mechanisms,
+    check_pantographs,
+    check_vehicle,
+)
 from catenary.cases.scene.input.faults import Fault, Origin, SceneError, UnfitScene
 from catenary.cases.scene.keys.error_sentences import unknown_key
 from catenary.cases.scene.keys.keys import is_known, known_keys

@@ -1,4 +1,4 @@
-"""Whether a scene gives the tables that its line's topology is made of, and no others."""
+"""Whether a scene gives its topology's tables, and droppers fit into spans and between wires."""
 
 from __future__ import annotations
 
@@ -6,14 +6,16 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from catenary.cases.scene.checks.free import check_free_places, check_free_tables
+from catenary.cases.scene.checks.free import check_free_places, check_free_tables, droppers_inside
 from catenary.cases.scene.input.faults import Fault
 from catenary.cases.scene.line.line import LineTable
+from catenary.cases.scene.line.line_data import numbered
 from catenary.cases.scene.run.incidents import TensionLossTable
 from catenary.cases.scene.scene import Scene
+from catenary.meshgen.geometry import find_cuts
 from catenary.meshgen.topologies.all_topologies import make_line, registered
 from catenary.meshgen.topologies.free import FREE
-from catenary.meshgen.topologies.line_data import SHORTEST_GAP, LineData
+from catenary.meshgen.topologies.line_data import SHORTEST_GAP, FreeDroppers, LineData
 
 # Keys of ``line`` that come with a part of a topology.
 _WITH = {"messenger_wire": ("encumbrance_m",)}
@@ -165,3 +167,44 @@ def _overlap(scene: Scene, line: LineData) -> Iterator[Fault]:
             "line.overlap.rise_m",
             f"it must be less than the {free:g} m that the messenger wire is above at the supports",
         )
+
+
+def check_droppers_inside_spans(scene: Scene, line: LineData) -> Iterator[Fault]:
+    """Of each group the first span whose droppers are outside or too close together."""
+    table, spans = scene.line, numbered(line.span_lengths)
+    if table.dropper is not None:
+        yield from droppers_inside(scene, "line.dropper", table.dropper, spans)
+    if line.auxiliary_wire is not None and table.auxiliary_wire is not None:
+        key, hung = "line.auxiliary_wire.dropper", table.auxiliary_wire.dropper
+        yield from droppers_inside(scene, key, hung, spans)
+
+
+def check_dropper_lengths(scene: Scene, line: LineData) -> Iterator[Fault]:
+    """Droppers whose upper wire is expected to hang below the lower one."""
+    made = make_line(line)
+    for number, group in enumerate(made.droppers):
+        x = np.array(group.lower_x)
+        upper, lower = (made.wire(name).points(x)[:, 2] for name in (group.upper, group.lower))
+        worst = int(np.argmin(upper - lower)) if x.size else 0
+        if x.size == 0 or upper[worst] > lower[worst]:
+            continue
+        below = lower[worst] - upper[worst]
+        if line.links is not None:
+            links = [i for i, own in enumerate(line.links) if isinstance(own, FreeDroppers)]
+            why = (
+                f"at {x[worst]:g} m it is expected {below:.3f} m below "
+                f"{group.lower}, which hangs from it: raise its height_m or its tension_N, or let "
+                "the other wire hang lower"
+            )
+            yield scene.refused(f"line.links.{links[number]}.upper", why)
+        elif line.overlaps is not None:
+            find_cuts(made)  # says so
+        else:
+            over, under = (name.replace("_", " ") for name in (group.upper, group.lower))
+            why = (
+                f"the {over} would hang {below:.2f} m below the {under} in span "
+                f"{np.searchsorted(line.support_positions, x[worst])}: raise it, raise "
+                "line.messenger_wire.tension_N or shorten the span"
+            )
+            yield scene.refused("line.encumbrance_m", why)
+        return
