@@ -9,8 +9,7 @@ import numpy as np
 
 from catenary.base.errors import InputError
 from catenary.meshgen.chains import assemble, names_of
-from catenary.meshgen.division import check_counts, divide, divisions_of
-from catenary.meshgen.geometry import find_cuts
+from catenary.meshgen.geometry import check_counts, divide, divisions_of, find_cuts
 from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import LineMesh
 

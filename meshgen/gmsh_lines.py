@@ -11,8 +11,7 @@ import numpy as np
 
 from catenary.base.errors import InputError
 from catenary.base.python_signals import python_signals_kept
-from catenary.meshgen.division import check_counts, divisions_of
-from catenary.meshgen.geometry import Cuts, find_cuts
+from catenary.meshgen.geometry import Cuts, check_counts, divisions_of, find_cuts
 from catenary.meshgen.hardware import Droppers
 from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import ANCHORS

@@ -11,9 +11,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from catenary.meshgen.curve import Curve
 from catenary.meshgen.hardware import Clamps, Droppers, Fittings, SteadyArms, Supports
-from catenary.meshgen.spans import Spans
+from catenary.meshgen.track import Curve, Spans
 from catenary.meshgen.wires import End, Profile, Role, Wire
 
 

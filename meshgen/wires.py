@@ -240,11 +240,11 @@ class Wire(Conductor):
         """
         force = np.zeros(x.shape)
         for piece in self.pieces:
-            at, course = np.array(piece.x), np.array(piece.y)
-            kink = np.diff(np.diff(course) / np.diff(at))
-            for place, change in zip(at[1:-1], kink, strict=True):
-                here = np.abs(x - place) < _SAME_PLACE
-                force[here] = -self.tension_at(x[here]) * change
+            at, y, _ = piece.course
+            kink = np.pad(np.diff(np.diff(y) / np.diff(at)), 1)
+            nearest = np.clip(np.searchsorted(at, x - _SAME_PLACE), None, at.size - 1)
+            here = np.abs(at[nearest] - x) < _SAME_PLACE
+            force[here] = -self.tension_at(x[here]) * kink[nearest[here]]
         return force
 
     def left_of(self, ends: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -280,15 +280,16 @@ class Wire(Conductor):
 
     def points(self, x: np.ndarray) -> np.ndarray:
         """Points of the wire at positions ``x`` (n,) inside its pieces, shape (n, 3) [m]."""
-        starts = [piece.x[0] for piece in self.pieces]
-        which = np.clip(np.searchsorted(starts, x + _SAME_PLACE, side="right") - 1, 0, None)
-        points = np.empty((x.size, 3))
-        for number in np.unique(which):
-            here = which == number
-            points[here] = self.pieces[number].points(x[here])
+        at, y, z = self._course
+        points = np.column_stack([x, np.interp(x, at, y), np.interp(x, at, z)])
         if self.profile is not None:
             points[:, 2] = self.profile.level(x) - self.profile.pre_sag(x)
         return points
+
+    @cached_property
+    def _course(self) -> np.ndarray:
+        """The points that all pieces pass, (3, n) [m]."""
+        return np.concatenate([np.zeros((3, 0)), *(piece.course for piece in self.pieces)], axis=1)
 
 
 def worn_bending(lost: float) -> float:

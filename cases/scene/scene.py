@@ -6,6 +6,8 @@ have been checked, so that what follows meets no surprise.
 
 from __future__ import annotations
 
+import difflib
+from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -79,18 +81,46 @@ class Scene(Table):
         """Where the keys were written, for sentences about them."""
         return self._origin
 
-    def refused(self, key: str, value: object, why: str) -> Fault:
-        """The fault of a key: its value, where it was written, and why it cannot be."""
-        return refusal(self._origin, key, value, why)
+    def refused(self, key: str, why: str, *, value: object = None) -> Fault:
+        """The fault of a key: its value, where it was written, and why it cannot be.
+
+        ``value`` is a part of the key's value, if that part alone cannot be.
+        """
+        return refusal(self._origin, key, self._at(key) if value is None else value, why)
+
+    def among(
+        self, key: str, known: Collection[str], has: str = "", *, name: str | None = None
+    ) -> Iterator[Fault]:
+        """The fault of a key that holds a name which is none of those ``known``; ``has`` says whose
+        they are. ``name`` is one that the key holds beside others."""
+        name = str(self._at(key)) if name is None else name
+        if name not in known:
+            near = difflib.get_close_matches(name, known, n=1)
+            meant = f"did you mean {near[0]}?" if near else ""
+            names = ", ".join(known)
+            why = f"{meant} {has} {names}".strip() if has else meant or f"it must be one of {names}"
+            yield self.refused(key, why, value=name)
+
+    def _at(self, key: str) -> object:
+        """The value of a dotted key, which exists; of an effect whether it is on."""
+        here: Any = self
+        if key.startswith("effects."):
+            return self.switches()[key.removeprefix("effects.")]
+        for part in key.split("."):
+            if isinstance(here, Table):
+                here = getattr(here, part)
+            else:
+                here = here[int(part) if isinstance(here, list) else part]
+        return here
 
     def fault(self, key: str, says: str) -> Fault:
         """The fault of a key whose sentence ``says`` goes on after its name and its place."""
         return Fault(key, f"{key} {self._origin.of(key)} {says}")
 
-    def needs_effect(self, key: str, value: object, effect: str) -> Fault:
+    def needs_effect(self, key: str, effect: str) -> Fault:
         """The fault of a key that nothing reads without an effect, which is off by default."""
         why = f"it acts only with effects.{effect} = true; write that, or false to leave it out"
-        return self.refused(key, value, why)
+        return self.refused(key, why)
 
     def switches(self) -> dict[str, bool]:
         """Every effect of the registry and whether it is on, in the registry's order."""

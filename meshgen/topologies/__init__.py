@@ -1,1 +1,1 @@
-"""Topologies: which wires, droppers and hardware a line has, one file each."""
+"""Topologies: which wires, droppers and hardware a line has; all are lists of wires and links."""

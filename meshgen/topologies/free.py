@@ -1,8 +1,12 @@
-"""Free line: wires and links from tables, for what no other topology has foreseen."""
+"""Free line: wires and links from tables, and the one way from wires and links to a line.
+
+What hangs on nothing but its own tension gets a first guess of its sag here; form finding gives the
+heights.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from graphlib import CycleError, TopologicalSorter
 from typing import TypeVar
@@ -12,23 +16,47 @@ import numpy as np
 from catenary.base.errors import InputError
 from catenary.meshgen.hardware import Clamps, Droppers, SteadyArms, Supports
 from catenary.meshgen.line import Line
-from catenary.meshgen.topologies.free_data import FreeDroppers, FreeLink, FreeWire
-from catenary.meshgen.topologies.line_data import LineData
+from catenary.meshgen.topologies.line_data import FreeDroppers, FreeLink, FreeWire, LineData
 from catenary.meshgen.topologies.registry import register
-from catenary.meshgen.topologies.sag import Loads, sag_between
-from catenary.meshgen.wires import End, Piece, Profile, Role, Wire
+from catenary.meshgen.wires import Conductor, End, Piece, Profile, Role, Wire
 
 FREE = "free"
+# Only for the first guess of a sag; equilibrium uses the scene's value [m/s2].
+GRAVITY = 9.81
 _Group = TypeVar("_Group", FreeDroppers, Clamps, SteadyArms, Supports)
-_NOWHERE: tuple[float, ...] = ()
 
 
 @register(FREE, ("wires", "links"))
 def free_line(data: LineData) -> Line:
-    """The wires and links of a scene's tables. Contact wires come first, the others as listed.
+    """The wires and links of a scene's tables.
+
+    Raises
+    ------
+    InputError
+        As ``line_of``.
+    """
+    assert data.wires is not None and data.links is not None
+    return line_of(data, FREE, data.wires, data.links)
+
+
+def line_of(
+    data: LineData,
+    topology: str,
+    wires: tuple[FreeWire, ...],
+    links: tuple[FreeLink, ...],
+    twins: tuple[tuple[str, str], ...] = (),
+) -> Line:
+    """The line of some wires and links. Contact wires come first, the others as listed.
 
     A contact wire, a wire that droppers hang, and one that supports or arms are to hold at its
     height have that height at rest; the others hang between what carries them.
+
+    Parameters
+    ----------
+    data : masts, and the rise of transition spans
+    topology : its name
+    wires, links : of the line
+    twins : pairs of names of wires, as of a ``Line``
 
     Raises
     ------
@@ -36,26 +64,26 @@ def free_line(data: LineData) -> Line:
         If there is no contact wire, or wires are clamped to each other or hang from each other in a
         circle.
     """
-    assert data.wires is not None and data.links is not None
-    wires = {wire.name: wire for wire in data.wires}
-    if not any(wire.role is Role.CONTACT for wire in wires.values()):
+    data = replace(data, wires=wires, links=links)
+    by_name = {wire.name: wire for wire in wires}
+    if not any(wire.role is Role.CONTACT for wire in wires):
         raise InputError("no wire of the line has the role contact")
-    droppers = _those(data.links, FreeDroppers)
-    clamps = (*_those(data.links, Clamps), *_end_clamps(data.wires))
-    loads = _loads(data, data.wires, droppers)
+    droppers = _those(links, FreeDroppers)
+    loads = _loads(data, wires, droppers)
     made: dict[str, Wire] = {}
-    for name in in_order((one.name, one.bearers) for one in data.wires):
-        made[name] = _wire(data, wires[name], made, loads[name])
-    listed = sorted((made[name] for name in wires), key=lambda one: one.role is not Role.CONTACT)
+    for name in in_order((one.name, one.bearers) for one in wires):
+        made[name] = _wire(data, by_name[name], made, loads[name])
+    listed = sorted((made[name] for name in by_name), key=lambda one: one.role is not Role.CONTACT)
     return Line(
         data.span_lengths,
         data.n_transition,
-        FREE,
-        tuple(replace(wire, taken=_taken(wire.name, data.wires)) for wire in listed),
+        topology,
+        tuple(replace(wire, taken=_taken(wire.name, wires)) for wire in listed),
         tuple(_plain(group) for group in droppers),
-        _those(data.links, SteadyArms),
-        _those(data.links, Supports),
-        clamps,
+        _those(links, SteadyArms),
+        _those(links, Supports),
+        (*_those(links, Clamps), *_end_clamps(wires)),
+        twins=twins,
     )
 
 
@@ -121,7 +149,8 @@ def _end_clamps(wires: tuple[FreeWire, ...]) -> tuple[Clamps, ...]:
             x = sorted(stretch[end] for stretch in wire.stretches for end in ends)
             carries = next(one for one in wires if one.name == bearer).role is Role.CONTACT
             pair = (wire.name, bearer) if carries else (bearer, wire.name)
-            name = f"{wire.name}_clamps" + (f"_on_{bearer}" if len(wire.bearers) > 1 else "")
+            name = wire.clamps or f"{wire.name}_clamps"
+            name += f"_on_{bearer}" if len(wire.bearers) > 1 else ""
             found.append(Clamps(name, wire.clamp_stiffness, wire.clamp_mass, *pair, tuple(x)))
     return tuple(found)
 
@@ -160,69 +189,120 @@ def _loads(
             loads[group.upper].add(group.upper_x, carried[np.searchsorted(at, group.lower_x)])
         for end, bearer in enumerate(wire.clamped_to):
             if bearer and not holding and by_name[bearer].role is not Role.CONTACT:
-                for stretch in wire.stretches:
-                    half = 0.5 * own.between(*stretch, wire.conductor.mass_per_length)
-                    loads[bearer].add((stretch[end],), (half,))
+                ends = np.array(wire.stretches)
+                whole = wire.conductor.mass_per_length * np.diff(ends) + np.diff(own.before(ends))
+                loads[bearer].add(ends[:, end], 0.5 * whole[:, 0])
     return loads
+
+
+class Loads:
+    """Masses that hang from a wire at places along the line."""
+
+    def __init__(self) -> None:
+        self._parts: list[tuple[np.ndarray, np.ndarray]] = []
+
+    def add(self, x: Sequence[float] | np.ndarray, mass: Sequence[float] | np.ndarray) -> None:
+        """Further masses [kg] at places ``x`` [m]."""
+        self._parts.append((np.asarray(x, dtype=float), np.asarray(mass, dtype=float)))
+
+    @property
+    def sorted(self) -> tuple[np.ndarray, np.ndarray]:
+        """Places, ascending, and masses there."""
+        x = np.concatenate([np.zeros(0), *(part[0] for part in self._parts)])
+        mass = np.concatenate([np.zeros(0), *(part[1] for part in self._parts)])
+        order = np.argsort(x, kind="stable")
+        return x[order], mass[order]
+
+    @property
+    def x(self) -> np.ndarray:
+        """Places, ascending [m]."""
+        return self.sorted[0]
+
+    def before(self, x: np.ndarray) -> np.ndarray:
+        """Mass of all that hangs before places ``x``, shape as ``x`` [kg]."""
+        at, mass = self.sorted
+        return np.asarray(np.concatenate([[0.0], np.cumsum(mass)])[np.searchsorted(at, x)])
+
+    def shared(self, carriers: np.ndarray, wire: FreeWire) -> np.ndarray:
+        """Masses (n,) that hang on what carries a wire at ``carriers`` (n,), ascending: half of the
+        wire up to each neighbour, and of what hangs from that [kg]."""
+        ends = wire.stretches[0][0], wire.stretches[-1][1]
+        between = 0.5 * (carriers[1:] + carriers[:-1])
+        bounds = np.concatenate([ends[:1], between, ends[1:]])
+        own = wire.conductor.mass_per_length * np.diff(bounds)
+        return np.asarray(own + np.diff(self.before(bounds)))
+
+
+def sag_between(x: np.ndarray, held: np.ndarray, loads: Loads, wire: Conductor) -> np.ndarray:
+    """How far a string hangs below the straight line between neighbouring places ``held`` (m,).
+
+    Parameters
+    ----------
+    x : (n,) places between the first and the last of ``held`` [m]
+    """
+    at, mass = loads.sorted
+    inside = (at > held[0]) & (at < held[-1])
+    at, mass = at[inside], mass[inside]
+    gap = np.clip(np.searchsorted(held, x, side="right") - 1, 0, held.size - 2)
+    of_load = np.searchsorted(held, at, side="right") - 1
+    length = np.diff(held)
+    # Moments as of a beam on two supports: reaction on the left, own weight, loads passed.
+    lever = mass * (held[of_load + 1] - at) / length[of_load]
+    reaction = 0.5 * wire.mass_per_length * length
+    reaction += np.bincount(of_load, lever, minlength=length.size)
+    along = x - held[gap]
+    levers = at - held[of_load]
+    sums = [np.concatenate([[0.0], np.cumsum(part)]) for part in (mass, mass * levers)]
+    first, passed = np.searchsorted(at, held[gap]), np.searchsorted(at, x)
+    masses, moments = (part[passed] - part[first] for part in sums)
+    moment = reaction[gap] * along - 0.5 * wire.mass_per_length * along**2
+    sag = GRAVITY * (moment - masses * along + moments) / wire.tension
+    return np.where(np.isin(x, held), 0.0, sag)
 
 
 def _wire(data: LineData, free: FreeWire, made: dict[str, Wire], loads: Loads) -> Wire:
     """A wire with its pieces; those that it is clamped to are ``made``."""
     profile = _profile(data, free) if free.name in hung(data) else None
-    at = np.concatenate([data.support_positions, carriers(data, free), loads.x])
+    held, ends = carriers(data, free), np.array(free.stretches).reshape(-1, 2)
+    clamps = [made[name] if name else None for name in free.clamped_to]
+    courses = [np.array(own.x) for own in (free.heights, free.lateral) if own is not None]
+    hanging = [] if profile is not None else [held, loads.x]
+    x = np.unique(np.concatenate([data.support_positions, ends.ravel(), *courses, *hanging]))
+    y = free.lateral.at(x) if free.lateral is not None else _beside(x, ends, clamps)
+    if profile is not None:
+        z = profile.level(x)
+    else:
+        z = _straight(free, x, ends, clamps)
+        z -= 0.0 if free.drawn else sag_between(x, held, loads, free.conductor)
+    kinds = [End.CLAMPED if clamp else End.HELD for clamp in clamps]
     pieces = []
-    for stretch in free.stretches:
-        own = at[(at > stretch[0]) & (at < stretch[1])]
-        x = np.unique([*stretch, *own, *_knots(free, stretch)])
-        ends = np.array(stretch)
-        clamps = [made[name] if name else None for name in free.clamped_to]
-        z = _height(free, x, ends, clamps)
-        if profile is None and not free.drawn:
-            held = carriers(data, free)
-            z = z - sag_between(x, held, loads, free.conductor)
-        y = free.lateral.at(x) if free.lateral is not None else _beside(x, clamps)
-        kinds = tuple(End.CLAMPED if clamp else End.HELD for clamp in clamps)
-        pieces.append(
-            Piece(
-                tuple(x.tolist()),
-                tuple(y.tolist()),
-                tuple(z.tolist()),
-                (kinds[0], kinds[1]),
-                free.tensioned,
-            )
-        )
+    for first, last in np.searchsorted(x, ends):
+        along, left, up = (tuple(row[first : last + 1].tolist()) for row in (x, y, z))
+        pieces.append(Piece(along, left, up, (kinds[0], kinds[1]), free.tensioned))
     return Wire.of(free.conductor, free.name, free.role, tuple(pieces), profile)
 
 
-def _knots(free: FreeWire, stretch: tuple[float, float]) -> tuple[float, ...]:
-    """Places inside a stretch at which a course given by points has a kink."""
-    courses = (free.heights, free.lateral)
-    given = {x for course in courses if course is not None for x in course.x}
-    return tuple(x for x in given if stretch[0] < x < stretch[1])
-
-
-def _height(
+def _straight(
     free: FreeWire, x: np.ndarray, ends: np.ndarray, clamps: list[Wire | None]
 ) -> np.ndarray:
-    """Heights of a piece without sag; clamped ends are where their wires are."""
-    at_ends = free.heights.at(ends) if free.heights is not None else np.zeros(2)
-    for end, clamp in enumerate(clamps):
+    """Heights of pieces without sag; clamped ends are where their wires are."""
+    inner = () if free.heights is None else free.heights.x
+    knots = np.unique(np.concatenate([ends.ravel(), inner]))
+    heights = np.zeros(knots.size) if free.heights is None else free.heights.at(knots)
+    for side, clamp in enumerate(clamps):
         if clamp is not None:
-            at_ends[end] = clamp.points(ends[end : end + 1])[0, 2]
-    inner = free.heights.x if free.heights is not None else _NOWHERE
-    inner = tuple(place for place in inner if ends[0] < place < ends[1])
-    knots = np.array([ends[0], *inner, ends[1]])
-    heights = free.heights.at(knots[1:-1]) if free.heights is not None else np.zeros(0)
-    return np.interp(x, knots, np.concatenate([at_ends[:1], heights, at_ends[1:]]))
+            at = ends[:, side]
+            heights[np.searchsorted(knots, at)] = clamp.points(at)[:, 2]
+    return np.interp(x, knots, heights)
 
 
-def _beside(x: np.ndarray, clamps: list[Wire | None]) -> np.ndarray:
-    """Lateral places of the wires that a piece is clamped to, from the first over to the last."""
+def _beside(x: np.ndarray, ends: np.ndarray, clamps: list[Wire | None]) -> np.ndarray:
+    """Lateral places of the wires that pieces are clamped to, from the first over to the last."""
     sides = [clamp.points(x)[:, 1] for clamp in clamps if clamp is not None]
     if not sides:
         return np.zeros(x.size)
-    over = (x - x[0]) / (x[-1] - x[0])
-    return np.asarray(sides[0] + (sides[-1] - sides[0]) * over)
+    starts, stops = ends[np.clip(np.searchsorted(ends[:, 0], x, side="right") - 1, 0, None)].T
+    return np.asarray(sides[0] + (sides[-1] - sides[0]) * (x - starts) / (stops - starts))
 
 
 def _profile(data: LineData, free: FreeWire) -> Profile:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from catenary.meshgen.curve import Curve
+from catenary.meshgen.track import Curve
 from catenary.solver.model.elements import beam
 from catenary.solver.model.model import Model, wire_elements
 

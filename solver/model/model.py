@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from catenary.meshgen.hardware import Slopes
 from catenary.meshgen.mesh import LineMesh
-from catenary.meshgen.slopes import Slopes
 from catenary.meshgen.wires import Role
 from catenary.solver.model.links import Links
 from catenary.solver.model.loads import Load

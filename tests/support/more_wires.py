@@ -10,11 +10,9 @@ from small_lines import en50318_line
 
 from catenary.meshgen.hardware import DropperKind
 from catenary.meshgen.line import Line
-from catenary.meshgen.topologies.compound import AUXILIARY_WIRE
 from catenary.meshgen.topologies.line_data import AuxiliaryWire, LineData, StitchWire
+from catenary.meshgen.topologies.named import AUXILIARY_WIRE, STITCH_WIRE, simple_catenary
 from catenary.meshgen.topologies.registry import register, unregister
-from catenary.meshgen.topologies.simple import simple_catenary
-from catenary.meshgen.topologies.stitched import STITCH_WIRE
 from catenary.meshgen.wires import Conductor, Piece, Role, Wire
 
 AUXILIARY, STITCH = AUXILIARY_WIRE, STITCH_WIRE

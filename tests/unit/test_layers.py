@@ -31,8 +31,8 @@ LEAVES = {"catenary.solver.kernels"}
 # The rooms of each part from below to above: each imports only itself and those before it. A file
 # beside sub-packages is a room of its own.
 ROOMS = {
-    "meshgen": ("spans", "curve", "wires", "slopes", "hardware", "line", "slowest_wave", "mesh",
-                "topologies", "geometry", "chains", "division", "gmsh_lines", "reader", "build"),
+    "meshgen": ("track", "wires", "hardware", "line", "slowest_wave", "mesh", "topologies",
+                "chains", "geometry", "gmsh_lines", "reader", "build"),
     "mbs": (
         "frame", "interface", "rigid", "time_steps", "vehicle", "control", "head", "air",
         "lumped_data", "mechanism", "library", "response", "lumped", "called_model", "lowering",

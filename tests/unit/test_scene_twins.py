@@ -8,8 +8,8 @@ from catenary.base.errors import InputError
 from catenary.cases.run.planning.needs import needs_before_meshing
 from catenary.cases.run.planning.plan import make_plan, plan_text
 from catenary.cases.run.scene_mesh import mesh_of
+from catenary.cases.scene.checks.effects import needs_relative_motion
 from catenary.cases.scene.checks.mesh_size import size_of
-from catenary.cases.scene.checks.twins import needs_relative_motion
 from catenary.cases.scene.input.faults import SceneError
 from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.problem import problem_of

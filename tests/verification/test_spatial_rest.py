@@ -11,9 +11,9 @@ from measuring import check, matrix_of
 from small_lines import ac_simple_line, mesh_of, problem_of
 from spatial_line import SpatialLine, shape
 
-from catenary.meshgen.curve import Curve
 from catenary.meshgen.mesh import CONTACT_WIRE
 from catenary.meshgen.topologies.line_data import LineData
+from catenary.meshgen.track import Curve
 from catenary.solver.model.model import Model
 from catenary.solver.model.rest_shape import Equilibrium
 from catenary.solver.problem.along_track import AlongTrack

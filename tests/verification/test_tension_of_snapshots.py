@@ -10,9 +10,9 @@ from axial_lines import ALONG, elastic_line
 from measuring import check
 from small_lines import mesh_of, problem_of
 
-from catenary.meshgen.curve import Curve
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
 from catenary.meshgen.topologies.line_data import LineData
+from catenary.meshgen.track import Curve
 from catenary.postproc.record.snapshots.blocks import RecordedLine, blocks_of
 from catenary.postproc.record.snapshots.field_kinds import ALONG as U
 from catenary.postproc.record.snapshots.field_kinds import ASIDE, KINDS, SLOPE, TURN, UP

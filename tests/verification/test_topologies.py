@@ -16,9 +16,8 @@ from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE, LineMesh
 from catenary.meshgen.topologies.all_topologies import make_line
 from catenary.meshgen.topologies.line_data import Bridle, LineData, Overlaps, Twin
+from catenary.meshgen.topologies.named import BRIDLE_WIRE, second
 from catenary.meshgen.topologies.overlaps import of_next
-from catenary.meshgen.topologies.single import BRIDLE_WIRE
-from catenary.meshgen.topologies.twin import second
 from catenary.meshgen.wires import Conductor, Role
 from catenary.solver.model.elements import beam
 from catenary.solver.statics.elasticity import elasticity

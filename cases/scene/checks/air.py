@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 from catenary.cases.scene.input.faults import Fault
 from catenary.cases.scene.keys.table import TAKE_AWAY
@@ -13,11 +12,9 @@ from catenary.cases.scene.keys.units import speed_from_km_h
 from catenary.cases.scene.line.line_data import wire_tables
 from catenary.cases.scene.problem import pantograph_of, static_force
 from catenary.cases.scene.run.wind import wind_of
+from catenary.cases.scene.scene import Scene
 from catenary.cases.scene.train.pantograph import PantographTable
 from catenary.meshgen.topologies.line_data import LineData
-
-if TYPE_CHECKING:
-    from catenary.cases.scene.scene import Scene
 
 
 def check_wind(scene: Scene, line: LineData) -> Iterator[Fault]:
@@ -38,19 +35,18 @@ def check_wind(scene: Scene, line: LineData) -> Iterator[Fault]:
     for i, stretch in enumerate(table.stretches):
         if stretch.from_m >= end:
             key = f"wind.stretches.{i}.from_m"
-            yield scene.refused(key, stretch.from_m, f"the line ends at {end:g} m")
+            yield scene.refused(key, f"the line ends at {end:g} m")
     for i, (before, after) in enumerate(pairwise(table.stretches), start=1):
         if after.from_m < before.to_m:
             why = f"it must be {before.to_m:g} at least, where the stretch before it ends"
-            yield scene.refused(f"wind.stretches.{i}.from_m", after.from_m, why)
+            yield scene.refused(f"wind.stretches.{i}.from_m", why)
     said = "roughness_length_m" in table.model_fields_set and not scene.origin.recorded
     if said and table.profile == "power" and table.gusts is None:
-        key, value = "wind.roughness_length_m", table.roughness_length_m
         why = "nothing reads it with the profile power and no gusts"
-        yield scene.refused(key, value, why + TAKE_AWAY)
+        yield scene.refused("wind.roughness_length_m", why + TAKE_AWAY)
     wind = wind_of(table)
     if wind is not None and (not math.isfinite(wind.mean) or wind.mean <= 0.0):
-        yield scene.refused("wind.height_m", table.height_m, "there is no wind at that height")
+        yield scene.refused("wind.height_m", "there is no wind at that height")
 
 
 def has_front(table: PantographTable) -> bool:
@@ -65,11 +61,11 @@ def check_tunnels(scene: Scene, line: LineData) -> Iterator[Fault]:
     for i, tunnel in enumerate(tunnels):
         if tunnel.from_m >= end:
             key = f"line.tunnels.{i}.from_m"
-            yield scene.refused(key, tunnel.from_m, f"the line ends at {end:g} m")
+            yield scene.refused(key, f"the line ends at {end:g} m")
     for i, (before, after) in enumerate(pairwise(tunnels), start=1):
         if after.from_m < before.to_m:
             why = f"it must be {before.to_m:g} at least, where the tunnel before it ends"
-            yield scene.refused(f"line.tunnels.{i}.from_m", after.from_m, why)
+            yield scene.refused(f"line.tunnels.{i}.from_m", why)
     known = [place.name for place in scene.train.pantographs if place.name in scene.pantographs]
     if tunnels and known and not any(_meets_air(scene, name) for name in known):
         yield Fault(
@@ -88,7 +84,7 @@ def check_crosswind(scene: Scene, line: LineData) -> Iterator[Fault]:
                 "the air has no forces on this pantograph: give it aerodynamics or a force of type "
                 f"aerodynamic_force{TAKE_AWAY}"
             )
-            yield scene.refused(key, table.crosswind_factor, why)
+            yield scene.refused(key, why)
 
 
 def check_uplift(scene: Scene) -> Iterator[Fault]:

@@ -1,10 +1,11 @@
-"""Whether a line can have the irregularities, defects and fittings of a scene."""
+"""Whether a line can have a scene's irregularities, defects and fittings, and incidents happen."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
+from catenary.cases.scene.checks.train import reaches_below
 from catenary.cases.scene.input.faults import Fault
 from catenary.cases.scene.line.imperfections import (
     DropperDefectTable,
@@ -14,18 +15,21 @@ from catenary.cases.scene.line.imperfections import (
     WrongTensionTable,
     stretch_of,
 )
-from catenary.cases.scene.problem import line_of
-from catenary.cases.scene.run.incidents import DropperBreakTable
+from catenary.cases.scene.problem import end_of, line_of
+from catenary.cases.scene.run.incidents import (
+    DropperBreakTable,
+    IncidentTable,
+    LoweringTable,
+    TensionLossTable,
+)
+from catenary.cases.scene.scene import Scene
 from catenary.meshgen.line import Line
 from catenary.meshgen.slowest_wave import slowest_wave_of
+from catenary.meshgen.topologies.all_topologies import make_line
 from catenary.meshgen.topologies.line_data import LineData
 from catenary.meshgen.wires import Role, Wire
 from catenary.postproc.evaluate.wording import counted
 from catenary.solver.effects.effect import Limit
-
-if TYPE_CHECKING:
-    from catenary.cases.scene.scene import Scene
-
 
 # More waves than these along a line take more memory than its motion.
 MOST_WAVES = 400_000
@@ -42,8 +46,8 @@ def check_defects(scene: Scene, data: LineData) -> Iterator[Fault]:
         key = f"defects.{i}"
         if isinstance(table, DropperDefectTable):
             which = table.span, table.dropper
-            found = list(_dropper(scene, line, key, *which))
-            yield from found or _twice(scene, seen, (f"{key}.dropper", table.dropper), which)
+            found = list(dropper_faults(scene, line, key, *which))
+            yield from found or _twice(scene, seen, f"{key}.dropper", which)
             continue
         assert isinstance(table, WornWireTable | WrongTensionTable | HardSpotTable | KinkTable)
         wire = line.wire(table.wire)
@@ -53,16 +57,16 @@ def check_defects(scene: Scene, data: LineData) -> Iterator[Fault]:
             yield from _worn_twice(scene, i, table)
         elif isinstance(table, WrongTensionTable):
             what = "tension", table.wire
-            yield from _twice(scene, seen, (f"{key}.wire", table.wire), what)
-            yield from _tension(scene, line, wire, f"{key}.factor", table.factor)
+            yield from _twice(scene, seen, f"{key}.wire", what)
+            yield from _wrong_tension(scene, line, wire, f"{key}.factor", table.factor)
         else:
             yield from _place(scene, wire, f"{key}.at_m", table.at_m)
             if isinstance(table, KinkTable) and wire.role is not Role.CONTACT:
                 why = "strips run on contact wires only"
-                yield scene.refused(f"{key}.wire", table.wire, why)
+                yield scene.refused(f"{key}.wire", why)
             elif isinstance(table, KinkTable) and not wire.bending_stiffness:
                 why = f"{wire.name} has no bending stiffness, and so keeps no bend under tension"
-                yield scene.refused(f"{key}.angle_deg", table.angle_deg, why)
+                yield scene.refused(f"{key}.angle_deg", why)
     yield from _broken_later(scene, seen)
 
 
@@ -75,28 +79,28 @@ def _irregularities(scene: Scene, line: Line) -> Iterator[Fault]:
         for i, (x, _) in enumerate(table.by_place or []):
             if not -_TINY <= x <= length + _TINY:
                 why = f"the line runs from 0 to {length:g} m"
-                yield scene.refused(f"{key}.by_place.{i}.0", x, why)
+                yield scene.refused(f"{key}.by_place.{i}.0", why)
         if table.standard_deviation_mm is None:
             continue
         start, end = stretch_of(table, line)
         for part, value in (("from_m", table.from_m), ("to_m", table.to_m)):
             if value is not None and value > length + _TINY:
                 why = f"the line ends at {length:g} m"
-                yield scene.refused(f"{key}.{part}", value, why)
+                yield scene.refused(f"{key}.{part}", why)
         if end <= start and table.to_m is not None:
             why = f"it must be greater than the {start:g} m where they begin"
-            yield scene.refused(f"{key}.to_m", table.to_m, why)
+            yield scene.refused(f"{key}.to_m", why)
         elif end - start < table.shortest_m:
             why = f"no wave of shortest_m = {table.shortest_m:g} m fits from {start:g} to {end:g} m"
             part = "shortest_m" if table.from_m is None else "from_m"
-            yield scene.refused(f"{key}.{part}", getattr(table, part), why)
+            yield scene.refused(f"{key}.{part}", why)
         if (end - start) / table.shortest_m > MOST_WAVES:
             why = f"it must be at least {(end - start) / MOST_WAVES:.3g} m on {end - start:g} m"
-            yield scene.refused(f"{key}.shortest_m", table.shortest_m, why)
+            yield scene.refused(f"{key}.shortest_m", why)
     lengths = scene.irregularities.dropper_lengths
     for i, (span, dropper, _) in enumerate((lengths and lengths.by_dropper) or []):
         entry = f"irregularities.dropper_lengths.by_dropper.{i}"
-        yield from _dropper(scene, line, entry, int(span), int(dropper), (".0", ".1"))
+        yield from dropper_faults(scene, line, entry, int(span), int(dropper), (".0", ".1"))
 
 
 def _fittings(scene: Scene, line: Line) -> Iterator[Fault]:
@@ -106,7 +110,7 @@ def _fittings(scene: Scene, line: Line) -> Iterator[Fault]:
         end = table.at_m + table.length_m
         if _is_at(wire, table.at_m) and not _is_at(wire, end):
             why = f"it would end at {end:g} m, where {wire.name} is not"
-            yield scene.refused(f"{key}.length_m", table.length_m, why)
+            yield scene.refused(f"{key}.length_m", why)
 
 
 def _place(scene: Scene, wire: Wire, key: str, x: float) -> Iterator[Fault]:
@@ -114,14 +118,14 @@ def _place(scene: Scene, wire: Wire, key: str, x: float) -> Iterator[Fault]:
         pieces = [f"{piece.x[0]:g} to {piece.x[-1]:g} m" for piece in wire.pieces]
         more = " and so on" if len(pieces) > 3 else ""
         why = f"{wire.name} runs from {', '.join(pieces[:3])}{more}"
-        yield scene.refused(key, x, why)
+        yield scene.refused(key, why)
 
 
 def _is_at(wire: Wire, x: float) -> bool:
     return any(piece.x[0] - _TINY <= x <= piece.x[-1] + _TINY for piece in wire.pieces)
 
 
-def _dropper(
+def dropper_faults(
     scene: Scene,
     line: Line,
     key: str,
@@ -129,27 +133,24 @@ def _dropper(
     dropper: int,
     parts: tuple[str, str] = (".span", ".dropper"),
 ) -> Iterator[Fault]:
+    """The number of a span, or of a dropper in it, that the line does not have."""
     if span > line.n_spans:
         why = f"the line has {counted(line.n_spans, 'span')}"
-        yield scene.refused(key + parts[0], span, why)
+        yield scene.refused(key + parts[0], why)
         return
     n = len(line.droppers_of_span(span - 1))
     if dropper > n:
         why = f"span {span} has {counted(n, 'dropper')}"
-        yield scene.refused(key + parts[1], dropper, why)
+        yield scene.refused(key + parts[1], why)
 
 
 def _twice(
-    scene: Scene,
-    seen: dict[tuple[object, ...], str],
-    key: tuple[str, object],
-    what: tuple[object, ...],
+    scene: Scene, seen: dict[tuple[object, ...], str], key: str, what: tuple[object, ...]
 ) -> Iterator[Fault]:
-    entry = key[0].rsplit(".", 1)[0]
     if what in seen:
         why = f"{seen[what]} has this already; take one of them away"
-        yield scene.refused(*key, why)
-    seen.setdefault(what, entry)
+        yield scene.refused(key, why)
+    seen.setdefault(what, key.rsplit(".", 1)[0])
 
 
 def _worn_twice(scene: Scene, i: int, table: WornWireTable) -> Iterator[Fault]:
@@ -158,17 +159,24 @@ def _worn_twice(scene: Scene, i: int, table: WornWireTable) -> Iterator[Fault]:
             continue
         if other.from_m < table.to_m and table.from_m < other.to_m:
             why = f"defects.{j} has a stretch of {table.wire} that reaches into this one"
-            yield scene.refused(f"defects.{i}.from_m", table.from_m, why)
+            yield scene.refused(f"defects.{i}.from_m", why)
 
 
-def _tension(scene: Scene, line: Line, wire: Wire, key: str, factor: float) -> Iterator[Fault]:
+def taken_faults(scene: Scene, wire: Wire, key: str, share: float) -> Iterator[Fault]:
+    """A share of its tension that wires which are clamped to a wire take."""
     most = wire.most_taken
-    if factor * wire.tension <= most:
+    if share * wire.tension <= most:
         why = (
             f"wires that are clamped to {wire.name} take {most:g} N of its {wire.tension:g} N: it "
             f"must be greater than {most / wire.tension:.3g}"
         )
-        yield scene.refused(key, factor, why)
+        yield scene.refused(key, why)
+
+
+def _wrong_tension(
+    scene: Scene, line: Line, wire: Wire, key: str, factor: float
+) -> Iterator[Fault]:
+    yield from taken_faults(scene, wire, key, factor)
     if wire.role is not Role.CONTACT or not scene.holds(Limit.WAVE_SPEED):
         return
     wave = 3.6 * slowest_wave_of(line, wire, factor)
@@ -177,7 +185,7 @@ def _tension(scene: Scene, line: Line, wire: Wire, key: str, factor: float) -> I
             f"the wave speed of {wire.name} would be {wave:.1f} km/h, not above train.speed_km_h = "
             f"{scene.train.speed_km_h:g}, which needs effects.supercritical_speed = true"
         )
-        yield scene.refused(key, factor, why)
+        yield scene.refused(key, why)
 
 
 def _broken_later(scene: Scene, seen: dict[tuple[object, ...], str]) -> Iterator[Fault]:
@@ -186,4 +194,129 @@ def _broken_later(scene: Scene, seen: dict[tuple[object, ...], str]) -> Iterator
             entry = seen.get((incident.span, incident.dropper))
             if entry is not None:
                 why = f"{entry} lets this one carry nothing from the start"
-                yield scene.refused(f"incidents.{i}.dropper", incident.dropper, why)
+                yield scene.refused(f"incidents.{i}.dropper", why)
+
+
+def check_incidents(scene: Scene, line: LineData) -> Iterator[Fault]:
+    """The incidents that cannot be."""
+    seen: dict[tuple[object, ...], int] = {}
+    duration = (end_of(scene) - scene.train.start_m) / (scene.train.speed_km_h / 3.6)
+    for i, table in enumerate(scene.incidents):
+        key, what = _what(scene, table)
+        if what in seen:
+            why = f"this happens in incidents.{seen[what]} already; take one of them away"
+            yield scene.refused(f"incidents.{i}.{key}", why)
+            continue
+        seen[what] = i
+        yield from _time(scene, i, table, duration)
+        if isinstance(table, DropperBreakTable):
+            yield from _dropper(scene, i, table, line)
+        elif isinstance(table, TensionLossTable):
+            yield from _tension(scene, i, table, line)
+        else:
+            assert isinstance(table, LoweringTable)
+            yield from _lowering(scene, i, table, line)
+    yield from _tensions_fall(scene)
+
+
+def _what(scene: Scene, table: IncidentTable) -> tuple[str, tuple[object, ...]]:
+    """The key that would have to differ, and the event that cannot happen twice."""
+    if isinstance(table, DropperBreakTable):
+        return "dropper", ("dropper", table.span, table.dropper)
+    if isinstance(table, TensionLossTable):
+        return "at_s", ("tension", table.wire, round(table.at_s / scene.numerics.dt_s))
+    assert isinstance(table, LoweringTable)
+    return "pantograph", ("pantograph", table.pantograph)
+
+
+def _tensions_fall(scene: Scene) -> Iterator[Fault]:
+    """Losses of tension that would give a wire back some of it, or change nothing.
+
+    Shares are of the tension at the start, which is easily taken for the tension before.
+    """
+    latest: dict[str, int] = {}
+    losses = [
+        (round(table.at_s / scene.numerics.dt_s), i, table)
+        for i, table in enumerate(scene.incidents)
+        if isinstance(table, TensionLossTable)
+    ]
+    for _, i, table in sorted(losses, key=lambda loss: loss[:2]):
+        if table.wire in latest:
+            before = scene.incidents[latest[table.wire]]
+            assert isinstance(before, TensionLossTable)
+            if table.share >= before.share:
+                why = (
+                    f"it must be less than the {before.share:g} that incidents.{latest[table.wire]}"
+                    f" leaves at {before.at_s:g} s: both are shares of the tension at the start"
+                )
+                yield scene.refused(f"incidents.{i}.share", why)
+        latest[table.wire] = i
+
+
+def _time(scene: Scene, i: int, table: IncidentTable, duration: float) -> Iterator[Fault]:
+    dt = scene.numerics.dt_s
+    if round(table.at_s / dt) >= math.floor(duration / dt + 1e-9):
+        why = f"it must be less than the {duration:.4g} s that the run lasts"
+        yield scene.refused(f"incidents.{i}.at_s", why)
+
+
+def _hangs(scene: Scene, i: int) -> Iterator[Fault]:
+    if not scene.switches().get("gravity", True):
+        why = "effects.gravity is off: a line that does not hang has no balance to lose"
+        yield scene.refused(f"incidents.{i}.type", why)
+
+
+def _dropper(scene: Scene, i: int, table: DropperBreakTable, line: LineData) -> Iterator[Fault]:
+    yield from _hangs(scene, i)
+    yield from dropper_faults(scene, make_line(line), f"incidents.{i}", table.span, table.dropper)
+
+
+def _tension(scene: Scene, i: int, table: TensionLossTable, line: LineData) -> Iterator[Fault]:
+    yield from _hangs(scene, i)
+    whole, key = make_line(line), f"incidents.{i}.share"
+    wire = whole.wire(table.wire)
+    taken = list(taken_faults(scene, wire, key, table.share))
+    yield from taken
+    if taken or wire.role is not Role.CONTACT or not scene.holds(Limit.WAVE_SPEED):
+        return
+    speed = scene.train.speed_km_h / 3.6
+    wave = slowest_wave_of(whole, wire, table.share)
+    if speed >= wave:
+        least = _least_share(whole, wire, speed)
+        why = (
+            f"the wave speed of the contact wire would fall to {3.6 * wave:.1f} "
+            f"km/h: it must be greater than {least:.3g} at train.speed_km_h = "
+            f"{scene.train.speed_km_h:g} unless effects.supercritical_speed = true"
+        )
+        yield scene.refused(key, why)
+
+
+def _least_share(line: Line, wire: Wire, speed: float) -> float:
+    """Share of its tension at which the slowest wave of a wire is as fast as a train [m/s], which
+    it is not faster than with all of it; 1 at most."""
+    from scipy import optimize  # for lines with a fault only
+
+    def faster(share: float) -> float:
+        return slowest_wave_of(line, wire, share) - speed
+
+    return 1.0 if faster(1.0) <= 0.0 else float(optimize.brentq(faster, 0.0, 1.0))
+
+
+def _lowering(scene: Scene, i: int, table: LoweringTable, line: LineData) -> Iterator[Fault]:
+    n = len(scene.train.pantographs)
+    if table.pantograph > n:
+        noun = counted(n, "pantograph")
+        yield scene.refused(f"incidents.{i}.pantograph", f"the train has {noun}")
+        return
+    why = ""
+    if scene.contact.law == "kinematic":
+        why = 'contact.law is "kinematic", which holds only while contact lasts'
+    elif not scene.switches().get("contact_loss", True):
+        why = "effects.contact_loss is off: the wire would hold the head"
+    if why:
+        yield scene.refused(f"incidents.{i}.type", why)
+        return
+    name = scene.train.pantographs[table.pantograph - 1].name
+    if not reaches_below(scene, name, line, table.drop_m):
+        why = f"the mechanism of pantographs.{name} does not reach down so far; take a smaller one"
+        yield scene.refused(f"incidents.{i}.drop_m", why)

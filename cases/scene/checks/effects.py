@@ -1,20 +1,25 @@
-"""Whether the effects of a scene exist, find what they require, and have the data they need."""
+"""Whether effects exist and have what they need, twins move as one, and keys have a reader."""
 
 from __future__ import annotations
 
 import difflib
 import functools
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 from catenary.cases.scene.input.faults import Fault, shown
-from catenary.cases.scene.line.line_data import hanging_table
+from catenary.cases.scene.keys.table import TAKE_AWAY
+from catenary.cases.scene.line.droppers import FEWEST_SAGGING
+from catenary.cases.scene.line.line_data import arm_tables, dropper_tables, hanging_table
+from catenary.cases.scene.problem import problem_of
+from catenary.cases.scene.scene import Scene
+from catenary.meshgen.line import Line
+from catenary.meshgen.topologies.all_topologies import make_line
+from catenary.meshgen.topologies.line_data import LineData
+from catenary.postproc.evaluate.wording import counted
 from catenary.solver.effects import all_effects as effects
 from catenary.solver.effects.effect import Limit
-
-if TYPE_CHECKING:
-    from catenary.cases.scene.scene import Scene
-
+from catenary.solver.problem.contact_laws import KinematicLaw
+from catenary.solver.problem.problem import Damping, Problem
 
 # Effects that are off by default and need a value in the scene: the key that holds it.
 _DATA_OF = {"residual_dropper_stiffness": "line.dropper.residual_stiffness_ratio"}
@@ -30,7 +35,7 @@ def check_effect_names(scene: Scene) -> Iterator[Fault]:
             hint = f"did you mean effects.{near[0]}?" if near else f"known are {', '.join(known)}"
             yield Fault(key, f"{shown(key)[1:-1]} {scene.origin.of(key)} is unknown; {hint}")
         elif known[name].always and not on:
-            yield scene.refused(key, on, "it is part of every scene and cannot be left out")
+            yield scene.refused(key, "it is part of every scene and cannot be left out")
 
 
 def check_requirements_of_chosen(scene: Scene) -> Iterator[Fault]:
@@ -45,8 +50,6 @@ def check_chosen_act(scene: Scene) -> Iterator[Fault]:
     One that lifts a limit is a permission, of which a scene need not make use. In a calm, such as
     a variant of a sweep, effects of the wind may stay on.
     """
-    from catenary.cases.scene.problem import problem_of
-
     if scene.origin.recorded:
         return
     problem = functools.cache(lambda: problem_of(scene))
@@ -57,7 +60,7 @@ def check_chosen_act(scene: Scene) -> Iterator[Fault]:
         if needs and not effect.applies(problem()):
             lacking = f"it acts only with {effect.data}; give that, or leave the effect out"
             why = effect.instead(problem()) or lacking
-            yield scene.refused(f"effects.{name}", True, why)
+            yield scene.refused(f"effects.{name}", why)
 
 
 def _calmed(scene: Scene) -> set[str]:
@@ -70,8 +73,6 @@ def _calmed(scene: Scene) -> set[str]:
 
 def check_requirements_of_defaults(scene: Scene) -> Iterator[Fault]:
     """Of effects that are on by default, unless the scene holds nothing for them to act on."""
-    from catenary.cases.scene.problem import problem_of
-
     problem = functools.cache(lambda: problem_of(scene))
     for name, effect in effects.registry().items():
         if name in scene.effects:
@@ -101,13 +102,238 @@ def check_effect_data(scene: Scene) -> Iterator[Fault]:
     for name, value in values.items():
         key = _DATA_OF[name]
         if switches.get(name) and value == 0:
-            yield scene.refused(
-                key, value, f"effects.{name} is on and needs a value greater than 0"
-            )
+            yield scene.refused(key, f"effects.{name} is on and needs a value greater than 0")
         if value > 0 and name not in scene.effects and switches.get(name) is False:
-            yield scene.needs_effect(key, value, name)
+            yield scene.needs_effect(key, name)
     n = len(scene.train.pantographs)
     if n > 1 and scene.holds(Limit.ONE_PANTOGRAPH):
         key = "effects.several_pantographs"
         why = f"train.pantographs has {n} entries; leave one or switch it on"
-        yield scene.refused(key, False, why)
+        yield scene.refused(key, why)
+
+
+def check_idle(scene: Scene, line: LineData) -> Iterator[Fault]:
+    """Masses of arms and clamps, lateral places of clamped wires, errors of droppers and further
+    overlaps of which there are none.
+
+    Of an effect that the scene writes as false data may stand there.
+    """
+    if scene.origin.recorded:
+        return
+    yield from _idle_arms(scene)
+    yield from _idle_clamps(scene)
+    yield from _lateral_places(scene)
+    yield from _dropper_lengths(scene, line)
+    yield from _random(scene)
+    yield from _sagging(scene)
+    yield from _further_overlaps(scene, line)
+
+
+def _idle_arms(scene: Scene) -> Iterator[Fault]:
+    for key, arm in arm_tables(scene.line).items():
+        if arm.mass_kg_per_m and not arm.length_m and scene.effects.get("arm_inertia") is not False:
+            why = f"an arm of length 0 has no mass by it: give {key}.length_m, or clamp_kg alone"
+            yield scene.refused(f"{key}.mass_kg_per_m", why + TAKE_AWAY)
+
+
+def _idle_clamps(scene: Scene) -> Iterator[Fault]:
+    """Clamps at the ends of free wires that none has."""
+    wires = scene.line.wires or []
+    names = {wire.name for wire in wires}
+    for i, wire in enumerate(wires):
+        if {wire.start, wire.end} & names:
+            continue
+        for name in ("clamp_kg", "clamp_stiffness_N_per_m"):
+            if name in wire.model_fields_set:
+                why = (
+                    f"{wire.name} has no clamp: neither start nor end names a wire to which it is "
+                    f"clamped{TAKE_AWAY}"
+                )
+                yield scene.refused(f"line.wires.{i}.{name}", why)
+
+
+def _lateral_places(scene: Scene) -> Iterator[Fault]:
+    """Lateral places of free wires that lie where the wires do to which they are clamped."""
+    wires = scene.line.wires or []
+    names = {wire.name for wire in wires}
+    links = scene.line.links or []
+    held = {link.wire for link in links if link.type in ("supports", "steady_arms")}
+    for i, wire in enumerate(wires):
+        n_clamped = len([end for end in (wire.start, wire.end) if end in names])
+        if n_clamped == 2 and wire.name not in held:
+            idle = ["stagger_m", "sideways_m"]
+            why = (
+                f"nothing holds {wire.name} sideways but the wires to which both of its ends are "
+                "clamped"
+            )
+        elif (
+            n_clamped and wire.role != "contact" and (wire.stagger_m, wire.course_m) == (None,) * 2
+        ):
+            idle = ["sideways_m"]
+            why = (
+                f"without stagger_m or course_m {wire.name} has the lateral place of the wire to "
+                "which it is clamped"
+            )
+        else:
+            continue
+        for name in set(idle) & wire.model_fields_set:
+            yield scene.refused(f"line.wires.{i}.{name}", why + TAKE_AWAY)
+
+
+def _dropper_lengths(scene: Scene, line: LineData) -> Iterator[Fault]:
+    name = "dropper_lengths"
+    given = scene.irregularities.dropper_lengths is not None
+    if given and scene.effects.get(name) is not False and not make_line(line).droppers:
+        key = f"irregularities.{name}"
+        yield scene.fault(
+            key,
+            f"changes nothing: the line has no droppers; leave it "
+            f"out, or write effects.{name} = false",
+        )
+
+
+def _sagging(scene: Scene) -> Iterator[Fault]:
+    """A sag at mid-span of droppers between a first and a last one, where there are none."""
+    for key, table in dropper_tables(scene.line).items():
+        if table.count is not None:
+            most = table.count
+        else:
+            each = [len(pattern.positions_m) for pattern in table.patterns or ()]
+            most = max([len(table.positions_m or ()), *each])
+        if table.pre_sag_mid_mm and most < FEWEST_SAGGING and scene.effects.get("pre_sag", True):
+            why = (
+                "it is that of droppers between the first and the last one of a span, of which "
+                f"there is none: spans have {counted(most, 'dropper')}"
+            )
+            at = f"{key}.pre_sag_mid_mm"
+            yield scene.refused(at, why + TAKE_AWAY)
+
+
+# What says how irregularities are drawn at random.
+_DRAWN = ("exponent", "shortest_m", "longest_m", "cut_off", "seed")
+
+
+def _random(scene: Scene) -> Iterator[Fault]:
+    """How random irregularities are drawn, where none are."""
+    for name in scene.irregularities.given:
+        table = getattr(scene.irregularities, name)
+        for part in _DRAWN if not table.standard_deviation_mm else ():
+            if part in table.model_fields_set:
+                key = f"irregularities.{name}.{part}"
+                why = f"nothing is random without irregularities.{name}.standard_deviation_mm"
+                yield scene.refused(key, why + TAKE_AWAY)
+
+
+def _further_overlaps(scene: Scene, line: LineData) -> Iterator[Fault]:
+    table = scene.line.overlap
+    if table is None or line.overlaps is None or table.repeat_every_spans is None:
+        return
+    if len(line.overlaps.first) == len(table.first_span):
+        next_one = table.first_span[-1] + table.repeat_every_spans
+        last = line.n_spans - line.n_transition[1] - table.n_spans
+        why = (
+            f"it adds no overlap: the next one would begin in span {next_one}, and the last in "
+            f"which one may begin is {last}"
+        )
+        key = "line.overlap.repeat_every_spans"
+        yield scene.refused(key, why + TAKE_AWAY)
+
+
+RELATIVE_MOTION = "relative_motion"
+# Effects that treat both wires of a pair alike, whatever their data.
+_ALIKE = frozenset(
+    {
+        "vertical",
+        "gravity",
+        "pre_sag",
+        RELATIVE_MOTION,
+        "transition_spans",
+        "dropper_mass",
+        "clamp_mass",
+        "arm_inertia",
+        "arm_stiffness",
+        "uplift_stops",
+        "structural_damping",
+        "dropper_slackening",
+        "stiff_link_damping",
+        "residual_dropper_stiffness",
+        "contact_loss",
+        "contact_damping",
+        "several_pantographs",
+        "pantograph_aerodynamics",
+        "pantograph_laws",
+        "regulated_lift",
+        "lowering",
+        "vehicle_motion",
+        "vehicle_suspension",
+        "absorbing_layers",
+        "periodic_ends",
+        "supercritical_speed",
+    }
+)
+
+
+def needs_relative_motion(problem: Problem, effect: str) -> bool:
+    """Whether a problem has twin wires that move as one, and an effect may move them apart."""
+    return effect not in _ALIKE and bool(effects.move_together(problem))
+
+
+def check_twins(scene: Scene) -> Iterator[Fault]:
+    """Scenes without the relative motion of twin wires in which they would move differently."""
+    if scene.switches()[RELATIVE_MOTION]:
+        return
+    problem = problem_of(scene)
+    why = _why_not(problem) if problem.line.twins else ""
+    if why:
+        yield scene.refused(f"effects.{RELATIVE_MOTION}", why)
+
+
+def _why_not(problem: Problem) -> str:
+    """The part that moves twin wires relative to each other, "" if none does."""
+    line = problem.line
+    if not _hang_alike(line):
+        return (
+            "droppers hang the two wires by turns, so that they move relative to each other; take "
+            "line.twin.droppers = pairs, or switch this on"
+        )
+    for effect in effects.active(problem):
+        if needs_relative_motion(problem, effect.name):
+            return (
+                f"effects.{effect.name} is simulated, which may move the two wires relative to "
+                "each other; switch that off, or this on"
+            )
+    for one, other in _pairs(line):
+        if _damping(problem.damping, one) != _damping(problem.damping, other):
+            return (
+                f"{one} and {other} have different damping (line.damping.per_component), so that "
+                "the two wires move relative to each other; give them the same, or switch this on"
+            )
+    if isinstance(problem.contact, KinematicLaw):
+        return (
+            "with contact.law kinematic nothing but their relative motion says how the two wires "
+            "share the contact force; take another law, or switch this on"
+        )
+    return ""
+
+
+def _hang_alike(line: Line) -> bool:
+    """Whether droppers of both wires of each pair hang at the same places."""
+    places = {group.lower: group.lower_x for group in line.droppers}
+    return all(places.get(one) == places.get(other) for one, other in line.twins)
+
+
+def _pairs(line: Line) -> Iterator[tuple[str, str]]:
+    """Names of both wires of each pair, and of what hangs them and stands under them."""
+    yield from line.twins
+    hung = {group.lower: group.name for group in line.droppers}
+    for one, other in line.twins:
+        if one in hung:
+            yield hung[one], hung[other]
+        for groups in (line.steady_arms, line.supports):
+            names = {group.wire: group.name for group in groups}
+            if one in names:
+                yield names[one], names[other]
+
+
+def _damping(damping: Damping, name: str) -> tuple[float, float]:
+    return damping.per_component.get(name, (damping.alpha, damping.beta))

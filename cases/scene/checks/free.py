@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable, Iterator
-from typing import TYPE_CHECKING
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
 from catenary.base.errors import InputError
-from catenary.cases.scene.checks.droppers import droppers_inside
 from catenary.cases.scene.input.faults import Fault
+from catenary.cases.scene.line.droppers import HangingTable, hung_in
 from catenary.cases.scene.line.free import (
     FreeArmsTable,
     FreeClampsTable,
@@ -26,18 +25,19 @@ from catenary.cases.scene.line.line_data import (
     stretches_of,
 )
 from catenary.cases.scene.problem import line_data_of
-from catenary.meshgen.division import divisions_of
-from catenary.meshgen.geometry import SAME_CUT, Cuts
+from catenary.cases.scene.scene import Scene
+from catenary.meshgen.geometry import SAME_CUT, Cuts, divisions_of
 from catenary.meshgen.hardware import Clamps
 from catenary.meshgen.mesh import ANCHORS
-from catenary.meshgen.topologies.all_topologies import make_line
 from catenary.meshgen.topologies.free import carriers, hung, in_order
-from catenary.meshgen.topologies.free_data import FreeDroppers, FreeLink, FreeWire
-from catenary.meshgen.topologies.line_data import SHORTEST_GAP, LineData
-
-if TYPE_CHECKING:
-    from catenary.cases.scene.scene import Scene
-
+from catenary.meshgen.topologies.line_data import (
+    SHORTEST_GAP,
+    FreeDroppers,
+    FreeLink,
+    FreeWire,
+    LineData,
+)
+from catenary.postproc.evaluate.wording import counted
 
 # Names that mean something else in files and among ends.
 TAKEN = (ANCHORS, "droppers", "clamps", "steady_arms", "masts", "pantographs", TENSIONER, FIXED)
@@ -72,12 +72,11 @@ def check_free_tables(scene: Scene) -> Iterator[Fault]:
         key = f"line.links.{i}"
         joined = ("upper", "lower", "wire", "holds")
         for end in joined:
-            name = getattr(link, end, None)
-            if name is not None:
-                yield from _known(scene, f"{key}.{end}", name, wires)
+            if getattr(link, end, None) is not None:
+                yield from scene.among(f"{key}.{end}", wires, "line.wires has")
         if isinstance(link, FreeDroppersTable | FreeClampsTable) and link.upper == link.lower:
             why = "a link joins two wires, and lower is this one too"
-            yield scene.refused(f"{key}.upper", link.upper, why)
+            yield scene.refused(f"{key}.upper", why)
         yield from _numbers(scene, key, link)
     yield from _circles(scene)
     yield from _lifted(scene)
@@ -92,23 +91,15 @@ def _names(scene: Scene) -> Iterator[Fault]:
     for key, name in [*entries, *links]:
         if name in TAKEN and key.startswith("line.wires"):
             why = "this name means something else; take another one"
-            yield scene.refused(f"{key}.name", name, why)
+            yield scene.refused(f"{key}.name", why)
         if name in seen:
             why = f"{seen[name]} has this name too; each wire and each link needs one of its own"
-            yield scene.refused(f"{key}.name", name, why)
+            yield scene.refused(f"{key}.name", why)
         seen.setdefault(name, key)
     for _, name in entries:
         if f"{name}_clamps" in seen:
             why = f"the clamps at the ends of {name} have this name"
-            yield scene.refused(f"{seen[f'{name}_clamps']}.name", f"{name}_clamps", why)
-
-
-def _known(scene: Scene, key: str, name: str, wires: Iterable[str]) -> Iterator[Fault]:
-    if name not in wires:
-        near = difflib.get_close_matches(name, list(wires), n=1)
-        meant = f"did you mean {near[0]}? " if near else ""
-        why = f"{meant}line.wires has {', '.join(wires)}"
-        yield scene.refused(key, name, why)
+            yield scene.refused(f"{seen[f'{name}_clamps']}.name", why)
 
 
 def _wire(
@@ -127,23 +118,23 @@ def _wire(
     beyond = [number for number in table.supports or [] if number > n]
     if beyond:
         why = f"the line has the supports 0 to {n}"
-        yield scene.refused(f"{key}.supports", beyond[0], why)
+        yield scene.refused(f"{key}.supports", why, value=beyond[0])
         return
     which = "stretches_m" if table.stretches_m is not None else "from_supports_m"
     stretches = stretches_of(table, masts)
     if not stretches:
         why = "the line has no inner support"
-        yield scene.refused(f"{key}.{which}", table.from_supports_m, why)
+        yield scene.refused(f"{key}.{which}", why)
         return
     if stretches[0][0] < -_TINY or stretches[-1][1] > length + _TINY:
         outside = stretches[0] if stretches[0][0] < -_TINY else stretches[-1]
         why = f"a piece would run from {outside[0]:g} to {outside[1]:g} m, and the line from 0 to"
-        yield scene.refused(f"{key}.{which}", given_of(table, which), f"{why} {length:g} m")
+        yield scene.refused(f"{key}.{which}", f"{why} {length:g} m")
         return
     for one, other in zip(stretches, stretches[1:], strict=False):
         if other[0] < one[1] + _TINY:
             why = f"pieces would overlap from {other[0]:g} to {one[1]:g} m"
-            yield scene.refused(f"{key}.{which}", given_of(table, which), why)
+            yield scene.refused(f"{key}.{which}", why)
             return
     for side in ("start", "end"):
         yield from _end(scene, f"{key}.{side}", table, getattr(table, side), wires)
@@ -157,30 +148,25 @@ def _wire(
         )
 
 
-def given_of(table: FreeWireTable, key: str) -> object:
-    """The value of a key of a table."""
-    return getattr(table, key)
-
-
 def _end(
     scene: Scene, key: str, table: FreeWireTable, given: str | None, wires: dict[str, FreeWireTable]
 ) -> Iterator[Fault]:
     if given is None or given in (TENSIONER, FIXED):
         return
     if given == table.name:
-        yield scene.refused(key, given, "a wire cannot be clamped to itself")
+        yield scene.refused(key, "a wire cannot be clamped to itself")
     elif given not in wires:
         near = difflib.get_close_matches(given, [*wires, TENSIONER, FIXED], n=1)
         meant = f"did you mean {near[0]}? " if near else ""
         why = f"{meant}it must be {TENSIONER}, {FIXED} or a wire of {', '.join(wires)}"
-        yield scene.refused(key, given, why)
+        yield scene.refused(key, why)
     elif {table.start, table.end} <= wires.keys() and table.start != table.end:
         if key.endswith("end"):
             why = (
                 f"it starts on {table.start}: both ends must be clamped to one wire, or one be "
                 f"{TENSIONER} or {FIXED}, for it to be known whose tension the wire takes"
             )
-            yield scene.refused(key, given, why)
+            yield scene.refused(key, why)
 
 
 def _numbers(
@@ -194,7 +180,7 @@ def _numbers(
         beyond = [number for number in getattr(link, name, None) or [] if number > n]
         if beyond:
             yield scene.refused(
-                f"{key}.{name}", beyond[0], f"the line has the {what} {first} to {n}"
+                f"{key}.{name}", f"the line has the {what} {first} to {n}", value=beyond[0]
             )
 
 
@@ -237,7 +223,7 @@ def _lifted(scene: Scene) -> Iterator[Fault]:
                 f"no clamp joins it to {link.wire}, which the supports carry, and droppers are cut "
                 f"for its height: it must be one of {', '.join(sorted(moved))}"
             )
-            yield scene.refused(f"line.links.{i}.holds", link.holds, why)
+            yield scene.refused(f"line.links.{i}.holds", why)
 
 
 def _slack(scene: Scene) -> Iterator[Fault]:
@@ -252,7 +238,7 @@ def _slack(scene: Scene) -> Iterator[Fault]:
             first = getattr(links[0][1], name)
             if getattr(link, name) != first:
                 why = f"it must be the {first} of line.links.{links[0][0]}, as for all droppers"
-                yield scene.refused(f"line.links.{i}.{name}", getattr(link, name), why)
+                yield scene.refused(f"line.links.{i}.{name}", why)
 
 
 def _many(scene: Scene) -> Iterator[Fault]:
@@ -274,6 +260,66 @@ def _many(scene: Scene) -> Iterator[Fault]:
                 return
 
 
+# As many span lengths are named in a sentence.
+_SOME = 6
+
+
+def droppers_inside(
+    scene: Scene, table: str, kind: HangingTable, spans: Mapping[int, float]
+) -> Iterator[Fault]:
+    """The first of some spans in which droppers of a table are outside or too close together.
+
+    ``spans`` are lengths [m] by numbers, from 1. Numbers of spans beyond the line are faults too.
+    """
+    numbers = {n: i for i, pattern in enumerate(kind.patterns or ()) for n in pattern.spans or ()}
+    beyond = max(numbers, default=0)
+    if beyond > scene.line.n_spans:
+        key, why = (
+            f"{table}.patterns.{numbers[beyond]}.spans",
+            f"the line has {counted(scene.line.n_spans, 'span')}",
+        )
+        yield scene.refused(key, why, value=beyond)
+        return
+    if kind.positions_m is not None and len(set(spans.values())) > 1:
+        key = f"{table}.positions_m"
+        lengths = ", ".join(f"{span:g}" for span in sorted(set(spans.values()))[:_SOME])
+        yield scene.fault(
+            key,
+            f"holds for one span length, but the spans are "
+            f"{lengths} m long; give {table}.patterns or count and spacing_m",
+        )
+        return
+    for number, (positions, _) in hung_in(scene.origin, table, kind, spans).items():
+        span = spans[number]
+        outside = [x for x in positions if not SHORTEST_GAP <= x <= span - SHORTEST_GAP]
+        close = [pair for pair in zip(positions, positions[1:], strict=False)
+                 if pair[1] - pair[0] < SHORTEST_GAP]  # fmt: skip
+        if not outside and not close:
+            continue
+        if kind.count is not None and not outside:
+            why = f"droppers must be at least {SHORTEST_GAP:g} m apart"
+            yield scene.refused(f"{table}.spacing_m", why)
+            return
+        if kind.count is not None:
+            yield scene.refused(
+                f"{table}.count",
+                f"at a spacing of {kind.spacing_m:g} m these do not fit into a span of {span:g} m",
+            )
+            return
+        which = "positions_m" if kind.positions_m is not None else "patterns"
+        key = f"{table}.{which}"
+        of = f" of span {number}" if number in numbers else ""
+        if outside:
+            what = f"a dropper{of} at {outside[0]:g} m; it must lie inside the span, between 0 and "
+            what += f"{span:g} m"
+        else:
+            left, right = close[0]
+            what = f"droppers{of} at {left:.10g} and {right:.10g} m; they must be at least "
+            what += f"{SHORTEST_GAP:g} m apart"
+        yield scene.fault(key, f"puts {what}")
+        return
+
+
 # A wire may hang on nothing over so many times the longest span.
 MOST_SPANS = 1.5
 
@@ -288,7 +334,7 @@ def check_free_droppers(scene: Scene, line: LineData) -> Iterator[Fault]:
 
 
 def check_free_places(scene: Scene, line: LineData) -> Iterator[Fault]:
-    """Links where a wire is not, places too close, wires that hang on nothing or cross."""
+    """Links where a wire is not, places too close, wires that hang on nothing."""
     assert line.wires is not None and line.links is not None
     wires = {wire.name: wire for wire in line.wires}
     found = [
@@ -304,7 +350,7 @@ def check_free_places(scene: Scene, line: LineData) -> Iterator[Fault]:
     for i, wire in enumerate([] if found else line.wires):
         found += _carried(scene, f"line.wires.{i}", wire, line)
         found += _left(scene, f"line.wires.{i}", wire, line)
-    yield from found or _crossing(scene, line)
+    yield from found
 
 
 def places_of(line: LineData) -> np.ndarray:
@@ -355,7 +401,7 @@ def _on_wires(
             runs = ", ".join(f"{start:g} to {stop:g}" for start, stop in wire.stretches[:3])
             more = " and so on" if len(wire.stretches) > 3 else ""
             why = f"{wire.name} does not pass {out:g} m, only {runs} m{more}"
-            yield scene.refused(f"{key}.{end}", wire.name, why)
+            yield scene.refused(f"{key}.{end}", why)
 
 
 def _clamped_on(
@@ -365,7 +411,7 @@ def _clamped_on(
         out = [] if not name else [s[end] for s in wire.stretches if not wires[name].passes(s[end])]
         if out:
             why = f"{name} does not pass {out[0]:g} m, where this wire would be clamped to it"
-            yield scene.refused(f"{key}.{('start', 'end')[end]}", name, why)
+            yield scene.refused(f"{key}.{('start', 'end')[end]}", why)
 
 
 def _heights(scene: Scene, key: str, wire: FreeWire, line: LineData) -> Iterator[Fault]:
@@ -401,7 +447,7 @@ def _twice(scene: Scene, line: LineData) -> Iterator[Fault]:
             j = seen.setdefault((link.lower, round(x / SHORTEST_GAP)), i)
             if j != i:
                 why = f"line.links.{j} has a dropper of {link.lower} at {x:g} m already"
-                yield scene.refused(f"line.links.{i}.lower", link.lower, why)
+                yield scene.refused(f"line.links.{i}.lower", why)
                 return
 
 
@@ -418,7 +464,7 @@ def _carried(scene: Scene, key: str, wire: FreeWire, line: LineData) -> Iterator
                 f"it hangs on nothing from {a:g} to {b:g} m, and the longest span is {longest:g} "
                 "m: give it droppers, clamps or supports there"
             )
-            yield scene.refused(f"{key}.name", wire.name, why)
+            yield scene.refused(f"{key}.name", why)
             return
 
 
@@ -435,25 +481,5 @@ def _left(scene: Scene, key: str, wire: FreeWire, line: LineData) -> Iterator[Fa
                 f"it must be more than the {taken:g} N that {' and '.join(o.name for o in own)} "
                 f"take of it at {x:g} m"
             )
-            yield scene.refused(f"{key}.tension_N", wire.conductor.tension, why)
-            return
-
-
-def _crossing(scene: Scene, line: LineData) -> Iterator[Fault]:
-    """Droppers whose upper wire is expected to hang below the lower one."""
-    assert line.links is not None
-    made = make_line(line)
-    for i, link in enumerate(line.links):
-        if not isinstance(link, FreeDroppers):
-            continue
-        x = np.array(link.lower_x)
-        upper, lower = (made.wire(name).points(x)[:, 2] for name in (link.upper, link.lower))
-        worst = int(np.argmin(upper - lower))
-        if not upper[worst] > lower[worst]:
-            why = (
-                f"at {x[worst]:g} m it is expected {lower[worst] - upper[worst]:.3f} m below "
-                f"{link.lower}, which hangs from it: raise its height_m or its tension_N, or let "
-                "the other wire hang lower"
-            )
-            yield scene.refused(f"line.links.{i}.upper", link.upper, why)
+            yield scene.refused(f"{key}.tension_N", why)
             return

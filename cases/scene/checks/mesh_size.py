@@ -4,28 +4,24 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from catenary.base.errors import InputError
+from catenary.cases.scene.checks.effects import RELATIVE_MOTION
 from catenary.cases.scene.checks.free import free_counts
-from catenary.cases.scene.checks.twins import RELATIVE_MOTION
 from catenary.cases.scene.cost_model import estimate_memory, estimate_start
 from catenary.cases.scene.input.faults import Fault, SceneError
 from catenary.cases.scene.line.free import FreeDroppersTable
 from catenary.cases.scene.line.line import LineTable, TransitionTable
 from catenary.cases.scene.line.line_data import free_wires, overlaps_of, span_lengths
 from catenary.cases.scene.problem import line_of
-from catenary.meshgen.division import divisions_of
-from catenary.meshgen.geometry import find_cuts
+from catenary.cases.scene.scene import Scene
+from catenary.meshgen.geometry import divisions_of, find_cuts
 from catenary.meshgen.line import Line
 from catenary.meshgen.wires import Wire
 from catenary.solver.effects import all_effects as effects
-
-if TYPE_CHECKING:
-    from catenary.cases.scene.scene import Scene
-
 
 # 20 000 spans of ten gaps with ten elements each; their run takes some 7 GB.
 MOST_NODES = 4_000_000

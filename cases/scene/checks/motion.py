@@ -1,10 +1,9 @@
-"""Whether a scene has what motion along and across the track needs."""
+"""Whether the ends of a line fit it, and a scene has what motion along and across it needs."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,14 +12,12 @@ from catenary.cases.scene.keys.table import TAKE_AWAY
 from catenary.cases.scene.line.free import FreeWireTable
 from catenary.cases.scene.line.line import LineTable
 from catenary.cases.scene.line.line_data import TENSIONER, along_of, arm_tables, wire_tables
+from catenary.cases.scene.run.incidents import DropperBreakTable, TensionLossTable
+from catenary.cases.scene.scene import Scene
 from catenary.meshgen.topologies.all_topologies import make_line
 from catenary.meshgen.topologies.line_data import LineData
 from catenary.meshgen.wires import End, Wire
 from catenary.solver.problem.along_track import AlongTrack
-
-if TYPE_CHECKING:
-    from catenary.cases.scene.scene import Scene
-
 
 _ACROSS = "lateral_motion"
 
@@ -30,19 +27,17 @@ def check_lateral(scene: Scene) -> Iterator[Fault]:
     line = scene.line
     if scene.switches()[_ACROSS]:
         return
-    given: dict[str, object] = {
-        **{
-            f"{key}.{name}": getattr(arm, name)
-            for key, arm in arm_tables(line).items()
-            for name in ("inclination_deg", "registration_stiffness_N_per_m")
-        },
+    given = {
         "line.messenger_stagger_m": line.messenger_stagger_m,
-        "line.curve.radius_m": line.curve and line.curve.radius_m,
+        "line.curve.radius_m": line.curve,
         "line.damping.lateral": line.damping.lateral,
     }
+    for key, arm in arm_tables(line).items():
+        for name in ("inclination_deg", "registration_stiffness_N_per_m"):
+            given[f"{key}.{name}"] = getattr(arm, name)
     for key, value in given.items():
         if value is not None and _ACROSS not in scene.effects:
-            yield scene.needs_effect(key, value, _ACROSS)
+            yield scene.needs_effect(key, _ACROSS)
 
 
 _ALONG = "axial_motion"
@@ -59,8 +54,8 @@ def check_along(scene: Scene, line: LineData) -> Iterator[Fault]:
     """Data that motion along the track lacks, and data that only it has a use for."""
     on = scene.switches()[_ALONG]
     if not on and _ALONG not in scene.effects:
-        for key, value in _data_of_effect(scene).items():
-            yield scene.needs_effect(key, value, _ALONG)
+        for key in _data_of_effect(scene):
+            yield scene.needs_effect(key, _ALONG)
     yield from _mid_points(scene, line)
     yield from _weights(scene, line)
     if not scene.origin.recorded:
@@ -73,26 +68,21 @@ def check_along(scene: Scene, line: LineData) -> Iterator[Fault]:
         yield from _elsewhere(scene)
 
 
-def _data_of_effect(scene: Scene) -> dict[str, object]:
-    """Keys and values of a line that nothing but motion along the track reads."""
-    table = scene.line
-    found: dict[str, object] = {}
-    overlap = table.overlap
-    if overlap and "along" in overlap.model_fields_set and not scene.origin.recorded:
-        found["line.overlap.along"] = overlap.along
-    for side, end in (("start", table.ends.start), ("end", table.ends.end)):
-        if end.along == TENSIONER:
-            found[f"line.ends.{side}.along"] = end.along
-    if table.temperature.difference_K:
-        found["line.temperature.difference_K"] = table.temperature.difference_K
-    if table.mid_points_m:
-        found["line.mid_points_m"] = table.mid_points_m
-    if not scene.origin.recorded:
-        found |= dict.fromkeys(_ends_of_free_wires(table), TENSIONER)
+def _data_of_effect(scene: Scene) -> list[str]:
+    """Keys of a line that nothing but motion along the track reads."""
+    table, recorded = scene.line, scene.origin.recorded
+    found, overlap = [], table.overlap
+    if overlap and "along" in overlap.model_fields_set and not recorded:
+        found.append("line.overlap.along")
+    ends = (("start", table.ends.start), ("end", table.ends.end))
+    found += [f"line.ends.{side}.along" for side, end in ends if end.along == TENSIONER]
+    found += ["line.temperature.difference_K"] if table.temperature.difference_K else []
+    found += ["line.mid_points_m"] if table.mid_points_m else []
+    if not recorded:
+        found += _ends_of_free_wires(table)
         # Without any tensioner it is idle in any case, see below.
         if not found and overlap and overlap.along == TENSIONER:
-            for name in sorted(table.tensioner.model_fields_set):
-                found[f"line.tensioner.{name}"] = getattr(table.tensioner, name)
+            found += [f"line.tensioner.{name}" for name in sorted(table.tensioner.model_fields_set)]
     return found
 
 
@@ -120,9 +110,8 @@ def _idle_tensioners(scene: Scene) -> Iterator[Fault]:
             + (", or start or end of a wire of line.wires" if table.wires else ""),
         )
     elif "stop_stiffness_N_per_m" in said and table.tensioner.travel_m is None:
-        key, value = "line.tensioner.stop_stiffness_N_per_m", table.tensioner.stop_stiffness_N_per_m
         why = "it acts only with line.tensioner.travel_m, where the stop stands"
-        yield scene.refused(key, value, why)
+        yield scene.refused("line.tensioner.stop_stiffness_N_per_m", why)
 
 
 def _wires(scene: Scene) -> Iterator[Fault]:
@@ -145,7 +134,6 @@ def _arms(scene: Scene, line: LineData) -> Iterator[Fault]:
         if arms.kind.length == 0 and made.wire(arms.wire).radial_force(np.array(arms.x)).any():
             yield scene.refused(
                 f"{keys.get(arms.name, _ARM)}.length_m",
-                0.0,
                 f"effects.{_ALONG} is on, and an arm that carries the radial force of its wire's "
                 "stagger swings about its hinge: it must be greater than 0",
             )
@@ -165,7 +153,6 @@ def _held(scene: Scene, line: LineData) -> Iterator[Fault]:
         if all(both) and not any(start < x < end for x in along.mid_points):
             yield scene.refused(
                 key,
-                TENSIONER,
                 f"the wires from {start:g} to {end:g} m would have tensioners at both ends and "
                 "nothing to hold them in between: name a mast there in line.mid_points_m, or hold "
                 "one end (fixed)",
@@ -189,7 +176,7 @@ def _held_free(scene: Scene, line: LineData) -> Iterator[Fault]:
                     "hold one end (fixed)"
                 )
                 key = f"line.wires.{i}.{'start' if wire.tensioned[0] else 'end'}"
-                yield scene.refused(key, TENSIONER, why)
+                yield scene.refused(key, why)
                 break
 
 
@@ -199,7 +186,7 @@ def _mid_points(scene: Scene, line: LineData) -> Iterator[Fault]:
         if masts.size == 0 or np.abs(masts - x).min() > _AT_MAST:
             near = f", such as {masts[np.abs(masts - x).argmin()]:g} m" if masts.size else ""
             why = f"a mid-point anchor stands at a mast between two spans{near}"
-            yield scene.refused(f"line.mid_points_m.{i}", x, why)
+            yield scene.refused(f"line.mid_points_m.{i}", why)
 
 
 def _weights(scene: Scene, line: LineData) -> Iterator[Fault]:
@@ -210,14 +197,14 @@ def _weights(scene: Scene, line: LineData) -> Iterator[Fault]:
         return
     wires = {wire.name: wire for wire in make_line(line).wires}
     tensioned = [name for name, wire in wires.items() if _has_tensioner(wire, along, line)]
-    for name, mass in tensioner.weights.items():
+    for name in tensioner.weights:
         key = f"line.tensioner.weights_kg.{name}"
         if name not in wires:
-            yield scene.refused(key, mass, f"the line has {', '.join(wires)}")
+            yield scene.refused(key, f"the line has {', '.join(wires)}")
             continue
         if tensioned and name not in tensioned and not scene.origin.recorded:
             why = f"no end of this wire has a tensioner, only those of {', '.join(tensioned)}"
-            yield scene.refused(key, mass, why + TAKE_AWAY)
+            yield scene.refused(key, why + TAKE_AWAY)
             continue
         tension = wires[name].tension
         low, high = tensioner.band(name, wires[name], _GRAVITY)
@@ -226,7 +213,6 @@ def _weights(scene: Scene, line: LineData) -> Iterator[Fault]:
             holds = f"{low:g} N" if low == high else f"{low:g} to {high:g} N"
             yield scene.refused(
                 key,
-                mass,
                 f"it would hold {holds} by line.tensioner.ratio and efficiency, but "
                 f"the wire has {tension:g} N, which {fits:.6g} kg hold",
             )
@@ -248,14 +234,98 @@ def _elsewhere(scene: Scene) -> Iterator[Fault]:
         if end.kind == "periodic":
             yield scene.refused(
                 f"line.ends.{side}.kind",
-                "periodic",
                 f"with effects.{_ALONG} a line ends fixed or in an absorbing_layer: waves along "
                 "the track would go on beyond the end for ever",
             )
     if scene.window.mode == "bounded" and scene.window.tolerance is None:
         yield scene.refused(
             "window.mode",
-            "bounded",
             f"with effects.{_ALONG} waves along the track run far ahead of a window of some "
             "spans; take exact, or off",
         )
+
+
+# Lengths of spans that differ by less are one [m].
+_TINY = 1e-6
+# The last span and the one that is repeated.
+_LAST = 2
+
+
+def check_ends(scene: Scene, line: LineData) -> Iterator[Fault]:
+    """Ends that cannot be."""
+    yield from _layers(scene, line)
+    for side, end in (("start", scene.line.ends.start), ("end", scene.line.ends.end)):
+        if end.kind == "periodic":
+            yield from _goes_on(scene, line, side)
+
+
+def _goes_on(scene: Scene, line: LineData, side: str) -> Iterator[Fault]:
+    """Lines that cannot go on beyond an end as they are there."""
+    key = f"line.ends.{side}.kind"
+
+    def refused(why: str) -> Fault:
+        return scene.refused(key, why)
+
+    numerics, n = scene.numerics, line.n_spans
+    if numerics.scheme == "ts_alpha2":
+        yield refused("it acts with numerics.scheme one_solve or fixed_point, not with ts_alpha2")
+    if numerics.adaptive_tolerance_N is not None:
+        yield refused(
+            "it remembers steps of one size, so that numerics.adaptive_tolerance_N must not be "
+            "given"
+        )
+    n_rising = line.n_transition[0 if side == "start" else 1]
+    if n_rising:
+        yield refused(
+            "the line goes on with spans at running height, so that "
+            f"line.transition.n_spans_{side} must be 0, not {n_rising}"
+        )
+        return
+    if n <= _LAST:
+        yield refused(f"it needs {_LAST + 1} spans (line.n_spans) at least, not {n}")
+        return
+    lengths = line.span_lengths[:_LAST] if side == "start" else line.span_lengths[-_LAST:]
+    if abs(lengths[0] - lengths[1]) > _TINY:
+        yield refused(
+            f"the two spans there must have one length (line.span_m), not {lengths[0]:g} and "
+            f"{lengths[1]:g} m"
+        )
+    switches = scene.switches()
+    for i, table in enumerate(scene.incidents):
+        if not switches.get(table.type, True):
+            continue
+        if isinstance(table, TensionLossTable):
+            yield refused(f"a line beyond does not lose tension, which incidents.{i} lets wires do")
+        elif isinstance(table, DropperBreakTable):
+            near = table.span <= _LAST if side == "start" else table.span > n - _LAST
+            if near:
+                yield refused(
+                    f"the line goes on with what the two spans there are, of which incidents.{i} "
+                    f"breaks a dropper (span {table.span})"
+                )
+
+
+def _layers(scene: Scene, line: LineData) -> Iterator[Fault]:
+    """Layers that are longer than the line, or reach into what is judged."""
+    masts, n = line.support_positions, line.n_spans
+    stretch = scene.evaluation
+    for side, end in (("start", scene.line.ends.start), ("end", scene.line.ends.end)):
+        if end.spans is None:
+            continue
+        key = f"line.ends.{side}.spans"
+        if end.spans >= n:
+            yield scene.refused(key, f"the line has {n} spans (line.n_spans) with it")
+            continue
+        inner = float(masts[end.spans] if side == "start" else masts[n - end.spans])
+        reaches = stretch.from_m < inner if side == "start" else stretch.to_m > inner
+        if reaches:
+            given = (
+                f"evaluation.from_m = {stretch.from_m:g}"
+                if side == "start"
+                else f"evaluation.to_m = {stretch.to_m:g}"
+            )
+            yield scene.refused(
+                key,
+                f"the absorbing layer reaches to {inner:g} m, into the evaluated stretch "
+                f"({given}); give the line more spans (line.n_spans) or the layer fewer",
+            )

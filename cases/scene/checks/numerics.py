@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 from catenary.cases.scene.input.faults import Fault
 from catenary.cases.scene.keys.table import TAKE_AWAY
 from catenary.cases.scene.problem import problem_of
 from catenary.cases.scene.run.contact import HERTZ, WITH_RESTITUTION
+from catenary.cases.scene.scene import Scene
 from catenary.cases.scene.train.pantograph import LumpedTable
 from catenary.solver.problem.integrator_parameters import NEWMARK
 from catenary.solver.window.where_possible import why_no_window
-
-if TYPE_CHECKING:
-    from catenary.cases.scene.scene import Scene
 
 
 def check_contact(scene: Scene) -> Iterator[Fault]:
@@ -39,23 +36,21 @@ def _damping(scene: Scene) -> Iterator[Fault]:
         if on:
             yield scene.refused(
                 "effects.contact_damping",
-                True,
                 f"contact.law {law} has no damping; leave it out or take another law",
             )
         return
     key = f"contact.{key}"
     if on and not acts:
         why = f"effects.contact_damping is on and needs a value {dissipates}"
-        yield scene.refused(key, value, why)
+        yield scene.refused(key, why)
     if acts and not on and not said:
-        yield scene.needs_effect(key, value, "contact_damping")
+        yield scene.needs_effect(key, "contact_damping")
 
 
 def _loss(scene: Scene) -> Iterator[Fault]:
     if scene.contact.law in HERTZ and not scene.switches()["contact_loss"]:
         yield scene.refused(
             "effects.contact_loss",
-            False,
             f"contact.law {scene.contact.law} has no force that pulls; take law linear",
         )
 
@@ -76,32 +71,27 @@ def _kinematic(scene: Scene) -> Iterator[Fault]:
         if value != needed:
             yield scene.refused(
                 f"numerics.{key}",
-                value,
                 f"contact.law kinematic has no force before the motion is known: take {needed}",
             )
     if numerics.adaptive_tolerance_N is not None:
         yield scene.refused(
             "numerics.adaptive_tolerance_N",
-            numerics.adaptive_tolerance_N,
             "contact.law kinematic has no stiffness to estimate an error with: take another law",
         )
     if scene.train.start_below_m:
         yield scene.refused(
             "train.start_below_m",
-            scene.train.start_below_m,
             "contact.law kinematic has no gap that a head could rise through: take another law",
         )
     if numerics.integrator != NEWMARK:
         yield scene.refused(
             "numerics.integrator",
-            numerics.integrator,
             "contact.law kinematic keeps line and pantographs together only if one method steps "
             f"both: take newmark, with numerics.newmark_gamma of at least {KINEMATIC_GAMMA:g}",
         )
     if numerics.newmark_gamma < KINEMATIC_GAMMA:
         yield scene.refused(
             "numerics.newmark_gamma",
-            numerics.newmark_gamma,
             f"contact.law kinematic needs at least {KINEMATIC_GAMMA:g}, with "
             "numerics.newmark_beta at least 0.28: without numerical damping its force alternates",
         )
@@ -116,7 +106,7 @@ def check_scheme(scene: Scene) -> Iterator[Fault]:
         return
     knows = "numerics.scheme ts_alpha2 knows only"
     if scene.contact.law != "linear":
-        yield scene.refused("contact.law", scene.contact.law, f"{knows} law linear")
+        yield scene.refused("contact.law", f"{knows} law linear")
     for key in ("twin", "overlap"):
         if getattr(scene.line, key) is not None:
             why = f"{knows} one contact wire: take one_solve or fixed_point"
@@ -125,10 +115,10 @@ def check_scheme(scene: Scene) -> Iterator[Fault]:
     for i, incident in enumerate(scene.incidents):
         if switches[incident.type]:
             why = f"{knows} lines and pantographs that stay what they are"
-            yield scene.refused(f"incidents.{i}.type", incident.type, why)
+            yield scene.refused(f"incidents.{i}.type", why)
     for i, defect in enumerate(scene.defects):
         if defect.type == "kink" and switches["kink"]:
-            yield scene.refused(f"defects.{i}.type", defect.type, f"{knows} smooth wires")
+            yield scene.refused(f"defects.{i}.type", f"{knows} smooth wires")
     if scene.irregularities.running_surface is not None and switches["running_surface"]:
         key = "irregularities.running_surface"
         why = f"{knows} smooth wires: write effects.running_surface = false"
@@ -137,14 +127,13 @@ def check_scheme(scene: Scene) -> Iterator[Fault]:
         if switches[name]:
             yield scene.refused(
                 f"effects.{name}",
-                True,
                 f"{knows} heads and bases that move along a vertical: switch it off",
             )
     for name in {place.name: None for place in scene.train.pantographs}:
         table = scene.pantographs[name]
         if not isinstance(table, LumpedTable):
             key = f"pantographs.{name}.type"
-            yield scene.refused(key, table.type, f"{knows} type lumped")
+            yield scene.refused(key, f"{knows} type lumped")
             continue
         switches_of = {"laws": "pantograph_laws", "regulation": "regulated_lift"}
         for part, effect in switches_of.items():
@@ -154,11 +143,10 @@ def check_scheme(scene: Scene) -> Iterator[Fault]:
                 yield scene.fault(key, f"is not linear; {why}")
         key = f"pantographs.{name}.strips"
         if table.strips.number != 1:
-            yield scene.refused(f"{key}.number", table.strips.number, f"{knows} one strip")
+            yield scene.refused(f"{key}.number", f"{knows} one strip")
         if table.strips.stiffness_N_per_m is not None:
-            value = table.strips.stiffness_N_per_m
             yield scene.refused(
-                f"{key}.stiffness_N_per_m", value, f"{knows} strips that are fixed to the head"
+                f"{key}.stiffness_N_per_m", f"{knows} strips that are fixed to the head"
             )
 
 
@@ -188,7 +176,7 @@ def check_iterations(scene: Scene) -> Iterator[Fault]:
         if name in numerics.model_fields_set and not any(made[reader] for reader in readers):
             needed = " or ".join(f"numerics.{reader}" for reader in readers)
             why = f"nothing reads it with scheme {scheme}; take {needed}, or leave the key out"
-            yield scene.refused(f"numerics.{name}", getattr(numerics, name), why + TAKE_AWAY)
+            yield scene.refused(f"numerics.{name}", why + TAKE_AWAY)
 
 
 def check_window(scene: Scene) -> Iterator[Fault]:
@@ -197,4 +185,4 @@ def check_window(scene: Scene) -> Iterator[Fault]:
         return
     why = why_no_window(problem_of(scene))
     if why:
-        yield scene.refused("window.mode", scene.window.mode, f"it must be off, as {why}")
+        yield scene.refused("window.mode", f"it must be off, as {why}")

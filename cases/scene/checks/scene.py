@@ -7,7 +7,6 @@ left out; all others go on.
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -21,31 +20,38 @@ from catenary.cases.scene.checks.air import (
     check_wind,
     has_front,
 )
-from catenary.cases.scene.checks.defects import check_defects
-from catenary.cases.scene.checks.droppers import check_dropper_lengths, check_droppers_inside_spans
+from catenary.cases.scene.checks.defects import check_defects, check_incidents
 from catenary.cases.scene.checks.effects import (
     check_chosen_act,
     check_effect_data,
     check_effect_names,
+    check_idle,
     check_requirements_of_chosen,
     check_requirements_of_defaults,
+    check_twins,
 )
-from catenary.cases.scene.checks.ends import check_ends
 from catenary.cases.scene.checks.free import check_free_droppers
-from catenary.cases.scene.checks.idle import check_idle
-from catenary.cases.scene.checks.incidents import check_incidents
+from catenary.cases.scene.checks.line import (
+    check_dropper_lengths,
+    check_droppers_inside_spans,
+    check_names,
+    check_parts,
+    check_topology,
+)
 from catenary.cases.scene.checks.mesh_size import size_faults
-from catenary.cases.scene.checks.motion import check_along, check_lateral
+from catenary.cases.scene.checks.motion import check_along, check_ends, check_lateral
 from catenary.cases.scene.checks.numerics import (
     check_contact,
     check_iterations,
     check_scheme,
     check_window,
 )
-from catenary.cases.scene.checks.pantographs import check_laws, check_mechanisms, check_pantographs
-from catenary.cases.scene.checks.topology import check_names, check_parts, check_topology
-from catenary.cases.scene.checks.twins import check_twins
-from catenary.cases.scene.checks.vehicle import check_vehicle
+from catenary.cases.scene.checks.train import (
+    check_laws,
+    check_mechanisms,
+    check_pantographs,
+    check_vehicle,
+)
 from catenary.cases.scene.input.faults import Fault, Origin, SceneError, UnfitScene
 from catenary.cases.scene.keys.error_sentences import unknown_key
 from catenary.cases.scene.keys.keys import is_known, known_keys
@@ -169,17 +175,10 @@ def _test_keys(scene: Scene) -> Iterator[Fault]:
 def _pantograph_names(scene: Scene) -> Iterator[Fault]:
     for i, place in enumerate(scene.train.pantographs):
         if place.name not in scene.pantographs:
-            near = difflib.get_close_matches(place.name, scene.pantographs, n=1)
-            hint = (
-                f"did you mean {near[0]}?"
-                if near
-                else f"it must be one of {', '.join(scene.pantographs)}"
-            )
-            yield scene.refused(f"train.pantographs.{i}.name", place.name, hint)
+            yield from scene.among(f"train.pantographs.{i}.name", scene.pantographs)
         elif place.reversed and not has_front(scene.pantographs[place.name]):
             yield scene.refused(
                 f"train.pantographs.{i}.reversed",
-                True,
                 f"{place.name} is a chain of lumped masses, with no front but what "
                 f"pantographs.{place.name}.aerodynamics.reversed gives it",
             )
@@ -189,7 +188,7 @@ def _separations(scene: Scene) -> Iterator[Fault]:
     behind = [place.behind_m for place in scene.train.pantographs]
     if behind[0] != 0:
         key = "train.pantographs.0.behind_m"
-        yield scene.refused(key, behind[0], "the first pantograph leads, so it must be 0")
+        yield scene.refused(key, "the first pantograph leads, so it must be 0")
     ahead = strips_ahead(scene)
     for i in range(1, len(behind)):
         strips = ahead[i - 1] + ahead[i]
@@ -197,7 +196,6 @@ def _separations(scene: Scene) -> Iterator[Fault]:
             because = f", because its strips and that one's take {strips:g} m" if strips else ""
             yield scene.refused(
                 f"train.pantographs.{i}.behind_m",
-                behind[i],
                 f"it must be at least {MIN_SEPARATION + strips:g} m more than the "
                 f"{behind[i - 1]:g} m of the pantograph before it{because}",
             )
@@ -216,7 +214,6 @@ def _speed(scene: Scene, line: LineData) -> Iterator[Fault]:
         of = f"bending_stiffness_N_m2 = {wire.bending_stiffness:g}, {of} between its supports"
     yield scene.refused(
         "train.speed_km_h",
-        speed,
         f"it must be below the wave speed of the contact wire ({3.6 * wave:.1f} km/h, which "
         f"{of} give it) unless effects.supercritical_speed = true",
     )
@@ -232,27 +229,22 @@ def _running(scene: Scene, line: LineData) -> Iterator[Fault]:
     if any(ahead):
         inside += ", strips included"
     if not first - _TINY <= start <= last + _TINY:
-        yield scene.refused("train.start_m", start, f"it must lie inside the line: {inside}")
+        yield scene.refused("train.start_m", f"it must lie inside the line: {inside}")
     if start - rear < first - _TINY:
         yield scene.refused(
             "train.start_m",
-            start,
             f"the pantograph {rear:g} m behind would start at {start - rear:g} m, outside the "
             f"line: {inside}",
         )
     given = scene.train.end_m
     if given is not None and given > last + _TINY:
-        yield scene.refused("train.end_m", given, f"it must lie inside the line: {inside}")
+        yield scene.refused("train.end_m", f"it must lie inside the line: {inside}")
     if end <= start:
         if given is None:
-            yield scene.refused("train.start_m", start, f"it must lie before the end at {end:g} m")
-        yield scene.refused(
-            "train.end_m", given, f"it must be greater than train.start_m ({start:g} m)"
-        )
+            yield scene.refused("train.start_m", f"it must lie before the end at {end:g} m")
+        yield scene.refused("train.end_m", f"it must be greater than train.start_m ({start:g} m)")
     if end - start < scene.train.speed_km_h / 3.6 * scene.numerics.dt_s:
-        yield scene.refused(
-            "numerics.dt_s", scene.numerics.dt_s, "the run would have no step at all"
-        )
+        yield scene.refused("numerics.dt_s", "the run would have no step at all")
 
 
 def _evaluation(scene: Scene) -> Iterator[Fault]:
@@ -262,9 +254,9 @@ def _evaluation(scene: Scene) -> Iterator[Fault]:
         who = "the pantograph" if len(scene.train.pantographs) == 1 else f"pantograph {i + 1}"
         covers = f"{who} only runs from {start - place.behind_m:g} to {end - place.behind_m:g} m"
         if stretch.from_m < start - place.behind_m - _TINY:
-            yield scene.refused("evaluation.from_m", stretch.from_m, covers)
+            yield scene.refused("evaluation.from_m", covers)
         if stretch.to_m > end - place.behind_m + _TINY:
-            yield scene.refused("evaluation.to_m", stretch.to_m, covers)
+            yield scene.refused("evaluation.to_m", covers)
 
 
 def _raising(scene: Scene) -> Iterator[Fault]:
@@ -272,7 +264,6 @@ def _raising(scene: Scene) -> Iterator[Fault]:
     if scene.train.raise_time_s > run + _TINY:
         yield scene.refused(
             "train.raise_time_s",
-            scene.train.raise_time_s,
             f"the leading pantograph reaches evaluation.from_m after {run:.3g} s and must be "
             "raised by then",
         )
@@ -285,17 +276,17 @@ def _standard(scene: Scene) -> Iterator[Fault]:
         ("evaluation.system", judged.system, SYSTEMS),
     ):
         if value is not None and value not in known:
-            yield scene.refused(key, value, f"it must be one of {', '.join(known)}")
+            yield scene.refused(key, f"it must be one of {', '.join(known)}")
             return
     if judged.edition is not None and judged.rules is not None:
         why = f'it is short for evaluation.rules = ["{DEFAULT}:{judged.edition}"]: take one away'
-        yield scene.refused("evaluation.edition", judged.edition, why)
+        yield scene.refused("evaluation.edition", why)
         return
     for place, name in enumerate(judged.chosen):
         try:
             book_named(name)
         except InputError as unknown:
-            yield scene.refused(f"evaluation.rules.{place}", name, str(unknown))
+            yield scene.refused(f"evaluation.rules.{place}", str(unknown))
             return
     if judged.own_rules is not None:
         try:
@@ -306,18 +297,18 @@ def _standard(scene: Scene) -> Iterator[Fault]:
             yield Fault("evaluation.own_rules", str(wrong))
             return
     elif not judged.chosen:
-        yield scene.refused("evaluation.rules", [], "without books a rules_file must be given")
+        yield scene.refused("evaluation.rules", "without books a rules_file must be given")
         return
     try:
         books = chosen_books(judged)
     except InputError as twice:
         yield scene.fault("evaluation.rules", f"has a book twice: {twice}")
         return
-    for name, number in judged.own_limits.items():
+    for name in judged.own_limits:
         if name not in _limits_read(books):
             readers = [book.key for book in shipped().values() if name in _limits_read([book])]
             why = f"no chosen rule book reads it; those that do are {', '.join(readers)}"
-            yield scene.refused(f"evaluation.limits.{name}", number, why)
+            yield scene.refused(f"evaluation.limits.{name}", why)
 
 
 def _limits_read(books: Iterable[RuleBook]) -> set[str]:
@@ -335,7 +326,7 @@ def _mesh_file(scene: Scene) -> Iterator[Fault]:
     except (OSError, ValueError):
         found = False
     if not found:
-        yield scene.refused("mesh.file", str(path), "there is no such file")
+        yield scene.refused("mesh.file", "there is no such file")
 
 
 def check_output(scene: Scene) -> Iterator[Fault]:
@@ -345,7 +336,7 @@ def check_output(scene: Scene) -> Iterator[Fault]:
         spans = getattr(output, key)
         if spans is not None and spans[1] > n:
             why = f"the line has the spans 1 to {n}"
-            yield scene.refused(f"output.{key}", spans, why)
+            yield scene.refused(f"output.{key}", why)
 
 
 def check_recorded_parts(scene: Scene, line: LineData) -> Iterator[Fault]:
@@ -356,7 +347,7 @@ def check_recorded_parts(scene: Scene, line: LineData) -> Iterator[Fault]:
     for part in scene.output.field_parts:
         if part not in parts:
             why = f"this line has {', '.join(parts)}"
-            yield scene.refused("output.field_parts", part, why)
+            yield scene.refused("output.field_parts", why, value=part)
 
 
 _MEANT = ", or case.accept_unusual = true if it is meant"

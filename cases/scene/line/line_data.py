@@ -28,8 +28,16 @@ from catenary.cases.scene.line.wires import (
     stitch_wire_of,
 )
 from catenary.meshgen.hardware import Clamps, SteadyArms, Supports
-from catenary.meshgen.topologies.free_data import Course, FreeDroppers, FreeLink, FreeWire
-from catenary.meshgen.topologies.line_data import AuxiliaryWire, LineData, Overlaps, Twin
+from catenary.meshgen.topologies.line_data import (
+    AuxiliaryWire,
+    Course,
+    FreeDroppers,
+    FreeLink,
+    FreeWire,
+    LineData,
+    Overlaps,
+    Twin,
+)
 from catenary.meshgen.wires import Conductor, Role
 from catenary.solver.problem.along_track import AlongTrack, Tensioner
 

@@ -11,7 +11,7 @@ from pydantic import Field, model_validator
 
 from catenary.cases.scene.keys.table import Table
 from catenary.mbs.air import Tunnel
-from catenary.meshgen.curve import Curve
+from catenary.meshgen.track import Curve
 
 
 class CurveTable(Table):

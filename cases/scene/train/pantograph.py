@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import (
@@ -23,10 +23,6 @@ from catenary.cases.scene.train.head import RollTable, SomeMass, StripsTable
 from catenary.cases.scene.train.laws import LawTable, RegulationTable
 from catenary.cases.scene.train.mechanism import BodyTable, ForceTable, JointTable, Name
 from catenary.mbs.library import READY
-
-if TYPE_CHECKING:
-    pass
-
 
 Mass = Annotated[float, Field(gt=0, le=1000), SomeMass]
 Stiffness = Annotated[float, Field(ge=0, le=1e8)]

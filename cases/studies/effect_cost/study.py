@@ -16,7 +16,7 @@ from mpi4py import MPI
 from catenary.base.errors import InputError, RunBroken
 from catenary.cases.process.interrupts import Phase
 from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.checks.twins import RELATIVE_MOTION, needs_relative_motion
+from catenary.cases.scene.checks.effects import RELATIVE_MOTION, needs_relative_motion
 from catenary.cases.scene.input.toml_input import Assigned
 from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.problem import end_of, problem_of

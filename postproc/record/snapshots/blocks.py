@@ -11,9 +11,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from catenary.meshgen.curve import Curve
 from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import DROPPERS, LineMesh
+from catenary.meshgen.track import Curve
 from catenary.solver.model.rest_shape import LateralShape
 
 CLAMPS, ARMS, MASTS = "clamps", "steady_arms", "masts"

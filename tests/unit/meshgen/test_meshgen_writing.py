@@ -116,8 +116,12 @@ def test_messenger_wire_sags_by_the_weight_of_both_wires(
     x, y, z = mesh.points[mesh.wires[MESSENGER_WIRE]].T
     assert not y.any()
     np.testing.assert_allclose(np.interp(line.support_positions, x, z), 5.3 + 1.4, atol=1e-12)
-    # q L^2 / 8F at the dropper in the middle of the first span
-    assert np.interp(25.0, x, z) == pytest.approx(6.7 - (1.35 + 1.07) * 9.81 * 50.0**2 / (8 * 16e3))
+    # Moment over tension in the middle of the first span, as of a beam on two supports: q L^2 / 8
+    # of the own weight, P a / 2 of what hangs at a from the nearer support. The droppers at 10, 25
+    # and 40 m share the contact wire with their neighbours, the first one with the anchor.
+    loads = 1.35 * np.array([12.5, 15.0, 15.0])
+    moment = 9.81 * (1.07 * 50.0**2 / 8 + 0.5 * loads @ [10.0, 25.0, 10.0])
+    assert np.interp(25.0, x, z) == pytest.approx(6.7 - moment / 16e3, abs=1e-9)
 
 
 def test_nodes_are_numbered_along_the_track(make_line: Callable[..., LineData]) -> None:

@@ -1,10 +1,40 @@
-"""A curve of the track: curvature and cant along the line."""
+"""Masts of a line, between which of them trains run, and a curve of the track beneath."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
+
+
+@dataclass(frozen=True)
+class Spans:
+    """Spans from anchor to anchor.
+
+    Attributes
+    ----------
+    span_lengths : (n_spans,) [m]
+    n_transition : spans at the start and at the end in which contact wires rise to the tensioner
+    """
+
+    span_lengths: tuple[float, ...]
+    n_transition: tuple[int, int]
+
+    @property
+    def n_spans(self) -> int:
+        return len(self.span_lengths)
+
+    @property
+    def support_positions(self) -> np.ndarray:
+        """Positions of all masts, both anchors included, shape (n_spans + 1,) [m]."""
+        return np.concatenate([[0.0], np.cumsum(self.span_lengths)])
+
+    @property
+    def running_range(self) -> tuple[float, float]:
+        """Where a pantograph may run: from the end of the first transition to the start of the
+        last one [m]."""
+        masts = self.support_positions
+        return float(masts[self.n_transition[0]]), float(masts[self.n_spans - self.n_transition[1]])
 
 
 @dataclass(frozen=True)

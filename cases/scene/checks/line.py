@@ -1,22 +1,21 @@
-"""Whether a scene gives the tables that its line's topology is made of, and no others."""
+"""Whether a scene gives its topology's tables, and droppers fit into spans and between wires."""
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
-from catenary.cases.scene.checks.free import check_free_places, check_free_tables
+import numpy as np
+
+from catenary.cases.scene.checks.free import check_free_places, check_free_tables, droppers_inside
 from catenary.cases.scene.input.faults import Fault
 from catenary.cases.scene.line.line import LineTable
+from catenary.cases.scene.line.line_data import numbered
 from catenary.cases.scene.run.incidents import TensionLossTable
+from catenary.cases.scene.scene import Scene
+from catenary.meshgen.geometry import find_cuts
 from catenary.meshgen.topologies.all_topologies import make_line, registered
 from catenary.meshgen.topologies.free import FREE
-from catenary.meshgen.topologies.line_data import SHORTEST_GAP, LineData
-
-if TYPE_CHECKING:
-    from catenary.cases.scene.scene import Scene
-
+from catenary.meshgen.topologies.line_data import SHORTEST_GAP, FreeDroppers, LineData
 
 # Keys of ``line`` that come with a part of a topology.
 _WITH = {"messenger_wire": ("encumbrance_m",)}
@@ -26,9 +25,7 @@ def check_topology(scene: Scene) -> Iterator[Fault]:
     """An unknown topology, tables that it lacks, and tables that it has no use for."""
     table, known = scene.line, registered()
     if table.topology not in known:
-        near = difflib.get_close_matches(table.topology, known, n=1)
-        hint = f"did you mean {near[0]}?" if near else f"it must be one of {', '.join(known)}"
-        yield scene.refused("line.topology", table.topology, hint)
+        yield from scene.among("line.topology", known)
         return
     needed = _keys(known[table.topology].parts)
     for name in needed:
@@ -71,24 +68,16 @@ def check_names(scene: Scene, line: LineData) -> Iterator[Fault]:
     """Names of parts of the line in other tables: damping by component, wires of incidents."""
     made = make_line(line)
     for name in scene.line.damping.per_component:
-        yield from _known(scene, f"line.damping.per_component.{name}", name, made.components)
+        key = f"line.damping.per_component.{name}"
+        yield from scene.among(key, made.components, "the line has", name=name)
     wires = tuple(wire.name for wire in made.wires)
     for i, table in enumerate(scene.incidents):
         if isinstance(table, TensionLossTable):
-            yield from _known(scene, f"incidents.{i}.wire", table.wire, wires)
+            yield from scene.among(f"incidents.{i}.wire", wires, "the line has")
     for where, entries in (("defects", scene.defects), ("line.fittings", scene.line.fittings)):
         for i, entry in enumerate(entries):
-            wire = getattr(entry, "wire", None)
-            if wire is not None:
-                yield from _known(scene, f"{where}.{i}.wire", wire, wires)
-
-
-def _known(scene: Scene, key: str, name: str, known: tuple[str, ...]) -> Iterator[Fault]:
-    if name not in known:
-        near = difflib.get_close_matches(name, known, n=1)
-        meant = f"did you mean {near[0]}? " if near else ""
-        why = f"{meant}the line has {', '.join(known)}"
-        yield scene.refused(key, name, why)
+            if hasattr(entry, "wire"):
+                yield from scene.among(f"{where}.{i}.wire", wires, "the line has")
 
 
 def _stitch_wire(scene: Scene, line: LineData) -> Iterator[Fault]:
@@ -98,20 +87,25 @@ def _stitch_wire(scene: Scene, line: LineData) -> Iterator[Fault]:
     key, tension = "line.stitch_wire.length_m", stitch.conductor.tension
     if line.n_spans < 2:
         why = "a stitched line needs a support, that is two spans"
-        yield scene.refused("line.n_spans", line.n_spans, why)
+        yield scene.refused("line.n_spans", why)
         return
     yield from _length(scene, line, key, stitch.length)
     clamps = line.around_supports(stitch.length).ravel()
-    apart = abs(line.dropper_x[:, None] - clamps)
+    apart = _to_nearest(clamps, line.dropper_x)
     if apart.min() < SHORTEST_GAP:
-        at = clamps[apart.min(axis=0).argmin()]
-        why = f"its clamp at {at:g} m of the line would stand on a dropper"
-        yield scene.refused(key, stitch.length, why)
-    nearest = abs(line.dropper_x[:, None] - line.support_positions[1:-1]).min()
+        why = f"its clamp at {clamps[apart.argmin()]:g} m of the line would stand on a dropper"
+        yield scene.refused(key, why)
+    nearest = _to_nearest(line.support_positions[1:-1], line.dropper_x).min()
     if nearest > 0.5 * stitch.length:
         why = f"no dropper would hang from it: the nearest one is {nearest:g} m from a support"
-        yield scene.refused(key, stitch.length, why)
+        yield scene.refused(key, why)
     yield from _tension(scene, "stitch_wire", tension, "messenger_wire", messenger.tension)
+
+
+def _to_nearest(x: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """Distances (n,) of places ``x`` (n,) from the nearest of others, ascending (m,) [m]."""
+    behind = np.clip(np.searchsorted(places, x), 1, places.size - 1)
+    return np.minimum(abs(x - places[behind - 1]), abs(places[behind] - x))
 
 
 def _bridle(scene: Scene, line: LineData) -> Iterator[Fault]:
@@ -125,7 +119,7 @@ def _length(scene: Scene, line: LineData, key: str, length: float) -> Iterator[F
     shortest = min(line.span_lengths)
     if length >= shortest:
         why = f"it must be less than the shortest span ({shortest:g} m)"
-        yield scene.refused(key, length, why)
+        yield scene.refused(key, why)
 
 
 def _tension(scene: Scene, wire: str, tension: float, bearer: str, whole: float) -> Iterator[Fault]:
@@ -133,7 +127,6 @@ def _tension(scene: Scene, wire: str, tension: float, bearer: str, whole: float)
     if tension >= whole:
         yield scene.refused(
             f"line.{wire}.tension_N",
-            tension,
             f"it must be less than line.{bearer}.tension_N ({whole:g} N), of which it takes its "
             "part between the clamps",
         )
@@ -144,7 +137,6 @@ def _auxiliary_wire(scene: Scene, line: LineData) -> Iterator[Fault]:
     if auxiliary is not None and auxiliary.height >= line.encumbrance:
         yield scene.refused(
             "line.auxiliary_wire.height_m",
-            auxiliary.height,
             f"it must be less than line.encumbrance_m ({line.encumbrance:g} m)",
         )
 
@@ -161,19 +153,58 @@ def _overlap(scene: Scene, line: LineData) -> Iterator[Fault]:
                 f"from {first} to {last}" if first <= last else "none, as the line is too short"
             )
             key = "line.overlap.first_span" + (f".{i}" if len(table.first_span) > 1 else "")
-            yield scene.refused(key, number, f"{needs}: possible are {inside}")
+            yield scene.refused(key, f"{needs}: possible are {inside}", value=number)
         first = number + overlaps.n_spans + 1
     every = table.repeat_every_spans
     if every is not None and every <= overlaps.n_spans:
         yield scene.refused(
             "line.overlap.repeat_every_spans",
-            every,
             f"{needs}: it must be at least {overlaps.n_spans + 1}",
         )
     free = line.encumbrance - (line.auxiliary_wire.height if line.auxiliary_wire else 0.0)
     if line.messenger_wire is not None and overlaps.rise >= free:
         yield scene.refused(
             "line.overlap.rise_m",
-            overlaps.rise,
             f"it must be less than the {free:g} m that the messenger wire is above at the supports",
         )
+
+
+def check_droppers_inside_spans(scene: Scene, line: LineData) -> Iterator[Fault]:
+    """Of each group the first span whose droppers are outside or too close together."""
+    table, spans = scene.line, numbered(line.span_lengths)
+    if table.dropper is not None:
+        yield from droppers_inside(scene, "line.dropper", table.dropper, spans)
+    if line.auxiliary_wire is not None and table.auxiliary_wire is not None:
+        key, hung = "line.auxiliary_wire.dropper", table.auxiliary_wire.dropper
+        yield from droppers_inside(scene, key, hung, spans)
+
+
+def check_dropper_lengths(scene: Scene, line: LineData) -> Iterator[Fault]:
+    """Droppers whose upper wire is expected to hang below the lower one."""
+    made = make_line(line)
+    for number, group in enumerate(made.droppers):
+        x = np.array(group.lower_x)
+        upper, lower = (made.wire(name).points(x)[:, 2] for name in (group.upper, group.lower))
+        worst = int(np.argmin(upper - lower)) if x.size else 0
+        if x.size == 0 or upper[worst] > lower[worst]:
+            continue
+        below = lower[worst] - upper[worst]
+        if line.links is not None:
+            links = [i for i, own in enumerate(line.links) if isinstance(own, FreeDroppers)]
+            why = (
+                f"at {x[worst]:g} m it is expected {below:.3f} m below "
+                f"{group.lower}, which hangs from it: raise its height_m or its tension_N, or let "
+                "the other wire hang lower"
+            )
+            yield scene.refused(f"line.links.{links[number]}.upper", why)
+        elif line.overlaps is not None:
+            find_cuts(made)  # says so
+        else:
+            over, under = (name.replace("_", " ") for name in (group.upper, group.lower))
+            why = (
+                f"the {over} would hang {below:.2f} m below the {under} in span "
+                f"{np.searchsorted(line.support_positions, x[worst])}: raise it, raise "
+                "line.messenger_wire.tension_N or shorten the span"
+            )
+            yield scene.refused("line.encumbrance_m", why)
+        return

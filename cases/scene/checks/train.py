@@ -1,0 +1,384 @@
+"""Whether pantographs can be what a scene says, and fit the vehicle's motion and the line."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from catenary.base.errors import InputError, RunBroken
+from catenary.cases.scene.input.faults import Fault, shown
+from catenary.cases.scene.problem import end_of, pantograph_of, strips_ahead
+from catenary.cases.scene.scene import Scene
+from catenary.cases.scene.train.mechanism import ActuatorTable
+from catenary.cases.scene.train.pantograph import LumpedTable, MultibodyTable, wanted_force
+from catenary.cases.scene.train.train import MotionTable, vehicle_of
+from catenary.mbs.frame import SPACE
+from catenary.mbs.roll import roll_of
+from catenary.meshgen.topologies.line_data import LineData
+
+if TYPE_CHECKING:
+    from catenary.mbs.mechanism.pantograph_data import MultibodyData
+
+
+# A wave of an irregular track takes at least so many steps.
+STEPS_PER_WAVE = 8
+# Slack for sums of decimal lengths [m] and times [s].
+_TINY = 1e-6
+
+
+def check_vehicle(scene: Scene, line: LineData) -> Iterator[Fault]:
+    """Contradictions between vehicle, heads and line."""
+    yield from _vehicle_acts(scene)
+    yield from _roll_acts(scene)
+    yield from _multibody_strips(scene)
+    reaches = list(_tables_reach(scene))
+    yield from reaches
+    yield from _waves(scene)
+    if not reaches:
+        yield from _strip_lengths(scene, line)
+
+
+def _vehicle_acts(scene: Scene) -> Iterator[Fault]:
+    on, said = scene.switches()["vehicle_motion"], "vehicle_motion" in scene.effects
+    if scene.vehicle is None:
+        return
+    if not on and not said:
+        yield _idle(scene, "vehicle", "vehicle_motion")
+    acts = any(scene.switches()[name] for name in ("head_roll", "lateral_motion"))
+    if on and scene.vehicle.lateral is not None and not acts:
+        key = "vehicle.lateral"
+        yield scene.fault(
+            key,
+            "moves the wire along the strips, which acts only with "
+            "effects.head_roll = true or effects.lateral_motion = true",
+        )
+
+
+def _roll_acts(scene: Scene) -> Iterator[Fault]:
+    on, said = scene.switches()["head_roll"], "head_roll" in scene.effects
+    speed = scene.train.speed_km_h
+    names = list(dict.fromkeys(place.name for place in scene.train.pantographs))
+    for name in names:
+        kind = scene.pantographs[name]
+        if isinstance(kind, LumpedTable) and kind.roll is not None and not on and not said:
+            yield _idle(scene, f"pantographs.{name}.roll", "head_roll")
+    if not on:
+        return
+    rolling = [
+        name for name in names if roll_of(pantograph_of(name, scene.pantographs[name], speed))
+    ]
+    for name in rolling:
+        if scene.pantographs[name].strips.length_m is None:
+            why = (
+                f"it needs pantographs.{name}.strips.length_m, the strip that the wire moves along"
+            )
+            yield scene.refused("effects.head_roll", why)
+
+
+def _idle(scene: Scene, key: str, effect: str) -> Fault:
+    return scene.fault(
+        key, f"acts only with effects.{effect} = true; write that, or false to leave it out"
+    )
+
+
+def _multibody_strips(scene: Scene) -> Iterator[Fault]:
+    for name in dict.fromkeys(place.name for place in scene.train.pantographs):
+        kind = scene.pantographs[name]
+        if not isinstance(kind, MultibodyTable) or kind.strips.mass_kg is None:
+            continue
+        from catenary.mbs.mechanism.pantograph_data import stand
+
+        data = pantograph_of(name, kind, scene.train.speed_km_h)
+        mass = stand(data).head.mass  # type: ignore[arg-type]
+        if kind.strips.mass >= mass:
+            yield scene.refused(
+                f"pantographs.{name}.strips.mass_kg",
+                f"strips are part of the head, which weighs {mass:.3g} kg",
+            )
+
+
+def _tables_reach(scene: Scene) -> Iterator[Fault]:
+    """Tables must hold for all of the run; splines are not continued."""
+    if scene.vehicle is None:
+        return
+    start, end = scene.train.start_m, end_of(scene)
+    rear = scene.train.pantographs[-1].behind_m
+    duration = (end - start) / (scene.train.speed_km_h / 3.6)
+    for direction in ("vertical", "lateral"):
+        table: MotionTable | None = getattr(scene.vehicle, direction)
+        if table is None:
+            continue
+        for name, pairs, low, high, unit in (
+            ("by_time", table.by_time, 0.0, duration, "s"),
+            ("by_place", table.by_place, start - rear, end, "m"),
+        ):
+            if pairs is None:
+                continue
+            first, last = pairs[0][0], pairs[-1][0]
+            if first > low + _TINY or last < high - _TINY:
+                key = f"vehicle.{direction}.{name}"
+                yield scene.fault(
+                    key,
+                    f"holds from {first:g} to {last:g} {unit}, but "
+                    f"the run needs it from {low:g} to {high:.5g} {unit}",
+                )
+
+
+def _waves(scene: Scene) -> Iterator[Fault]:
+    if scene.vehicle is None or scene.vehicle.irregularity is None:
+        return
+    step = scene.train.speed_km_h / 3.6 * scene.numerics.dt_s
+    shortest = scene.vehicle.irregularity.shortest_m
+    if shortest < STEPS_PER_WAVE * step:
+        yield scene.refused(
+            "vehicle.irregularity.shortest_m",
+            f"the train runs {step:.3g} m in a step of numerics.dt_s; a wave must take "
+            f"{STEPS_PER_WAVE} of these",
+        )
+
+
+def _strip_lengths(scene: Scene, line: LineData) -> Iterator[Fault]:
+    for i, place in enumerate(scene.train.pantographs):
+        kind = scene.pantographs[place.name]
+        length = kind.strips.length_m
+        if length is None:
+            continue
+        far, x = _farthest(scene, line, i)
+        if 2.0 * abs(far) > length + _TINY:
+            keys = "line.stagger_m"
+            if scene.switches()["vehicle_motion"] and scene.vehicle is not None:
+                keys += " and vehicle"
+            needed = math.ceil(2e3 * abs(far) - 1e-6) / 1e3
+            yield scene.refused(
+                f"pantographs.{place.name}.strips.length_m",
+                f"at {x:.4g} m the wire is {abs(far):.3g} m beside the strips' middle ({keys}), so "
+                f"that they must be at least {needed:g} m long",
+            )
+
+
+def _farthest(scene: Scene, line: LineData, number: int) -> tuple[float, float]:
+    """Where the wire is farthest from the middle of a pantograph's strips on its run, and the
+    pantograph's place then [m]."""
+    place, speed = scene.train.pantographs[number], scene.train.speed_km_h / 3.6
+    start = scene.train.start_m - place.behind_m
+    duration = (end_of(scene) - scene.train.start_m) / speed
+    offsets = np.array([1.0, -1.0]) * strips_ahead(scene)[number]
+    base = None
+    if scene.switches()["vehicle_motion"] and scene.vehicle is not None:
+        from catenary.mbs.vehicle.base_motion import BaseMotion
+
+        vehicle = vehicle_of(scene.vehicle)
+        if not scene.switches()["vehicle_suspension"]:
+            vehicle = replace(vehicle, suspension=None)
+        base = BaseMotion(vehicle, start, speed)
+    # Extremes are at supports, unless the vehicle sways: then every 0.25 m and 20 ms are sampled.
+    supports = line.support_positions
+    times = np.concatenate(
+        [[0.0, duration], *((supports - start - one) / speed for one in offsets)]
+    )
+    if base is not None:
+        n = math.ceil(duration / min(0.25 / speed, 0.02))
+        times = np.concatenate([times, np.linspace(0.0, duration, n)])
+    times = times[(times >= 0.0) & (times <= duration)]
+    ahead = start + speed * times[:, None] + offsets
+    courses = np.array(line.contact_sideways(ahead))
+    places = np.take_along_axis(courses, np.abs(courses).argmax(axis=0)[None], axis=0)[0]
+    if base is not None:
+        places -= np.array([base.lateral(time).place for time in times.tolist()])[:, None]
+    farthest = np.abs(places).max(axis=1)
+    first = int(np.argmax(farthest))
+    if farthest[first] == 0.0:
+        return 0.0, start
+    strip = int(np.argmax(np.abs(places[first])))
+    return float(places[first, strip]), float(start + speed * times[first])
+
+
+# By how much the arm may be further down than the head while both fall [m].
+_LEADS = 0.05
+
+
+def check_pantographs(scene: Scene) -> Iterator[Fault]:
+    """Names and forces that are wrong with a kind of pantograph."""
+    on_the_train = {place.name for place in scene.train.pantographs}
+    yield from _static_forces(scene, on_the_train)
+    for name, table in scene.pantographs.items():
+        if isinstance(table, MultibodyTable):
+            yield from _names(scene, name, table)
+            yield from _actuator(scene, name, table)
+
+
+def check_mechanisms(scene: Scene, line: LineData) -> Iterator[Fault]:
+    """Mechanisms on the train that cannot be assembled, or do not reach the wire from the height
+    that ``nominal_height_m`` puts them to. Names and forces have no fault.
+
+    The machinery of multibody systems is imported here, for scenes that have a mechanism.
+    """
+    on_the_train = {place.name for place in scene.train.pantographs}
+    found: list[Fault] = []
+    for name, table in scene.pantographs.items():
+        if name in on_the_train and isinstance(table, MultibodyTable):
+            found += _mechanism(scene, name, table)
+    yield from found or _heights(scene, line)
+
+
+def _heights(scene: Scene, line: LineData) -> Iterator[Fault]:
+    lowest = line.lowest_contact
+    heights = lowest, line.contact_height
+    for name in dict.fromkeys(place.name for place in scene.train.pantographs):
+        table = scene.pantographs[name]
+        if not isinstance(table, MultibodyTable) or table.nominal_height_m is None:
+            continue
+        data, working = _standing(scene, name, table)
+        for height in heights:
+            if _reaches(data, working + height - table.nominal_height_m):
+                continue
+            yield scene.refused(
+                f"pantographs.{name}.nominal_height_m",
+                f"the contact wire hangs at {lowest:.4g} to {line.contact_height:.4g} m, where its "
+                f"head would be {height - table.nominal_height_m:+.4g} m away from there, beyond "
+                "the reach of its mechanism",
+            )
+            break
+
+
+def reaches_below(scene: Scene, name: str, line: LineData, drop: float) -> bool:
+    """Whether a kind of pantograph can go down by ``drop`` [m] from wherever the wire is."""
+    table = scene.pantographs[name]
+    if not isinstance(table, MultibodyTable):
+        return True
+    lowest = line.lowest_contact
+    nominal = line.contact_height if table.nominal_height_m is None else table.nominal_height_m
+    data, working = _standing(scene, name, table)
+    return _reaches(data, working + lowest - nominal - drop - _LEADS)
+
+
+def _standing(scene: Scene, name: str, table: MultibodyTable) -> tuple[MultibodyData, float]:
+    """A mechanism and the height of its arm above its base where it stands [m]."""
+    from catenary.cases.scene.train.multibody import multibody_of
+    from catenary.mbs.mechanism.pantograph_data import stand
+
+    data = multibody_of(name, table, scene.train.speed_km_h)
+    return data, stand(data).working_height
+
+
+def _reaches(data: MultibodyData, arm: float) -> bool:
+    """Whether a mechanism can have its arm at a height above its base [m]."""
+    from catenary.mbs.mechanism.pantograph_data import HOLDER, reduced, stand
+    from catenary.mbs.rigid.joints import PrescribedPoint, constant
+
+    if data.all_bodies is None:
+        heights = reduced(data).heights
+        return bool(heights[0] <= arm <= heights[-1])
+    standing = stand(data)
+    holder = PrescribedPoint(HOLDER, data.arm, constant(arm))
+    try:
+        standing.system.with_joints(holder).assemble(standing.motion)
+    except InputError:
+        return False
+    return True
+
+
+def _names(scene: Scene, kind: str, table: MultibodyTable) -> Iterator[Fault]:
+    key = f"pantographs.{kind}"
+    bodies = list(table.bodies)
+    if SPACE in bodies:
+        yield _refusal(
+            scene, f"{key}.bodies.{SPACE}", "is the name of the frame at rest; choose another"
+        )
+    for role in ("head", "arm"):
+        yield from scene.among(f"{key}.{role}", bodies)
+    if table.head == table.arm:
+        yield _refusal(
+            scene, f"{key}.head", f"is {shown(table.head)} as the arm is; they are two bodies"
+        )
+    if table.actuator is not None:
+        yield from scene.among(f"{key}.actuator", list(table.forces))
+    for place in _uses(table):
+        # What is on one body alone would be without effect on what is at rest.
+        on_one = place.endswith(".body")
+        yield from scene.among(f"{key}.{place}", bodies if on_one else [*bodies, SPACE])
+    for what in ("joints", "forces"):
+        for label, one in getattr(table, what).items():
+            if getattr(one, "i", None) == getattr(one, "j", SPACE):
+                yield _refusal(scene, f"{key}.{what}.{label}", f"has {shown(one.i)} on both sides")
+    for label in table.forces:
+        if label in table.joints or label == "gravity":
+            yield _refusal(scene, f"{key}.forces.{label}", "has the name of a joint or of gravity")
+
+
+def _uses(table: MultibodyTable) -> Iterator[str]:
+    """Keys of joints and forces that hold names of bodies."""
+    for what in ("joints", "forces"):
+        for label, one in getattr(table, what).items():
+            for end in ("i", "j", "body"):
+                if hasattr(one, end):
+                    yield f"{what}.{label}.{end}"
+
+
+def _actuator(scene: Scene, kind: str, table: MultibodyTable) -> Iterator[Fault]:
+    if not table.calibrate or table.actuator not in table.forces:
+        return
+    force = table.forces[table.actuator]
+    key = f"pantographs.{kind}.actuator"
+    if not isinstance(force, ActuatorTable):
+        yield scene.refused(key, f"that is a {force.type}, no actuator")
+    elif force.force_N is None:
+        why = "its force is a table, so that it cannot be calibrated; write calibrate = false"
+        yield scene.refused(key, why)
+
+
+def _static_forces(scene: Scene, on_the_train: set[str]) -> Iterator[Fault]:
+    speed = scene.train.speed_km_h
+    for name, table in scene.pantographs.items():
+        if name not in on_the_train or table.static_force_by_speed is None:
+            continue
+        if wanted_force(table, speed) is None:
+            first, last = table.static_force_by_speed[0][0], table.static_force_by_speed[-1][0]
+            key = "train.speed_km_h"
+            held = f"{first:g} km/h" if first == last else f"{first:g} to {last:g} km/h"
+            yield Fault(
+                key,
+                f"{key} is {speed:g} km/h {scene.origin.of(key)}; "
+                f"pantographs.{name}.static_force_by_speed only holds forces for {held}",
+            )
+
+
+def _mechanism(scene: Scene, name: str, table: MultibodyTable) -> Iterator[Fault]:
+    try:
+        _standing(scene, name, table)
+    except (InputError, RunBroken) as error:
+        key = f"pantographs.{name}"
+        yield scene.fault(key, f"cannot be built: {error}")
+
+
+def _refusal(scene: Scene, key: str, says: str) -> Fault:
+    return Fault(key, f"{key} {says} {scene.origin.of(key)}")
+
+
+def check_laws(scene: Scene) -> Iterator[Fault]:
+    """Laws on masses that are not there, and what all bodies or slow samples do not allow."""
+    for name, table in scene.pantographs.items():
+        key = f"pantographs.{name}"
+        lumped = isinstance(table, LumpedTable)
+        n = len(table.masses_kg) if isinstance(table, LumpedTable) else 2
+        for number, law in enumerate(table.laws):
+            if law.at_mass is not None and law.at_mass > n:
+                has = f"{n} masses" if lumped else "2, the head and the arm"
+                yield scene.refused(f"{key}.laws.{number}.at_mass", f"the pantograph has {has}")
+        whole = not isinstance(table, LumpedTable) and table.motion == "all_bodies"
+        for part, given in (("laws", table.laws), ("regulation", table.regulation)):
+            if whole and given:
+                yield scene.refused(
+                    f"{key}.motion",
+                    f"{key}.{part} acts on mechanisms that are reduced to tables only",
+                )
+        regulation = table.regulation
+        if regulation is not None and regulation.sample_s < scene.numerics.dt_s:
+            yield scene.refused(
+                f"{key}.regulation.sample_s",
+                f"a sample takes at least a step, numerics.dt_s = {scene.numerics.dt_s:g}",
+            )
