@@ -28,18 +28,21 @@ FromWhere = Annotated[
 
 @app.command(
     "report",
-    help="Write the report of a run again, from its result file alone.",
-    epilog="Example: catenary report results/en300",
+    help="Write the full report of a run from its result file, with data sheets, worst places, "
+    "spectra and vector pictures.",
+    epilog="Example: catenary report results/en300 --pdf",
 )
 @console.guarded
 @console.serial
 def report(
     folder: RunFolder,
+    pdf: Annotated[bool, typer.Option("--pdf", help="Write report.pdf too, on A4.")] = False,
 ) -> None:
     """Serial."""
-    from catenary.postproc.report.report import write_report
+    from catenary.postproc.report.report import SECTIONS, write_report
 
-    written = write_report(folder, folder, _records(folder))
+    records = _records(folder)
+    written = write_report(folder, folder, records, SECTIONS, vector=True, on_paper=pdf)
     console.say("\n".join(str(path) for path in written.files))
 
 

@@ -92,6 +92,11 @@ def _droppers(results: Results, rows: Sequence[DropperRow], title: str = "") -> 
     return texts_table(heads, cells, set(range(6)), title)
 
 
+def has_registration(run: EvaluatedRun) -> bool:
+    """Whether steady arms of a run have forces and places across the track."""
+    return run.results.registration() is not None
+
+
 def from_above(run: EvaluatedRun) -> Section:
     """Where the contact wires are laterally, and their steady arms."""
     from catenary.postproc.report.pictures.line_pictures import plan_view
@@ -99,9 +104,7 @@ def from_above(run: EvaluatedRun) -> Section:
     results = run.results
     text = "The line at rest from above, and its steady arms."
     picture = Picture("plan_view", text, lambda: plan_view(results))
-    there = results.registration() is not None
-    heading = "Line from above" if there else ""
-    return Section(heading, _lateral(results), [picture], _registration(results))
+    return Section("Line from above", _lateral(results), [picture], _registration(results))
 
 
 def _lateral(results: Results) -> Iterator[Text]:
@@ -120,8 +123,7 @@ def _lateral(results: Results) -> Iterator[Text]:
 
 def _registration(results: Results) -> Iterator[Folded]:
     found = results.registration()
-    if found is None:
-        return
+    assert found is not None
     heads = ["position [m]", "stagger [m]", "radial force [N]", "lift [N]", "slope [deg]"]
     heads += ["force along the track [N]", "slew [deg]", *(["wire"] if found.wires else [])]
     title = f"Registration: {len(found.x)} steady arms, also in registration.csv"
