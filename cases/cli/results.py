@@ -39,10 +39,20 @@ def report(
     pdf: Annotated[bool, typer.Option("--pdf", help="Write report.pdf too, on A4.")] = False,
 ) -> None:
     """Serial."""
-    from catenary.postproc.report.report import SECTIONS, write_report
-
     records = _records(folder)
-    written = write_report(folder, folder, records, SECTIONS, vector=True, on_paper=pdf)
+    console.alone()  # starts MPI as one process, before anything imports it
+    from catenary.cases.studies.full_report.sections import SceneOfRun, full_sections
+    from catenary.postproc.read.results import Results
+    from catenary.postproc.report.report import write_report
+
+    with Results(folder, records) as results:
+        try:
+            scene = SceneOfRun(results)
+        except InputError as error:
+            console.warn(f"the report has no data sheets: {error}")
+            scene = None
+    entries = full_sections(scene)
+    written = write_report(folder, folder, records, entries, vector=True, on_paper=pdf)
     console.say("\n".join(str(path) for path in written.files))
 
 
