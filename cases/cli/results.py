@@ -44,6 +44,7 @@ def report(
     from catenary.cases.studies.full_report.sections import SceneOfRun, full_sections
     from catenary.postproc.read.results import Results
     from catenary.postproc.report.report import write_report
+    from catenary.postproc.report.sections.run_facts import INPUT
 
     with Results(folder, records) as results:
         try:
@@ -51,8 +52,9 @@ def report(
         except InputError as error:
             console.warn(f"the report has no data sheets: {error}")
             scene = None
-    entries = full_sections(scene)
-    written = write_report(folder, folder, records, entries, vector=True, on_paper=pdf)
+    entries, text = full_sections(scene), scene and scene.input_text
+    beside = {INPUT: text} if text else {}
+    written = write_report(folder, folder, records, entries, beside, vector=True, on_paper=pdf)
     console.say("\n".join(str(path) for path in written.files))
 
 

@@ -22,7 +22,7 @@ from catenary.postproc.read.results import Results
 from catenary.postproc.report import csv_tables
 from catenary.postproc.report.page import page, pdf, refuse_without_pdf
 from catenary.postproc.report.sections import acceptance as acceptance_section
-from catenary.postproc.report.sections import contact_force, line, run_facts
+from catenary.postproc.report.sections import contact_force, dynamics, line, run_facts
 from catenary.postproc.report.sections.section import (
     EvaluatedRun,
     Picture,
@@ -40,8 +40,11 @@ logger = logging.getLogger("catenary.report")
 SECTIONS: list[SectionEntry] = [
     SectionEntry("verdict", acceptance_section.status),
     SectionEntry("acceptance", acceptance_section.section),
+    SectionEntry("checks", run_facts.checks),
     SectionEntry("force", contact_force.section),
+    SectionEntry("spectrum", dynamics.section, dynamics.has_statistics, full=True),
     SectionEntry("motion", line.in_motion),
+    SectionEntry("places", dynamics.places, dynamics.has_places, full=True),
     SectionEntry("rest", line.at_rest),
     SectionEntry("above", line.from_above, line.has_registration),
     SectionEntry("effects", run_facts.effects),
@@ -68,6 +71,7 @@ def write_report(
     out_dir: Path | str,
     records: Records | None = None,
     entries: Sequence[SectionEntry] | None = None,
+    beside: Mapping[str, str] | None = None,
     *,
     vector: bool = False,
     on_paper: bool = False,
@@ -83,6 +87,7 @@ def write_report(
     out_dir : folder that exists
     records : what ``evaluate.guard`` found in the file, None to check it here
     entries : the sections, None for those of ``quick_sections``
+    beside : texts of further files by name
     vector : pictures are SVG files instead of PNG files
     on_paper : write ``report.pdf`` too
 
@@ -104,6 +109,7 @@ def write_report(
         run = EvaluatedRun(results, statistics, criteria)
         summary = as_json(summarise(results, statistics, criteria, run.indicators))
         content: dict[str, bytes | str] = {"droppers.csv": csv_tables.droppers_csv(results)}
+        content |= beside or {}
         registration = results.registration()
         if registration is not None:
             content["registration.csv"] = registration.csv()

@@ -71,7 +71,7 @@ def _blocks(results: Results, places: WorstPlaces, causes: Causes) -> Iterator[T
             f"span {one.span + 1}, {one.start:.0f} to {one.end:.0f} m, {names[one.pantograph]}: "
             f"standard deviation {one.std:.1f} N (median of all spans {one.median:.1f} N), force "
             f"{one.minimum:.0f} to {one.maximum:.0f} N{_out(one.stands_out)}.",
-            "open",
+            "note",
             "Worst span:",
             causes.of_passage(one) or [_NO_CAUSE],
         )
@@ -79,12 +79,12 @@ def _blocks(results: Results, places: WorstPlaces, causes: Causes) -> Iterator[T
         for spot in spots(places)[:1]:
             said = words.format(x=spot.x, v=spot.value, m=spot.median)
             items = causes.at(spot.x) or [_NO_CAUSE]
-            yield Text(f"{said}{_out(spot.stands_out)}.", "open", first, items)
+            yield Text(f"{said}{_out(spot.stands_out)}.", "note", first, items)
     everywhere = causes.of_line()
     if everywhere:
-        yield Text("acts on all spans alike:", "open", "The line as a whole", everywhere)
+        yield Text("acts on all spans alike:", "note", "The line as a whole", everywhere)
     yield Text(
-        "Candidates are near in place or frequency; none is proved. `catenary worst` tells all."
+        "Candidates are near in place or frequency; none is proved. The verb worst tells all places."
     )
     rows = [
         [p.span + 1, f"{p.start:.0f} to {p.end:.0f}", names[p.pantograph], number(p.std),

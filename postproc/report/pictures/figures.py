@@ -31,6 +31,7 @@ logger = logging.getLogger("catenary.pictures")
 
 COLOURS = ("#1f5fa8", "#d1641b", "#2f8f4e", "#7b4fa3", "#8c6d31", "#444444")
 GREY, LIGHT, SHADE, LIMIT = "#6b6b6b", "#c9c9c9", "#eef3e6", "#b3261e"
+RUN_IN = "#fdf7e3"
 WIDTH = 9.0
 _RESOLUTION = 130
 # Room around panels whose layout is not computed [inch]: tick labels of six characters and a

@@ -143,11 +143,12 @@ def _criteria(run: EvaluatedRun) -> Iterator[Text | StudyTable]:
             continue
         value, limit = _figures(one)
         source = one.clause if one.compared else f"{one.clause}; {_UNCOMPARED}"
-        words = one.unit, _WORDS[one.passed], source
+        words = one.unit, source
         of_margin = _margin(one), _error(one, errors)
-        rows.append([label, value, _RELATIONS[one.relation], limit, *of_margin, *words])
-    heads = ["criterion", "value", "", "limit", "margin", "error", "unit", "verdict", "source"]
-    yield texts_table(heads, rows, {1, 3, 4, 5})
+        first = label, _WORDS[one.passed], value, _RELATIONS[one.relation], limit
+        rows.append([*first, *of_margin, *words])
+    heads = ["criterion", "verdict", "value", "", "limit", "margin", "error", "unit", "source"]
+    yield texts_table(heads, rows, {2, 4, 5, 6})
     yield Text(
         "The margin is the distance from the limit, negative beyond it. The error is that of the "
         "time step, estimated from the record; three times the rms error of the history for "

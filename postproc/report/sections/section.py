@@ -44,8 +44,8 @@ class Text(NamedTuple):
     Attributes
     ----------
     text : what it says
-    look : "good", "bad" or "open" for a verdict, "remark" for a remark, "code" for what is shown to
-        the letter; empty for plain text
+    look : "good", "bad" or "open" for a verdict, "note" for a box, "remark" for a remark, "code"
+        for what is shown to the letter; empty for plain text
     first : words before the text, in bold
     items : a list below it
     """
