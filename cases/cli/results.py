@@ -37,6 +37,13 @@ FromWhere = Annotated[
 def report(
     folder: RunFolder,
     pdf: Annotated[bool, typer.Option("--pdf", help="Write report.pdf too, on A4.")] = False,
+    interactive: Annotated[
+        bool,
+        typer.Option(
+            "--interactive",
+            help="Write report_interactive.html too: pictures to zoom and read off, 5 MB.",
+        ),
+    ] = False,
 ) -> None:
     """Serial."""
     records = _records(folder)
@@ -54,7 +61,16 @@ def report(
             scene = None
     entries, text = full_sections(scene), scene and scene.input_text
     beside = {INPUT: text} if text else {}
-    written = write_report(folder, folder, records, entries, beside, vector=True, on_paper=pdf)
+    written = write_report(
+        folder,
+        folder,
+        records,
+        entries,
+        beside,
+        vector=True,
+        on_paper=pdf,
+        interactive=interactive,
+    )
     console.say("\n".join(str(path) for path in written.files))
 
 

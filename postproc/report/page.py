@@ -25,6 +25,8 @@ def page(
     sections: Iterable[Section],
     pictures: Mapping[str, bytes],
     names: Sequence[str] = (),
+    plots: Mapping[str, str] | None = None,
+    script: str = "",
 ) -> str:
     """The page as text; sections are made as it is written. Not collective.
 
@@ -33,6 +35,8 @@ def page(
     title, lead : above the sections
     pictures : PNG or SVG files by name; sections show those that are there
     names : of the sections, as their anchors and for a list of contents; none without both
+    plots : pictures of Plotly in JSON by name, which stand in the place of others
+    script : the program of Plotly
     """
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
@@ -51,6 +55,9 @@ def page(
         sections=list(zip(made, names or [""] * len(made), strict=True)),
         uris=uris,
         marks=_MARKS,
+        # A text of a picture must not end the element that it stands in.
+        plots={name: text.replace("</", "<\\/") for name, text in (plots or {}).items() if text},
+        script=script,
     )
 
 

@@ -75,6 +75,7 @@ def write_report(
     *,
     vector: bool = False,
     on_paper: bool = False,
+    interactive: bool = False,
 ) -> Report:
     """Write summary, report, pictures and dropper table of a run into a folder. Not collective.
 
@@ -90,17 +91,24 @@ def write_report(
     beside : texts of further files by name
     vector : pictures are SVG files instead of PNG files
     on_paper : write ``report.pdf`` too
+    interactive : write ``report_interactive.html`` too, whose pictures are Plotly's
 
     Raises
     ------
     InputError
-        If ``result_path`` is no result file, or too damaged; if ``on_paper`` lacks a library.
+        If ``result_path`` is no result file, or too damaged; if a library for PDF or Plotly is
+        missing.
     RunBroken
         If a file cannot be written.
     """
     out = Path(out_dir)
     if on_paper:
         refuse_without_pdf()
+    program = ""
+    if interactive:
+        from catenary.postproc.report.pictures.interactive import script
+
+        program = script()
     with Results(result_path, records) as results:
         for sentence in results.damage:
             logger.warning("%s", sentence)
@@ -120,8 +128,13 @@ def write_report(
             if entry.applies(run)
         }
         pictures = _painted(shown.values(), "svg" if vector else "png")
-        html = _page(run, shown, {Path(name).stem: data for name, data in pictures.items()})
+        html = _page(run, shown, _by_stem(pictures))
         content = {**pictures, "report.html": html}
+        if interactive:
+            plots = _by_stem(_painted(shown.values(), "json"))
+            texts = {name: data.decode() for name, data in plots.items()}
+            page_of_plots = _page(run, shown, _by_stem(pictures), texts, program)
+            content["report_interactive.html"] = page_of_plots
         if on_paper:
             content["report.pdf"] = pdf(html)
         files += write_into(out, content)
@@ -154,8 +167,9 @@ def drawings(results: Results, statistics: RunStatistics) -> Iterator[Picture]:
 
 
 def _with_lists(section: Section) -> Section:
-    """The section with its pictures in a list, which is gone through twice."""
-    return section._replace(pictures=list(section.pictures))
+    """The section with its parts in lists, which several pages go through."""
+    _, blocks, pictures, folded = section
+    return section._replace(blocks=list(blocks), pictures=list(pictures), folded=list(folded))
 
 
 def _painted(sections: Iterable[Section], kind: str) -> dict[str, bytes]:
@@ -170,8 +184,18 @@ def _painted(sections: Iterable[Section], kind: str) -> dict[str, bytes]:
     return painted
 
 
-def _page(run: EvaluatedRun, sections: Mapping[str, Section], pictures: Mapping[str, bytes]) -> str:
-    """The page of a run, with the files of its pictures by name."""
+def _by_stem(files: Mapping[str, bytes]) -> dict[str, bytes]:
+    return {Path(name).stem: data for name, data in files.items()}
+
+
+def _page(
+    run: EvaluatedRun,
+    sections: Mapping[str, Section],
+    pictures: Mapping[str, bytes],
+    plots: Mapping[str, str] | None = None,
+    script: str = "",
+) -> str:
+    """The page of a run; the files of its pictures by name, others as for ``page``."""
     results = run.results
     start, end = (number(place, 0) for place in results.evaluation)
     lead = (
@@ -179,4 +203,4 @@ def _page(run: EvaluatedRun, sections: Mapping[str, Section], pictures: Mapping[
         f"{counted(results.n_pantographs, 'pantograph')}, evaluated from {start} to {end} m."
     )
     title = results.attributes["title"]
-    return page(title, lead, sections.values(), pictures, list(sections))
+    return page(title, lead, sections.values(), pictures, list(sections), plots, script)

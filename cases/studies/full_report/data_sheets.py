@@ -17,6 +17,7 @@ from catenary.mbs.shape import HEAD, SPRING, shape_of
 from catenary.meshgen.hardware import DropperKind
 from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import LineMesh
+from catenary.meshgen.slowest_wave import slowest_wave_of
 from catenary.meshgen.wires import Role, Wire
 from catenary.postproc.report.pictures.figures import COLOURS, new_figure, own_style, tidy
 from catenary.postproc.report.sections.section import EvaluatedRun, Picture, Section, Text, number
@@ -48,7 +49,7 @@ def _line_blocks(problem: Problem, rest: LineAtRest) -> Iterator[StudyTable]:
             _plain(wire.name), wire.role.value, number(1e-3 * wire.tension, 2),
             number(wire.mass_per_length, 3), number(wire.bending_stiffness, 1),
             number(None if wire.axial_stiffness is None else 1e-6 * wire.axial_stiffness, 2),
-            number(wire.wave_speed, 1), f"{alpha:.3g}", f"{beta:.3g}",
+            number(slowest_wave_of(line, wire), 1), f"{alpha:.3g}", f"{beta:.3g}",
         ])  # fmt: skip
     heads = ["wire", "role", "tension [kN]", "mass [kg/m]", "EI [N m²]", "EA [MN]"]
     heads += ["wave speed [m/s]", "alpha [s]", "beta [1/s]"]
@@ -161,10 +162,18 @@ def pantographs(scene: SceneOfRun, run: EvaluatedRun) -> Section:
     for placement, said in zip(scene.problem.train.placements, words, strict=True):
         kinds.setdefault(said["kind"], (placement, said["description"]))
     pictures = [
-        Picture(f"pantograph_{n}", f"{name}, drawn to scale.", partial(_drawn, one[0].data))
+        Picture(
+            f"pantograph_{n}", f"{name}, {_how_drawn(one[0].data)}.", partial(_drawn, one[0].data)
+        )
         for n, (name, one) in enumerate(kinds.items(), start=1)
     ]
     return Section("Data sheet of the pantographs", _pantograph_blocks(kinds), pictures)
+
+
+def _how_drawn(data: Any) -> str:
+    if isinstance(data, LumpedData):
+        return "a scheme of its masses and springs; the head is to scale"
+    return "drawn to scale from its joints"
 
 
 def _pantograph_blocks(

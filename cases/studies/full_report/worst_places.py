@@ -84,7 +84,7 @@ def _blocks(results: Results, places: WorstPlaces, causes: Causes) -> Iterator[T
     if everywhere:
         yield Text("acts on all spans alike:", "note", "The line as a whole", everywhere)
     yield Text(
-        "Candidates are near in place or frequency; none is proved. The verb worst tells all places."
+        "Candidates are near in place or frequency; none is proved. The verb worst tells all."
     )
     rows = [
         [p.span + 1, f"{p.start:.0f} to {p.end:.0f}", names[p.pantograph], number(p.std),

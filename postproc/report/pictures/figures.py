@@ -196,7 +196,8 @@ def legend_above(axes: Axes, columns: int = 5) -> Legend:
 
 
 def painted(name: str, draw: Callable[[], Figure | None]) -> dict[str, bytes]:
-    """A picture as ``{name: file}``, PNG or SVG by its suffix; empty if none can be drawn.
+    """A picture as ``{name: file}``, PNG, SVG or JSON of Plotly by its suffix; empty if none can be
+    drawn.
 
     A failure is logged and costs this picture alone. Results that are damaged, a `CatenaryError`,
     are not a failure of drawing and are raised.
@@ -211,6 +212,10 @@ def painted(name: str, draw: Callable[[], Figure | None]) -> dict[str, bytes]:
             figure = draw()
             if figure is None:
                 return {}
+            if name.endswith(".json"):
+                from catenary.postproc.report.pictures.interactive import as_json
+
+                return {name: as_json(figure).encode()}
             return {name: svg(figure) if name.endswith(".svg") else png(figure)}
     except CatenaryError:
         raise

@@ -23,11 +23,15 @@ def in_motion(run: EvaluatedRun) -> Section:
     """Uplift and dropper forces."""
     droppers, supports = run.statistics.droppers, run.statistics.supports
     rows: list[list[Any]] = [
-        ["largest uplift at a steady arm", number(1e3 * supports.maximum), "mm"],
+        ["largest uplift at a steady arm", number(1e3 * supports.maximum), "mm"]
+    ]
+    of_droppers: list[list[Any]] = [
         ["droppers that slackened", droppers.n_slackened, f"of {droppers.evaluated.sum()}"],
         ["largest dropper force", number(droppers.maximum), "N"],
         ["smallest dropper force", number(droppers.minimum), "N"],
     ]
+    if droppers.x.size:
+        rows += of_droppers
     table = texts_table(["in the evaluation stretch", "value", "unit"], rows, {1})
     return Section("Line in motion", [table], _of_motion(run))
 
@@ -70,11 +74,14 @@ def _of_rest(results: Results) -> Iterator[Text | StudyTable]:
             f"{number(100 * (high - low) / (high + low))} %)."
         )
     own = [row for row in csv_tables.dropper_table(results) if row.span == span]
-    yield _droppers(results, own, f"Droppers of span {span}")
+    if own:
+        yield _droppers(results, own, f"Droppers of span {span}")
 
 
 def _all_droppers(results: Results) -> Iterator[Folded]:
     rows = csv_tables.dropper_table(results)
+    if not rows:
+        return
     title = f"Droppers of all spans ({len(rows)}), also in droppers.csv"
     yield Folded(title, _droppers(results, rows))
 

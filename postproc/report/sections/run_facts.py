@@ -83,13 +83,15 @@ def signatures(text: str | None, run: EvaluatedRun) -> Section:
     text : what stands in ``INPUT``, None if there is no such file
     """
     about = run.results.attributes
-    rows = [[name, version] for name, version in about["versions"].items()]
+    name, version = next(iter(about["versions"].items()))
+    rows = [["program", f"{name} {version}; all versions above"]]
     if text is not None:
         options = " ".join(about.get("petsc_options", []))
         command = f"catenary run {INPUT} -o AGAIN" + (f" -- {options}" if options else "")
         mark = sha256(text.encode()).hexdigest()
         rows = [["input", f"{INPUT}, SHA-256 {mark}"], ["command", command], *rows]
-    roles = [[role, *[" "] * 3] for role in ("computed", "checked", "approved")]
+    room = [width * "\u00a0" for width in (40, 20, 45)]
+    roles = [[role, *room] for role in ("computed", "checked", "approved")]
     signed = texts_table(["", "name", "date", "signature"], roles)
     blocks = [texts_table(["", ""], rows), signed]
     return Section("Reproduction and signatures", blocks)
