@@ -48,7 +48,8 @@ def report(
     """Serial."""
     records = _records(folder)
     console.alone()  # starts MPI as one process, before anything imports it
-    from catenary.cases.studies.full_report.sections import SceneOfRun, full_sections
+    from catenary.cases.studies.full_report.scene_of_run import SceneOfRun
+    from catenary.cases.studies.full_report.sections import full_sections
     from catenary.postproc.read.results import Results
     from catenary.postproc.report.report import write_report
     from catenary.postproc.report.sections.run_facts import INPUT

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from catenary.cases.run.describe.pantographs import header_words
 from catenary.cases.run.scene_mesh import line_figure
-from catenary.cases.studies.full_report.sections import SceneOfRun
+from catenary.cases.studies.full_report.scene_of_run import SceneOfRun
 from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.shape import HEAD, SPRING, shape_of
 from catenary.meshgen.hardware import DropperKind
