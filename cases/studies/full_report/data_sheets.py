@@ -197,7 +197,7 @@ def _pantograph_blocks(
             heads = ["body", "mass [kg]", "Ixx [kg m²]", "Iyy [kg m²]", "Izz [kg m²]"]
             yield texts_table(heads, rows, {1, 2, 3, 4}, name)
         strips = data.strips
-        rows = [["strips", strips.number, ""]]
+        rows = [["strips", str(strips.number), ""]]
         if strips.number > 1:
             rows.append(["distance of the strips", number(strips.spacing, 3), "m"])
         rows.append(["length of a strip", number(strips.length, 3), "m"])

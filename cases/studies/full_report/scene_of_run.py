@@ -13,12 +13,18 @@ from catenary.cases.scene.load import scene_from
 from catenary.cases.scene.problem import problem_of, resolved
 from catenary.postproc.read.results import Results
 from catenary.postproc.report.sections.run_facts import INPUT
+from catenary.solver.effects.all_effects import registry
 from catenary.solver.problem.problem import Problem
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest
 
 
 class SceneOfRun:
     """The scene that a run recorded, and its line at rest, computed when it is asked for.
+
+    Attributes
+    ----------
+    scene, problem : of the run
+    has_train : whether a train excites the line
 
     Parameters
     ----------
@@ -34,18 +40,26 @@ class SceneOfRun:
         origin = Origin(str(results.path), recorded=True)
         self.scene = scene_from(results.attributes["config"], origin)
         self.problem: Problem = problem_of(self.scene)
+        # A line that a force or a blow excites has no train, though its scene has.
+        self.has_train = not results.attributes.get("excitation")
 
     @cached_property
     def input_text(self) -> str | None:
-        """The scene as a case in TOML, without keys at their usual values; None if that would load
-        to another scene, such as one with files that are not there."""
+        """The scene as a case in TOML, without keys at their usual values.
+
+        None if it would not make the run again: of a line without its train, or of a scene that
+        does not load to the same one, as its files are gone.
+        """
+        if not self.has_train:
+            return None
         plain = self.scene.model_dump(mode="json", exclude_none=True, exclude_defaults=True)
-        origin = Origin(INPUT)
+        # What is on by itself where its data are there is not asked for; what is off has its data.
+        known, switched = registry(), self.scene.switches()
+        plain["effects"] = {
+            name: on for name, on in switched.items() if not (on and known[name].default)
+        }
         try:
-            usual = scene_from(plain | {"effects": {}}, origin).switches()
-            switched = self.scene.switches().items()
-            plain["effects"] = {name: on for name, on in switched if on != usual[name]}
-            if resolved(scene_from(plain, origin)) != resolved(self.scene):
+            if resolved(scene_from(plain, Origin(INPUT))) != resolved(self.scene):
                 return None
         except InputError:
             return None

@@ -8,7 +8,7 @@ from catenary.base.errors import InputError
 from catenary.cases.studies.full_report import data_sheets, worst_places
 from catenary.cases.studies.full_report.scene_of_run import SceneOfRun
 from catenary.postproc.report.report import SECTIONS
-from catenary.postproc.report.sections import run_facts
+from catenary.postproc.report.sections import dynamics, run_facts
 from catenary.postproc.report.sections.section import (
     EvaluatedRun,
     Picture,
@@ -50,23 +50,18 @@ def full_sections(scene: SceneOfRun | None) -> list[SectionEntry]:
     ----------
     scene : of the run; None leaves out what needs it
     """
-
-    def is_driven(run: object) -> bool:
-        return scene is not None and bool(scene.problem.train.placements)
-
-    def is_known(run: object) -> bool:
-        return scene is not None
-
-    worst = partial(worst_places.section, at_rest=lambda: scene and scene.at_rest)
-    behind = {
-        "spectrum": [SectionEntry("waves", partial(_waves, scene), is_driven, full=True)],
-        "motion": [SectionEntry("worst", worst, worst_places.applies, full=True)],
-        "rest": [SectionEntry("line", partial(data_sheets.line, scene), is_known, full=True)],
-        "above": [
-            SectionEntry("pantographs", partial(data_sheets.pantographs, scene), is_driven, True)
-        ],
-    }
-    text = scene.input_text if scene is not None else None
+    worst = partial(worst_places.section, scene)
+    behind = {"motion": [SectionEntry("worst", worst, dynamics.has_statistics, full=True)]}
+    text = None
+    if scene is not None:
+        text = scene.input_text
+        behind["spectrum"] = [SectionEntry("waves", partial(_waves, scene), full=True)]
+        behind["rest"] = [SectionEntry("line", partial(data_sheets.line, scene), full=True)]
+        if scene.has_train:
+            sheet = partial(data_sheets.pantographs, scene)
+            behind["above"] = [SectionEntry("pantographs", sheet, full=True)]
     last = SectionEntry("signatures", partial(run_facts.signatures, text), full=True)
-    behind["run"] = [last]
-    return [one for entry in SECTIONS for one in (entry, *behind.get(entry.name, ()))]
+    return [
+        *(one for entry in SECTIONS for one in (entry, *behind.get(entry.name, ()))),
+        last,
+    ]

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from catenary.base.errors import CatenaryError
+from catenary.cases.studies.full_report.scene_of_run import SceneOfRun
 from catenary.cases.studies.questions.causes import Causes
 from catenary.cases.studies.questions.worst import Passage, Spot, WorstPlaces, worst_places
 from catenary.postproc.evaluate import filters
@@ -26,40 +27,28 @@ from catenary.postproc.report.pictures.marks import mark_line
 from catenary.postproc.report.sections.section import EvaluatedRun, Picture, Section, Text, number
 from catenary.postproc.report.study_table import StudyTable, texts_table
 from catenary.solver.statics.elasticity import elasticity
-from catenary.solver.statics.line_at_rest import LineAtRest
 
 # What is shown to both sides of an arm or a dropper [m], and how many places tables have.
 _BESIDE, _MOST = 30.0, 5
 _NO_CAUSE = "no cause found"
 
 
-def applies(run: EvaluatedRun) -> bool:
-    """Whether forces of a run have statistics, which rank its places."""
-    return len(run.statistics.complaints) < len(run.statistics.pantographs)
-
-
-def section(run: EvaluatedRun, at_rest: Callable[[], LineAtRest | None]) -> Section:
+def section(scene: SceneOfRun | None, run: EvaluatedRun) -> Section:
     """The worst places of the evaluated stretch.
 
     Parameters
     ----------
-    at_rest : returns the line at rest, for its elasticity; None if it is not known
+    scene : of the run, for the elasticity of its line; None if it is not known
     """
     results, places = run.results, worst_places(run.results)
-    causes = Causes(results, places.passages, _elasticity(results, at_rest))
+    causes = Causes(results, places.passages, _elasticity(results, scene))
     return Section("Worst places", _blocks(results, places, causes), _pictures(results, places))
 
 
-def _elasticity(
-    results: Results, at_rest: Callable[[], LineAtRest | None]
-) -> tuple[np.ndarray, np.ndarray] | None:
-    try:
-        rest = at_rest()
-    except CatenaryError:
+def _elasticity(results: Results, scene: SceneOfRun | None) -> tuple[np.ndarray, np.ndarray] | None:
+    if scene is None:
         return None
-    if rest is None:
-        return None
-    found = elasticity(rest.model, *results.evaluation)
+    found = elasticity(scene.at_rest.model, *results.evaluation)
     return found.x, found.lift
 
 
@@ -122,7 +111,7 @@ def _pictures(results: Results, places: WorstPlaces) -> Iterator[Picture]:
     ):
         for spot in spots[:1]:
             caption = f"{what}, {spot.x:.1f} m, as the train passes."
-            yield Picture(name, caption, lambda c=channel, s=spot: _passage(results, c, s))
+            yield Picture(name, caption, partial(_passage, results, channel, spot))
 
 
 def _noun(name: str) -> str:

@@ -103,7 +103,7 @@ def _axes(axes: Axes, own: str, panels: Sequence[Axes]) -> dict[str, Any]:
         }
         if isinstance(axis.get_major_locator(), FixedLocator):
             entry["tickvals"] = _numbers(axis.get_majorticklocs())
-            texts = axis.get_major_formatter().format_ticks(axis.get_majorticklocs())
+            texts = axis.get_major_formatter().format_ticks(list(axis.get_majorticklocs()))
             entry["ticktext"] = [text.replace("\n", "<br>") for text in texts]
     if axes.get_aspect() == 1.0:
         y["scaleanchor"] = f"x{own}"
@@ -132,7 +132,7 @@ def _traces(axes: Axes) -> Iterator[dict[str, Any]]:
     for line in axes.lines:
         if line.get_transform() != axes.transData:
             continue
-        marker, style = line.get_marker(), line.get_linestyle()
+        marker, style = str(line.get_marker()), line.get_linestyle()
         drawn = str(style) in _DASHES
         modes = [*(["lines"] if drawn else []), *(["markers"] if marker in _SYMBOLS else [])]
         if not modes:
@@ -160,7 +160,7 @@ def _traces(axes: Axes) -> Iterator[dict[str, Any]]:
                 "mode": "lines",
                 "x": _numbers(x),
                 "y": _numbers(y),
-                "line": {"color": to_hex(ranges.get_color()[0]), "width": 1.6},
+                "line": {"color": _colour_of(ranges), "width": 1.6},
                 **_named(ranges.get_label()),
             }
 
@@ -179,7 +179,7 @@ def _shapes(axes: Axes, own: str) -> Iterator[dict[str, Any]]:
     for line in axes.lines:
         across = line.get_transform() in (axes.get_xaxis_transform(), axes.get_yaxis_transform())
         if across and line.get_linestyle() != "None":
-            (x0, x1), (y0, y1) = line.get_xdata(), line.get_ydata()
+            (x0, y0), (x1, y1) = np.asarray(line.get_xydata())[[0, -1]].tolist()
             yield {
                 "type": "line",
                 "line": {"color": to_hex(line.get_color()), "width": line.get_linewidth(),
@@ -190,11 +190,15 @@ def _shapes(axes: Axes, own: str) -> Iterator[dict[str, Any]]:
             }  # fmt: skip
     for ranges in axes.collections:
         if isinstance(ranges, LineCollection) and ranges.get_transform() != axes.transData:
-            colour = to_hex(ranges.get_color()[0])
+            colour = _colour_of(ranges)
             for low, high in ranges.get_segments():
                 ends = _ends(axes, own, ranges.get_transform(), low, high)
-                line = {"color": colour, "width": 1.0}
-                yield {"type": "line", "layer": "below", "line": line, **ends}
+                look = {"color": colour, "width": 1.0}
+                yield {"type": "line", "layer": "below", "line": look, **ends}
+
+
+def _colour_of(lines: LineCollection) -> str:
+    return to_hex(np.atleast_2d(lines.get_edgecolor())[0])
 
 
 def _ends(axes: Axes, own: str, transform: Transform, low: Any, high: Any) -> dict[str, Any]:

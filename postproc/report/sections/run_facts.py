@@ -42,9 +42,9 @@ def _checks(run: EvaluatedRun) -> Iterator[Text | StudyTable]:
              f"{100.0 * made / work:.2g} % of that work" if work > 0.0 else ""],
         ]  # fmt: skip
     if "largest_rotation_rad" in watched:
-        largest = f"{watched['largest_rotation_rad']:.3g}"
+        rotation = f"{watched['largest_rotation_rad']:.3g}"
         rows.append(
-            ["largest rotation of a wire", largest, "rad", "linear theory: small against 1"]
+            ["largest rotation of a wire", rotation, "rad", "linear theory: small against 1"]
         )
     if "unconverged_steps" in n:
         steps = f"of {results.n_steps} steps"
