@@ -20,7 +20,7 @@ def name_of(requirement: str) -> str:
 
 
 def main() -> None:
-    """Print one requirement a line: build, program, films, tables, site and tests."""
+    """Print one requirement a line: build, program, films, tables, reports, site and tests."""
     with open(sys.argv[1], "rb") as file:
         settings = tomllib.load(file)
     project = settings["project"]
@@ -29,7 +29,7 @@ def main() -> None:
         *(r for r in project["dependencies"] if name_of(r) not in FROM_SYSTEM),
         *(
             one
-            for extra in ("film", "parquet", "docs", "test")
+            for extra in ("film", "parquet", "report", "docs", "test")
             for one in project["optional-dependencies"][extra]
         ),
     ]

@@ -28,18 +28,50 @@ FromWhere = Annotated[
 
 @app.command(
     "report",
-    help="Write the report of a run again, from its result file alone.",
-    epilog="Example: catenary report results/en300",
+    help="Write the full report of a run from its result file, with data sheets, worst places, "
+    "spectra and vector pictures.",
+    epilog="Example: catenary report results/en300 --pdf",
 )
 @console.guarded
 @console.serial
 def report(
     folder: RunFolder,
+    pdf: Annotated[bool, typer.Option("--pdf", help="Write report.pdf too, on A4.")] = False,
+    interactive: Annotated[
+        bool,
+        typer.Option(
+            "--interactive",
+            help="Write report_interactive.html too: pictures to zoom and read off, 5 MB.",
+        ),
+    ] = False,
 ) -> None:
     """Serial."""
+    records = _records(folder)
+    console.alone()  # starts MPI as one process, before anything imports it
+    from catenary.cases.studies.full_report.scene_of_run import SceneOfRun
+    from catenary.cases.studies.full_report.sections import full_sections
+    from catenary.postproc.read.results import Results
     from catenary.postproc.report.report import write_report
+    from catenary.postproc.report.sections.run_facts import INPUT
 
-    written = write_report(folder, folder, _records(folder))
+    with Results(folder, records) as results:
+        try:
+            scene = SceneOfRun(results)
+        except InputError as error:
+            console.warn(f"the report has no data sheets: {error}")
+            scene = None
+    entries, text = full_sections(scene), scene and scene.input_text
+    beside = {INPUT: text} if text else {}
+    written = write_report(
+        folder,
+        folder,
+        records,
+        entries,
+        beside,
+        vector=True,
+        on_paper=pdf,
+        interactive=interactive,
+    )
     console.say("\n".join(str(path) for path in written.files))
 
 

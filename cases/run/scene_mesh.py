@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from catenary.base.errors import InputError
 from catenary.cases.result_folder.output_files import new_file
@@ -12,6 +13,12 @@ from catenary.cases.scene.problem import line_of
 from catenary.cases.scene.scene import Scene
 from catenary.meshgen.build import make_mesh, use_mesh
 from catenary.meshgen.mesh import LineMesh
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from catenary.solver.problem.problem import Problem
+    from catenary.solver.statics.form_finding.equilibrium import Equilibrium
 
 # Suffixes of drawings.
 DRAWN = (".png", ".svg")
@@ -68,15 +75,29 @@ def draw_scene(scene: Scene, path: Path, force: bool) -> tuple[float, float]:
         If the file must not be written, or the line has no equilibrium.
     """
     new_file(path, DRAWN, force)
-    # Matplotlib takes long to import.
-    from catenary.cases.run.describe.defects import defect_facts
-    from catenary.cases.scene.line.line_data import overlaps_of
     from catenary.cases.scene.problem import problem_of
-    from catenary.postproc.report.pictures.line_drawing import Mark, draw_line
     from catenary.solver.statics.form_finding.equilibrium import find_form
 
     problem, mesh = problem_of(scene), mesh_of(scene)
-    _, form = find_form(problem, mesh)
+    figure, stretch = line_figure(scene, problem, mesh, find_form(problem, mesh)[1])
+    figure.savefig(path, format=path.suffix[1:], metadata={} if path.suffix == ".png" else None)
+    return stretch
+
+
+def line_figure(
+    scene: Scene, problem: Problem, mesh: LineMesh, form: Equilibrium
+) -> tuple[Figure, tuple[float, float]]:
+    """The line of a scene at rest as a drawing, and from where to where it shows it [m].
+
+    Parameters
+    ----------
+    problem, mesh, form : of the scene, and of its line at rest
+    """
+    # Matplotlib takes long to import.
+    from catenary.cases.run.describe.defects import defect_facts
+    from catenary.cases.scene.line.line_data import overlaps_of
+    from catenary.postproc.report.pictures.line_drawing import Mark, draw_line
+
     line, masts = problem.line, problem.line.support_positions
     overlaps = overlaps_of(scene.line)
     if overlaps is not None:
@@ -93,5 +114,4 @@ def draw_scene(scene: Scene, path: Path, force: bool) -> tuple[float, float]:
         for fact in defect_facts(scene, problem)
         if "at_m" in fact
     ]
-    draw_line(line, mesh, form, path, stretch, min(known, default=None), marks)
-    return stretch
+    return draw_line(line, mesh, form, stretch, min(known, default=None), marks), stretch

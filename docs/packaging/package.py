@@ -32,6 +32,7 @@ class Catenary(PythonPackage):
         depends_on("py-xarray@2023.1:2026")
         depends_on("py-pandas@1.5:3")
         depends_on("py-salib@1.4.7:1")
+        depends_on("py-tomli-w@1:1")
         depends_on("py-cma@4:4")
 
     # Its module for Python, gmsh.py, lies beside the library.

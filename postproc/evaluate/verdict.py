@@ -32,6 +32,7 @@ class Criterion:
     because : why it is not judged, empty if it is
     absent : whether it is not judged because scene or book lack what it takes: such a criterion
         leaves the verdict as it is
+    pantograph : name of the pantograph that is judged, empty for the run
     """
 
     criterion: str
@@ -48,6 +49,7 @@ class Criterion:
     compared: bool = False
     because: str = ""
     absent: bool = False
+    pantograph: str = ""
 
 
 def judge(
@@ -177,6 +179,7 @@ class _Judge:
             self.book.is_compared(rule),
             because,
             absent,
+            name,
         )
 
     def _limit(self, rule: Rule, name: str) -> tuple[float, str]:

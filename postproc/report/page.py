@@ -1,11 +1,14 @@
-"""A page of sections as one HTML file that needs no network, with its pictures in it."""
+"""A page of sections as one HTML file that needs no network, with its pictures in it; the same as
+PDF."""
 
 from __future__ import annotations
 
 import base64
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
+from catenary.base.errors import InputError
 from catenary.postproc.report.sections.section import Section
 
 _TEMPLATES = Path(__file__).parent / "templates"
@@ -16,13 +19,24 @@ _MARKS = {
 }  # fmt: skip
 
 
-def page(title: str, lead: str, sections: Iterable[Section], pictures: Mapping[str, bytes]) -> str:
+def page(
+    title: str,
+    lead: str,
+    sections: Iterable[Section],
+    pictures: Mapping[str, bytes],
+    names: Sequence[str] = (),
+    plots: Mapping[str, str] | None = None,
+    script: str = "",
+) -> str:
     """The page as text; sections are made as it is written. Not collective.
 
     Parameters
     ----------
     title, lead : above the sections
-    pictures : PNG files by name; sections show those that are there
+    pictures : PNG or SVG files by name; sections show those that are there
+    names : of the sections, as their anchors and for a list of contents; none without both
+    plots : pictures of Plotly in JSON by name, which stand in the place of others
+    script : the program of Plotly
     """
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
@@ -33,10 +47,54 @@ def page(title: str, lead: str, sections: Iterable[Section], pictures: Mapping[s
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    uris = {
-        name: "data:image/png;base64," + base64.b64encode(data).decode("ascii")
-        for name, data in pictures.items()
-    }
+    made = list(sections)
+    uris = {name: _data_uri(data) for name, data in pictures.items()}
     return environment.get_template("page.html.j2").render(
-        title=title, lead=lead, sections=sections, uris=uris, marks=_MARKS
+        title=title,
+        lead=lead,
+        sections=list(zip(made, names or [""] * len(made), strict=True)),
+        uris=uris,
+        marks=_MARKS,
+        # A text of a picture must not end the element that it stands in.
+        plots={name: text.replace("</", "<\\/") for name, text in (plots or {}).items() if text},
+        script=script,
     )
+
+
+def _data_uri(data: bytes) -> str:
+    kind = "png" if data.startswith(b"\x89PNG") else "svg+xml"
+    return f"data:image/{kind};base64," + base64.b64encode(data).decode("ascii")
+
+
+def pdf(html: str) -> bytes:
+    """A page as PDF on A4, with page numbers and bookmarks. Not collective.
+
+    Parameters
+    ----------
+    html : what ``page`` returned; what is folded away there is printed in full
+
+    Raises
+    ------
+    InputError
+        If the package WeasyPrint or a library that it needs is missing.
+    """
+    HTML, URLFetcher = _weasyprint()
+    fetcher = URLFetcher(allowed_protocols=["data"])  # pictures are in the page
+    return bytes(HTML(string=html, url_fetcher=fetcher).write_pdf())
+
+
+def refuse_without_pdf() -> None:
+    """Raise `InputError` if no PDF can be written. Not collective."""
+    _weasyprint()
+
+
+def _weasyprint() -> tuple[Any, Any]:
+    try:
+        from weasyprint import HTML
+        from weasyprint.urls import URLFetcher
+    except (ImportError, OSError) as error:  # OSError: of Pango, which is no package of Python
+        raise InputError(
+            f"--pdf needs the package weasyprint and the library Pango ({error}): pip install "
+            "'catenary[pdf]', and on Debian apt-get install libpango-1.0-0 libpangoft2-1.0-0"
+        ) from error
+    return HTML, URLFetcher

@@ -6,7 +6,7 @@ It reads the result file and nothing else, and works for unfinished runs as well
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,10 +20,16 @@ from catenary.postproc.files.disk import write_into
 from catenary.postproc.read.records import Records
 from catenary.postproc.read.results import Results
 from catenary.postproc.report import csv_tables
-from catenary.postproc.report.page import page
+from catenary.postproc.report.page import page, pdf, refuse_without_pdf
 from catenary.postproc.report.sections import acceptance as acceptance_section
-from catenary.postproc.report.sections import contact_force, line, run_facts
-from catenary.postproc.report.sections.section import EvaluatedRun, Picture, Section, number
+from catenary.postproc.report.sections import contact_force, dynamics, line, run_facts
+from catenary.postproc.report.sections.section import (
+    EvaluatedRun,
+    Picture,
+    Section,
+    SectionEntry,
+    number,
+)
 from catenary.postproc.report.summary import as_json, summarise
 from catenary.postproc.standards.supplies import KMH
 
@@ -31,16 +37,24 @@ logger = logging.getLogger("catenary.report")
 
 
 # The sections of a report in their order.
-SECTIONS: list[Callable[[EvaluatedRun], Section]] = [
-    acceptance_section.status,
-    acceptance_section.section,
-    contact_force.section,
-    line.in_motion,
-    line.at_rest,
-    line.from_above,
-    run_facts.effects,
-    run_facts.section,
+SECTIONS: list[SectionEntry] = [
+    SectionEntry("verdict", acceptance_section.status),
+    SectionEntry("acceptance", acceptance_section.section),
+    SectionEntry("checks", run_facts.checks),
+    SectionEntry("force", contact_force.section),
+    SectionEntry("spectrum", dynamics.section, dynamics.has_statistics, full=True),
+    SectionEntry("motion", line.in_motion),
+    SectionEntry("places", dynamics.places, dynamics.has_places, full=True),
+    SectionEntry("rest", line.at_rest),
+    SectionEntry("above", line.from_above, line.has_registration),
+    SectionEntry("effects", run_facts.effects),
+    SectionEntry("run", run_facts.section),
 ]
+
+
+def quick_sections() -> list[SectionEntry]:
+    """Those that a run writes when it ends."""
+    return [entry for entry in SECTIONS if not entry.full]
 
 
 @dataclass(frozen=True)
@@ -53,7 +67,15 @@ class Report:
 
 
 def write_report(
-    result_path: Path | str, out_dir: Path | str, records: Records | None = None
+    result_path: Path | str,
+    out_dir: Path | str,
+    records: Records | None = None,
+    entries: Sequence[SectionEntry] | None = None,
+    beside: Mapping[str, str] | None = None,
+    *,
+    vector: bool = False,
+    on_paper: bool = False,
+    interactive: bool = False,
 ) -> Report:
     """Write summary, report, pictures and dropper table of a run into a folder. Not collective.
 
@@ -65,15 +87,28 @@ def write_report(
     result_path : result file or its folder
     out_dir : folder that exists
     records : what ``evaluate.guard`` found in the file, None to check it here
+    entries : the sections, None for those of ``quick_sections``
+    beside : texts of further files by name
+    vector : pictures are SVG files instead of PNG files
+    on_paper : write ``report.pdf`` too
+    interactive : write ``report_interactive.html`` too, whose pictures are Plotly's
 
     Raises
     ------
     InputError
-        If ``result_path`` is no result file, or too damaged.
+        If ``result_path`` is no result file, or too damaged; if a library for PDF or Plotly is
+        missing.
     RunBroken
         If a file cannot be written.
     """
     out = Path(out_dir)
+    if on_paper:
+        refuse_without_pdf()
+    program = ""
+    if interactive:
+        from catenary.postproc.report.pictures.interactive import script
+
+        program = script()
     with Results(result_path, records) as results:
         for sentence in results.damage:
             logger.warning("%s", sentence)
@@ -82,13 +117,27 @@ def write_report(
         run = EvaluatedRun(results, statistics, criteria)
         summary = as_json(summarise(results, statistics, criteria, run.indicators))
         content: dict[str, bytes | str] = {"droppers.csv": csv_tables.droppers_csv(results)}
+        content |= beside or {}
         registration = results.registration()
         if registration is not None:
             content["registration.csv"] = registration.csv()
         files = write_into(out, {"summary.json": summary, **content})
-        pictures = _painted(run)
-        content = {f"{name}.png": data for name, data in pictures.items()}
-        files += write_into(out, {**content, "report.html": _page(run, pictures)})
+        shown = {
+            entry.name: _with_lists(entry.make(run))
+            for entry in (quick_sections() if entries is None else entries)
+            if entry.applies(run)
+        }
+        pictures = _painted(shown.values(), "svg" if vector else "png")
+        html = _page(run, shown, _by_stem(pictures))
+        content = {**pictures, "report.html": html}
+        if interactive:
+            plots = _by_stem(_painted(shown.values(), "json"))
+            texts = {name: data.decode() for name, data in plots.items()}
+            page_of_plots = _page(run, shown, _by_stem(pictures), texts, program)
+            content["report_interactive.html"] = page_of_plots
+        if on_paper:
+            content["report.pdf"] = pdf(html)
+        files += write_into(out, content)
     return Report(files, criteria, run.verdict if run.results.complete else None)
 
 
@@ -111,32 +160,47 @@ def write_summary(result_path: Path | str, out_dir: Path | str) -> bool | None:
 
 def drawings(results: Results, statistics: RunStatistics) -> Iterator[Picture]:
     """What makes each picture of a run, in their order."""
-    yield from _pictures(EvaluatedRun(results, statistics, criteria_of(results, statistics)))
+    run = EvaluatedRun(results, statistics, criteria_of(results, statistics))
+    for entry in SECTIONS:
+        if entry.applies(run):
+            yield from entry.make(run).pictures
 
 
-def _pictures(run: EvaluatedRun) -> Iterator[Picture]:
-    """What makes each picture of a run that has been judged, in their order."""
-    for section in SECTIONS:
-        yield from section(run).pictures
+def _with_lists(section: Section) -> Section:
+    """The section with its parts in lists, which several pages go through."""
+    _, blocks, pictures, folded = section
+    return section._replace(blocks=list(blocks), pictures=list(pictures), folded=list(folded))
 
 
-def _painted(run: EvaluatedRun) -> dict[str, bytes]:
-    """The pictures of a run as PNG, without those that cannot be drawn, which is logged."""
+def _painted(sections: Iterable[Section], kind: str) -> dict[str, bytes]:
+    """The files of all pictures, without those that cannot be drawn, which is logged."""
     # A summary alone does without Matplotlib.
     from catenary.postproc.report.pictures import figures
 
     painted: dict[str, bytes] = {}
-    for name, _, draw in _pictures(run):
-        painted.update(zip([name], figures.painted(f"{name}.png", draw).values(), strict=False))
+    for section in sections:
+        for name, _, draw in section.pictures:
+            painted |= figures.painted(f"{name}.{kind}", draw)
     return painted
 
 
-def _page(run: EvaluatedRun, pictures: Mapping[str, bytes]) -> str:
-    """The page of a run, with the PNG files of its pictures by name."""
+def _by_stem(files: Mapping[str, bytes]) -> dict[str, bytes]:
+    return {Path(name).stem: data for name, data in files.items()}
+
+
+def _page(
+    run: EvaluatedRun,
+    sections: Mapping[str, Section],
+    pictures: Mapping[str, bytes],
+    plots: Mapping[str, str] | None = None,
+    script: str = "",
+) -> str:
+    """The page of a run; the files of its pictures by name, others as for ``page``."""
     results = run.results
     start, end = (number(place, 0) for place in results.evaluation)
     lead = (
         f"Case {results.attributes['case']}: {number(KMH * results.fact('speed'), 0)} km/h, "
         f"{counted(results.n_pantographs, 'pantograph')}, evaluated from {start} to {end} m."
     )
-    return page(results.attributes["title"], lead, [make(run) for make in SECTIONS], pictures)
+    title = results.attributes["title"]
+    return page(title, lead, sections.values(), pictures, list(sections), plots, script)

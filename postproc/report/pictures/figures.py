@@ -31,6 +31,7 @@ logger = logging.getLogger("catenary.pictures")
 
 COLOURS = ("#1f5fa8", "#d1641b", "#2f8f4e", "#7b4fa3", "#8c6d31", "#444444")
 GREY, LIGHT, SHADE, LIMIT = "#6b6b6b", "#c9c9c9", "#eef3e6", "#b3261e"
+RUN_IN = "#fdf7e3"
 WIDTH = 9.0
 _RESOLUTION = 130
 # Room around panels whose layout is not computed [inch]: tick labels of six characters and a
@@ -195,20 +196,27 @@ def legend_above(axes: Axes, columns: int = 5) -> Legend:
 
 
 def painted(name: str, draw: Callable[[], Figure | None]) -> dict[str, bytes]:
-    """A picture as ``{name: PNG file}``; empty if there is none to draw or drawing fails.
+    """A picture as ``{name: file}``, PNG, SVG or JSON of Plotly by its suffix; empty if none can be
+    drawn.
 
     A failure is logged and costs this picture alone. Results that are damaged, a `CatenaryError`,
     are not a failure of drawing and are raised.
 
     Parameters
     ----------
-    name : of the file, with its end
+    name : of the file, with its suffix
     draw : makes the figure, None if there is nothing to show
     """
     try:
         with own_style():
             figure = draw()
-            return {} if figure is None else {name: png(figure)}
+            if figure is None:
+                return {}
+            if name.endswith(".json"):
+                from catenary.postproc.report.pictures.interactive import as_json
+
+                return {name: as_json(figure).encode()}
+            return {name: svg(figure) if name.endswith(".svg") else png(figure)}
     except CatenaryError:
         raise
     except Exception as error:
@@ -220,13 +228,7 @@ def painted(name: str, draw: Callable[[], Figure | None]) -> dict[str, bytes]:
 @own_style()
 def png(figure: Figure) -> bytes:
     """``figure`` as the bytes of a PNG file. A dollar sign in a text is one, and no formula."""
-    for text in _texts(figure):
-        if "$" in text.get_text():
-            text.set_parse_math(False)
-    canvas = figure.canvas
-    if not isinstance(canvas, FigureCanvasAgg):  # a figure that `new_figure` has not made
-        canvas = FigureCanvasAgg(figure)
-    _make_room_for_legends(figure, canvas)
+    canvas = _prepared(figure)
     with warnings.catch_warnings():
         # Names may be written in letters that the font has not; boxes stand for them.
         warnings.filterwarnings("ignore", message="Glyph .* missing from")
@@ -236,6 +238,28 @@ def png(figure: Figure) -> bytes:
     resolution = (_RESOLUTION, _RESOLUTION)
     picture.convert("RGB").save(stream, "png", compress_level=_LEVEL, dpi=resolution)
     return stream.getvalue()
+
+
+@own_style()
+def svg(figure: Figure) -> bytes:
+    """``figure`` as the bytes of an SVG file, whose texts are texts."""
+    _prepared(figure)
+    stream = io.BytesIO()
+    with matplotlib.rc_context({"svg.fonttype": "none", "svg.hashsalt": "catenary"}):
+        figure.savefig(stream, format="svg", metadata={"Date": None})
+    return stream.getvalue()
+
+
+def _prepared(figure: Figure) -> FigureCanvasAgg:
+    """The canvas of a figure whose legends have room and whose texts are no formulas."""
+    for text in _texts(figure):
+        if "$" in text.get_text():
+            text.set_parse_math(False)
+    canvas = figure.canvas
+    if not isinstance(canvas, FigureCanvasAgg):  # a figure that `new_figure` has not made
+        canvas = FigureCanvasAgg(figure)
+    _make_room_for_legends(figure, canvas)
+    return canvas
 
 
 def _make_room_for_legends(figure: Figure, canvas: FigureCanvasAgg) -> None:

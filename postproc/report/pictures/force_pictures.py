@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
+from scipy import signal
 
 from catenary.base.errors import InputError
 from catenary.postproc.evaluate import filters
@@ -15,6 +18,8 @@ from catenary.postproc.read.results import Results
 from catenary.postproc.report.pictures.envelope import thinned
 from catenary.postproc.report.pictures.figures import (
     GREY,
+    LIMIT,
+    RUN_IN,
     colour,
     legend_above,
     own_style,
@@ -22,6 +27,9 @@ from catenary.postproc.report.pictures.figures import (
     tidy,
 )
 from catenary.postproc.report.pictures.marks import mark_line, panels_along_track, travelled
+
+# Frequencies that a spectrum shows [Hz], and fewest records of one.
+_HIGHEST, _FEWEST = 60.0, 64
 
 
 @own_style()
@@ -31,8 +39,11 @@ def contact_force(results: Results) -> Figure:
     n = results.n_pantographs
     start, end = travelled(results)
     figure, panels = stacked(0.7 + 2.7 * n, n, shared=True)
+    arrivals = results.attributes.get("arrivals", {}).get("pantographs", [])
     for p, axes in enumerate(panels):
         mark_line(axes, results, start, end)
+        if p < len(arrivals):
+            _mark_arrivals(axes, results.evaluation[0], arrivals[p])
         force = results.column("contact_force", p)
         chosen = thinned(force)
         light: dict[str, Any] = {"alpha": 0.3, "linewidth": 0.6, "label": "unfiltered"}
@@ -52,6 +63,82 @@ def contact_force(results: Results) -> Figure:
         tidy(axes, "", "contact force [N]", names[p].capitalize())
         legend_above(axes)
     panels[-1].set_xlabel("position along the track [m]")
+    return figure
+
+
+def _mark_arrivals(axes: Axes, evaluated_from: float, facts: Mapping[str, Any]) -> None:
+    """The run-in of a pantograph, and where reflections of the line's ends reach it."""
+    if facts.get("start_m") is not None and facts["start_m"] < evaluated_from:
+        axes.axvspan(facts["start_m"], evaluated_from, color=RUN_IN, zorder=0, label="run-in")
+    for end, style in (("near", ":"), ("far", "-.")):
+        met = facts.get(f"{end}_end_met_at_m")
+        if met is not None:
+            label = f"reflection of the {end} end"
+            axes.axvline(met, color=LIMIT, linestyle=style, linewidth=1.3, label=label)
+
+
+@own_style()
+def force_spectrum(results: Results, lengths: Mapping[str, float]) -> Figure:
+    """Power spectral density of the unfiltered force of each pantograph in the evaluation stretch.
+
+    Parameters
+    ----------
+    lengths : by which the line repeats [m], by name; the speed over each is a frequency
+    """
+    start, end = results.evaluation
+    figure, (axes,) = stacked(3.8, 1)
+    speed = results.fact("speed")
+    for p, name in enumerate(results.pantograph_names()):
+        position = results.column("contact_position", p)
+        force = results.column("contact_force", p)[(position >= start) & (position <= end)]
+        if force.size < _FEWEST:
+            continue
+        # Four lines of the spectrum to the lowest frequency that is marked, if the record has them.
+        wanted = int(4.0 * max(lengths.values()) / speed / results.dt)
+        stretch = min(force.size, max(wanted, _FEWEST))
+        frequency, power = signal.welch(force, 1.0 / results.dt, nperseg=stretch, detrend="linear")
+        shown = (frequency > 0.0) & (frequency <= _HIGHEST)
+        axes.plot(frequency[shown], power[shown], color=colour(p), linewidth=1.3, label=name)
+    for (word, length), style in zip(lengths.items(), ("--", ":"), strict=False):
+        first = speed / length
+        label = f"{word} passing, {first:.2f} Hz and multiples"
+        for multiple in range(1, 4):
+            if multiple * first <= _HIGHEST:
+                how: Any = {"linestyle": style, "linewidth": 1.2 if multiple == 1 else 0.6}
+                axes.axvline(multiple * first, color=GREY, label=label, **how)
+                label = ""
+    axes.axvline(filters.CUT_OFF, color=LIMIT, linewidth=0.9, label="end of the filtered band")
+    axes.set_yscale("log")
+    axes.set_xlim(0.0, _HIGHEST)
+    tidy(axes, "frequency [Hz]", "spectral density [N²/Hz]")
+    legend_above(axes)
+    return figure
+
+
+@own_style()
+def contact_height(
+    results: Results, heights: Mapping[str, tuple[np.ndarray, np.ndarray, np.ndarray]]
+) -> Figure:
+    """Height of the contact point and its gradient along the track.
+
+    Parameters
+    ----------
+    heights : places [m], heights [m] and gradients [-], (n,) each, by name of the pantograph
+    """
+    figure, (height, gradient) = stacked(5.6, 2)
+    start, end = travelled(results)
+    for axes, number, factor, label in (
+        (height, 1, 1.0, "height above rail [m]"),
+        (gradient, 2, 1e3, "gradient [‰]"),
+    ):
+        mark_line(axes, results, start, end)
+        for p, (name, own) in enumerate(heights.items()):
+            chosen = thinned(own[number])
+            x, values = own[0][chosen], factor * own[number][chosen]
+            axes.plot(x, values, color=colour(p), linewidth=1.2, label=name)
+        tidy(axes, "", label)
+        legend_above(axes)
+    gradient.set_xlabel("position of the pantograph along the track [m]")
     return figure
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -47,12 +46,11 @@ def draw_line(
     line: Line,
     mesh: LineMesh,
     form: Equilibrium,
-    path: Path,
     stretch: tuple[float, float],
     half_head: float | None = None,
     marks: Sequence[Mark] = (),
-) -> None:
-    """Write a drawing of a line at rest, as PNG or SVG by the file's suffix. Not collective.
+) -> Figure:
+    """A drawing of a line at rest. Not collective.
 
     Parameters
     ----------
@@ -92,7 +90,7 @@ def draw_line(
         names[wire.role] = wire.name.replace("_", " ") if alone else f"{wire.role.value} wires"
     handles = [Line2D([], [], color=_COLOUR[role], label=name) for role, name in names.items()]
     figure.legend(handles=handles, loc="upper right", ncols=len(handles), frameon=False)
-    figure.savefig(path, format=path.suffix[1:], metadata={} if path.suffix == ".png" else None)
+    return figure
 
 
 def _side_view(

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+
+import numpy as np
 
 from catenary.postproc.evaluate.acceptance import judged_by
 from catenary.postproc.evaluate.verdict import Criterion, labels
@@ -12,6 +14,9 @@ from catenary.postproc.report.study_table import StudyTable, texts_table
 from catenary.postproc.standards.supplies import KMH
 
 _RELATIONS = {"<=": "≤", "<": "<", ">=": "≥", ">": ">"}
+NAN = float("nan")
+# Error of a quantity over the rms error of the force history.
+_TIMES_RMS = {"mean_force": 1.0, "force_std": 1.0, "force_max": 3.0, "force_min": 3.0}
 _UNCOMPARED = "not compared with the text"
 _WORDS = {None: "not judged", True: "passed", False: "failed"}
 _BROKEN_OFF = {
@@ -49,6 +54,7 @@ def _status(run: EvaluatedRun) -> Iterator[Text]:
         yield Text(f"{by}. Failed:", "bad", "Not passed.", failed)
     elif results.complete:
         yield Text(f"{by}.", "good", "Passed.")
+    yield from (Text(sentence) for sentence in nearest_limit(run))
     yield from (Text(sentence, "open") for sentence in run.statistics.complaints)
 
 
@@ -63,6 +69,66 @@ def _sentence(one: Criterion, label: str) -> str:
     return f"{label}: {value} {one.unit}, must be {relation} {limit} {one.unit}"
 
 
+def step_errors(run: EvaluatedRun) -> dict[str, dict[str, float]]:
+    """Estimated errors by the time step, by quantity and pantograph, in the quantity's unit.
+
+    The rms error of the history of the filtered force bounds the error of its mean and of its
+    deviation. Three times that stands for the error of its extremes, for which there is no bound.
+    """
+    found: dict[str, dict[str, float]] = {}
+    for one, error in zip(run.statistics.pantographs, run.indicators.force_error, strict=True):
+        for quantity, factor in _TIMES_RMS.items():
+            found.setdefault(quantity, {})[one.name] = factor * float(error)
+    return found
+
+
+def _error_of(one: Criterion, errors: Mapping[str, Mapping[str, float]]) -> float:
+    """Estimated error of the value of a criterion, NaN if there is no estimate."""
+    return errors.get(one.quantity, {}).get(one.pantograph, NAN)
+
+
+def _error(one: Criterion, errors: Mapping[str, Mapping[str, float]]) -> str:
+    return number(_error_of(one, errors), 2)
+
+
+def _distance(one: Criterion) -> float:
+    """Distance of the value from its limit, negative if the criterion failed; NaN if not judged."""
+    if one.passed is None:
+        return NAN
+    return abs(one.limit - one.value) * (1.0 if one.passed else -1.0)
+
+
+def _margin(one: Criterion) -> str:
+    return number(_distance(one), decimals_that_tell(_distance(one), 0.0, 1))
+
+
+def nearest_limit(run: EvaluatedRun) -> Iterator[str]:
+    """Sentences on the smallest margin, and on verdicts that an estimated error could turn."""
+    judged = [
+        (one, label)
+        for one, label in zip(run.criteria, labels(run.criteria), strict=True)
+        if one.passed is not None and one.limit != 0.0
+    ]
+    if not judged:
+        return
+    one, label = min(judged, key=lambda pair: abs(_distance(pair[0]) / pair[0].limit))
+    share = 100.0 * _distance(one) / abs(one.limit)
+    yield (
+        f"Nearest to its limit: {label}, with a margin of {_margin(one)} {one.unit} "
+        f"({number(share, decimals_that_tell(share, 0.0, 1))} %)."
+    )
+    errors = step_errors(run)
+    turned = [
+        f"{label} (margin {_margin(one)}, error {_error(one, errors)} {one.unit})"
+        for one, label in judged
+        if abs(_distance(one)) <= _error_of(one, errors)
+    ]
+    if turned:
+        yield f"The estimated error of the time step could turn: {'; '.join(turned)}."
+    elif any(np.isfinite(_error_of(one, errors)) for one, _ in judged):
+        yield "The estimated error of the time step is smaller than every margin of the force."
+
+
 def section(run: EvaluatedRun) -> Section:
     """All criteria with their limits."""
     return Section("Acceptance", _criteria(run))
@@ -70,15 +136,25 @@ def section(run: EvaluatedRun) -> Section:
 
 def _criteria(run: EvaluatedRun) -> Iterator[Text | StudyTable]:
     rows, left = [], []
+    errors = step_errors(run)
     for one, label in zip(run.criteria, labels(run.criteria), strict=True):
         if one.absent:
             left.append(f"{label}: because {one.because}")
             continue
         value, limit = _figures(one)
         source = one.clause if one.compared else f"{one.clause}; {_UNCOMPARED}"
-        words = one.unit, _WORDS[one.passed], source
-        rows.append([label, value, _RELATIONS[one.relation], limit, *words])
-    yield texts_table(["criterion", "value", "", "limit", "unit", "", "source"], rows, {1, 3})
+        words = one.unit, source
+        of_margin = _margin(one), _error(one, errors)
+        first = label, _WORDS[one.passed], value, _RELATIONS[one.relation], limit
+        rows.append([*first, *of_margin, *words])
+    heads = ["criterion", "verdict", "value", "", "limit", "margin", "error", "unit", "source"]
+    yield texts_table(heads, rows, {2, 4, 5, 6})
+    yield Text(
+        "The margin is the distance from the limit, negative beyond it. The error is that of the "
+        "time step, estimated from the record; three times the rms error of the history for "
+        "extremes, a dash where there is no estimate. The error of the mesh is not estimated: "
+        f"catenary accuracy {run.results.attributes['case']} measures both."
+    )
     if left:
         yield Text("for want of data or of a limit:", "open", "Not judged", left)
     speed = number(KMH * run.results.fact("wave_speed"), 0)

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from catenary.postproc.evaluate.remarks import all_remarks
 from catenary.postproc.read.results import Results
-from catenary.postproc.report.sections.section import EvaluatedRun, Picture, Section, Text, number
+from catenary.postproc.report.sections.section import EvaluatedRun, Picture, Section, number
 from catenary.postproc.report.study_table import StudyTable, texts_table
 
 _ROWS = (
@@ -29,7 +28,7 @@ def section(run: EvaluatedRun) -> Section:
     return Section("Contact force", _blocks(run), _pictures(run))
 
 
-def _blocks(run: EvaluatedRun) -> Iterator[Text | StudyTable]:
+def _blocks(run: EvaluatedRun) -> Iterator[StudyTable]:
     pantographs, found = run.statistics.pantographs, run.indicators
     rows = [
         [label, unit, *(number(factor * getattr(p, name), digits) for p in pantographs)]
@@ -41,8 +40,6 @@ def _blocks(run: EvaluatedRun) -> Iterator[Text | StudyTable]:
     rows += [["the same, of the standard deviation", "%", *shares], *_violations(run.results)]
     heads = ["in the evaluation stretch", "unit", *(p.name for p in pantographs)]
     yield texts_table(heads, rows, set(range(2, len(heads))))
-    remarks = [*run.results.damage, *all_remarks(run.results, found)]
-    yield from (Text(sentence, "remark") for sentence in remarks)
 
 
 def _violations(results: Results) -> list[list[str]]:

@@ -23,11 +23,15 @@ def in_motion(run: EvaluatedRun) -> Section:
     """Uplift and dropper forces."""
     droppers, supports = run.statistics.droppers, run.statistics.supports
     rows: list[list[Any]] = [
-        ["largest uplift at a steady arm", number(1e3 * supports.maximum), "mm"],
+        ["largest uplift at a steady arm", number(1e3 * supports.maximum), "mm"]
+    ]
+    of_droppers: list[list[Any]] = [
         ["droppers that slackened", droppers.n_slackened, f"of {droppers.evaluated.sum()}"],
         ["largest dropper force", number(droppers.maximum), "N"],
         ["smallest dropper force", number(droppers.minimum), "N"],
     ]
+    if droppers.x.size:
+        rows += of_droppers
     table = texts_table(["in the evaluation stretch", "value", "unit"], rows, {1})
     return Section("Line in motion", [table], _of_motion(run))
 
@@ -70,11 +74,14 @@ def _of_rest(results: Results) -> Iterator[Text | StudyTable]:
             f"{number(100 * (high - low) / (high + low))} %)."
         )
     own = [row for row in csv_tables.dropper_table(results) if row.span == span]
-    yield _droppers(results, own, f"Droppers of span {span}")
+    if own:
+        yield _droppers(results, own, f"Droppers of span {span}")
 
 
 def _all_droppers(results: Results) -> Iterator[Folded]:
     rows = csv_tables.dropper_table(results)
+    if not rows:
+        return
     title = f"Droppers of all spans ({len(rows)}), also in droppers.csv"
     yield Folded(title, _droppers(results, rows))
 
@@ -92,6 +99,11 @@ def _droppers(results: Results, rows: Sequence[DropperRow], title: str = "") -> 
     return texts_table(heads, cells, set(range(6)), title)
 
 
+def has_registration(run: EvaluatedRun) -> bool:
+    """Whether steady arms of a run have forces and places across the track."""
+    return run.results.registration() is not None
+
+
 def from_above(run: EvaluatedRun) -> Section:
     """Where the contact wires are laterally, and their steady arms."""
     from catenary.postproc.report.pictures.line_pictures import plan_view
@@ -99,9 +111,7 @@ def from_above(run: EvaluatedRun) -> Section:
     results = run.results
     text = "The line at rest from above, and its steady arms."
     picture = Picture("plan_view", text, lambda: plan_view(results))
-    there = results.registration() is not None
-    heading = "Line from above" if there else ""
-    return Section(heading, _lateral(results), [picture], _registration(results))
+    return Section("Line from above", _lateral(results), [picture], _registration(results))
 
 
 def _lateral(results: Results) -> Iterator[Text]:
@@ -120,8 +130,7 @@ def _lateral(results: Results) -> Iterator[Text]:
 
 def _registration(results: Results) -> Iterator[Folded]:
     found = results.registration()
-    if found is None:
-        return
+    assert found is not None
     heads = ["position [m]", "stagger [m]", "radial force [N]", "lift [N]", "slope [deg]"]
     heads += ["force along the track [N]", "slew [deg]", *(["wire"] if found.wires else [])]
     title = f"Registration: {len(found.x)} steady arms, also in registration.csv"

@@ -3,31 +3,98 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
+from hashlib import sha256
 
 import numpy as np
 
 from catenary.postproc.channels.line_record import says
 from catenary.postproc.evaluate.error_indicators import Indicators
+from catenary.postproc.evaluate.remarks import all_remarks
 from catenary.postproc.evaluate.wording import counted
 from catenary.postproc.read.results import Results
 from catenary.postproc.report.sections.section import EvaluatedRun, Folded, Section, Text, number
-from catenary.postproc.report.study_table import texts_table
+from catenary.postproc.report.study_table import StudyTable, texts_table
 from catenary.postproc.report.summary import real_time_factor
 
 # Counters of summary.json that say how the contact problem was solved, not what came of it.
 _OF_THE_SOLVER = ("steps", "rounds", "repeated_steps", "pivoted_steps")
+# File beside a full report: the scene as a case that `catenary run` takes.
+INPUT = "input.toml"
+
+
+def checks(run: EvaluatedRun) -> Section:
+    """What the march found of itself: energy, motion beyond linear theory, iterations."""
+    return Section("The run's own checks", _checks(run))
+
+
+def _checks(run: EvaluatedRun) -> Iterator[Text | StudyTable]:
+    results, about = run.results, run.results.attributes
+    watched, n = about.get("watched", {}), about.get("inner_iterations", {})
+    rows: list[list[str]] = []
+    if "contact_work_J" in watched:
+        made, work = watched["energy_made_J"], watched["contact_work_J"]
+        rows += [
+            ["work of the contact forces on the line", f"{work:.3g}", "J", ""],
+            ["energy of the line at the end", f"{watched['line_energy_J']:.3g}", "J",
+             f"largest {watched['most_line_energy_J']:.3g} J"],
+            ["energy made by the time integration", f"{made:.3g}", "J",
+             f"{100.0 * made / work:.2g} % of that work" if work > 0.0 else ""],
+        ]  # fmt: skip
+    if "largest_rotation_rad" in watched:
+        rotation = f"{watched['largest_rotation_rad']:.3g}"
+        rows.append(
+            ["largest rotation of a wire", rotation, "rad", "linear theory: small against 1"]
+        )
+    if "unconverged_steps" in n:
+        steps = f"of {results.n_steps} steps"
+        rows.append(["steps that did not converge", str(n["unconverged_steps"]), "", steps])
+    if results.has_violations:
+        largest = max((v for v in results.largest_violations() if v is not None), default=0.0)
+        rows.append(["largest open joint of a pantograph", f"{largest:.1e}", "m", ""])
+    if rows:
+        yield texts_table(["", "value", "unit", ""], rows, {1})
+    if "contact_work_J" not in watched:
+        yield Text("No energy balance: loads other than contact forces do work on this line.")
+    remarks = [*results.damage, *all_remarks(results, run.indicators)]
+    yield from (Text(sentence, "remark") for sentence in remarks)
+    if not remarks:
+        yield Text("The program has no remark on this run.")
 
 
 def effects(run: EvaluatedRun) -> Section:
-    """Each effect, whether it is on, and why."""
+    """Each effect that was simulated, and those that were not, with the reasons."""
     about = run.results.attributes
-    rows = [
-        [name, state, title, reason]
-        for state in ("on", "off")
-        for name, title, reason in about[f"effects_{state}"]
-    ]
     heads = ["effect", "", "what it is", "why"]
-    return Section("What was simulated and what was not", [texts_table(heads, rows)])
+    on, off = (
+        texts_table(heads, [[name, state, *words] for name, *words in about[f"effects_{state}"]])
+        for state in ("on", "off")
+    )
+    left = Folded(f"What was not simulated: {counted(len(off.rows), 'effect')}", off)
+    how = f"catenary plan {about['case']} --cost measures what each costs and changes."
+    return Section("What was simulated", [on, Text(how)], folded=[left])
+
+
+def signatures(text: str | None, run: EvaluatedRun) -> Section:
+    """How to make the run again, and room for those who answer for it.
+
+    Parameters
+    ----------
+    text : what stands in ``INPUT``, None if there is no such file
+    """
+    about = run.results.attributes
+    name, version = next(iter(about["versions"].items()))
+    rows = [["program", f"{name} {version}; all versions above"]]
+    if text is not None:
+        options = " ".join(about.get("petsc_options", []))
+        command = f"catenary run {INPUT} -o AGAIN" + (f" -- {options}" if options else "")
+        mark = sha256(text.encode()).hexdigest()
+        rows = [["input", f"{INPUT}, SHA-256 {mark}"], ["command", command], *rows]
+    room = [width * "\u00a0" for width in (40, 20, 45)]
+    roles = [[role, *room] for role in ("computed", "checked", "approved")]
+    signed = texts_table(["", "name", "date", "signature"], roles)
+    blocks = [texts_table(["", ""], rows), signed]
+    return Section("Reproduction and signatures", blocks)
 
 
 def section(run: EvaluatedRun) -> Section:

@@ -44,8 +44,8 @@ class Text(NamedTuple):
     Attributes
     ----------
     text : what it says
-    look : "good", "bad" or "open" for a verdict, "remark" for a remark, "code" for what is shown to
-        the letter; empty for plain text
+    look : "good", "bad" or "open" for a verdict, "note" for a box, "remark" for a remark, "code"
+        for what is shown to the letter; empty for plain text
     first : words before the text, in bold
     items : a list below it
     """
@@ -57,7 +57,8 @@ class Text(NamedTuple):
 
 
 class Picture(NamedTuple):
-    """A picture: name of the file without its end, caption, and what makes the figure, if any."""
+    """A picture: name of the file without its suffix, caption, and a function that draws the figure
+    or returns None."""
 
     name: str
     caption: str
@@ -86,6 +87,27 @@ class Section(NamedTuple):
     blocks: Iterable[Text | StudyTable]
     pictures: Iterable[Picture] = ()
     folded: Iterable[Folded] = ()
+
+
+def _always(run: EvaluatedRun) -> bool:
+    return True
+
+
+class SectionEntry(NamedTuple):
+    """An entry of a report's list of sections.
+
+    Attributes
+    ----------
+    name : of the section, an anchor of the page
+    make : returns the section of a run
+    applies : whether a run has anything to show there; the section is left out otherwise
+    full : whether it stands in full reports alone, because it takes long
+    """
+
+    name: str
+    make: Callable[[EvaluatedRun], Section]
+    applies: Callable[[EvaluatedRun], bool] = _always
+    full: bool = False
 
 
 def number(value: Any, digits: int = 1) -> str:

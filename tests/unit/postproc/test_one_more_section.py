@@ -16,6 +16,7 @@ from catenary.postproc.report.sections.section import (
     Folded,
     Picture,
     Section,
+    SectionEntry,
     Text,
 )
 from catenary.postproc.report.study_table import texts_table
@@ -43,17 +44,20 @@ def speed_section(run: EvaluatedRun) -> Section:
 def test_a_section_is_one_function(
     run_folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("catenary.postproc.report.report.SECTIONS", [*SECTIONS, speed_section])
+    entries = [*SECTIONS, SectionEntry("speed", speed_section)]
+    monkeypatch.setattr("catenary.postproc.report.report.SECTIONS", entries)
     files = {path.name for path in write_report(run_folder, tmp_path).files}
     assert "course.png" in files
     page = (tmp_path / "report.html").read_text()
-    assert page.index("<h2>The run</h2>") < page.index("<h2>Course &lt;of&gt; the train</h2>")
-    own = page[page.index("<h2>Course") :]
+    assert page.index('<h2 id="run">The run</h2>') < page.index(
+        '<h2 id="speed">Course &lt;of&gt; the train</h2>'
+    )
+    own = page[page.index('id="speed">Course') :]
     with Results(run_folder) as results:
         first = results.column("contact_position", 0)[0]
         shown = [name for name, *_ in drawings(results, statistics.evaluate(results))]
     assert shown[-1] == "course"
-    assert f'<tr><td>start</td><td class="n">{first:.1f} m</td></tr>' in own
+    assert f'<tr><td class="w">start</td><td class="n">{first:.1f} m</td></tr>' in own
     assert "<p>2 heads pass.</p>" in own and '<th class="n">at</th>' in own
     assert "<figcaption>Position over time.</figcaption>" in own
     assert "<details><summary>All steps</summary>" in own and "<pre>8001 rows</pre>" in own

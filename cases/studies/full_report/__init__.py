@@ -1,0 +1,1 @@
+"""The full report of a run: its data sheets, its line to scale, its worst places seen closely."""

@@ -1,0 +1,233 @@
+"""Data sheets of a run: its line to scale with wires and hardware, and its pantographs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import partial
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from catenary.cases.run.describe.pantographs import header_words
+from catenary.cases.run.scene_mesh import line_figure
+from catenary.cases.studies.full_report.scene_of_run import SceneOfRun
+from catenary.mbs.lumped_data import LumpedData
+from catenary.mbs.shape import HEAD, SPRING, shape_of
+from catenary.meshgen.hardware import DropperKind
+from catenary.meshgen.line import Line
+from catenary.meshgen.mesh import LineMesh
+from catenary.meshgen.slowest_wave import slowest_wave_of
+from catenary.meshgen.wires import Role, Wire
+from catenary.postproc.report.pictures.figures import COLOURS, new_figure, own_style, tidy
+from catenary.postproc.report.sections.section import EvaluatedRun, Picture, Section, Text, number
+from catenary.postproc.report.study_table import StudyTable, texts_table
+from catenary.solver.effects.all_effects import simulated
+from catenary.solver.problem.problem import Placement, Problem
+from catenary.solver.statics.line_at_rest import LineAtRest
+
+# Places along the track closer than this are one [m].
+_OFF = 1e-6
+
+
+def line(scene: SceneOfRun, run: EvaluatedRun) -> Section:
+    """The line to scale, and what it is made of."""
+    rest = scene.at_rest
+    text = "The line at rest: three spans from the side and above, and a cross-section."
+    picture = Picture(
+        "line", text, lambda: line_figure(scene.scene, scene.problem, rest.mesh, rest.form)[0]
+    )
+    return Section("Data sheet of the line", _line_blocks(scene.problem, rest), [picture])
+
+
+def _line_blocks(problem: Problem, rest: LineAtRest) -> Iterator[StudyTable]:
+    line, damping = problem.line, simulated(problem).damping
+    rows = []
+    for wire in line.wires:
+        alpha, beta = damping.per_component.get(wire.name, (damping.alpha, damping.beta))
+        rows.append([
+            _plain(wire.name), wire.role.value, number(1e-3 * wire.tension, 2),
+            number(wire.mass_per_length, 3), number(wire.bending_stiffness, 1),
+            number(None if wire.axial_stiffness is None else 1e-6 * wire.axial_stiffness, 2),
+            number(slowest_wave_of(line, wire), 1), f"{alpha:.3g}", f"{beta:.3g}",
+        ])  # fmt: skip
+    heads = ["wire", "role", "tension [kN]", "mass [kg/m]", "EI [N m²]", "EA [MN]"]
+    heads += ["wave speed [m/s]", "alpha [s]", "beta [1/s]"]
+    note = "Damping C = alpha K + beta M."
+    yield texts_table(heads, rows, set(range(2, len(heads))), "Wires", note)
+    yield texts_table(["", "", ""], list(_geometry(rest, line)), {1}, "Geometry")
+    hardware = list(_hardware(problem))
+    if hardware:
+        yield texts_table(["part", "number", "data"], hardware, {1}, "Hardware")
+
+
+def _geometry(rest: LineAtRest, line: Line) -> Iterator[list[Any]]:
+    lengths = np.diff(line.support_positions)
+    yield ["topology", line.topology, ""]
+    yield ["spans", line.n_spans, ""]
+    yield ["span length", _range(lengths, 2), "m"]
+    yield ["length", number(float(np.ptp(line.support_positions)), 1), "m"]
+    first, last = line.running_range
+    masts = line.support_positions
+    masts = masts[(masts > first + _OFF) & (masts < last - _OFF)]
+    places = rest.mesh.points.copy()
+    places[:, 2] = rest.form.height
+    if rest.form.lateral is not None:
+        places[:, 1] = rest.form.lateral.y
+    contact, messengers = line.wires_of(Role.CONTACT)[0], line.wires_of(Role.MESSENGER)
+    y, height = _course(rest.mesh, places, contact, masts)
+    at = "at the supports of the running spans"
+    yield [f"contact wire above the rail {at}", _range(height, 3), "m"]
+    if messengers:
+        above = _course(rest.mesh, places, messengers[0], masts)[1] - height
+        yield ["encumbrance there (messenger wire above contact wire)", _range(above, 3), "m"]
+    if np.nanmax(np.abs(y), initial=0.0) > 0.0:
+        yield ["stagger there, to the left", _range(y, 3), "m"]
+    sag = max((max(own.sag, default=0.0) for own in line.profiles), default=0.0)
+    yield ["largest pre-sag wanted", number(1e3 * sag, 1), "mm"]
+
+
+def _course(
+    mesh: LineMesh, places: np.ndarray, wire: Wire, x: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Lateral places and heights of a wire at rest, (n,) each [m], NaN where it is absent."""
+    found = np.full((2, x.size), np.nan)
+    for nodes in mesh.pieces(wire.name):
+        own = places[nodes]
+        there = (x >= own[0, 0] - _OFF) & (x <= own[-1, 0] + _OFF)
+        for axis in (0, 1):
+            found[axis, there] = np.interp(x[there], own[:, 0], own[:, axis + 1])
+    return found[0], found[1]
+
+
+def _hardware(problem: Problem) -> Iterator[list[Any]]:
+    line = problem.line
+    for group in line.droppers:
+        joined = f"{_plain(group.upper)} to {_plain(group.lower)}"
+        yield [f"droppers, {joined}", len(group.lower_x), _of_dropper(group.kind)]
+    for arms in line.steady_arms:
+        kind = arms.kind
+        stiffness = (
+            "radial force over length" if kind.by_radial_force else f"{kind.stiffness:g} N/m"
+        )
+        data = (
+            f"{kind.length:g} m, {kind.mass_per_length:g} kg/m, clamp {kind.clamp_mass:g} kg, "
+            f"vertical stiffness {stiffness}"
+        )
+        if kind.uplift_stop is not None:
+            data += f", stop at {1e3 * kind.uplift_stop:g} mm with {kind.stop_stiffness:g} N/m"
+        yield [f"steady arms on {_plain(arms.wire)}", len(arms.x), data]
+    for supports in line.supports:
+        yield [
+            f"supports of {_plain(supports.wire)}",
+            len(supports.x),
+            f"{supports.stiffness:g} N/m",
+        ]
+    for clamps in line.clamps:
+        joined = f"{_plain(clamps.upper)} to {_plain(clamps.lower)}"
+        data = f"{clamps.stiffness:g} N/m, {clamps.mass:g} kg"
+        yield [f"clamps, {joined}", len(clamps.x), data]
+    for own in line.fittings:
+        masses = _range(np.array(own.mass), 2)
+        yield [f"{own.kind} on {_plain(own.wire)}", len(own.x), f"{masses} kg"]
+
+
+def _of_dropper(kind: DropperKind) -> str:
+    if kind.stiffness is not None:
+        data = f"{kind.stiffness:g} N/m"
+    elif kind.axial_stiffness is not None:
+        data = f"EA {kind.axial_stiffness:g} N"
+    else:
+        data = f"curve of {kind.n_pieces + 1} points"
+    clamps = f"clamps {kind.upper_clamp_mass:g} kg above and {kind.lower_clamp_mass:g} kg below"
+    return f"{data}, {kind.mass_per_length:g} kg/m, {clamps}"
+
+
+def _range(values: np.ndarray, digits: int) -> str:
+    values = values[np.isfinite(values)]
+    if not values.size:
+        return "–"
+    low, high = (number(float(end), digits) for end in (values.min(), values.max()))
+    return low if low == high else f"{low} to {high}"
+
+
+def _plain(name: str) -> str:
+    return name.replace("_", " ")
+
+
+def pantographs(scene: SceneOfRun, run: EvaluatedRun) -> Section:
+    """Each kind of pantograph of the train: its data, and the pantograph drawn to scale."""
+    kinds: dict[str, tuple[Placement, str]] = {}
+    words = header_words(scene.scene, scene.problem)
+    for placement, said in zip(scene.problem.train.placements, words, strict=True):
+        kinds.setdefault(said["kind"], (placement, said["description"]))
+    pictures = [
+        Picture(
+            f"pantograph_{n}", f"{name}, {_how_drawn(one[0].data)}.", partial(_drawn, one[0].data)
+        )
+        for n, (name, one) in enumerate(kinds.items(), start=1)
+    ]
+    return Section("Data sheet of the pantographs", _pantograph_blocks(kinds), pictures)
+
+
+def _how_drawn(data: Any) -> str:
+    if isinstance(data, LumpedData):
+        return "a scheme of its masses and springs; the head is to scale"
+    return "drawn to scale from its joints"
+
+
+def _pantograph_blocks(
+    kinds: dict[str, tuple[Placement, str]],
+) -> Iterator[Text | StudyTable]:
+    for name, (placement, description) in kinds.items():
+        yield Text(f"{description}; static force {placement.static_force:.1f} N.", "", name)
+        data = placement.data
+        if isinstance(data, LumpedData):
+            rows = [
+                [f"{n}{' (head)' if n == 1 else ''}", *(f"{value:g}" for value in own)]
+                for n, own in enumerate(
+                    zip(data.masses, data.stiffnesses, data.dampings, strict=True), start=1
+                )
+            ]
+            heads = ["mass", "mass [kg]", "stiffness below [N/m]", "damping below [N s/m]"]
+            yield texts_table(heads, rows, {1, 2, 3}, name)
+        else:
+            rows = [[_plain(body.name), f"{body.mass:g}", *(f"{i:g}" for i in body.inertia)]
+                    for body in data.system.bodies]  # fmt: skip
+            heads = ["body", "mass [kg]", "Ixx [kg m²]", "Iyy [kg m²]", "Izz [kg m²]"]
+            yield texts_table(heads, rows, {1, 2, 3, 4}, name)
+        strips = data.strips
+        rows = [["strips", str(strips.number), ""]]
+        if strips.number > 1:
+            rows.append(["distance of the strips", number(strips.spacing, 3), "m"])
+        rows.append(["length of a strip", number(strips.length, 3), "m"])
+        if strips.suspension is not None:
+            own = strips.suspension
+            rows += [
+                ["mass of a strip", f"{own.mass:g}", "kg"],
+                ["stiffness below a strip", f"{own.stiffness:g}", "N/m"],
+                ["damping below a strip", f"{own.damping:g}", "N s/m"],
+            ]
+        yield texts_table(["head", "", ""], rows, {1})
+
+
+@own_style()
+def _drawn(data: Any) -> Figure:
+    """A pantograph from the side and from the front, heights above its base."""
+    shape = shape_of(data)
+    n_places = data.n_masses if isinstance(data, LumpedData) else 1
+    rest = shape.pose(np.full(n_places, shape.below), 0.0, shape.below, shape.below).rest
+    figure = new_figure(3.6)
+    for axes, across, label in zip(
+        figure.subplots(1, 2, sharey=True), (0, 1), ("along the track [m]", "to the left [m]"),
+        strict=True,
+    ):  # fmt: skip
+        for kind, (first, second) in zip(shape.kinds, shape.cells, strict=True):
+            ends = rest[[first, second]]
+            tone = COLOURS[1] if kind == HEAD else COLOURS[0] if kind == SPRING else "#222222"
+            axes.plot(
+                ends[:, across], ends[:, 2], color=tone, linewidth=2.2 if kind == HEAD else 1.3
+            )
+        axes.set_aspect("equal")
+        tidy(axes, label, "height [m]" if across == 0 else "")
+    return figure

@@ -1,0 +1,67 @@
+"""Sections of a full report, those that need the scene of the run among them."""
+
+from __future__ import annotations
+
+from functools import partial
+
+from catenary.base.errors import InputError
+from catenary.cases.studies.full_report import data_sheets, worst_places
+from catenary.cases.studies.full_report.scene_of_run import SceneOfRun
+from catenary.postproc.report.report import SECTIONS
+from catenary.postproc.report.sections import dynamics, run_facts
+from catenary.postproc.report.sections.section import (
+    EvaluatedRun,
+    Picture,
+    Section,
+    SectionEntry,
+    Text,
+)
+
+
+def _waves(scene: SceneOfRun, run: EvaluatedRun) -> Section:
+    """Motion of the contact wire over place and time, from the snapshots of the run."""
+    # Snapshots of films are read as waves are.
+    from catenary.cases.studies.waves import pictures
+    from catenary.cases.studies.waves.seen import waves_seen
+    from catenary.cases.studies.waves.theory import wave_theory
+    from catenary.postproc.film.film_data import film_data
+    from catenary.postproc.film.snapshots import Snapshots
+
+    heading, results = "Waves over place and time", run.results
+    try:
+        data = film_data(results)
+        folder, until = results.path.parent, float(data.time[-1])
+        with Snapshots(folder, len(data.points), until=until) as snapshots:
+            snapshots.need_whole("a space-time picture")
+            seen = waves_seen(data, snapshots)
+        theory = wave_theory(scene.problem, scene.at_rest)
+    except InputError as error:
+        return Section(heading, [Text(f"There is no picture: {error}.")])
+    supports = results.line("support_x")
+    text = "Velocity of the contact wire over place and time, with the pantographs' courses."
+    picture = Picture("space_time", text, lambda: pictures.space_time(seen, theory, supports))
+    return Section(heading, [], [picture])
+
+
+def full_sections(scene: SceneOfRun | None) -> list[SectionEntry]:
+    """The sections of a full report in their order.
+
+    Parameters
+    ----------
+    scene : of the run; None leaves out what needs it
+    """
+    worst = partial(worst_places.section, scene)
+    behind = {"motion": [SectionEntry("worst", worst, dynamics.has_statistics, full=True)]}
+    text = None
+    if scene is not None:
+        text = scene.input_text
+        behind["spectrum"] = [SectionEntry("waves", partial(_waves, scene), full=True)]
+        behind["rest"] = [SectionEntry("line", partial(data_sheets.line, scene), full=True)]
+        if scene.has_train:
+            sheet = partial(data_sheets.pantographs, scene)
+            behind["above"] = [SectionEntry("pantographs", sheet, full=True)]
+    last = SectionEntry("signatures", partial(run_facts.signatures, text), full=True)
+    return [
+        *(one for entry in SECTIONS for one in (entry, *behind.get(entry.name, ()))),
+        last,
+    ]

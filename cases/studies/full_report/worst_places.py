@@ -1,0 +1,183 @@
+"""The worst span, steady arm and dropper of a run, each seen closely, with candidates for why."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from catenary.cases.studies.full_report.scene_of_run import SceneOfRun
+from catenary.cases.studies.questions.causes import Causes
+from catenary.cases.studies.questions.worst import Passage, Spot, WorstPlaces, worst_places
+from catenary.postproc.evaluate import filters
+from catenary.postproc.read.results import Results
+from catenary.postproc.report.pictures.figures import (
+    COLOURS,
+    LIMIT,
+    colour,
+    legend_above,
+    own_style,
+    stacked,
+    tidy,
+)
+from catenary.postproc.report.pictures.marks import mark_line
+from catenary.postproc.report.sections.section import EvaluatedRun, Picture, Section, Text, number
+from catenary.postproc.report.study_table import StudyTable, texts_table
+from catenary.solver.statics.elasticity import elasticity
+
+# What is shown to both sides of an arm or a dropper [m], and how many places tables have.
+_BESIDE, _MOST = 30.0, 5
+_NO_CAUSE = "no cause found"
+
+
+def section(scene: SceneOfRun | None, run: EvaluatedRun) -> Section:
+    """The worst places of the evaluated stretch.
+
+    Parameters
+    ----------
+    scene : of the run, for the elasticity of its line; None if it is not known
+    """
+    results, places = run.results, worst_places(run.results)
+    causes = Causes(results, places.passages, _elasticity(results, scene))
+    return Section("Worst places", _blocks(results, places, causes), _pictures(results, places))
+
+
+def _elasticity(results: Results, scene: SceneOfRun | None) -> tuple[np.ndarray, np.ndarray] | None:
+    if scene is None:
+        return None
+    found = elasticity(scene.at_rest.model, *results.evaluation)
+    return found.x, found.lift
+
+
+def _blocks(results: Results, places: WorstPlaces, causes: Causes) -> Iterator[Text | StudyTable]:
+    names = results.pantograph_names()
+    if places.passages:
+        one = places.passages[0]
+        yield Text(
+            f"span {one.span + 1}, {one.start:.0f} to {one.end:.0f} m, {names[one.pantograph]}: "
+            f"standard deviation {one.std:.1f} N (median of all spans {one.median:.1f} N), force "
+            f"{one.minimum:.0f} to {one.maximum:.0f} N{_out(one.stands_out)}.",
+            "note",
+            "Worst span:",
+            causes.of_passage(one) or [_NO_CAUSE],
+        )
+    for first, spots, words in _KINDS:
+        for spot in spots(places)[:1]:
+            said = words.format(x=spot.x, v=spot.value, m=spot.median)
+            items = causes.at(spot.x) or [_NO_CAUSE]
+            yield Text(f"{said}{_out(spot.stands_out)}.", "note", first, items)
+    everywhere = causes.of_line()
+    if everywhere:
+        yield Text("acts on all spans alike:", "note", "The line as a whole", everywhere)
+    yield Text(
+        "Candidates are near in place or frequency; none is proved. The verb worst tells all."
+    )
+    rows = [
+        [p.span + 1, f"{p.start:.0f} to {p.end:.0f}", names[p.pantograph], number(p.std),
+         number(p.maximum), number(p.minimum), number(p.loss, 3)]
+        for p in places.passages[:_MOST]
+    ]  # fmt: skip
+    heads = ["span", "from, to [m]", "pantograph", "sigma [N]", "max [N]", "min [N]", "loss [%]"]
+    if rows:
+        yield texts_table(heads, rows, {0, 3, 4, 5, 6}, "Spans by standard deviation")
+
+
+_KINDS: tuple[tuple[str, Callable[[WorstPlaces], Sequence[Spot]], str], ...] = (
+    ("Worst support:", lambda p: p.arms, "{x:.1f} m, uplift {v:.1f} mm (median {m:.1f} mm)"),
+    ("Worst dropper:", lambda p: p.forces, "{x:.1f} m, up to {v:.0f} N (usual {m:.0f} N)"),
+    ("Longest slack:", lambda p: p.slack, "dropper at {x:.1f} m, {v:.2f} s (usual {m:.2f} s)"),
+)
+
+
+def _out(is_out: bool | None) -> str:
+    if is_out is None:
+        return "; too few others to compare"
+    return "; it stands out" if is_out else "; within the scatter of the others"
+
+
+def _pictures(results: Results, places: WorstPlaces) -> Iterator[Picture]:
+    if places.passages:
+        passage = places.passages[0]
+        who = results.pantograph_names()[passage.pantograph]
+        text = f"Contact force of the {_noun(who)} in the worst span and its neighbours."
+        yield Picture("worst_span", text, lambda: _span(results, passage))
+    for name, spots, channel, what in (
+        ("worst_support", places.arms, "arm_uplift", "Uplift at the worst support"),
+        ("worst_dropper", places.forces, "dropper_force", "Force of the most loaded dropper"),
+        ("longest_slack", places.slack, "dropper_force", "Force of the dropper with longest slack"),
+    ):
+        for spot in spots[:1]:
+            caption = f"{what}, {spot.x:.1f} m, as the train passes."
+            yield Picture(name, caption, partial(_passage, results, channel, spot))
+
+
+def _noun(name: str) -> str:
+    return name if name == "pantograph" else f"{name} pantograph"
+
+
+@own_style()
+def _span(results: Results, passage: Passage) -> Figure:
+    """Contact force, and height of the contact point, in a span with those beside it."""
+    length = passage.end - passage.start
+    low, high = passage.start - length, passage.end + length
+    p = passage.pantograph
+    position = results.column("contact_position", p)
+    rows = slice(*np.searchsorted(position, (low, high)).tolist())
+    figure, (force, height) = stacked(6.0, 2)
+    raw = results.column("contact_force", p)
+    filtered = filters.low_pass(raw, results.dt)[rows]
+    for axes in (force, height):
+        mark_line(axes, results, low, high)
+        axes.axvspan(passage.start, passage.end, color="#f6e3c3", zorder=0.5, label="worst span")
+    x = position[rows]
+    light: dict[str, Any] = {"color": colour(p), "alpha": 0.35, "linewidth": 0.7}
+    force.plot(x, raw[rows], label="unfiltered", **light)
+    force.plot(x, filtered, color=colour(p), linewidth=1.6, label="20 Hz low-pass")
+    for which, word in ((np.argmax, "largest"), (np.argmin, "smallest")):
+        within = np.flatnonzero((x >= passage.start) & (x <= passage.end))
+        at = int(within[which(filtered[within])])
+        force.annotate(
+            f"{word} {filtered[at]:.0f} N at {x[at]:.1f} m", (x[at], filtered[at]),
+            xytext=(6, 4 if word == "largest" else -12), textcoords="offset points", fontsize=8,
+        )  # fmt: skip
+        force.plot(x[at], filtered[at], "o", color=LIMIT, ms=4)
+    force.axhline(0.0, color=LIMIT, linewidth=0.9)
+    tidy(force, "", "contact force [N]")
+    legend_above(force, 6)
+    line = results.column("wire_height", p)[rows]
+    height.plot(x, line, color=COLOURS[2], linewidth=1.3, label="contact wire at the pantograph")
+    tidy(height, "position of the pantograph along the track [m]", "height [m]")
+    legend_above(height, 6)
+    return figure
+
+
+@own_style()
+def _passage(results: Results, channel: str, spot: Spot) -> Figure:
+    """History of an arm or a dropper over the place of the leading pantograph."""
+    leader = int(np.argmax(results.first_position))
+    place = results.column("contact_position", leader)[:: results.line_record.every]
+    behind = results.first_position[leader] - results.first_position
+    reach = spot.x - _BESIDE, spot.x + float(behind.max()) + _BESIDE
+    rows = slice(*np.clip(np.searchsorted(place, reach), 0, results.n_rows(channel)).tolist())
+    values = results.column(channel, spot.number, rows)
+    is_uplift = channel == "arm_uplift"
+    values = 1e3 * values if is_uplift else values
+    figure, (axes,) = stacked(3.0, 1)
+    x = place[rows] - spot.x
+    axes.plot(x, values, color="#222222", linewidth=1.4, label="uplift" if is_uplift else "force")
+    for p, name in enumerate(results.pantograph_names()):
+        label = f"{name} passes"
+        axes.axvline(behind[p], color=colour(p), linestyle="--", linewidth=1.1, label=label)
+    if not is_uplift:
+        slack = values <= 0.0
+        axes.plot(x[slack], values[slack], ".", color=LIMIT, ms=3, label="slack")
+    axes.axhline(0.0, color="#6b6b6b", linewidth=0.7)
+    axes.margins(x=0.0)
+    who = "leading pantograph" if results.n_pantographs > 1 else "pantograph"
+    label = "uplift [mm]" if is_uplift else "dropper force [N]"
+    tidy(axes, f"position of the {who} relative to this place [m]", label)
+    legend_above(axes)
+    return figure

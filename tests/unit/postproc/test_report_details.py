@@ -1,0 +1,211 @@
+"""What a full report says in detail, against signals whose spectra and margins are known."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import html5lib
+import numpy as np
+import pytest
+from matplotlib.axes import Axes
+
+from catenary.base.errors import InputError
+from catenary.postproc.evaluate import statistics
+from catenary.postproc.evaluate.acceptance import criteria_of
+from catenary.postproc.evaluate.verdict import Criterion
+from catenary.postproc.read.results import Results
+from catenary.postproc.report.pictures import figures, force_pictures, interactive
+from catenary.postproc.report.report import SECTIONS, write_report
+from catenary.postproc.report.sections import acceptance, dynamics
+from catenary.postproc.report.sections.section import EvaluatedRun
+
+
+def evaluated(results: Results) -> EvaluatedRun:
+    found = statistics.evaluate(results)
+    return EvaluatedRun(results, found, criteria_of(results, found))
+
+
+def test_spectrum_has_the_power_of_each_part(run_folder: Path) -> None:
+    """Of a sine of amplitude a, a^2/2: around 9 Hz 15 N and 20 N, around 60 Hz nothing is shown.
+
+    Hann's window spreads a line over four bins; those within six hold all but 1e-4 of it. The
+    lines at 1.67 and 60 Hz are 20 bins and more away, where the window has fallen to 1e-5.
+    """
+    with Results(run_folder) as results:
+        lengths = dynamics.passing_lengths(results)
+        (axes,) = force_pictures.force_spectrum(results, lengths).axes
+    assert lengths == pytest.approx({"span": 50.0, "dropper": 5.0})
+    curves = {line.get_label(): np.asarray(line.get_xydata()) for line in axes.lines}
+    for name, amplitude in (("leading", 15.0), ("trailing", 20.0)):
+        frequency, power = curves[name].T
+        width = frequency[1] - frequency[0]
+        near = np.abs(frequency - 9.0) <= 6.0 * width
+        assert power[near].sum() * width == pytest.approx(0.5 * amplitude**2, rel=2e-3)
+        assert frequency.max() <= 60.0
+    # At 300 km/h a span of 50 m passes 5/3 times a second.
+    assert "span passing, 1.67 Hz and multiples" in curves
+    assert "dropper passing, 16.67 Hz and multiples" in curves
+
+
+def test_gradient_of_the_contact_point(run_folder: Path) -> None:
+    """Of 15 mm over 50 m: 2 pi 15 mm / 50 m; filter and steps of 83 mm change 1e-4 of it."""
+    with Results(run_folder) as results:
+        found = dynamics.contact_height(results, 0)
+        assert found is not None
+        x, height, gradient = found
+        inside = (x >= results.evaluation[0]) & (x <= results.evaluation[1])
+    assert np.ptp(height[inside]) == pytest.approx(0.030, rel=1e-3)
+    assert np.abs(gradient[inside]).max() == pytest.approx(2 * np.pi * 0.015 / 50.0, rel=1e-3)
+
+
+def criterion(value: float, limit: float, relation: str, quantity: str) -> Criterion:
+    passed = value <= limit if relation == "<=" else value > limit
+    words = f"{quantity} of the run", value, limit, "N", relation, passed, "clause"
+    return Criterion(*words, quantity=quantity, pantograph="pantograph")
+
+
+def told(error: float, *criteria: Criterion) -> str:
+    run: Any = SimpleNamespace(
+        criteria=criteria,
+        statistics=SimpleNamespace(pantographs=[SimpleNamespace(name="pantograph")]),
+        indicators=SimpleNamespace(force_error=np.array([error])),
+    )
+    return " ".join(acceptance.nearest_limit(run))
+
+
+def test_an_error_larger_than_the_margin_could_turn_a_verdict() -> None:
+    mean = criterion(149.0, 150.0, "<=", "mean_force")
+    largest = criterion(345.0, 350.0, "<=", "force_max")
+    assert "could turn: mean_force of the run (margin 1.0, error 1.50 N)." in told(1.5, mean)
+    assert "smaller than every margin" in told(0.9, mean)
+    # Extremes have three times the rms error of the history.
+    assert "could turn: force_max of the run" in told(1.7, largest)
+    assert "smaller than every margin" in told(1.6, largest)
+    # A failed criterion can be turned as well; what has no estimate cannot be.
+    assert "could turn: mean_force of the run (margin -1.0" in told(
+        1.5, criterion(151.0, 150.0, "<=", "mean_force")
+    )
+    assert "turn" not in told(np.nan, mean) and "smaller" not in told(np.nan, mean)
+
+
+def test_the_nearest_limit_is_the_smallest_share() -> None:
+    mean = criterion(147.0, 150.0, "<=", "mean_force")  # 2 %
+    largest = criterion(346.5, 350.0, "<=", "force_max")  # 1 %
+    zero = criterion(1.0, 0.0, ">", "force_min")  # no share of zero
+    assert told(0.1, mean, largest, zero).startswith(
+        "Nearest to its limit: force_max of the run, with a margin of 3.5 N (1.0 %)."
+    )
+
+
+def names_in(folder: Path) -> set[str]:
+    page = html5lib.parse((folder / "report.html").read_text(), namespaceHTMLElements=False)
+    return {one.get("id") for one in page.iter("h2")} - {None}
+
+
+def test_sections_are_there_where_they_apply(
+    run_folder: Path, tmp_path: Path, make_march: Any
+) -> None:
+    write_report(run_folder, tmp_path, None, SECTIONS, vector=True)
+    full = {
+        "acceptance",
+        "checks",
+        "force",
+        "spectrum",
+        "motion",
+        "places",
+        "rest",
+        "effects",
+        "run",
+        "above",
+    }
+    assert names_in(tmp_path) == full
+    write_report(run_folder, tmp_path)
+    assert names_in(tmp_path) == full - {"spectrum", "places"}
+    from catenary.postproc.record.recorder import Recorder
+
+    broken = tmp_path / "broken"
+    broken.mkdir()
+    march = make_march()
+    watcher = Recorder(march.comm, broken / "run.h5", march.header())
+    march.drive(watcher, outcome="interrupted", last=30)
+    watcher.close()
+    write_report(broken, broken, None, SECTIONS, vector=True)
+    assert names_in(broken) == full - {"spectrum"}
+
+
+def test_tables_of_supports_and_droppers(run_folder: Path) -> None:
+    with Results(run_folder) as results:
+        arms, droppers = dynamics.places(evaluated(results)).blocks
+        uplift = results.extremes("arm_uplift")[1]
+        lowest, highest = results.extremes("dropper_force")
+        x = results.line("dropper_x")
+    # Supports at 250, 300 ... 550 m, and a limit of 120 mm.
+    assert [row[0] for row in arms.texts()] == [f"{50 * k}.00" for k in range(5, 12)]
+    for row, own in zip(arms.texts(), uplift[4:11], strict=True):
+        assert float(row[2]) == pytest.approx(1e3 * own, abs=0.05)
+        assert float(row[3]) == pytest.approx(120.0 - 1e3 * own, abs=0.1)
+    inside = np.flatnonzero((x >= 250.0) & (x <= 550.0))
+    assert len(droppers.rows) == inside.size
+    first = droppers.texts()[0]
+    assert float(first[2]) == pytest.approx(highest[inside[0]], abs=0.05)
+    assert float(first[3]) == pytest.approx(lowest[inside[0]], abs=0.05)
+
+
+@figures.own_style()
+def panel() -> Axes:
+    _, (axes,) = figures.stacked(3.0, 1)
+    axes.plot([0.0, 1.0, 2.0], [1.0, np.nan, 3.0], color="#ff0000", label="force")
+    axes.bar([1.0, 2.0], [4.0, 5.0], 0.5, color="#00ff00", label="bars")
+    axes.vlines([0.5], [0.0], [2.0], color="#0000ff", label="range")
+    axes.axvspan(0.25, 0.75, color="#eeeeee")
+    axes.axvline(1.5, color="#123456", linestyle="--")
+    axes.set_xlim(0.0, 3.0)
+    figures.tidy(axes, "x [m]", "y [N]", "Title <b>")
+    return axes
+
+
+def test_a_picture_is_translated_for_plotly() -> None:
+    found = json.loads(interactive.as_json(panel().figure))
+    bars, line, ranges = found["data"]
+    assert (line["x"], line["y"]) == ([0.0, 1.0, 2.0], [1.0, None, 3.0])
+    assert line["line"]["color"] == "#ff0000" and line["name"] == "force"
+    assert (bars["x"], bars["y"], bars["width"]) == ([1.0, 2.0], [4.0, 5.0], [0.5, 0.5])
+    assert ranges["x"][:2] == [0.5, 0.5] and ranges["y"][:2] == [0.0, 2.0]
+    stripe, upright = found["layout"]["shapes"]
+    assert (stripe["x0"], stripe["x1"], stripe["yref"]) == (0.25, 0.75, "y domain")
+    assert (upright["x0"], upright["x1"], upright["line"]["dash"]) == (1.5, 1.5, "dash")
+    assert found["layout"]["xaxis"]["range"] == [0.0, 3.0]
+    assert found["layout"]["xaxis"]["title"]["text"] == "x [m]"
+
+
+def test_a_picture_that_cannot_be_translated_stays_one() -> None:
+    axes = panel()
+    axes.pcolormesh(np.zeros((2, 2)))
+    assert interactive.as_json(axes.figure) == ""
+
+
+def test_an_svg_has_its_texts_as_texts_and_no_date() -> None:
+    first, second = (figures.svg(panel().figure) for _ in range(2))
+    assert first == second
+    assert b">x [m]</text>" in first and b"<dc:date>" not in first
+
+
+@pytest.mark.parametrize(
+    ("package", "option", "words"),
+    [("weasyprint", "on_paper", "--pdf needs"), ("plotly.offline", "interactive", "--interactive")],
+)
+def test_without_its_package_nothing_is_written(
+    run_folder: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    package: str,
+    option: str,
+    words: str,
+) -> None:
+    monkeypatch.setitem(__import__("sys").modules, package, None)
+    with pytest.raises(InputError, match=words):
+        write_report(run_folder, tmp_path, **{option: True})
+    assert not list(tmp_path.iterdir())

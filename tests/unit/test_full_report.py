@@ -1,0 +1,173 @@
+"""``catenary report``: pages that are valid and closed in themselves, data sheets, a run again."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+import shutil
+import tomllib
+from pathlib import Path
+
+import html5lib
+import pypdf
+import pytest
+from typer.testing import CliRunner
+
+from catenary.base.errors import InputError
+from catenary.cases.cli.main import app
+from catenary.cases.scene.load import load_scene
+from catenary.cases.scene.problem import resolved
+from catenary.cases.studies.full_report.scene_of_run import SceneOfRun
+from catenary.postproc.read.results import Results
+from catenary.postproc.report.pictures import interactive
+
+CHANGES = ("train.speed_km_h=280", "line.contact_wire.tension_N=21e3")
+
+
+def invoke(*words: str) -> str:
+    done = CliRunner().invoke(app, list(words))
+    assert done.exit_code == 0, done.output
+    return done.output
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("full")
+    changed = (word for change in CHANGES for word in ("--set", change))
+    invoke("run", "ac_simple", "--short", "-q", "-o", str(out), *changed)
+    said = invoke("report", str(out), "--pdf", "--interactive").splitlines()
+    assert {Path(line).name for line in said} >= {"report.html", "report.pdf", "input.toml"}
+    assert all(Path(line).is_file() for line in said)
+    return out
+
+
+def words_of(page: str) -> str:
+    tree = html5lib.parse(page, namespaceHTMLElements=False)
+    return " ".join(" ".join(tree.itertext()).split())
+
+
+@pytest.mark.process
+@pytest.mark.parametrize("name", ["report.html", "report_interactive.html"])
+def test_pages_are_valid_and_ask_for_nothing(folder: Path, name: str) -> None:
+    text = (folder / name).read_text(encoding="utf-8")
+    program = interactive.script()  # which holds letters that HTML calls invalid
+    assert (program in text) == (name == "report_interactive.html")
+    text = text.replace(program, "")
+    parser = html5lib.HTMLParser(strict=True, namespaceHTMLElements=False)
+    tree = parser.parse(text)  # raises at the first error
+    for element in tree.iter():
+        for key, address in element.attrib.items():
+            if key in ("src", "href", "srcset", "data", "action"):
+                assert address.startswith(("#", "data:image/")), (element.tag, key)
+    anchors = {one.get("href") for one in tree.iter("a")}
+    assert anchors == {f"#{one.get('id')}" for one in tree.iter("h2")}
+    scripts = [one for one in tree.iter("script")]
+    assert bool(scripts) == (name == "report_interactive.html")
+    plots = [one for one in tree.iter("div") if one.get("class") == "plot"]
+    assert (len(plots) > 10) == bool(scripts)
+
+
+@pytest.mark.process
+def test_all_sections_of_a_run_with_data_sheets(folder: Path) -> None:
+    tree = html5lib.parse((folder / "report.html").read_text(), namespaceHTMLElements=False)
+    assert [one.get("id") for one in tree.iter("h2")] == [
+        "acceptance", "checks", "force", "spectrum", "waves", "motion", "worst", "places", "rest",
+        "line", "above", "pantographs", "effects", "run", "signatures",
+    ]  # fmt: skip
+    pictures = {path.stem for path in folder.glob("*.svg")}
+    assert pictures >= {"spectrum", "contact_height", "space_time", "worst_span", "worst_support",
+                        "worst_dropper", "line", "pantograph_1"}  # fmt: skip
+
+
+@pytest.mark.process
+def test_data_sheets_have_the_data_of_the_scene(folder: Path) -> None:
+    words = words_of((folder / "report.html").read_text())
+    sheet = words[words.rindex("Data sheet of the line") :]
+    wires = re.search(r"contact wire contact ([\d.]+) ([\d.]+) ([\d.]+) – ([\d.]+) ", sheet)
+    assert wires is not None
+    tension, mass, bending, speed = map(float, wires.groups())
+    # AC simple: 1.35 kg/m and 195 N m2; waves of a string run at sqrt(T / m).
+    assert (tension, mass, bending) == (21.0, 1.35, 195.0)
+    assert speed == pytest.approx((21e3 / 1.35) ** 0.5, abs=0.05)
+    assert "span length 55.00 m" in sheet
+    # Masses, and stiffness and damping below each, from the head down.
+    assert "1 (head) 7.5 7000 45 2 9 15500 0.1 3 6 160 100" in sheet
+
+
+@pytest.mark.process
+def test_the_paper_form_has_pages_and_text(folder: Path) -> None:
+    paper = pypdf.PdfReader(folder / "report.pdf")
+    assert len(paper.pages) > 5
+    for page in paper.pages:  # 210 x 297 mm
+        assert float(page.mediabox.width) == pytest.approx(595.3, abs=0.5)
+        assert float(page.mediabox.height) == pytest.approx(841.9, abs=0.5)
+    text = " ".join(" ".join(page.extract_text().split()) for page in paper.pages)
+    assert "Acceptance" in paper.pages[0].extract_text()
+    for words in ("The run's own checks", "Worst span:", "Data sheet of the line", "signature"):
+        assert words in text
+    assert f"1 / {len(paper.pages)}" in text
+    # Pictures are vector graphics: their texts are texts of the page.
+    assert "spectral density [N²/Hz]" in text
+    # What is folded away on a screen is not printed.
+    assert '"elements_per_gap"' not in text
+    assert {one.title for one in paper.outline if not isinstance(one, list)}
+
+
+@pytest.mark.process
+def test_the_input_makes_the_same_run(folder: Path) -> None:
+    own = folder / "input.toml"
+    with Results(folder) as results:
+        assert resolved(load_scene(own)) == results.attributes["config"]
+    assert tomllib.loads(own.read_text())["line"]["contact_wire"]["tension_N"] == 21e3
+    mark = hashlib.sha256(own.read_bytes()).hexdigest()
+    assert f"input.toml, SHA-256 {mark}" in words_of((folder / "report.html").read_text())
+
+
+@pytest.mark.process
+def test_a_rail_has_neither_droppers_nor_a_view_from_above(tmp_path: Path) -> None:
+    quiet = "-q", "--set", "output.field_every_s=0"
+    invoke("run", "conductor_rail", "--short", "-o", str(tmp_path), *quiet)
+    invoke("report", str(tmp_path))
+    page = (tmp_path / "report.html").read_text()
+    assert 'id="line"' in page and 'id="above"' not in page
+    assert "There is no picture:" in page  # of waves, without snapshots
+    words = words_of(page)
+    assert "Worst span:" in words and "Worst dropper:" not in words
+    assert "droppers that slackened" not in words and "Evaluated droppers" not in words
+
+
+@pytest.mark.process
+@pytest.mark.parametrize("case", ["ambrosio2012", "curve", "windy_viaduct", "conductor_rail"])
+def test_other_inputs_load_to_the_same_scene(case: str) -> None:
+    """Effects that are on for want of a word, and those that were switched off, stay so."""
+    from catenary.cases.scene.input.case_files import find_case
+
+    recorded = resolved(load_scene(find_case(case)))
+    scene = SceneOfRun(_Recorded(recorded))  # type: ignore[arg-type]
+    assert scene.input_text is not None
+    assert "[line" in scene.input_text
+
+
+class _Recorded:
+    """Results of which nothing but the scene is known."""
+
+    def __init__(self, config: object) -> None:
+        self.attributes = {"config": config}
+        self.path = Path("run.h5")
+
+
+@pytest.mark.process
+def test_a_scene_of_another_version_costs_the_data_sheets_alone(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shutil.copy(folder / "run.h5", tmp_path / "run.h5")
+
+    def refuse(*_: object) -> None:
+        raise InputError("overhead is no key")
+
+    monkeypatch.setattr("catenary.cases.studies.full_report.scene_of_run.scene_from", refuse)
+    said = invoke("report", str(tmp_path))
+    assert "the report has no data sheets: overhead is no key" in said
+    page = (tmp_path / "report.html").read_text()
+    assert 'id="worst"' in page and 'id="line"' not in page and 'id="pantographs"' not in page
+    assert not (tmp_path / "input.toml").exists()
