@@ -20,11 +20,13 @@ import catenary
 from catenary.base.errors import InputError
 from catenary.cases.cli.main import app
 from catenary.cases.scene.load import load_scene
-from catenary.cases.studies.identification.measurement import Measurement, read_table
+from catenary.cases.studies.identification.measurement import Measurement
 from catenary.cases.studies.identification.noise import Whitening, correlation, kept_variance
 from catenary.cases.studies.identification.posterior import posterior_of
 from catenary.cases.studies.identification.residuals import innovations_of, judge
-from catenary.cases.studies.identification.task import Measured, task_of
+from catenary.cases.studies.identification.task import task_of
+from catenary.cases.studies.measured.description import Measured
+from catenary.cases.studies.measured.table_file import read_table
 from catenary.postproc.evaluate import filters
 
 CASE = "en50318_2002"
