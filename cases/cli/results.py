@@ -48,7 +48,7 @@ def report(
     help="Print the figures of several runs side by side and which of their differences are "
     "more than chance, or compare a run with a measured passage: errors of the measurement, "
     "figures of both, tolerances.",
-    epilog="Examples: catenary compare results/coarse results/fine; "
+    epilog="Example: catenary compare results/coarse results/fine, or with a measurement: "
     "catenary compare results/en300 measured.csv --description measured.toml -o results/measured",
 )
 @console.guarded

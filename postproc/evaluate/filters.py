@@ -17,6 +17,12 @@ from catenary.base.errors import InputError
 CUT_OFF = 20.0
 BAND_LIMIT = 5.0
 ORDER = 6
+# The filter of contact forces, for files that hold some.
+ABOUT = {
+    "filter": "low-pass of EN 50317: Butterworth, forward and backward, gain 1/2 at the cut-off",
+    "cut_off_Hz": CUT_OFF,
+    "order": ORDER,
+}
 # The slowest pole of the 6th-order low-pass decays with sin(pi/12) 2 pi fc, thus to 1e-4 in
 # 5.7 / fc; the record is continued by that much at both ends before it is filtered.
 _PADDING_PERIODS = 6.0
