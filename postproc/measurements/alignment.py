@@ -145,6 +145,16 @@ class _Refined:
     cost: float
     n_independent: float
 
+    def certainty_against(self, other: _Refined) -> float:
+        """Twice the logarithm of how much likelier this fit is, by the samples that both have."""
+        _, own, its = np.intersect1d(
+            self.within, other.within, assume_unique=True, return_indices=True
+        )
+        if own.size < _LEAST_OVERLAP * min(self.rest.size, other.rest.size):
+            return self.n_independent * (other.cost - self.cost)
+        ratio = np.sum(other.rest[its] ** 2) / max(float(np.sum(self.rest[own] ** 2)), 1e-12)
+        return float(self.n_independent * own.size / self.rest.size * np.log(max(ratio, 1e-12)))
+
 
 class _Fit:
     def __init__(
@@ -212,7 +222,7 @@ class _Fit:
         if not found:
             return None, ()
         best = min(found, key=lambda one: one.cost)
-        alike = [one for one in found if best.n_independent * (one.cost - best.cost) < CERTAIN]
+        alike = [one for one in found if best.certainty_against(one) < CERTAIN]
         own = min(alike, key=lambda one: abs(one.shift))
         others = {round(one.shift, 1) for one in alike if abs(one.shift - own.shift) > self._wave}
         return own, tuple(sorted(others, key=abs))

@@ -25,6 +25,10 @@ _SHIFT, _DRIFTED, _FORCE_SHARE, _HEIGHT, _FILTER_SHARE = 0.2, 0.1, 0.003, 2e-3, 
 _NO_FORCE, _MOST_GAPS = 0.2, 0.2
 # Forces with a lower correlation are not those of the run: nothing is aligned by them.
 _LEAST_CORRELATION = 0.6
+# A constant of so many stated deviations is no error.
+_BIASES = 3.0
+# What remains is more than the stated noise beyond this factor.
+_MORE_THAN_NOISE = 1.3
 # A range is widened by noise of deviation 1 by up to so much.
 _WIDENED = 6.0
 # A support is that of the run if it is this near [m].
@@ -232,7 +236,8 @@ class _Comparing:
             text = f"{name}: the forces are not those of the run{said}: nothing is aligned by them"
             self._find("unlike", name, text)
         else:
-            self._errors(found, name, run)
+            self._errors(found, name, run, own.bias)
+            self._noise_floor(found, name, passage.noise_in_band(own.noise, dt))
         at = place if aligned is None else aligned.placed(place)
         begin, end = passage.stretch
         within = (at >= max(begin, run.position[0])) & (at <= min(end, run.position[-1]))
@@ -248,7 +253,7 @@ class _Comparing:
             heights = self._heights(own, valid, within, at, dt)
         self._force_figures(name, at, force, run)
         if heights is not None:
-            self._height_figures(name, *heights)
+            self._height_figures(name, *heights, own.height_bias)
         measured_height, run_height = heights or (None, None)
         self.overlays.append(
             Overlay(name, at, force, modelled, measured_height, run_height, aligned)
@@ -293,8 +298,8 @@ class _Comparing:
                 return text, float(other)
         return None
 
-    def _errors(self, found: Alignment, name: str, run: RunForce) -> None:
-        """Find what the alignment says of the measurement."""
+    def _errors(self, found: Alignment, name: str, run: RunForce, bias: float) -> None:
+        """Find what the alignment says of the measurement; ``bias`` [N] is stated of the force."""
         passage = self._passage
         if found.shift.differs(0.0, _SHIFT):
             shift, way = found.shift, "far along the track" if found.shift.value > 0 else "far back"
@@ -314,7 +319,7 @@ class _Comparing:
             self._find("drift", name, text, drift.value)
         mean = float(np.mean(run.below(passage.cut_off)(run.position)))
         if max(found.gain_certainty, found.offset_certainty) > CERTAIN and (
-            abs(found.offset.value) > _FORCE_SHARE * mean
+            abs(found.offset.value) > max(_FORCE_SHARE * mean, _BIASES * bias)
         ):
             self._find("gain", name, f"{name}: {_gain_words(found)}", found.gain.value)
         elif found.both_certainty > CERTAIN and found.gain_beside_offset.differs(1.0, _FORCE_SHARE):
@@ -335,13 +340,22 @@ class _Comparing:
         if found.other_shifts:
             shifts = ", ".join(f"{shift:+.1f}" for shift in found.other_shifts[:4])
             self.remarks.append(f"{name}: shifts of {shifts} m fit as well")
-        told = np.sqrt(CERTAIN)
+
+    def _noise_floor(self, found: Alignment, name: str, stated: float) -> None:
+        """Tell what remains, and which errors are told beyond it; ``stated`` is the noise [N]."""
+        told, length = np.sqrt(CERTAIN), found.length
         self.remarks.append(
             f"{name}: noise floor {found.residual:.2f} N (correlation {found.correlation:.3f}); "
             f"told are a shift above {max(_SHIFT, told * found.shift.deviation):.2g} m, a drift "
             f"above {max(_DRIFTED, told * found.drift.deviation * length):.2g} m, a gain above "
             f"{100 * max(_FORCE_SHARE, told * found.gain.deviation):.2g} %"
         )
+        if stated and found.residual > _MORE_THAN_NOISE * stated:
+            more = np.sqrt(found.residual**2 - stated**2)
+            self.remarks.append(
+                f"{name}: the stated noise is {stated:.2f} N below the cut-off: {more:.2f} N of "
+                "the floor are not of it, and the run differs from the measurement by so much"
+            )
 
     # ---- figures --------------------------------------------------------------------------------
 
@@ -380,13 +394,15 @@ class _Comparing:
             at
         )
 
-    def _height_figures(self, name: str, measured: np.ndarray, run: np.ndarray) -> None:
-        """The range of heights, and an error of their zero."""
+    def _height_figures(
+        self, name: str, measured: np.ndarray, run: np.ndarray, bias: float
+    ) -> None:
+        """The range of heights, and an error of their zero beyond the stated ``bias`` [m]."""
         difference = measured - run
         offset, rest = float(difference.mean()), float(difference.std())
         # As for forces: what remains is noise, with its correlation.
         n = difference.size / correlation_time(difference)
-        if abs(offset) > max(_HEIGHT, np.sqrt(CERTAIN / n) * rest):
+        if abs(offset) > max(_HEIGHT, np.sqrt(CERTAIN / n) * rest, _BIASES * bias):
             text = f"{name}: head heights are {1e3 * offset:+.1f} mm off the run's throughout"
             self._find("height", name, text, offset)
         self.remarks.append(f"{name}: noise floor of heights {1e3 * rest:.2f} mm")

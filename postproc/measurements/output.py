@@ -20,7 +20,8 @@ from catenary.postproc.report.study_table import Column, StudyTable
 PAGE, SUMMARY, FIGURES = "measurement.html", "measurement.json", "figures.csv"
 FORCES, UPLIFTS = "forces.csv", "uplifts.csv"
 _FORCE, _UPLIFT = "measured_force", "measured_uplift"
-NO_ERRORS = "No error of the measurement is seen."
+NO_ERRORS = "No error is seen: the measurement is that of this run, but for noise."
+WHOSE = "An error is one of the measurement, of its description, or of the scene that was run."
 _SOURCES = (
     f"Tolerances marked {UNCOMPARED} are from memory of the {LINE_TEST}, and were not compared "
     "with its text."
@@ -69,6 +70,7 @@ def as_text(found: Comparison) -> str:
     """What is printed."""
     lines = [found.lead, ""]
     lines += [f"ERROR       {one.text}" for one in found.findings] or [NO_ERRORS]
+    lines += [WHOSE] if found.findings else []
     lines += [*(f"REMARK      {text}" for text in found.remarks), ""]
     return "\n".join([*lines, figures_table(found).text(), _SOURCES])
 
@@ -142,7 +144,7 @@ def write(folder: Path, found: Comparison) -> list[Path]:
 
 def _sections(found: Comparison) -> Iterator[Section]:
     errors = [Text(one.text, "bad", "Error: ") for one in found.findings]
-    yield Section("Errors of the measurement", errors or [Text(NO_ERRORS, "good")])
+    yield Section("Errors", [*errors, Text(WHOSE)] if errors else [Text(NO_ERRORS, "good")])
     force = Picture(_FORCE, "Contact forces below the cut-off, on the run's places", _nothing)
     table = replace(figures_table(found), title="")
     yield Section("Figures", [table], [force] if found.overlays else [])

@@ -24,14 +24,17 @@ class MeasuredForce:
     place : (n,) as the file says [m]
     force : (n,) >= 0 in compression, NaN where the file has none [N]
     head_height : (n,) above top of rail [m], None if not measured
-    height_noise : standard deviation of a sample [m], zero if not stated
+    noise : standard deviation of the noise of a sample of the force [N], zero if not stated
+    bias, height_bias : standard deviations of an unknown constant in force [N] and height [m]
     """
 
     pantograph: int
     place: np.ndarray
     force: np.ndarray
     head_height: np.ndarray | None = None
-    height_noise: float = 0.0
+    noise: float = 0.0
+    bias: float = 0.0
+    height_bias: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -91,6 +94,11 @@ class Passage:
                 f"measured.filter_Hz = {self.cut_off:g}"
             )
         return filters.low_pass(values, dt, self.cut_off)
+
+    def noise_in_band(self, noise: float, dt: float) -> float:
+        """What the filter leaves of the stated noise of samples ``dt`` [s] apart."""
+        share = 1.0 if self.is_filtered else filters.kept_variance(self.cut_off, dt)
+        return noise * float(np.sqrt(share))
 
     def margin(self, dt: float) -> int:
         """Samples at either end of a record that the filter has spoiled."""

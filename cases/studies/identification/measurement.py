@@ -9,7 +9,7 @@ import pandas as pd
 from scipy.interpolate import CubicSpline
 
 from catenary.base.errors import InputError
-from catenary.cases.studies.identification.noise import Whitening, kept_variance
+from catenary.cases.studies.identification.noise import Whitening
 from catenary.cases.studies.measured.description import Force, Height, Measured
 from catenary.cases.studies.measured.table_file import LEAST_SAMPLES, column_of, places_of
 from catenary.postproc.evaluate import filters
@@ -117,7 +117,7 @@ class Measurement:
         assert column.noise is not None  # the task was checked
         deviation = column.noise * column.factor
         if self._dt is not None:
-            deviation *= np.sqrt(kept_variance(self._cut_off, self._dt))
+            deviation *= np.sqrt(filters.kept_variance(self._cut_off, self._dt))
         whitening = Whitening(lags, deviation, self._cut_off, self._dt)
         return Signal(name, values, whitening, deviation, column.bias * column.factor)
 
