@@ -12,6 +12,7 @@ import numpy as np
 from catenary.base.errors import InputError
 from catenary.cases.scene.load import Draft
 from catenary.pictures import Pictures
+from catenary.postproc.evaluate import filters
 from catenary.postproc.evaluate import statistics as stats
 from catenary.postproc.evaluate.acceptance import criteria_of
 from catenary.postproc.evaluate.statistics import RunStatistics
@@ -289,6 +290,32 @@ class Run:
         'N'
         """
         return self.channel("contact_force")
+
+    @property
+    def filtered_force(self) -> xr.DataArray:
+        """Contact force of each pantograph below 20 Hz, (n_times, n_pantographs) [N].
+
+        Attributes ``filter``, ``cut_off_Hz`` and ``order`` name the filter. The file of a run that
+        is done holds it, to single precision; of others it is made of the record.
+
+        Raises
+        ------
+        InputError
+            If the time step is too long for the filter.
+
+        Examples
+        --------
+        >>> run.filtered_force.attrs["cut_off_Hz"]
+        20.0
+        >>> bool(run.filtered_force.std() < run.force.std())
+        True
+        """
+        force = self.force
+        stored = self._results.stored_filtered_force()
+        if stored is None:
+            stored = filters.low_pass(force.values, self._results.dt), dict(filters.ABOUT)
+        values, about = stored
+        return force.copy(data=values).assign_attrs(about).rename("filtered_force")
 
     @property
     def uplift(self) -> xr.Dataset:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from catenary.base.errors import InputError
-from catenary.cases.cli.app import RunFolder, app
+from catenary.cases.cli.app import Force, RunFolder, app, folder_option
 from catenary.cases.terminal import console
 from catenary.postproc.film.view import View
 
@@ -77,21 +77,74 @@ def report(
 
 @app.command(
     "compare",
-    help="Print two runs' figures side by side.",
-    epilog="Example: catenary compare results/coarse results/fine",
+    help="Print the figures of several runs side by side and which of their differences are "
+    "more than chance, or compare a run with a measured passage: errors of the measurement, "
+    "figures of both, tolerances.",
+    epilog="Example: catenary compare results/coarse results/fine, or with a measurement: "
+    "catenary compare results/en300 measured.csv --description measured.toml -o results/measured",
 )
 @console.guarded
 @console.serial
 def compare(
     first: Annotated[Path, typer.Argument(help="Folder of a run.")],
-    second: Annotated[Path, typer.Argument(help="Folder of another run.")],
+    others: Annotated[
+        list[Path], typer.Argument(help="Folders of other runs, or the CSV file of a measurement.")
+    ],
+    description: Annotated[
+        Path | None,
+        typer.Option(help="TOML file: columns, units, filter and pantograph of the measurement."),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        folder_option("Folder for page, tables and JSON of a measurement; none if absent."),
+    ] = None,
+    force: Force = False,
 ) -> None:
     """Serial."""
-    from catenary.postproc.evaluate.compare import compare as compare_runs
     from catenary.postproc.read.guard import examined
 
-    found = examined(first), examined(second)
-    console.say(compare_runs(first, second, found).rstrip())
+    is_measured = others[0].suffix.lower() == ".csv"
+    if is_measured and len(others) == 1:
+        _compare_measured(first, others[0], description, out, force)
+        return
+    if is_measured or description is not None or out is not None:
+        option = "--description" if description is not None else "-o"
+        raise InputError(
+            "a measurement is compared with one run: name a run and a CSV file"
+            if is_measured
+            else f"{option} belongs to a measurement: name a run and a CSV file"
+        )
+    from catenary.postproc.evaluate.compare import compare as compare_runs
+
+    folders = [first, *others]
+    console.say(compare_runs(*folders, records=[examined(one) for one in folders]).rstrip())
+
+
+def _compare_measured(
+    folder: Path, file: Path, description: Path | None, out: Path | None, force: bool
+) -> None:
+    """Compare a run with a measured passage. Serial."""
+    from catenary.cases.studies.measured.description import read_description
+
+    wanted = None if description is None else read_description(description)
+    from catenary.cases.result_folder.output_folder import refuse_table
+    from catenary.cases.studies.measured.passages import passage_of, usual_description
+    from catenary.cases.studies.measured.table_file import read_table
+    from catenary.postproc.measurements import output
+    from catenary.postproc.measurements.comparison import compare_with
+    from catenary.postproc.read.results import Results
+
+    if out is not None:
+        refuse_table(out / output.PAGE, force)
+    table = read_table(file)
+    if wanted is None:
+        wanted = usual_description(table, file)
+    beside = (description or file).parent
+    with Results(folder, _records(folder)) as results:
+        found = compare_with(results, passage_of(table, file, wanted, beside, results))
+    console.say(output.as_text(found))
+    if out is not None:
+        console.say("\n" + "\n".join(map(str, output.write(out, found))))
 
 
 @app.command(

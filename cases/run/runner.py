@@ -41,6 +41,7 @@ from catenary.cases.scene.problem import problem_of
 from catenary.cases.scene.scene import Scene
 from catenary.meshgen.mesh import LineMesh
 from catenary.postproc.channels.header import Header
+from catenary.postproc.files.filtered_force import ForceFilter
 from catenary.postproc.files.own_files import remove_stale
 from catenary.postproc.record.progress import Progress
 from catenary.postproc.record.recorder import Recorder
@@ -320,6 +321,7 @@ def _observers(
         record=recording.line,
         resume=order.resume,
         on_begun=begun,
+        force_filter=lambda: _force_filter(dt) if with_train else None,
     )
     first: list[Observer] = [] if fields is None else [fields]
     half_lengths = [place.data.strips.half_length for place in problem.train.placements]
@@ -329,6 +331,16 @@ def _observers(
         first += excited.watching(at_rest)
     watch = RunWatch(comm, watched(at_rest, excited is None), watch_cadence(dt))
     return [*first, progress, watch, recorder], recorder, watch
+
+
+def _force_filter(dt: float) -> ForceFilter | None:
+    """The filter of the contact force, None where steps are too long for it."""
+    # Once the march is over: filters load for long.
+    from catenary.postproc.evaluate import filters
+
+    if 2.0 * filters.CUT_OFF * dt >= 1.0:
+        return None
+    return ForceFilter(filters.ABOUT, filters.low_pass)
 
 
 def _reported(order: _Order, outcome: Outcome) -> RunOutcome:

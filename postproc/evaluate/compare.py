@@ -1,15 +1,26 @@
-"""Compares two runs: statistics side by side, and the force histories where their times agree."""
+"""Compares runs: statistics side by side, differences by spans, histories at equal times."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from contextlib import ExitStack
 from pathlib import Path
+from string import ascii_uppercase
 
 import numpy as np
 
+from catenary.base.errors import InputError
+from catenary.postproc.evaluate import filters
 from catenary.postproc.evaluate import statistics as stats
 from catenary.postproc.evaluate.acceptance import criteria_of, judged_by
 from catenary.postproc.evaluate.error_indicators import indicate
 from catenary.postproc.evaluate.remarks import all_remarks
+from catenary.postproc.evaluate.span_differences import (
+    STATISTICS,
+    SpanSums,
+    differences,
+    span_sums,
+)
 from catenary.postproc.evaluate.verdict import Criterion, labels
 from catenary.postproc.evaluate.wording import UNCOMPARED, UNCOMPARED_SAYS, counted, fixed
 from catenary.postproc.read.records import Records
@@ -27,40 +38,56 @@ _FORCES = (
 )
 
 
-def compare(
-    first: Path | str,
-    second: Path | str,
-    records: tuple[Records | None, Records | None] = (None, None),
-) -> str:
-    """A table of the differences of two runs, as text. Not collective.
+_Evaluated = tuple[Results, stats.RunStatistics]
+
+
+def compare(*runs: Path | str, records: Sequence[Records | None] | None = None) -> str:
+    """A table of the figures of two or more runs and of their differences, as text. Not collective.
 
     Parameters
     ----------
-    first, second : result folders or files
-    records : what ``evaluate.guard`` found in each, None to check it here
+    runs : result folders or files
+    records : what ``guard.examined`` found in each, None to check it here
 
     Raises
     ------
     InputError
-        If one of them is no result.
+        If one of them is no result, or if there are more than letters.
     """
-    with Results(first, records[0]) as a, Results(second, records[1]) as b:
-        return "\n".join([*_heads(a, b), "", *_statistics(a, b), "", _histories(a, b)]) + "\n"
+    if len(runs) > len(ascii_uppercase):
+        raise InputError(f"{len(runs)} runs are too many to compare; name {len(ascii_uppercase)}")
+    known = records or [None] * len(runs)
+    with ExitStack() as stack:
+        opened = [
+            stack.enter_context(Results(path, own)) for path, own in zip(runs, known, strict=True)
+        ]
+        found = [(run, stats.evaluate(run)) for run in opened]
+        parts = [_heads(opened), _statistics(found), _by_spans(opened)]
+        parts.append([_histories(opened[0], one, letter) for letter, one in _others(opened)])
+        return "\n\n".join("\n".join(part) for part in parts if part) + "\n"
 
 
-def _heads(a: Results, b: Results) -> list[str]:
+def _others(runs: Sequence[Results]) -> list[tuple[str, Results]]:
+    """The runs after the first with their letters; a lone one has none."""
+    letters = ascii_uppercase[1 : len(runs)] if len(runs) > 2 else [""]
+    return list(zip(letters, runs[1:], strict=False))
+
+
+def _heads(runs: Sequence[Results]) -> list[str]:
     lines = []
-    for letter, run in (("A", a), ("B", b)):
+    for letter, run in zip(ascii_uppercase, runs, strict=False):
         about = run.attributes
         lines.append(
             f"{letter}: {run.path} ({about['case']}, {3.6 * run.fact('speed'):.0f} km/h, "
             f"dt {run.dt:g} s, {counted(about['n_ranks'], 'rank')}, "
             f"{counted(run.n_steps, 'step')}, {run.outcome})"
         )
-    for letter, run, other in (("A", a, b), ("B", b, a)):
-        alone = _simulated(run) - _simulated(other)
+    shared = set.intersection(*map(_simulated, runs))
+    for letter, run in zip(ascii_uppercase, runs, strict=False):
+        alone = _simulated(run) - shared
         if alone:
-            lines.append(f"only {letter} simulates {', '.join(sorted(alone))}")
+            only = "only " if len(runs) == 2 else ""
+            lines.append(f"{only}{letter} simulates {', '.join(sorted(alone))}")
     return lines
 
 
@@ -68,51 +95,56 @@ def _simulated(run: Results) -> set[str]:
     return {name for name, *_ in run.attributes["effects_on"]}
 
 
-def _statistics(a: Results, b: Results) -> list[str]:
-    of_a, of_b = stats.evaluate(a), stats.evaluate(b)
-    lines = [f"{'':34}{'A':>14}{'B':>14}{'B - A':>14}"]
-    for p, q in zip(of_a.pantographs, of_b.pantographs, strict=False):
-        lines.append(p.name if p.name == q.name else f"{p.name} / {q.name}")
+def _statistics(runs: Sequence[_Evaluated]) -> list[str]:
+    found = [statistics for _, statistics in runs]
+    letters = ascii_uppercase[: len(runs)]
+    heads = [*letters, *(f"{letter} - A" for letter in letters[1:])]
+    lines = [f"{'':34}" + "".join(f"{head:>14}" for head in heads)]
+    for of_all in zip(*(one.pantographs for one in found), strict=False):
+        lines.append(" / ".join(dict.fromkeys(one.name for one in of_all)))
         for label, name, factor in _FORCES:
-            lines.append(_row("  " + label, factor * getattr(p, name), factor * getattr(q, name)))
-    if len(of_a.pantographs) != len(of_b.pantographs):
+            lines.append(_row("  " + label, [factor * getattr(one, name) for one in of_all]))
+    counts = [len(one.pantographs) for one in found]
+    if len(set(counts)) > 1:
+        named = zip(letters[1:], counts[1:], strict=True)
+        others = ", ".join(f"{letter} has {n}" for letter, n in named)
         lines.append(
-            f"A has {counted(len(of_a.pantographs), 'pantograph')}, B has "
-            f"{len(of_b.pantographs)}: "
-            "only the first are compared."
+            f"A has {counted(counts[0], 'pantograph')}, {others}: only the first are compared."
         )
     lines += [
         "line",
-        _row("  max uplift at arms [mm]", 1e3 * of_a.supports.maximum, 1e3 * of_b.supports.maximum),
-        _row("  droppers slackened", of_a.droppers.n_slackened, of_b.droppers.n_slackened),
-        _row("  max dropper force [N]", of_a.droppers.maximum, of_b.droppers.maximum),
-        _row("  min dropper force [N]", of_a.droppers.minimum, of_b.droppers.minimum),
+        _row("  max uplift at arms [mm]", [1e3 * one.supports.maximum for one in found]),
+        _row("  droppers slackened", [one.droppers.n_slackened for one in found]),
+        _row("  max dropper force [N]", [one.droppers.maximum for one in found]),
+        _row("  min dropper force [N]", [one.droppers.minimum for one in found]),
     ]
-    lines += _acceptance((a, of_a), (b, of_b))
-    said = [
+    lines += _acceptance(*runs)
+    for _, statistics in runs:
+        lines += statistics.complaints
+    for run, _ in runs:
+        lines += run.damage
+    return lines + [
         f"{letter}: {text}"
-        for letter, run in (("A", a), ("B", b))
+        for letter, (run, _) in zip(letters, runs, strict=True)
         for text in all_remarks(run, indicate(run))
     ]
-    return lines + of_a.complaints + of_b.complaints + a.damage + b.damage + said
 
 
-_Evaluated = tuple[Results, stats.RunStatistics]
 _WORDS = {True: "passed", False: "FAILED", None: "not judged"}
 
 
 def _acceptance(*runs: _Evaluated) -> list[str]:
-    """Every criterion of either run with its value and verdict in both."""
+    """Every criterion of any run with its value and verdict in all."""
     found = [criteria_of(run, statistics) for run, statistics in runs]
     lines = ["acceptance"]
-    for letter, (run, _), criteria in zip("AB", runs, found, strict=True):
+    for letter, (run, _), criteria in zip(ascii_uppercase, runs, found, strict=False):
         lines.append(f"  {letter} by {judged_by(run, criteria)}")
     columns = [dict(zip(labels(criteria), criteria, strict=True)) for criteria in found]
     every = list(dict.fromkeys(label for column in columns for label in column))
     width = max(map(len, every), default=0)
     for label in every:
         cells = [_judged(column.get(label)) for column in columns]
-        lines.append(f"  {label:{width}}{cells[0]:>26}{cells[1]:>26}")
+        lines.append(f"  {label:{width}}" + "".join(f"{cell:>26}" for cell in cells))
     return [*lines, f"  {UNCOMPARED_SAYS}"]
 
 
@@ -125,19 +157,77 @@ def _judged(one: Criterion | None) -> str:
     return f"{fixed(one.value, 2)} {one.unit} {_WORDS[one.passed]}{mark}"
 
 
-def _row(label: str, first: float, second: float) -> str:
-    difference = second - first + 0.0  # which makes no negative zero
-    return f"{label:34}{fixed(first, 4):>14}{fixed(second, 4):>14}{difference:14.3e}"
+def _row(label: str, values: Sequence[float]) -> str:
+    first, *others = values
+    cells = [f"{fixed(value, 4):>14}" for value in values]
+    # To add zero makes no negative zero.
+    return f"{label:34}" + "".join(cells + [f"{value - first + 0.0:14.3e}" for value in others])
 
 
-def _histories(a: Results, b: Results) -> str:
-    """The largest difference of the unfiltered contact forces, if both have the same times."""
+def _by_spans(runs: Sequence[Results]) -> list[str]:
+    """Differences from the first run with their intervals, by the spread from span to span."""
+    lines = []
+    n = min(run.n_pantographs for run in runs)
+    names = runs[0].pantograph_names()
+    of_all = [[_span_sums(run, number) for run in runs] for number in range(n)]
+    for name, (first, *others) in zip(names, of_all, strict=False):
+        for letter, own, other in zip(ascii_uppercase[1:], runs[1:], others, strict=False):
+            if first is None or other is None:
+                continue
+            paired = _spans_alike(runs[0], own)
+            found = differences(first, other, paired)
+            for label, one in zip(STATISTICS, found or (), strict=False):
+                mark = "more than chance" if one.is_certain else "within chance"
+                whole = f"{one.low:9.3f} to {one.high:9.3f}"
+                lines.append(
+                    f"  {name + ' ' + label + ' [N]':32}{letter + ' - A':>14}{one.value:14.3f}"
+                    f"  {whole}  {mark}"
+                )
+    if lines:
+        head = "differences by the spread from span to span, 95 % intervals"
+        lines.insert(0, head)
+    return lines
+
+
+def _span_sums(run: Results, number: int) -> SpanSums | None:
+    """Sums of the filtered force of a pantograph by evaluated spans; None if it has no record."""
+    position, force = run.column("contact_position", number), run.column("contact_force", number)
+    if position.size < 2 or not (np.isfinite(position).all() and np.isfinite(force).all()):
+        return None
+    try:
+        force = filters.low_pass(force, run.dt)
+    except InputError:  # sampled too slowly; statistics say so
+        return None
+    return span_sums(position, force, _evaluated_masts(run))
+
+
+def _evaluated_masts(run: Results) -> np.ndarray:
+    """Places of the masts of the evaluated stretch [m]."""
+    masts, (begin, end) = run.line("support_x"), run.evaluation
+    return masts[(masts >= begin - 1e-6) & (masts <= end + 1e-6)]
+
+
+def _spans_alike(a: Results, b: Results) -> bool:
+    """Whether two runs are evaluated on the same spans."""
+    own, other = _evaluated_masts(a), _evaluated_masts(b)
+    return own.size == other.size and np.allclose(own, other, rtol=0.0, atol=1e-6)
+
+
+def _histories(a: Results, b: Results, letter: str) -> str:
+    """The largest difference of the unfiltered contact forces, if both have the same times.
+
+    ``letter`` names b where there are several.
+    """
+    of_all = f"{letter} - A: " if letter else ""
     tolerance = 1e-6 * min(a.dt, b.dt)
     same = a.n_pantographs == b.n_pantographs and a.n_rows("time") == b.n_rows("time")
     if not same or not np.allclose(a.time, b.time, rtol=0, atol=tolerance):
-        return "The runs differ in their times or pantographs: force histories are not compared."
+        return (
+            f"{of_all}The runs differ in their times or pantographs: force histories are not "
+            "compared."
+        )
     if not a.n_rows("time"):
-        return "The runs hold no steps: force histories are not compared."
+        return f"{of_all}The runs hold no steps: force histories are not compared."
     largest, at, whose = -1.0, 0, 0
     for p in range(a.n_pantographs):
         difference = np.abs(a.column("contact_force", p) - b.column("contact_force", p))
@@ -148,6 +238,6 @@ def _histories(a: Results, b: Results) -> str:
         if np.isnan(largest):
             break
     return (
-        f"Largest difference of the contact force histories: {largest:.3e} N "
+        f"{of_all}Largest difference of the contact force histories: {largest:.3e} N "
         f"at t = {a.time_at(at):.4f} s ({a.pantograph_names()[whose]})."
     )

@@ -11,15 +11,24 @@ from functools import lru_cache
 
 import numpy as np
 from scipy import signal
+from scipy.integrate import trapezoid
 
 from catenary.base.errors import InputError
 
 CUT_OFF = 20.0
 BAND_LIMIT = 5.0
 ORDER = 6
+# The filter of contact forces, for files that hold some.
+ABOUT = {
+    "filter": "low-pass of EN 50317: Butterworth, forward and backward, gain 1/2 at the cut-off",
+    "cut_off_Hz": CUT_OFF,
+    "order": ORDER,
+}
 # The slowest pole of the 6th-order low-pass decays with sin(pi/12) 2 pi fc, thus to 1e-4 in
 # 5.7 / fc; the record is continued by that much at both ends before it is filtered.
 _PADDING_PERIODS = 6.0
+# Frequencies up to so many cut-offs, where the gain is 1e-7, in so many intervals a cut-off.
+_UP_TO, _INTERVALS = 4, 500
 # Rows that are filtered at once.
 _BLOCK = 1 << 16
 
@@ -61,6 +70,29 @@ def band_5_20(values: np.ndarray, dt: float) -> np.ndarray:
     check_sampling(dt, CUT_OFF)
     sections = _sections("bandpass", (BAND_LIMIT, CUT_OFF), dt)
     return _both_ways(sections, values, dt, BAND_LIMIT)
+
+
+def kept_variance(cut_off: float, dt: float) -> float:
+    """Part of the variance of independent samples, ``dt`` [s] apart, that the filter leaves."""
+    frequency, gain_squared = power_kept(cut_off, dt)
+    return float(2.0 * dt * trapezoid(gain_squared, frequency))
+
+
+def power_kept(cut_off: float, dt: float | None) -> tuple[np.ndarray, np.ndarray]:
+    """Frequencies (n,) [Hz], and the power that ``low_pass`` leaves of each.
+
+    Parameters
+    ----------
+    cut_off : where the gain is 1/2 [Hz]
+    dt : time between the samples that are filtered [s]; None if they are very dense
+    """
+    most = _UP_TO * cut_off if dt is None else min(_UP_TO * cut_off, 0.5 / dt * (1.0 - 1e-9))
+    frequency = np.linspace(0.0, most, _UP_TO * _INTERVALS + 1)
+    if dt is None:
+        ratio = frequency / cut_off
+    else:
+        ratio = np.tan(np.pi * frequency * dt) / np.tan(np.pi * cut_off * dt)
+    return frequency, 1.0 / (1.0 + ratio ** (2 * ORDER)) ** 2
 
 
 @lru_cache(maxsize=64)

@@ -83,6 +83,13 @@ def describe_extremes(dataset: h5py.Dataset, name: str) -> None:
     _describe(dataset, channel.unit, f"extremes of the {channel.meaning}")
 
 
+def describe_filtered(dataset: h5py.Dataset) -> None:
+    """Name the dimensions of a new table (n, n_pantographs) of filtered contact forces."""
+    channel = _channel("contact_force")
+    _attach(dataset, ("time", COLUMNS[channel.per]))
+    _describe(dataset, channel.unit, f"filtered {channel.meaning}", "time")
+
+
 def hide(dataset: h5py.Dataset) -> None:
     """Let readers of netCDF-4 take a table of a state to continue from for a dimension alone.
 

@@ -33,6 +33,7 @@ from catenary.postproc.files.disk import (
     reserve,
     trimmed,
 )
+from catenary.postproc.files.filtered_force import ForceFilter, drop_filtered, store_filtered
 from catenary.postproc.files.hdf5.array_writes import put_array, set_attribute
 from catenary.postproc.files.hdf5.checked import (
     FORMAT_BOUNDS,
@@ -145,7 +146,7 @@ class ResultFile:
         shapes = chunks_of(table, stage.n_steps, rows_per_append, record.every)
         rows = min(rows_per_append, stage.n_steps + 1)
         self._room = room_of(table, shapes, rows, record) + MARGIN
-        self._start_time = stage.start_time
+        self._start_time, self._dt = stage.start_time, stage.dt
         self._n_states = 0
         place, mode = (path, "r+") if resume else (self._made_as, "w")
         self._file = open_to_write(place, mode, libver=FORMAT_BOUNDS)
@@ -226,6 +227,10 @@ class ResultFile:
         # Of a resumed run the part that its wall time belongs to.
         attributes["marched_s"] = float(time[-1]) - self._start_time if time.shape[0] else 0.0
         self._file.flush()
+
+    def store_filtered(self, force: ForceFilter) -> None:
+        """Store the filtered contact force of all steps."""
+        store_filtered(self._file, force, self._dt)
 
     def close(self, performance: Mapping[str, Any]) -> None:
         """Store ``performance`` as root attributes and close the file."""
@@ -471,7 +476,8 @@ def _rows_to_keep(file: h5py.File, time: float) -> list[int]:
 
 
 def _cut(file: h5py.File, time: float) -> None:
-    """Drop the records from ``time`` [s] on."""
+    """Drop the records from ``time`` [s] on, and what was derived from all of them."""
+    drop_filtered(file)
     for keep, paths in zip(_rows_to_keep(file, time), _tables_by_clock(file), strict=True):
         for path in paths:
             lost = shorten(file, path, keep)

@@ -14,6 +14,7 @@ import numpy as np
 from catenary.base.errors import InputError
 from catenary.meshgen.wires import Role
 from catenary.postproc.channels.line_record import LineRecord
+from catenary.postproc.files.filtered_force import filtered_in
 from catenary.postproc.files.hdf5 import block_reading
 from catenary.postproc.files.run_schema import ALL_COLUMNS, DONE, LINE_TIME, PLACES, RUNNING
 from catenary.postproc.read.line_of_run import ResultTables
@@ -171,6 +172,11 @@ class Results(TrainOfRun):
         ``blocks``.
         """
         return self.rows(name, slice(0, self.n_rows(name)))
+
+    def stored_filtered_force(self) -> tuple[np.ndarray, dict[str, Any]] | None:
+        """The filtered contact force (n, n_pantographs) [N] and what its filter is; None where the
+        file has none that is valid, such as that of a run that is not done."""
+        return filtered_in(self._file, (self._length, self.n_pantographs))
 
     def rows(self, name: str, part: slice) -> np.ndarray:
         """Some rows of a channel, shape (rows, columns), NaN where it is damaged and where the

@@ -18,6 +18,7 @@ from catenary.base.parallel import on_root
 from catenary.postproc.channels.header import Header
 from catenary.postproc.channels.line_record import LineRecord
 from catenary.postproc.files.disk import Elsewhere, NoRoom, broken_write
+from catenary.postproc.files.filtered_force import ForceFilter
 from catenary.postproc.files.result_file import LineRows, ResultFile
 from catenary.postproc.files.run_schema import DONE, INTERRUPTED
 from catenary.postproc.record.column_gather import next_flush
@@ -46,6 +47,8 @@ class Recorder(Observer):
     record : which part of the line's channels is recorded
     resume : continue a file: what it holds from the stage's start time on is replaced
     on_begun : called on rank 0 when a new file has taken its place
+    force_filter : called on rank 0 when a run is done; the contact force is stored filtered by it
+        too, unless it is None
     """
 
     def __init__(
@@ -59,6 +62,7 @@ class Recorder(Observer):
         record: LineRecord | None = None,
         resume: bool = False,
         on_begun: Callable[[], None] = lambda: None,
+        force_filter: Callable[[], ForceFilter | None] = lambda: None,
     ) -> None:
         if comm.rank == 0 and header is None:
             raise ValueError("rank 0 needs the head of the result file")
@@ -70,6 +74,8 @@ class Recorder(Observer):
         self._record = record or LineRecord()
         self._resume = resume
         self._on_begun = on_begun
+        self._force_filter = force_filter
+        self._is_done = False
         self._file: ResultFile | None = None
         self._broken = False
         self._view: StepView | None = None
@@ -159,6 +165,7 @@ class Recorder(Observer):
         if self._kept:
             self._flush(self._view if outcome in (DONE, INTERRUPTED) else None)
         self._guarded(lambda: self._open_file.conclude(outcome))
+        self._is_done = outcome == DONE
 
     def close(self, performance: Mapping[str, Any] | None = None) -> None:
         """Write what is known at the very end as root attributes and close the file. Collective.
@@ -263,6 +270,9 @@ class Recorder(Observer):
 
     def _close(self, performance: Mapping[str, Any]) -> None:
         self._open_file.check_in_place()
+        force_filter = self._force_filter() if self._is_done else None
+        if force_filter is not None:
+            self._open_file.store_filtered(force_filter)
         self._open_file.close(performance)
 
     def _read_extremes(self) -> None:

@@ -7,6 +7,7 @@ from typing import NamedTuple, TextIO
 
 import numpy as np
 
+from catenary.postproc.evaluate.slack_times import slack_times
 from catenary.postproc.evaluate.wording import fixed
 from catenary.postproc.files.csv_text import csv_text
 from catenary.postproc.read.results import Results
@@ -65,8 +66,13 @@ def dropper_table(results: Results) -> list[DropperRow]:
             names[wires[i, 0]],
             names[wires[i, 1]],
         )
-        for i in np.argsort(x, kind="stable").tolist()
+        for i in _order(results)
     ]
+
+
+def _order(results: Results) -> list[int]:
+    """Numbers of the droppers in order of x."""
+    return [int(i) for i in np.argsort(results.line("dropper_x"), kind="stable")]
 
 
 def _numbers_in_spans(span: np.ndarray, x: np.ndarray) -> np.ndarray:
@@ -82,8 +88,15 @@ def _numbers_in_spans(span: np.ndarray, x: np.ndarray) -> np.ndarray:
 
 
 def droppers_csv(results: Results) -> str:
-    """The dropper table as CSV text, lengths to a tenth of a millimetre."""
+    """The dropper table as CSV text, lengths to a tenth of a millimetre.
+
+    Beside the force at rest stand the least and the largest one of every step, and for how long the
+    dropper was slack; they are empty where they are not known.
+    """
     heads = ["span", "dropper", "position in span [m]", "position [m]", "length [m]", "force [N]"]
+    heads += ["least force [N]", "largest force [N]", "slack [s]"]
+    least, largest = results.extremes("dropper_force")
+    slack = slack_times(results)
     several = joins_several(results)
     if several:
         heads += ["hangs from", "carries"]
@@ -95,11 +108,18 @@ def droppers_csv(results: Results) -> str:
             fixed(row.x, 4),
             fixed(row.length, 4),
             fixed(row.force, 2),
+            _known(least[i], 2),
+            _known(largest[i], 2),
+            _known(slack[i], 3),
             *((row.upper, row.lower) if several else ()),
         )
-        for row in dropper_table(results)
+        for i, row in zip(_order(results), dropper_table(results), strict=True)
     )
     return csv_text(heads, rows)
+
+
+def _known(value: float, digits: int) -> str:
+    return fixed(value, digits) if np.isfinite(value) else ""
 
 
 def pantographs_csv(results: Results) -> str:

@@ -80,7 +80,7 @@ def ends(folder: Path, before: dict[str, Any], caplog: pytest.LogCaptureFixture)
     try:
         records = examined(folder, LIMIT)
         found = figures(folder, records)
-        compare(folder, folder, (records, records))
+        compare(folder, folder, records=(records, records))
     except InputError as error:
         assert "\n" not in str(error) and str(error).startswith(str(folder / "run.h5"))
         return "refused"

@@ -20,11 +20,13 @@ import catenary
 from catenary.base.errors import InputError
 from catenary.cases.cli.main import app
 from catenary.cases.scene.load import load_scene
-from catenary.cases.studies.identification.measurement import Measurement, read_table
-from catenary.cases.studies.identification.noise import Whitening, correlation, kept_variance
+from catenary.cases.studies.identification.measurement import Measurement
+from catenary.cases.studies.identification.noise import Whitening, correlation
 from catenary.cases.studies.identification.posterior import posterior_of
 from catenary.cases.studies.identification.residuals import innovations_of, judge
-from catenary.cases.studies.identification.task import Measured, task_of
+from catenary.cases.studies.identification.task import task_of
+from catenary.cases.studies.measured.description import Measured
+from catenary.cases.studies.measured.table_file import read_table
 from catenary.postproc.evaluate import filters
 
 CASE = "en50318_2002"
@@ -66,7 +68,7 @@ def test_filtered_noise_has_the_correlation_of_the_filters_impulse(dt: float) ->
     lags = np.arange(0, 60)
     sums = np.array([response[lag:] @ response[: len(response) - lag] for lag in lags])
     # Trapezoids over a smooth spectrum that ends at a gain of 6e-8: 1e-6 of the whole.
-    check("variance", kept_variance(20.0, dt), sums[0], within=1e-5 * sums[0])
+    check("variance", filters.kept_variance(20.0, dt), sums[0], within=1e-5 * sums[0])
     check("correlation", correlation(lags * dt, 20.0, dt), sums / sums[0], within=1e-5)
 
 
@@ -214,7 +216,7 @@ def test_raw_samples_and_the_march_pass_the_same_filter() -> None:
     modelled = found.of_march(100.0 + 50.0 * dense, values, 1e-3)
     check("as the march", modelled, signal.values, within=1e-3)
     # Of 5 N white noise at 250 Hz the filter leaves the root of 0.148.
-    assert signal.deviation == pytest.approx(5.0 * np.sqrt(kept_variance(20.0, 0.004)))
+    assert signal.deviation == pytest.approx(5.0 * np.sqrt(filters.kept_variance(20.0, 0.004)))
 
 
 def test_tables_with_semicolons_and_decimal_commas_are_read(tmp_path: Path) -> None:

@@ -44,7 +44,7 @@ ROOMS = {
         "tangents", "ensemble",
     ),
     "postproc": ("standards", "channels", "files", "read", "record", "evaluate", "film", "paraview",
-        "report",
+        "report", "measurements",
     ),
     "cases": (
         "scene.input", "scene.keys", "scene.line", "scene.train", "scene.run", "scene.scene",
@@ -55,7 +55,8 @@ ROOMS = {
         "studies.records", "studies.ensemble", "studies.sweep", "studies.sampling",
         "studies.uncertainty", "studies.merged_sweeps", "studies.scene_sets", "studies.optimise",
         "studies.tolerance", "studies.pantograph_response", "studies.accuracy", "studies.hard",
-        "studies.scaling", "studies.sensitivity", "studies.identification", "studies.stability",
+        "studies.scaling", "studies.sensitivity", "studies.measured",
+        "studies.identification", "studies.stability",
         "studies.effect_cost", "studies.waves", "studies.case_study", "studies.questions",
         "studies.full_report", "studies.paper",
         "ambrosio2012", "cli", FACE,

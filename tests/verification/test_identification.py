@@ -20,12 +20,13 @@ from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.problem import problem_of
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.identification.fitted_march import FittedMarch
-from catenary.cases.studies.identification.measurement import Measurement, read_table
+from catenary.cases.studies.identification.measurement import Measurement
 from catenary.cases.studies.identification.output import as_text, verdict
 from catenary.cases.studies.identification.posterior import posterior_of
 from catenary.cases.studies.identification.residuals import innovations_of, judge
 from catenary.cases.studies.identification.study import Identification, identify
 from catenary.cases.studies.identification.task import task_of
+from catenary.cases.studies.measured.table_file import read_table
 from catenary.cases.studies.sensitivity.parameters import ChangedScenes
 
 FORCE_NOISE, HEIGHT_NOISE = 5.0, 5e-3

@@ -96,13 +96,14 @@ def estimate_files(
     n_ends = len(GAUGES) * recording.end_x.size
     kept = 2 * (_STATE_ARRAYS * n_dofs + 2 * (n_droppers + n_arms + n_ends))
     at_rest = _PER_NODE * recording.n_nodes + _PER_DROPPER * n_droppers
+    filtered = 0.5 * _BYTES * len(problem.train.placements) * (recording.n_steps + 1)
     head = _EMPTY_FILE + len(json.dumps(resolved(scene)))
     film = 0.0
     if recording.field_every:
         n_snapshots = recording.n_steps // recording.field_every + 1
         film = _film_bytes(problem, recording, n_snapshots)
     return FileSizes(
-        result=rows + _BYTES * (kept + at_rest) + head,
+        result=rows + _BYTES * (kept + at_rest) + filtered + head,
         film=film,
         report=_REPORT + _REPORT_PER_DROPPER * n_droppers + _REPORT_PER_ARM * n_arms,
     )

@@ -2,26 +2,21 @@
 
 from __future__ import annotations
 
-import io
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
 from scipy.interpolate import CubicSpline
 
 from catenary.base.errors import InputError
-from catenary.cases.scene.input.plain_text import decode, plain, read_whole
-from catenary.cases.studies.identification.noise import Whitening, kept_variance
-from catenary.cases.studies.identification.task import Force, Height, Measured
+from catenary.cases.studies.identification.noise import Whitening
+from catenary.cases.studies.measured.description import Force, Height, Measured
+from catenary.cases.studies.measured.table_file import LEAST_SAMPLES, column_of, places_of
 from catenary.postproc.evaluate import filters
 
 FORCE, HEIGHT = "force", "head height"
 UNITS = {FORCE: "N", HEIGHT: "m"}
 _MOST_SAMPLES = 8000  # their covariance takes half a gigabyte
-_LEAST_SAMPLES = 20
-# Samples are equidistant if their spacings differ by less than this part.
-_EVEN = 0.02
 # A filter leaves 1e-4 of what is beyond a record's end after so many periods of its cut-off.
 _SETTLED = 6.0
 
@@ -57,7 +52,7 @@ class Measurement:
 
     Parameters
     ----------
-    table : of a CSV file, see ``read_table``
+    table : of a CSV file, see ``table_file.read_table``
     path : what sentences call it
     task : what its columns are
     speed : of the train [m/s]
@@ -81,7 +76,7 @@ class Measurement:
     ) -> None:
         self.pantograph = task.pantograph - 1
         self._cut_off, self._is_filtered = task.filter_Hz, task.is_filtered
-        places = self._placed(table, path, task, speed, start)
+        places = places_of(table, path, task, speed, start)
         dt = float(places[-1] - places[0]) / ((len(places) - 1) * speed)
         self._dt = None if task.is_filtered else dt
         begin = stretch[0] if task.from_m is None else task.from_m
@@ -98,10 +93,10 @@ class Measurement:
             within = within[(within >= margin) & (within < len(places) - margin)]
         # A signal of this bandwidth is known from samples half a period of it apart.
         kept = within[:: max(1, int(0.5 / (task.filter_Hz * dt) + 1e-6))]
-        if not _LEAST_SAMPLES <= kept.size <= _MOST_SAMPLES:
+        if not LEAST_SAMPLES <= kept.size <= _MOST_SAMPLES:
             raise InputError(
                 f"{path} has {kept.size} samples between {begin:g} and {end:g} m, half a period of "
-                f"the filter apart; an identification takes {_LEAST_SAMPLES} to {_MOST_SAMPLES}"
+                f"the filter apart; an identification takes {LEAST_SAMPLES} to {_MOST_SAMPLES}"
             )
         # Rows of the file from the first sample to the last, and of a filter's reach beside them.
         self._rows = slice(int(kept[0]) - margin, int(kept[-1]) + margin + 1)
@@ -114,34 +109,15 @@ class Measurement:
             if column is not None
         ]
 
-    def _placed(
-        self, table: pd.DataFrame, path: str, task: Measured, speed: float, start: float
-    ) -> np.ndarray:
-        """Places of all samples of the file, evened out."""
-        if task.place is not None:
-            places = _column(table, path, task.place.column) * task.place.factor
-        else:
-            assert task.time is not None
-            places = start + speed * task.time.factor * _column(table, path, task.time.column)
-        if len(places) < _LEAST_SAMPLES:
-            raise InputError(f"{path} has {len(places)} rows; at least {_LEAST_SAMPLES} are needed")
-        even = np.linspace(places[0], places[-1], len(places))
-        spacing = even[1] - even[0]
-        if spacing <= 0.0 or np.abs(np.diff(places) - spacing).max() > _EVEN * spacing + 1e-4:
-            raise InputError(
-                f"{path} must have equidistant samples in ascending order; resample it at even "
-                "steps of place or time"
-            )
-        return even
-
     def _signal(
         self, table: pd.DataFrame, path: str, name: str, column: Force | Height, lags: np.ndarray
     ) -> Signal:
-        values = _column(table, path, column.column)[self._rows] * column.factor
+        values = column_of(table, path, column.column)[self._rows] * column.factor
         values = self._sampled(values)
+        assert column.noise is not None  # the task was checked
         deviation = column.noise * column.factor
         if self._dt is not None:
-            deviation *= np.sqrt(kept_variance(self._cut_off, self._dt))
+            deviation *= np.sqrt(filters.kept_variance(self._cut_off, self._dt))
         whitening = Whitening(lags, deviation, self._cut_off, self._dt)
         return Signal(name, values, whitening, deviation, column.bias * column.factor)
 
@@ -171,38 +147,3 @@ class Measurement:
             values = filters.low_pass(values, dt, self._cut_off)
             return np.asarray(CubicSpline(position, values)(needed))
         return self._sampled(np.asarray(CubicSpline(position, values)(needed)))
-
-
-def read_table(path: Path) -> pd.DataFrame:
-    """The table of a CSV file, with commas or with semicolons and decimal commas or points.
-
-    Raises
-    ------
-    InputError
-        If it is none.
-    """
-    text = decode(read_whole(path, str(path)), str(path))
-    semicolons = ";" in text
-    try:
-        return pd.read_csv(
-            io.StringIO(text.replace(",", ".") if semicolons else text),
-            sep=";" if semicolons else ",",
-            comment="#",
-            skipinitialspace=True,
-        )
-    except ValueError as error:  # pandas' ParserError is one
-        why = str(error).strip().removeprefix("Error tokenizing data. C error: ")
-        raise InputError(f"{path} is no table of CSV: {plain(why, 200)}") from error
-
-
-def _column(table: pd.DataFrame, path: str, name: str) -> np.ndarray:
-    if name not in table:
-        there = ", ".join(plain(str(column), 40) for column in table.columns[:12])
-        raise InputError(f'{path} has no column "{plain(name, 100)}": it has {there}')
-    values = pd.to_numeric(table[name], errors="coerce").to_numpy(dtype=float)
-    wrong = np.flatnonzero(~np.isfinite(values))
-    if wrong.size:
-        raise InputError(
-            f'{path} has in row {wrong[0] + 1} of column "{plain(name, 100)}" no finite number'
-        )
-    return np.asarray(values)

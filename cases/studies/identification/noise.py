@@ -6,10 +6,8 @@ import numpy as np
 from scipy import linalg
 from scipy.integrate import trapezoid
 
-from catenary.postproc.evaluate.filters import ORDER
+from catenary.postproc.evaluate.filters import power_kept
 
-# Frequencies up to so many cut-offs, where the gain is 1e-7, in so many intervals a cut-off.
-_UP_TO, _INTERVALS = 4, 500
 # The slowest pole decays with sin(pi/12) 2 pi fc, so that 1e-8 is left after so many periods.
 _REMEMBERED = 12.0
 
@@ -26,29 +24,12 @@ def correlation(lags: np.ndarray, cut_off: float, dt: float | None = None) -> np
     cut_off : fc [Hz]
     dt : time between the samples that were filtered [s]; None if they were very dense
     """
-    frequency, gain_squared = _power(cut_off, dt)
+    frequency, gain_squared = power_kept(cut_off, dt)
     found = np.zeros(np.shape(lags))
     near = np.abs(lags) * cut_off < _REMEMBERED
     waves = np.cos(2.0 * np.pi * np.multiply.outer(lags[near], frequency))
     found[near] = trapezoid(waves * gain_squared, axis=-1) / trapezoid(gain_squared)
     return found
-
-
-def kept_variance(cut_off: float, dt: float) -> float:
-    """Part of the variance of independent samples, ``dt`` [s] apart, that the filter leaves."""
-    frequency, gain_squared = _power(cut_off, dt)
-    return float(2.0 * dt * trapezoid(gain_squared, frequency))
-
-
-def _power(cut_off: float, dt: float | None) -> tuple[np.ndarray, np.ndarray]:
-    """Frequencies [Hz], and the power that the filter leaves of each."""
-    most = _UP_TO * cut_off if dt is None else min(_UP_TO * cut_off, 0.5 / dt * (1.0 - 1e-9))
-    frequency = np.linspace(0.0, most, _UP_TO * _INTERVALS + 1)
-    if dt is None:
-        ratio = frequency / cut_off
-    else:
-        ratio = np.tan(np.pi * frequency * dt) / np.tan(np.pi * cut_off * dt)
-    return frequency, 1.0 / (1.0 + ratio ** (2 * ORDER)) ** 2
 
 
 class Whitening:

@@ -2,95 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
-from pydantic import Field, ValidationError, model_validator
+from pydantic import Field, model_validator
 
-from catenary.base.errors import InputError
-from catenary.cases.scene.input.faults import Origin
-from catenary.cases.scene.input.plain_text import plain
 from catenary.cases.scene.input.toml_input import read_toml
-from catenary.cases.scene.keys.error_sentences import schema_faults
-from catenary.cases.scene.keys.keys import nearest
 from catenary.cases.scene.keys.table import Table
-
-_UNITS = {"N": 1.0, "kN": 1e3, "m": 1.0, "cm": 1e-2, "mm": 1e-3, "km": 1e3, "s": 1.0, "ms": 1e-3}
-_POSITIVE = Annotated[float, Field(gt=0.0, le=1e9)]
-_NOT_NEGATIVE = Annotated[float, Field(ge=0.0, le=1e9)]
-_NAME = Annotated[str, Field(min_length=1, max_length=100)]
-
-
-class _Column(Table):
-    column: _NAME
-
-    @property
-    def factor(self) -> float:
-        """From the column's unit to SI."""
-        return _UNITS[self.unit]  # type: ignore[attr-defined, no-any-return]
-
-
-class Place(_Column):
-    """The column of places along the track."""
-
-    unit: Literal["m", "km"] = "m"
-
-
-class Time(_Column):
-    """The column of times since the start of the march."""
-
-    unit: Literal["s", "ms"] = "s"
-
-
-class _Signal(_Column):
-    noise: _POSITIVE
-    bias: _NOT_NEGATIVE = 0.0
-
-
-class Force(_Signal):
-    """The column of contact forces; ``noise`` and ``bias`` in its unit."""
-
-    unit: Literal["N", "kN"] = "N"
-
-
-class Height(_Signal):
-    """The column of head heights above top of rail; ``noise`` and ``bias`` in its unit."""
-
-    unit: Literal["m", "cm", "mm"] = "m"
-
-
-class Measured(Table):
-    """What was measured, and how well.
-
-    Attributes
-    ----------
-    place, time : which of the two columns there is; place is start + speed time
-    force, head_height : at least one of them
-    pantograph : number of the pantograph on the train, from 1
-    filter_Hz : bandwidth of force and height, the cut-off of the filter of EN 50317
-    is_filtered : whether the values in the file have passed this filter, and noise is theirs;
-        otherwise noise is that of each sample, independent of others, and the filter is applied
-    from_m, to_m : stretch that is compared; that of the scene's evaluation if absent
-    """
-
-    place: Place | None = None
-    time: Time | None = None
-    force: Force | None = None
-    head_height: Height | None = None
-    pantograph: Annotated[int, Field(ge=1, le=100)] = 1
-    filter_Hz: Annotated[float, Field(gt=0.0, le=1e3)] = 20.0
-    is_filtered: bool = True
-    from_m: float | None = None
-    to_m: float | None = None
-
-    @model_validator(mode="after")
-    def _columns(self) -> Measured:
-        if (self.place is None) == (self.time is None):
-            raise ValueError("must name the column of one of place and time")
-        if self.force is None and self.head_height is None:
-            raise ValueError("must name the column of force, of head_height, or of both")
-        return self
+from catenary.cases.studies.measured.description import NAME, POSITIVE, Measured, validated
 
 
 class Sought(Table):
@@ -103,8 +22,8 @@ class Sought(Table):
     mean : of the prior; the scene's value if absent
     """
 
-    key: _NAME
-    deviation: _POSITIVE
+    key: NAME
+    deviation: POSITIVE
     mean: float | None = None
 
 
@@ -113,7 +32,7 @@ class Droppers(Table):
     the standard deviation of their prior."""
 
     spans: Annotated[list[Annotated[int, Field(ge=1)]], Field(min_length=1, max_length=1000)]
-    deviation_mm: _POSITIVE
+    deviation_mm: POSITIVE
 
 
 class Task(Table):
@@ -127,19 +46,11 @@ class Task(Table):
     def _something(self) -> Task:
         if not self.parameters and self.droppers is None:
             raise ValueError("must have [[parameters]] or [droppers] to look for")
+        for name in ("force", "head_height"):
+            signal = getattr(self.measured, name)
+            if signal is not None and signal.noise is None:
+                raise ValueError(f"must have measured.{name}.noise, which weighs the samples")
         return self
-
-
-_KEYS: dict[str, Sequence[str]] = {
-    "": list(Task.model_fields),
-    "measured": list(Measured.model_fields),
-    "measured.place": list(Place.model_fields),
-    "measured.time": list(Time.model_fields),
-    "measured.force": list(Force.model_fields),
-    "measured.head_height": list(Height.model_fields),
-    "parameters": list(Sought.model_fields),
-    "droppers": list(Droppers.model_fields),
-}
 
 
 def read_task(path: Path) -> Task:
@@ -161,21 +72,4 @@ def task_of(raw: dict[str, Any], name: str) -> Task:
     InputError
         If it is none: one sentence about its first fault.
     """
-    try:
-        return Task.model_validate(raw)
-    except ValidationError as failed:
-        first = min(failed.errors(), key=lambda one: one["type"] != "extra_forbidden")
-        if first["type"] == "extra_forbidden":
-            raise InputError(_unknown(first["loc"], name)) from failed
-        faults, _ = schema_faults(failed, raw, Task, Origin(name))
-        raise InputError(faults[0].sentence.replace("the scene in ", "the task in ")) from failed
-
-
-def _unknown(location: tuple[int | str, ...], name: str) -> str:
-    *above, last = (str(part) for part in location)
-    known = _KEYS[".".join(part for part in above if not part.isdigit())]
-    near = nearest(last, list(known))
-    key = plain(".".join([*above, last]), 100)
-    return f"{key} in {name} is unknown: " + (
-        f"did you mean {near}?" if near else f"it takes {', '.join(known)}"
-    )
+    return validated(Task, raw, name, "the task")

@@ -303,3 +303,19 @@ def test_runs_of_different_step_are_compared_by_statistics_only(
     assert "A has 2 pantographs, B has 1" in text
     assert ", 1 rank, " in text and "-0.0000" not in text
     assert "force histories are not compared" in text
+
+
+def test_dropper_table_has_the_forces_of_the_run(report_folder: Path, run_folder: Path) -> None:
+    """By hand from the record: every step of it stands for a time step."""
+    rows = list(csv.DictReader((report_folder / "droppers.csv").read_text().splitlines()))
+    with Results(run_folder) as results:
+        force, dt = results.channel("dropper_force"), results.dt
+        order = np.argsort(results.line("dropper_x"), kind="stable")
+    expected = np.stack([force.min(axis=0), force.max(axis=0)], axis=1)[order]
+    names = ("least force [N]", "largest force [N]")
+    found = np.array([[float(row[name]) for name in names] for row in rows])
+    np.testing.assert_allclose(found, expected, atol=0.5e-2 + 1e-9)  # two decimals
+    slack = np.array([float(row["slack [s]"]) for row in rows])
+    by_hand = dt * np.count_nonzero(force <= 0.0, axis=0)[order]
+    np.testing.assert_allclose(slack, by_hand, atol=0.5e-3 + 1e-9)  # three decimals
+    assert slack.max() > 0.1 and slack.min() == 0.0

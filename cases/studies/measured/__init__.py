@@ -1,0 +1,1 @@
+"""Measured passages: what a CSV file holds, described in TOML, and its columns."""

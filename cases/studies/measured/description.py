@@ -1,0 +1,189 @@
+"""The description of a measurement: columns, units and noise of a CSV file, as tables of TOML."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any, Literal, TypeVar
+
+from pydantic import Field, ValidationError, model_validator
+
+from catenary.base.errors import InputError
+from catenary.cases.scene.input.faults import Origin
+from catenary.cases.scene.input.plain_text import plain
+from catenary.cases.scene.input.toml_input import read_toml
+from catenary.cases.scene.keys.error_sentences import schema_faults
+from catenary.cases.scene.keys.keys import nearest, tables_in
+from catenary.cases.scene.keys.table import Table
+
+_UNITS = {"N": 1.0, "kN": 1e3, "m": 1.0, "cm": 1e-2, "mm": 1e-3, "km": 1e3, "s": 1.0, "ms": 1e-3}
+POSITIVE = Annotated[float, Field(gt=0.0, le=1e9)]
+_NOT_NEGATIVE = Annotated[float, Field(ge=0.0, le=1e9)]
+NAME = Annotated[str, Field(min_length=1, max_length=100)]
+_NUMBER = Annotated[int, Field(ge=1, le=100)]
+
+T = TypeVar("T", bound=Table)
+
+
+class _Column(Table):
+    column: NAME
+
+    @property
+    def factor(self) -> float:
+        """From the column's unit to SI."""
+        return _UNITS[self.unit]  # type: ignore[attr-defined, no-any-return]
+
+
+class Place(_Column):
+    """The column of places along the track."""
+
+    unit: Literal["m", "km"] = "m"
+
+
+class Time(_Column):
+    """The column of times since the start of the march."""
+
+    unit: Literal["s", "ms"] = "s"
+
+
+class _Signal(_Column):
+    noise: POSITIVE | None = None
+    bias: _NOT_NEGATIVE = 0.0
+
+
+class Force(_Signal):
+    """The column of contact forces; ``noise`` and ``bias`` in its unit."""
+
+    unit: Literal["N", "kN"] = "N"
+
+
+class Height(_Signal):
+    """The column of head heights above top of rail; ``noise`` and ``bias`` in its unit."""
+
+    unit: Literal["m", "cm", "mm"] = "m"
+
+
+class Measured(Table):
+    """What was measured, and how well.
+
+    Attributes
+    ----------
+    place, time : which of the two columns there is; place is start + speed time
+    force, head_height : at least one of them
+    pantograph : number of the pantograph on the train, from 1
+    filter_Hz : bandwidth of force and height, the cut-off of the filter of EN 50317
+    is_filtered : whether the values in the file have passed this filter, and noise is theirs;
+        otherwise noise is that of each sample, independent of others, and the filter is applied
+    from_m, to_m : stretch that is compared; that of the scene's evaluation if absent
+    """
+
+    place: Place | None = None
+    time: Time | None = None
+    force: Force | None = None
+    head_height: Height | None = None
+    pantograph: _NUMBER = 1
+    filter_Hz: Annotated[float, Field(gt=0.0, le=1e3)] = 20.0
+    is_filtered: bool = True
+    from_m: float | None = None
+    to_m: float | None = None
+
+    @model_validator(mode="after")
+    def _columns(self) -> Measured:
+        if (self.place is None) == (self.time is None):
+            raise ValueError("must name the column of one of place and time")
+        if self.force is None and self.head_height is None:
+            raise ValueError("must name the column of force, of head_height, or of both")
+        return self
+
+
+class OtherPantograph(Table):
+    """Columns of a further pantograph of the same passage, at the same places or times."""
+
+    pantograph: _NUMBER
+    force: Force
+
+
+class Uplift(Table):
+    """A CSV file of largest uplifts at supports, beside the description.
+
+    Attributes
+    ----------
+    file : its name
+    place : of the supports along the track
+    largest : uplift of the contact wire there in the passage
+    """
+
+    file: NAME
+    place: Place
+    largest: Height
+
+
+class Tolerances(Table):
+    """How far a run may be from the measurement, in place of the usual ones."""
+
+    mean_N: POSITIVE | None = None
+    std_percent: POSITIVE | None = None
+    maximum_N: POSITIVE | None = None
+    minimum_N: POSITIVE | None = None
+    uplift_mm: POSITIVE | None = None
+    contact_height_range_mm: POSITIVE | None = None
+
+
+class Description(Table):
+    """What a line test measured of a passage, for a comparison with a run."""
+
+    measured: Measured
+    others: Annotated[list[OtherPantograph], Field(max_length=20)] = []
+    uplift: Uplift | None = None
+    tolerances: Tolerances = Tolerances()
+
+    @model_validator(mode="after")
+    def _forces(self) -> Description:
+        if self.measured.force is None:
+            raise ValueError("must name the column measured.force, by which a run is aligned")
+        numbers = [self.measured.pantograph, *(one.pantograph for one in self.others)]
+        if len(set(numbers)) < len(numbers):
+            raise ValueError("must name each pantograph once")
+        return self
+
+
+def read_description(path: Path) -> Description:
+    """The description in a TOML file. Not collective.
+
+    Raises
+    ------
+    InputError
+        If it is none.
+    """
+    return validated(Description, read_toml(path), str(path), "the description")
+
+
+def validated(model: type[T], raw: dict[str, Any], name: str, kind: str) -> T:
+    """A table made of nested ones, which sentences call ``kind`` in ``name``.
+
+    Raises
+    ------
+    InputError
+        If it is none: one sentence about its first fault.
+    """
+    try:
+        return model.model_validate(raw)
+    except ValidationError as failed:
+        first = min(failed.errors(), key=lambda one: one["type"] != "extra_forbidden")
+        if first["type"] == "extra_forbidden":
+            raise InputError(_unknown(model, first["loc"], name)) from failed
+        faults, _ = schema_faults(failed, raw, model, Origin(name))
+        raise InputError(faults[0].sentence.replace("the scene in ", f"{kind} in ")) from failed
+
+
+def _unknown(model: type[Table], location: tuple[int | str, ...], name: str) -> str:
+    *above, last = (str(part) for part in location)
+    table = model
+    for part in above:
+        if not part.isdigit():
+            table = tables_in(table.model_fields[part].annotation)[0][0]
+    known = list(table.model_fields)
+    near = nearest(last, known)
+    key = plain(".".join([*above, last]), 100)
+    return f"{key} in {name} is unknown: " + (
+        f"did you mean {near}?" if near else f"it takes {', '.join(known)}"
+    )

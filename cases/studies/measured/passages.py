@@ -1,0 +1,124 @@
+"""From the files of a measurement to a passage in SI units."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from catenary.base.errors import InputError
+from catenary.cases.studies.measured.description import (
+    Description,
+    Force,
+    Tolerances,
+    Uplift,
+    validated,
+)
+from catenary.cases.studies.measured.table_file import column_of, places_of, read_table
+from catenary.postproc.measurements.passage import MeasuredForce, MeasuredUplift, Passage
+from catenary.postproc.read.results import Results
+
+# Names of columns that need no description, with their units.
+_USUAL = {
+    "place": {"place_m": "m", "place_km": "km"},
+    "time": {"time_s": "s"},
+    "force": {"force_N": "N", "force_kN": "kN"},
+    "head_height": {"head_height_m": "m", "head_height_mm": "mm"},
+}
+
+
+def usual_description(table: pd.DataFrame, path: Path) -> Description:
+    """The description of a file whose columns have the usual names: forces below 20 Hz.
+
+    Raises
+    ------
+    InputError
+        If it lacks one that is needed.
+    """
+    measured = {}
+    for key, names in _USUAL.items():
+        there = [name for name in names if name in table]
+        if there and not (key == "time" and "place" in measured):
+            measured[key] = {"column": there[0], "unit": names[there[0]]}
+    if "force" not in measured or len(measured.keys() & {"place", "time"}) != 1:
+        raise InputError(
+            f"{path} has no columns of the usual names, place_m or time_s and force_N: describe "
+            "its columns with --description"
+        )
+    return validated(Description, {"measured": measured}, str(path), "the description")
+
+
+def passage_of(
+    table: pd.DataFrame, path: Path, description: Description, folder: Path, results: Results
+) -> Passage:
+    """The passage of a table, as a run of the same train places it. Not collective.
+
+    Parameters
+    ----------
+    table : of a CSV file
+    path : of that file, for its name and sentences
+    description : what its columns are
+    folder : of further files that the description names
+    results : of the run; with a column of times it has start and speed
+
+    Raises
+    ------
+    InputError
+        If a column or file is not there, or no table of this kind.
+    """
+    own = description.measured
+    assert own.force is not None  # the description was checked
+    columns: list[tuple[int, Force]] = [(own.pantograph, own.force)]
+    columns += [(other.pantograph, other.force) for other in description.others]
+    forces = []
+    for number, force in columns:
+        start = _start(results, number - 1) if own.time is not None else 0.0
+        places = places_of(table, str(path), own, results.fact("speed"), start)
+        values = column_of(table, str(path), force.column, may_lack=True) * force.factor
+        height, height_bias = None, 0.0
+        if own.head_height is not None and number == own.pantograph:
+            signal = own.head_height
+            height = column_of(table, str(path), signal.column, may_lack=True) * signal.factor
+            height_bias = signal.bias * signal.factor
+        noise, bias = (force.noise or 0.0) * force.factor, force.bias * force.factor
+        forces.append(MeasuredForce(number - 1, places, values, height, noise, bias, height_bias))
+    begin, end = results.evaluation
+    return Passage(
+        path.name,
+        forces,
+        own.filter_Hz,
+        own.is_filtered,
+        own.time is not None,
+        (begin if own.from_m is None else own.from_m, end if own.to_m is None else own.to_m),
+        None if description.uplift is None else _uplift(description.uplift, folder),
+        _tolerances(description.tolerances),
+    )
+
+
+def _start(results: Results, number: int) -> float:
+    """Place of a pantograph at time zero [m], of the first one if there are not so many."""
+    number = number if number < results.n_pantographs else 0
+    position = results.column("contact_position", number, slice(0, 1))
+    return float(position[0]) - results.fact("speed") * results.time_at(0)
+
+
+def _uplift(own: Uplift, folder: Path) -> MeasuredUplift:
+    if Path(own.file).name != own.file:
+        raise InputError(f"uplift.file is {own.file!r}: name a file beside the description")
+    path = folder / own.file
+    table = read_table(path)
+    place = column_of(table, str(path), own.place.column) * own.place.factor
+    largest = column_of(table, str(path), own.largest.column) * own.largest.factor
+    return MeasuredUplift(place, largest, (own.largest.noise or 0.0) * own.largest.factor)
+
+
+def _tolerances(given: Tolerances) -> dict[str, float]:
+    """Tolerances in SI units, that of the standard deviation as a share, by the figure."""
+    factors = {"N": 1.0, "percent": 1e-2, "mm": 1e-3}
+    found = {}
+    for name, value in given:
+        figure, _, unit = name.rpartition("_")
+        if value is not None:
+            found[figure] = float(np.float64(value) * factors[unit])
+    return found

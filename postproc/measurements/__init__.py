@@ -1,0 +1,1 @@
+"""Measured passages beside a run: alignment, errors of the measurement, tolerances, files."""

@@ -1,0 +1,497 @@
+"""A measured passage beside a run: errors of the measurement, figures of both, tolerances."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from catenary.base.errors import InputError
+from catenary.postproc.measurements.alignment import CERTAIN, Alignment, align, correlation_time
+from catenary.postproc.measurements.passage import (
+    MeasuredForce,
+    MeasuredUplift,
+    Passage,
+    RunForce,
+)
+from catenary.postproc.read.results import Results
+
+# Errors below these are of no account, however certain: of places [m], of the force as a share of
+# its mean, of heights [m], of a filter as a share of the standard deviation.
+_SHIFT, _DRIFTED, _FORCE_SHARE, _HEIGHT, _FILTER_SHARE = 0.2, 0.1, 0.003, 2e-3, 0.03
+# A pantograph has no force if half of its samples lie below this share of the run's mean, and none
+# was measured if this share of the samples has no number.
+_NO_FORCE, _MOST_GAPS = 0.2, 0.2
+# Forces with a lower correlation are not those of the run: nothing is aligned by them.
+_LEAST_CORRELATION = 0.6
+# A constant of so many stated deviations is no error.
+_BIASES = 3.0
+# What remains is more than the stated noise beyond this factor.
+_MORE_THAN_NOISE = 1.3
+# A range is widened by noise of deviation 1 by up to so much.
+_WIDENED = 6.0
+# A support is that of the run if it is this near [m].
+_NEAR_SUPPORT = 10.0
+LINE_TEST = "comparison with a line test, EN 50318"
+
+
+@dataclass(frozen=True)
+class Finding:
+    """An error of the measurement, or of what is said of it.
+
+    Attributes
+    ----------
+    kind : "shift", "drift", "gain", "filter", "missing pantograph", "other pantograph", "unlike",
+        "height", "gaps" or "supports"
+    pantograph : its name, empty if of none
+    text : a sentence
+    value : of what was found, in SI units, NaN without
+    """
+
+    kind: str
+    pantograph: str
+    text: str
+    value: float = float("nan")
+
+
+@dataclass(frozen=True)
+class Compared:
+    """A figure of run and measurement.
+
+    Attributes
+    ----------
+    name, pantograph, unit : in words; the unit is that of the values
+    run, measured : values
+    tolerance : how far they may differ, NaN where none is known
+    passed : None if it is not judged
+    because : why it is not judged
+    source : of the tolerance
+    """
+
+    name: str
+    pantograph: str
+    unit: str
+    run: float
+    measured: float
+    tolerance: float
+    passed: bool | None
+    because: str
+    source: str
+
+
+@dataclass(frozen=True)
+class Overlay:
+    """Histories of a pantograph on the run's places.
+
+    Attributes
+    ----------
+    pantograph : its name
+    place : (n,) of the measured samples on the run's line [m]
+    measured, run : (n,) forces below the cut-off [N]
+    measured_height, run_height : (n,) heights of the head likewise [m], None if not measured
+    alignment : None if it could not be aligned
+    """
+
+    pantograph: str
+    place: np.ndarray
+    measured: np.ndarray
+    run: np.ndarray
+    measured_height: np.ndarray | None
+    run_height: np.ndarray | None
+    alignment: Alignment | None
+
+
+@dataclass(frozen=True)
+class UpliftAtSupports:
+    """Largest uplifts (n,) at supports [m], by their places in the run [m]."""
+
+    place: np.ndarray
+    measured: np.ndarray
+    run: np.ndarray
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """A measured passage beside a run.
+
+    Attributes
+    ----------
+    measured, run, lead : names of both, and a sentence on the run
+    overlays : of the pantographs that were measured
+    uplift : None if it was not measured
+    figures : of run and measurement
+    findings : errors; empty if there is none
+    remarks : sentences on the noise floor, and on what cannot be told apart
+    """
+
+    measured: str
+    run: str
+    lead: str
+    overlays: Sequence[Overlay]
+    uplift: UpliftAtSupports | None
+    figures: Sequence[Compared]
+    findings: Sequence[Finding]
+    remarks: Sequence[str]
+
+    @property
+    def passed(self) -> bool | None:
+        """Whether all judged figures are within their tolerances, None if none is judged."""
+        judged = [one.passed for one in self.figures if one.passed is not None]
+        return all(judged) if judged else None
+
+
+def compare_with(results: Results, passage: Passage) -> Comparison:
+    """Compare a run with a measured passage. Not collective.
+
+    Raises
+    ------
+    InputError
+        If the run has no such pantograph, or if the measurement does not cover the run's line.
+    """
+    names = results.pantograph_names()
+    for one in passage.forces:
+        if one.pantograph >= len(names):
+            raise InputError(
+                f"{passage.name} has pantograph {one.pantograph + 1} by its description, and the "
+                f"run in {results.path} has {len(names)}"
+            )
+    work = _Comparing(results, passage, names)
+    for one in passage.forces:
+        work.pantograph(one)
+    work.unmeasured()
+    if passage.uplift is not None:
+        work.uplifts(passage.uplift)
+    about = results.attributes
+    lead = (
+        f"{passage.name} beside {results.path} ({about['case']}, "
+        f"{3.6 * results.fact('speed'):.0f} km/h), {passage.stretch[0]:g} to "
+        f"{passage.stretch[1]:g} m, forces below {passage.cut_off:g} Hz"
+    )
+    return Comparison(
+        passage.name,
+        str(results.path),
+        lead,
+        work.overlays,
+        work.uplift,
+        work.figures,
+        work.findings,
+        work.remarks,
+    )
+
+
+class _Comparing:
+    def __init__(self, results: Results, passage: Passage, names: Sequence[str]) -> None:
+        self._results, self._passage, self._names = results, passage, names
+        self._runs: dict[int, RunForce] = {}
+        self.overlays: list[Overlay] = []
+        self.uplift: UpliftAtSupports | None = None
+        self.figures: list[Compared] = []
+        self.findings: list[Finding] = []
+        self.remarks: list[str] = []
+
+    def _run(self, number: int) -> RunForce:
+        if number not in self._runs:
+            position = self._results.column("contact_position", number)
+            force = self._results.column("contact_force", number)
+            if position.size < 2 or not np.isfinite(force).all():
+                raise InputError(f"{self._results.path} has no record of its contact forces")
+            self._runs[number] = RunForce(position, force, self._results.dt)
+        return self._runs[number]
+
+    def _find(self, kind: str, name: str, text: str, value: float = float("nan")) -> None:
+        self.findings.append(Finding(kind, name, text, value))
+
+    # ---- a pantograph ---------------------------------------------------------------------------
+
+    def pantograph(self, own: MeasuredForce) -> None:
+        """Align the force of a pantograph, and compare it."""
+        passage, name = self._passage, self._names[own.pantograph]
+        run = self._run(own.pantograph)
+        force = self._without_gaps(own.force, name)
+        if force is None:
+            return
+        if np.median(force) < _NO_FORCE * float(np.mean(run.below(passage.cut_off)(run.position))):
+            text = f"{name}: half of the measured forces are below {np.median(force):.1f} N: "
+            self._find("missing pantograph", name, text + "lowered, or not recorded")
+            return
+        dt = float(own.place[1] - own.place[0]) / run.speed
+        valid = slice(passage.margin(dt), own.place.size - passage.margin(dt))
+        place, force = own.place[valid], passage.in_band(force, dt)[valid]
+        if place.size < 20:
+            raise InputError(
+                f"{passage.name} is too short for the filter of {passage.cut_off:g} Hz"
+            )
+        found = self._aligned(place, force, own.pantograph)
+        other = (
+            None if found is None else self._other_pantograph(place, force, own.pantograph, found)
+        )
+        aligned = found
+        if other is not None:
+            aligned = None
+            self._find("other pantograph", name, *other)
+        elif found is None or found.correlation < _LEAST_CORRELATION:
+            aligned = None
+            said = "" if found is None else f" (correlation {found.correlation:.2f})"
+            text = f"{name}: the forces are not those of the run{said}: nothing is aligned by them"
+            self._find("unlike", name, text)
+        else:
+            self._errors(found, name, run, own.bias)
+            self._noise_floor(found, name, passage.noise_in_band(own.noise, dt))
+        at = place if aligned is None else aligned.placed(place)
+        begin, end = passage.stretch
+        within = (at >= max(begin, run.position[0])) & (at <= min(end, run.position[-1]))
+        if np.count_nonzero(within) < 20:
+            raise InputError(
+                f"{passage.name} has places from {at[0]:.1f} to {at[-1]:.1f} m, and the run is "
+                f"compared from {begin:g} to {end:g} m: they share nothing"
+            )
+        at, force = at[within], force[within]
+        modelled = run.below(passage.cut_off)(at)
+        heights = None
+        if own.head_height is not None:
+            heights = self._heights(own, valid, within, at, dt)
+        self._force_figures(name, at, force, run)
+        if heights is not None:
+            self._height_figures(name, *heights, own.height_bias)
+        measured_height, run_height = heights or (None, None)
+        self.overlays.append(
+            Overlay(name, at, force, modelled, measured_height, run_height, aligned)
+        )
+
+    def _without_gaps(self, values: np.ndarray, name: str) -> np.ndarray | None:
+        """Values with gaps bridged by straight lines; None where too much is missing."""
+        missing = np.isnan(values)
+        share = float(missing.mean())
+        if share > _MOST_GAPS:
+            text = f"{name}: {100 * share:.0f} % of the measured forces are no numbers"
+            self._find("missing pantograph", name, text)
+            return None
+        if missing.any():
+            text = f"{name}: {missing.sum()} samples without a number are bridged by straight lines"
+            self._find("gaps", name, text, float(missing.sum()))
+            index = np.arange(values.size)
+            values = np.interp(index, index[~missing], values[~missing])
+        return values
+
+    def _aligned(self, place: np.ndarray, force: np.ndarray, number: int) -> Alignment | None:
+        passage = self._passage
+        return align(
+            place, force, self._run(number), passage.stretch, passage.cut_off, passage.is_filtered
+        )
+
+    def _other_pantograph(
+        self, place: np.ndarray, force: np.ndarray, number: int, found: Alignment
+    ) -> tuple[str, float] | None:
+        """A sentence and the number of the pantograph of the train whose force this rather is."""
+        for other, name in enumerate(self._names):
+            there = None if other == number else self._aligned(place, force, other)
+            if there is None:
+                continue
+            # Twice the logarithm of the ratio of likelihoods, of as many samples.
+            ratio = np.log(found.residual / max(there.residual, 1e-9))
+            if 2.0 * found.n_independent * ratio > CERTAIN:
+                text = (
+                    f"{self._names[number]}: the measured force is rather that of the {name} "
+                    f"pantograph ({there.residual:.1f} N remain, not {found.residual:.1f} N)"
+                )
+                return text, float(other)
+        return None
+
+    def _errors(self, found: Alignment, name: str, run: RunForce, bias: float) -> None:
+        """Find what the alignment says of the measurement; ``bias`` [N] is stated of the force."""
+        passage = self._passage
+        if found.shift.differs(0.0, _SHIFT):
+            shift, way = found.shift, "far along the track" if found.shift.value > 0 else "far back"
+            by = f"{abs(shift.value):.2f} m too {way} (+- {shift.deviation:.2g} m)"
+            text = f"{name}: places are {by} at {found.middle:.0f} m"
+            if passage.by_time:
+                early = "ahead" if shift.value > 0 else "behind"
+                text += f": the clock is {abs(shift.value) / run.speed:.3f} s {early}"
+            self._find("shift", name, text, shift.value)
+        length = found.length
+        if found.drift.differs(0.0, _DRIFTED / length):
+            drift = found.drift
+            what = "clock or speed" if passage.by_time else "places"
+            by = f"{1e3 * drift.value:+.2f} in 1000 (+- {1e3 * drift.deviation:.2g})"
+            over = f"{drift.value * length:+.2f} m over {length:.0f} m"
+            text = f"{name}: {what} drift by {by}, {over}"
+            self._find("drift", name, text, drift.value)
+        mean = float(np.mean(run.below(passage.cut_off)(run.position)))
+        if max(found.gain_certainty, found.offset_certainty) > CERTAIN and (
+            abs(found.offset.value) > max(_FORCE_SHARE * mean, _BIASES * bias)
+        ):
+            self._find("gain", name, f"{name}: {_gain_words(found)}", found.gain.value)
+        elif found.both_certainty > CERTAIN and found.gain_beside_offset.differs(1.0, _FORCE_SHARE):
+            gain = found.gain_beside_offset
+            text = (
+                f"{name}: the force swings {gain.value:.3f} (+- {gain.deviation:.2g}) times as much"
+            )
+            self._find("gain", name, text, gain.value)
+        spread = float(np.std(run.below(passage.cut_off)(run.position)))
+        if found.filter_certainty > CERTAIN and found.filter_effect > _FILTER_SHARE * spread:
+            stated = f"{passage.cut_off:g} Hz" if passage.is_filtered else "none"
+            seems = "no filter" if found.filter is None else f"a filter of {found.filter:.3g} Hz"
+            text = (
+                f"{name}: the values seem to have passed {seems}; the description states {stated}"
+            )
+            value = np.inf if found.filter is None else found.filter
+            self._find("filter", name, text, float(value))
+        if found.other_shifts:
+            shifts = ", ".join(f"{shift:+.1f}" for shift in found.other_shifts[:4])
+            self.remarks.append(f"{name}: shifts of {shifts} m fit as well")
+
+    def _noise_floor(self, found: Alignment, name: str, stated: float) -> None:
+        """Tell what remains, and which errors are told beyond it; ``stated`` is the noise [N]."""
+        told, length = np.sqrt(CERTAIN), found.length
+        self.remarks.append(
+            f"{name}: noise floor {found.residual:.2f} N (correlation {found.correlation:.3f}); "
+            f"told are a shift above {max(_SHIFT, told * found.shift.deviation):.2g} m, a drift "
+            f"above {max(_DRIFTED, told * found.drift.deviation * length):.2g} m, a gain above "
+            f"{100 * max(_FORCE_SHARE, told * found.gain.deviation):.2g} %"
+        )
+        if stated and found.residual > _MORE_THAN_NOISE * stated:
+            more = np.sqrt(found.residual**2 - stated**2)
+            self.remarks.append(
+                f"{name}: the stated noise is {stated:.2f} N below the cut-off: {more:.2f} N of "
+                "the floor are not of it, and the run differs from the measurement by so much"
+            )
+
+    # ---- figures --------------------------------------------------------------------------------
+
+    def _force_figures(self, name: str, at: np.ndarray, force: np.ndarray, run: RunForce) -> None:
+        """Mean, deviation and extremes of both forces over the same places."""
+        filtered = run.below(self._passage.cut_off)(run.position)
+        own = filtered[(run.position >= at[0]) & (run.position <= at[-1])]
+        for label, key, of in (
+            ("mean", "mean", np.mean),
+            ("standard deviation", "std", np.std),
+            ("maximum", "maximum", np.max),
+            ("minimum", "minimum", np.min),
+        ):
+            values = float(of(own)), float(of(force))
+            usual = 0.2 * values[1] if key == "std" else float("nan")
+            if key == "std" and "std" in self._passage.tolerances:
+                usual = self._passage.tolerances["std"] * values[1]
+            self._figure(label, name, "N", key, values, usual)
+
+    def _heights(
+        self, own: MeasuredForce, valid: slice, within: np.ndarray, at: np.ndarray, dt: float
+    ) -> tuple[np.ndarray, np.ndarray] | None:
+        """Heights of the head, measured and of the run, at the places that are compared."""
+        name = self._names[own.pantograph]
+        if own.head_height is None or not self._results.has("head_height"):
+            return None
+        if np.isnan(own.head_height).any():
+            missing = int(np.isnan(own.head_height).sum())
+            text = f"{name}: {missing} head heights are no numbers: heights are not compared"
+            self._find("gaps", name, text, float(missing))
+            return None
+        measured = self._passage.in_band(own.head_height, dt)[valid][within]
+        record = self._results.column("head_height", own.pantograph)
+        position = self._run(own.pantograph).position
+        return measured, RunForce(position, record, self._results.dt).below(self._passage.cut_off)(
+            at
+        )
+
+    def _height_figures(
+        self, name: str, measured: np.ndarray, run: np.ndarray, bias: float
+    ) -> None:
+        """The range of heights, and an error of their zero beyond the stated ``bias`` [m]."""
+        difference = measured - run
+        offset, rest = float(difference.mean()), float(difference.std())
+        # As for forces: what remains is noise, with its correlation.
+        n = difference.size / correlation_time(difference)
+        if abs(offset) > max(_HEIGHT, np.sqrt(CERTAIN / n) * rest, _BIASES * bias):
+            text = f"{name}: head heights are {1e3 * offset:+.1f} mm off the run's throughout"
+            self._find("height", name, text, offset)
+        self.remarks.append(f"{name}: noise floor of heights {1e3 * rest:.2f} mm")
+        values = 1e3 * float(np.ptp(run)), 1e3 * float(np.ptp(measured))
+        key = "contact_height_range"
+        self._figure("range of head height", name, "mm", key, values, 20.0, _WIDENED * 1e3 * rest)
+
+    def _figure(
+        self,
+        label: str,
+        name: str,
+        unit: str,
+        key: str,
+        values: tuple[float, float],
+        usual: float,
+        noise: float = 0.0,
+    ) -> None:
+        """Add a figure (run, measured), judged by its tolerance; ``noise`` is what noise may add to
+        the measured one."""
+        given = self._passage.tolerances
+        tolerance, source = usual, LINE_TEST
+        if key in given:
+            source = "description"
+            tolerance = usual if key == "std" else given[key] * (1e3 if unit == "mm" else 1.0)
+        run, measured = values
+        passed, because = None, ""
+        if np.isnan(tolerance):
+            because = "no tolerance is known; the description may give one"
+        elif abs(run - measured) <= tolerance:
+            passed = True
+        elif 0.0 < measured - run <= tolerance + noise:
+            because = f"noise alone may add {noise:.3g} {unit} to the measured figure"
+        else:
+            passed = False
+        self.figures.append(
+            Compared(label, name, unit, run, measured, tolerance, passed, because, source)
+        )
+
+    # ---- the train, and supports ----------------------------------------------------------------
+
+    def unmeasured(self) -> None:
+        """Find pantographs of the run of which the description names no column."""
+        there = {one.pantograph for one in self._passage.forces}
+        for number, name in enumerate(self._names):
+            if number not in there:
+                text = (
+                    f"{name}: the run has this pantograph, and the description has no column of it"
+                )
+                self._find("missing pantograph", name, text)
+
+    def uplifts(self, measured: MeasuredUplift) -> None:
+        """Compare the largest uplifts at supports."""
+        x = self._results.line("arm_x")
+        uplift = self._results.extremes("arm_uplift")[1]
+        begin, end = self._passage.stretch
+        if not x.size or np.isnan(uplift).all():
+            raise InputError(f"{self._results.path} has no record of uplifts at supports")
+        nearest = np.abs(x[None, :] - measured.place[:, None]).argmin(axis=1)
+        distance = measured.place - x[nearest]
+        far = np.abs(distance) > _NEAR_SUPPORT
+        if far.any():
+            text = f"{far.sum()} of {far.size} supports of the uplifts stand at none of the run's"
+            self._find("supports", "", text, float(far.sum()))
+        near = ~far & (x[nearest] >= begin) & (x[nearest] <= end) & np.isfinite(measured.largest)
+        if not near.any():
+            return
+        off = float(np.median(distance[near]))
+        if abs(off) > 1.0:
+            text = f"supports of the uplifts stand {off:+.1f} m off the run's"
+            self._find("supports", "", text, off)
+        self.uplift = UpliftAtSupports(
+            x[nearest[near]], measured.largest[near], uplift[nearest[near]]
+        )
+        difference = self.uplift.measured - self.uplift.run
+        scatter = float(difference.std()) if difference.size > 2 else measured.noise
+        self.remarks.append(
+            f"uplift at {difference.size} supports: measured {1e3 * difference.mean():+.1f} mm "
+            f"beyond the run's on average, scatter {1e3 * scatter:.1f} mm"
+        )
+        values = 1e3 * float(self.uplift.run.max()), 1e3 * float(self.uplift.measured.max())
+        noise = 3.0 * 1e3 * max(scatter, measured.noise)
+        self._figure("largest uplift at supports", "", "mm", "uplift", values, 20.0, noise)
+
+
+def _gain_words(found: Alignment) -> str:
+    """A gain, an offset, or both where the record does not tell them apart."""
+    gain = f"a gain of {found.gain.value:.3f} (+- {found.gain.deviation:.2g})"
+    offset = f"an offset of {found.offset.value:+.1f} N (+- {found.offset.deviation:.2g} N)"
+    if abs(found.gain_certainty - found.offset_certainty) < CERTAIN / 2.0:
+        return f"the measured force has {gain}, or {offset}"
+    is_gain = found.gain_certainty > found.offset_certainty
+    return f"the measured force has {gain if is_gain else offset}"

@@ -1,0 +1,326 @@
+"""``catenary compare`` with a measurement and with several runs: what is read, told and written."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from measuring import check
+from mpi4py import MPI
+from scipy import signal, stats
+from typer.testing import CliRunner
+
+from catenary.base.errors import InputError
+from catenary.cases.cli.main import app
+from catenary.cases.run.runner import run_case
+from catenary.cases.scene.load import load_scene
+from catenary.cases.studies.measured.description import Description, validated
+from catenary.cases.studies.measured.passages import passage_of
+from catenary.postproc.evaluate.compare import compare
+from catenary.postproc.evaluate.span_differences import SpanSums, differences, span_sums
+from catenary.postproc.measurements.alignment import align, correlation_time
+from catenary.postproc.measurements.comparison import Comparison, compare_with
+from catenary.postproc.measurements.passage import RunForce
+from catenary.postproc.read.results import Results
+
+# Nine spans with two elements a gap, 6.7 s at 2 ms.
+SCENE = (
+    "line.n_spans=9", "mesh.elements_per_gap=2", "train.start_m=65", "train.end_m=475",
+    "train.raise_time_s=0.2", "numerics.dt_s=0.002", "evaluation.from_m=120",
+    "evaluation.to_m=420", "output.field_every_s=0",
+)  # fmt: skip
+PLACES: dict[str, Any] = {"place": {"column": "place_m"}, "force": {"column": "force_N"}}
+
+
+@pytest.fixture(autouse=True)
+def own_hook(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The command line installs an exception hook; it goes with the test."""
+    monkeypatch.setattr(sys, "excepthook", sys.excepthook)
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder: Path = tmp_path_factory.mktemp("run")
+    run_case(load_scene("en50318_2002", [*SCENE]), folder, MPI.COMM_SELF, only_summary=True)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def table(run: Path) -> pd.DataFrame:
+    """The passage of the run itself, below 20 Hz by SciPy's own filter, with 2 N of noise."""
+    with Results(run) as results:
+        position = results.column("contact_position", 0)
+        sos = signal.butter(6, 20.0, fs=500.0, output="sos")
+        force = signal.sosfiltfilt(sos, results.column("contact_force", 0), padlen=150)
+        height = signal.sosfiltfilt(sos, results.column("head_height", 0), padlen=150)
+    force = force + 2.0 * np.random.default_rng(0).normal(size=force.size)
+    return pd.DataFrame({"place_m": position, "force_N": force, "head_height_m": height})[::2]
+
+
+def found_in(run: Path, table: pd.DataFrame, folder: Path = Path(), **tables: Any) -> Comparison:
+    """What a description tells of a table."""
+    tables.setdefault("measured", PLACES)
+    with Results(run) as results:
+        own = validated(Description, tables, "m.toml", "the description")
+        return compare_with(results, passage_of(table, Path("m.csv"), own, folder, results))
+
+
+# --- figures and findings ------------------------------------------------------------------------
+
+
+def test_figures_of_the_measurement_are_those_of_its_samples(
+    run: Path, table: pd.DataFrame
+) -> None:
+    found = found_in(run, table)
+    own = table[(table.place_m >= 120.0) & (table.place_m <= 420.0)].force_N
+    by_name = {one.name: one for one in found.figures}
+    # The alignment moves the stretch by millimetres: a sample less or more of a thousand,
+    # which is off the mean by up to 80 N.
+    check("mean", by_name["mean"].measured, own.mean(), within=0.1)
+    check("deviation", by_name["standard deviation"].measured, own.std(ddof=0), within=0.1)
+    assert found.findings == [] and found.passed is True
+    assert by_name["mean"].passed is None and "no tolerance is known" in by_name["mean"].because
+
+
+def test_given_tolerances_are_kept(run: Path, table: pd.DataFrame) -> None:
+    table = table.assign(force_N=table.force_N + 10.0)
+    found = found_in(run, table, tolerances={"mean_N": 5.0, "maximum_N": 50.0, "std_percent": 30.0})
+    judged = {one.name: (one.passed, one.source, one.tolerance) for one in found.figures}
+    assert judged["mean"] == (False, "description", 5.0) and found.passed is False
+    assert judged["maximum"] == (True, "description", 50.0)
+    deviation = next(one for one in found.figures if one.name == "standard deviation")
+    assert deviation.tolerance == pytest.approx(0.3 * deviation.measured)
+
+
+def test_an_offset_is_told_unless_it_is_a_stated_bias(run: Path, table: pd.DataFrame) -> None:
+    table = table.assign(force_N=table.force_N + 8.0, head_height_m=table.head_height_m + 0.006)
+    heights = {**PLACES, "head_height": {"column": "head_height_m"}}
+    found = found_in(run, table, measured=heights)
+    assert [one.kind for one in found.findings] == ["gain", "height"]
+    assert "an offset of +8.0 N" in found.findings[0].text
+    assert found.findings[1].value == pytest.approx(0.006, abs=1e-4)
+    stated = {
+        "place": {"column": "place_m"},
+        "force": {"column": "force_N", "bias": 4.0},
+        "head_height": {"column": "head_height_m", "bias": 0.003},
+    }
+    assert found_in(run, table, measured=stated).findings == []
+
+
+def test_noise_that_was_stated_is_beside_what_remains(run: Path, table: pd.DataFrame) -> None:
+    told = {noise: found_in(run, table, measured={**PLACES, "force": {
+        "column": "force_N", "noise": noise}}).remarks for noise in (2.0, 0.5)}  # fmt: skip
+    assert not any("stated noise" in text for text in told[2.0])
+    (text,) = (text for text in told[0.5] if "stated noise" in text)
+    # The root of 2^2 - 0.5^2, of noise with 3 % of its own.
+    assert "0.50 N below the cut-off" in text
+    assert float(text.split(": ")[2].split(" N")[0]) == pytest.approx(1.94, rel=0.1)
+
+
+def test_forces_of_another_world_are_not_aligned(run: Path, table: pd.DataFrame) -> None:
+    rng = np.random.default_rng(3)
+    smooth = signal.sosfiltfilt(
+        signal.butter(4, 2.0, fs=250.0, output="sos"), rng.normal(size=len(table))
+    )
+    table = table.assign(force_N=120.0 + 25.0 / smooth.std() * smooth)
+    found = found_in(run, table)
+    assert [one.kind for one in found.findings] == ["unlike"]
+    assert found.overlays[0].alignment is None
+
+
+def test_gaps_are_bridged_and_told(run: Path, table: pd.DataFrame) -> None:
+    holed = table.copy()
+    holed.iloc[300:310, 1] = np.nan
+    found = found_in(run, holed)
+    assert [(one.kind, one.value) for one in found.findings] == [("gaps", 10.0)]
+
+
+def test_uplifts_are_found_at_their_supports(
+    run: Path, table: pd.DataFrame, tmp_path: Path
+) -> None:
+    with Results(run) as results:
+        x, uplift = results.line("arm_x"), results.extremes("arm_uplift")[1]
+    rows = [f"{a + 3.0:.3f},{1e3 * b + 30.0:.4f}" for a, b in zip(x, uplift, strict=True)]
+    (tmp_path / "u.csv").write_text("\n".join(["x,u", *rows]), encoding="utf-8")
+    columns = {"place": {"column": "x"}, "largest": {"column": "u", "unit": "mm"}}
+    found = found_in(run, table, tmp_path, uplift={"file": "u.csv", **columns})
+    assert [one.kind for one in found.findings] == ["supports"]
+    assert found.findings[0].value == pytest.approx(3.0, abs=1e-3)
+    assert found.uplift is not None
+    inside = (x >= 120.0) & (x <= 420.0)
+    np.testing.assert_allclose(found.uplift.run, uplift[inside])
+    # All 30 mm higher, beyond 20 mm and without scatter.
+    assert found.figures[-1].passed is False
+    with pytest.raises(InputError, match="name a file beside the description"):
+        found_in(run, table, tmp_path, uplift={"file": "../u.csv", **columns})
+
+
+def test_shifts_that_fit_as_well_are_told() -> None:
+    """A force that repeats itself every 60 m, and a record with noise of it."""
+    position = np.arange(0.0, 600.0, 0.1)
+    force = 120.0 + 30.0 * np.sin(2.0 * np.pi * position / 60.0)
+    force += 20.0 * np.sin(2.0 * np.pi * position / 12.0)
+    run = RunForce(position, force, 0.1 / 70.0)
+    rng = np.random.default_rng(1)
+    place = position[1000:5000:5]
+    measured = force[1000:5000:5] + 3.0 * rng.normal(size=place.size)
+    found = align(place + 58.0, measured, run, (120.0, 480.0), 20.0, True)
+    assert found is not None
+    # The smallest shift is taken.
+    check("shift", found.shift.value, -2.0, within=5.0 * found.shift.deviation)
+    assert 58.0 in np.round(found.other_shifts)
+
+
+@pytest.mark.parametrize("memory", [0.0, 0.8])
+def test_the_time_of_correlation_is_that_of_a_series(memory: float) -> None:
+    """First-order: 1 + 2 sum of a^k is (1 + a) / (1 - a), cut off at correlations of 0.05."""
+    rng = np.random.default_rng(2)
+    series = signal.lfilter([1.0], [1.0, -memory], rng.normal(size=100_000))
+    expected = (1.0 + memory) / (1.0 - memory)
+    # What is cut off is 0.05 a / (1 - a) twice: 0.4 of 9.
+    check("time", correlation_time(series), expected, within=0.05 * expected + 0.05)
+
+
+# --- differences of runs by spans ----------------------------------------------------------------
+
+
+def test_the_jackknife_of_a_mean_is_its_standard_error() -> None:
+    """Of spans with as many samples each: the deviation of their means over the root of n."""
+    rng = np.random.default_rng(4)
+    edges = np.arange(0.0, 481.0, 60.0)
+    position = np.arange(0.25, 480.0, 0.5)
+    a = 120.0 + 20.0 * rng.normal(size=position.size)
+    b = a + 1.0 + rng.normal(size=8).repeat(120)
+    sums = span_sums(position, a, edges), span_sums(position, b, edges)
+    found = differences(*sums, paired=True)
+    assert found is not None
+    per_span = (b - a).reshape(8, 120).mean(axis=1)
+    expected = stats.t.interval(0.95, 7, per_span.mean(), stats.sem(per_span))
+    check("mean", found[0].value, per_span.mean(), within=1e-10)
+    check("interval", np.array(found[0][1:]), np.array(expected), within=1e-9)
+    assert differences(*(SpanSums(*(one[:3] for one in own)) for own in sums), True) is None
+
+
+@pytest.mark.parametrize("paired", [True, False])
+def test_chance_is_called_more_in_a_twentieth_of_cases(paired: bool) -> None:
+    """Two runs of independent spans: of 400, 20 with a deviation of 4.4; five of these allowed."""
+    rng = np.random.default_rng(6)
+    wrong = np.zeros(2)
+    edges, position = np.arange(11.0), np.arange(0.005, 10.0, 0.01)
+    for _ in range(400):
+        forces = [
+            rng.normal(120.0, 5.0, 10).repeat(100) + rng.normal(25.0, 3.0, 10).repeat(100) * wave
+            for wave in np.sin(2.0 * np.pi * 5.0 * position)[None].repeat(2, axis=0)
+        ]
+        found = differences(*(span_sums(position, own, edges) for own in forces), paired)
+        assert found is not None
+        wrong += [one.is_certain for one in found]
+    check("wrong", wrong, np.full(2, 20.0), within=22.0)
+    sure = differences(
+        span_sums(position, forces[0], edges), span_sums(position, forces[0] * 1.5, edges), paired
+    )
+    assert sure is not None and sure[0].is_certain
+
+
+def test_three_runs_stand_side_by_side(run: Path, tmp_path: Path) -> None:
+    scene = load_scene("en50318_2002", [*SCENE, "train.speed_km_h=275"])
+    run_case(scene, tmp_path, MPI.COMM_SELF, only_summary=True)
+    lines = compare(run, run, tmp_path).splitlines()
+    (head,) = (line for line in lines if line.split()[-2:] == ["-", "A"] and "B - A" in line)
+    assert head.split() == ["A", "B", "C", "B", "-", "A", "C", "-", "A"]
+    (mean,) = (line.split() for line in lines if line.startswith("  mean [N]"))
+    assert mean[2] == mean[3] and float(mean[5]) == 0.0
+    assert float(mean[6]) == pytest.approx(float(mean[4]) - float(mean[2]), abs=2e-4)
+    by_spans = [line for line in lines if line.endswith(("within chance", "more than chance"))]
+    assert len(by_spans) == 4
+    assert by_spans[-1].split("[N]")[1].split()[0] == "C"
+    assert sum("Largest difference" in line for line in lines) == 1
+    assert any(line.startswith("C - A: The runs differ") for line in lines)
+
+
+# --- the command line ----------------------------------------------------------------------------
+
+
+def invoke(*words: str) -> Any:
+    return CliRunner().invoke(app, ["compare", *words])
+
+
+@pytest.mark.process
+def test_a_file_with_the_usual_names_needs_no_description(
+    run: Path, table: pd.DataFrame, tmp_path: Path
+) -> None:
+    file, out = tmp_path / "m.csv", tmp_path / "out"
+    table.to_csv(file, index=False, sep=";", decimal=",")
+    done = invoke(str(run), str(file), "-o", str(out))
+    assert done.exit_code == 0, done.output
+    assert "No error is seen" in done.stdout and "standard deviation" in done.stdout
+    about = json.loads((out / "measurement.json").read_text())
+    assert about["errors"] == [] and about["passed"] is True
+    assert abs(about["alignments"]["pantograph"]["shift"]["value"]) < 0.1
+    forces = pd.read_csv(out / "forces.csv")
+    assert list(forces.columns[:4]) == ["pantograph", "place_m", "measured_N", "run_N"]
+    # Noise of 2 N, to 5 deviations of its deviation.
+    left = (forces.measured_N - forces.run_N).std()
+    check("noise", left, 2.0, within=5.0 * 2.0 / np.sqrt(2.0 * len(forces)))
+    page = (out / "measurement.html").read_text()
+    assert "data:image/png" in page and "No error is seen" in page
+    again = invoke(str(run), str(file), "-o", str(out))
+    assert again.exit_code == 2 and "is there already" in again.output
+
+
+@pytest.mark.process
+@pytest.mark.parametrize(
+    ("description", "told"),
+    [
+        ("[measured]\nplace = { column = 'x' }\nforce = { column = 'F' }", 'no column "x"'),
+        ("[measured]\nforce = { column = 'force_N' }", "one of place and time"),
+        (
+            "[measured]\nplace = { column = 'place_m' }\nhead_height = { column = 'h' }",
+            "must name the column measured.force",
+        ),
+        (
+            "[measured]\nplace = { column = 'place_m' }\n"
+            "force = { column = 'force_N', unit = 'kg' }",
+            "measured.force.unit",
+        ),
+        (
+            "[measured]\nplace = { column = 'place_m' }\nforce = { column = 'force_N' }\n"
+            "pantograph = 2",
+            "m.csv has pantograph 2 by its description, and the run",
+        ),
+        (
+            "[measured]\nplace = { column = 'place_m' }\nforce = { column = 'force_N' }\n"
+            "[[others]]\npantograf = 2",
+            "did you mean pantograph?",
+        ),
+        (
+            "[measured]\nplace = { column = 'place_m' }\nforce = { column = 'force_N' }\n"
+            "from_m = 1000.0\nto_m = 2000.0",
+            "they share nothing",
+        ),
+    ],
+)
+def test_a_wrong_description_is_refused_in_a_sentence(
+    description: str, told: str, run: Path, table: pd.DataFrame, tmp_path: Path
+) -> None:
+    file, toml = tmp_path / "m.csv", tmp_path / "m.toml"
+    table.to_csv(file, index=False)
+    toml.write_text(description, encoding="utf-8")
+    done = invoke(str(run), str(file), "--description", str(toml))
+    assert done.exit_code == 2, done.output
+    assert told in " ".join(done.output.split()) and done.output.count("\n") == 1
+
+
+def test_what_belongs_to_a_measurement_is_refused_of_runs(run: Path, tmp_path: Path) -> None:
+    done = invoke(str(run), str(run), "-o", str(tmp_path / "out"))
+    assert done.exit_code == 2 and "-o belongs to a measurement" in done.output
+    (tmp_path / "m.csv").write_text("a,b\n1,2\n", encoding="utf-8")
+    done = invoke(str(run), str(tmp_path / "m.csv"))
+    assert done.exit_code == 2 and "describe its columns with --description" in done.output
+    done = invoke(str(run), str(tmp_path / "m.csv"), str(run))
+    assert done.exit_code == 2 and "name a run and a CSV file" in done.output
