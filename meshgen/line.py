@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from catenary.meshgen.hardware import Clamps, Droppers, Fittings, SteadyArms, Supports
-from catenary.meshgen.track import Curve, Spans
+from catenary.meshgen.track import Curve, Spans, read_only
 from catenary.meshgen.wires import End, Profile, Role, Wire
 
 
@@ -96,15 +97,17 @@ class Line(Spans):
         """Heights wanted of the wires that droppers hang, in the order of ``wires``."""
         return tuple(wire.profile for wire in self.wires if wire.profile is not None)
 
-    @property
+    @cached_property
     def dropper_x(self) -> np.ndarray:
-        """Places of the lower ends of all droppers, ascending [m]."""
-        return np.sort(np.concatenate([np.zeros(0), *(group.lower_x for group in self.droppers)]))
+        """Places of the lower ends of all droppers, ascending [m]; read-only."""
+        places = [np.zeros(0), *(group.lower_x for group in self.droppers)]
+        return read_only(np.sort(np.concatenate(places)))
 
     def droppers_of_span(self, span: int) -> np.ndarray:
         """Places of the lower ends of a span's droppers, ascending [m]; spans count from 0."""
         masts, x = self.support_positions, self.dropper_x
-        return np.asarray(x[(x > masts[span]) & (x < masts[span + 1])])
+        first = np.searchsorted(x, masts[span], side="right")
+        return x[first : np.searchsorted(x, masts[span + 1])]
 
     def with_shares(self, shares: Mapping[str, float]) -> Line:
         """The line with the tension of the named wires a share of what it was.

@@ -3,8 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
+
+
+def read_only(values: np.ndarray) -> np.ndarray:
+    """An array that nothing may write into, as it is shared."""
+    values.flags.writeable = False
+    return values
 
 
 @dataclass(frozen=True)
@@ -24,10 +31,10 @@ class Spans:
     def n_spans(self) -> int:
         return len(self.span_lengths)
 
-    @property
+    @cached_property
     def support_positions(self) -> np.ndarray:
-        """Positions of all masts, both anchors included, shape (n_spans + 1,) [m]."""
-        return np.concatenate([[0.0], np.cumsum(self.span_lengths)])
+        """Positions of all masts, both anchors included, shape (n_spans + 1,) [m]; read-only."""
+        return read_only(np.concatenate([[0.0], np.cumsum(self.span_lengths)]))
 
     @property
     def running_range(self) -> tuple[float, float]:

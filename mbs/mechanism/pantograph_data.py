@@ -18,12 +18,18 @@ from catenary.base.errors import InputError, RunBroken
 from catenary.mbs.air import Uplift
 from catenary.mbs.head.laws import Law
 from catenary.mbs.head.strips import ONE_STRIP, Strips
-from catenary.mbs.mechanism.reduction import ReducedMechanism, reduce_mechanism
+from catenary.mbs.mechanism.reduction import Places, ReducedMechanism, reduce_mechanism
 from catenary.mbs.rigid.arrays import Joint
 from catenary.mbs.rigid.bodies import Motion
 from catenary.mbs.rigid.forces import Force, Gravity, PointForce, SpringDamper
 from catenary.mbs.rigid.joints import PrescribedPoint, constant
-from catenary.mbs.rigid.statics import calibrate_actuator, equilibrium, held_force, unheld_force
+from catenary.mbs.rigid.statics import (
+    Calibration,
+    calibrate_actuator,
+    equilibrium,
+    held_force,
+    unheld_force,
+)
 from catenary.mbs.rigid.system import Miss, System
 
 logger = logging.getLogger("catenary.multibody")
@@ -139,6 +145,63 @@ def stand(data: MultibodyData) -> Standing:
     InputError
         In one sentence: it cannot be assembled, or is no mechanism that raises a head on springs.
     """
+    mechanism = _mechanism(_bodies_of(data))
+    height, system = mechanism.height, data.system
+    holder = PrescribedPoint(HOLDER, data.arm, constant(height))
+    push = None
+    if data.actuator is not None and data.static_force is not None:
+        found = calibrate_actuator(
+            system,
+            data.actuator,
+            holder,
+            mechanism.motion,
+            data.static_force,
+            mechanism.calibration,
+        )
+        push, force, before = found.actuator_force, found.static_force, found.force_before
+        if abs(push) > MOST_FORCE:
+            raise InputError(
+                f"its actuator {data.actuator!r} would need {push:.3g} N for its static force of "
+                f"{force:g} N: it hardly acts on the arm {data.arm!r}; check its points"
+            )
+        system, motion = system.with_force_changed(data.actuator, force=push), found.motion
+        mechanism.calibration = found
+    else:
+        force = before = held_force(system, holder, mechanism.motion)
+        if force <= 0.0:
+            raise InputError(
+                f"its static force is {force:.4g} N at its working height of {height:g} m: its "
+                "actuators cannot raise it"
+            )
+        motion = equilibrium(system.with_joints(holder), mechanism.motion).motion
+    if mechanism.head is None or not _is_at(motion, mechanism.head[0]):
+        head = _head(data, system.with_joints(holder), motion)
+        mechanism.head = motion, head, system.n_degrees_of_freedom(motion)
+    _, head, n_freedoms = mechanism.head
+    result = Standing(
+        system, motion, mechanism.missed, height, force, push, before, n_freedoms, head
+    )
+    _log(data, result)
+    return result
+
+
+@dataclass
+class _Mechanism:
+    """A mechanism with its arm held at the ``height``, and what was found of it for one static
+    force, which serves for others: the calibration, the head with the place where it was measured
+    and the number of freedoms there, and places of the arm."""
+
+    missed: tuple[Miss, ...]
+    height: float
+    motion: Motion
+    places: Places
+    calibration: Calibration | None = None
+    head: tuple[Motion, Head, int] | None = None
+
+
+@lru_cache(maxsize=64)
+def _mechanism(data: MultibodyData) -> _Mechanism:
+    """The pantograph assembled and judged, whatever its static force; errors as of ``stand``."""
     _judge_head(data)
     missed = _judge_positions(data)
     system = data.system
@@ -160,29 +223,26 @@ def stand(data: MultibodyData) -> Standing:
         raise InputError(
             f"its arm {data.arm!r} does not reach its working height of {height:g} m: {error}"
         ) from error
-    push = None
-    if data.actuator is not None and data.static_force is not None:
-        found = calibrate_actuator(system, data.actuator, holder, motion, data.static_force)
-        push, force, before = found.actuator_force, found.static_force, found.force_before
-        if abs(push) > MOST_FORCE:
-            raise InputError(
-                f"its actuator {data.actuator!r} would need {push:.3g} N for its static force of "
-                f"{force:g} N: it hardly acts on the arm {data.arm!r}; check its points"
-            )
-        system = system.with_force_changed(data.actuator, force=push)
-    else:
-        force = before = held_force(system, holder, motion)
-        if force <= 0.0:
-            raise InputError(
-                f"its static force is {force:.4g} N at its working height of {height:g} m: its "
-                "actuators cannot raise it"
-            )
-    motion = equilibrium(system.with_joints(holder), motion).motion
-    head = _head(data, system.with_joints(holder), motion)
-    n_freedoms = system.n_degrees_of_freedom(motion)
-    result = Standing(system, motion, missed, height, force, push, before, n_freedoms, head)
-    _log(data, result)
-    return result
+    return _Mechanism(missed, height, motion, Places(data.actuator))
+
+
+def _bodies_of(data: MultibodyData) -> MultibodyData:
+    """Data of the mechanism alone: no static force, and nothing that is not there at standstill."""
+    return MultibodyData(
+        data.name,
+        data.system,
+        data.head,
+        data.arm,
+        data.working_height,
+        data.actuator,
+        assembly_tolerance=data.assembly_tolerance,
+    )
+
+
+def _is_at(motion: Motion, other: Motion) -> bool:
+    """Whether bodies are where they are in another motion."""
+    places = (motion.position, other.position), (motion.parameters, other.parameters)
+    return all(np.allclose(one, another, 0.0, 1e-12) for one, another in places)
 
 
 @lru_cache(maxsize=64)
@@ -201,6 +261,7 @@ def reduced(data: MultibodyData) -> ReducedMechanism:
         tolerance=LIFT_TOLERANCE,
         name=data.name,
         blowing=_on_frame(data, standing.motion),
+        places=None if standing.actuator_force is None else _mechanism(_bodies_of(data)).places,
     )
 
 

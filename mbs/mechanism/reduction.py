@@ -19,10 +19,10 @@ from catenary.base.errors import InputError, RunBroken
 from catenary.mbs.head.head_arrays import SplineTables
 from catenary.mbs.rigid.arrays import ORIGIN
 from catenary.mbs.rigid.bodies import Motion, Vector
-from catenary.mbs.rigid.forces import Force
+from catenary.mbs.rigid.forces import Actuator, Force
 from catenary.mbs.rigid.joints import PrescribedPoint
 from catenary.mbs.rigid.kinematics import Law, point
-from catenary.mbs.rigid.least_squares import least_squares
+from catenary.mbs.rigid.least_squares import least_squares, null_space
 from catenary.mbs.rigid.statics import at_rest
 from catenary.mbs.rigid.system import System
 
@@ -31,6 +31,8 @@ FINEST = 5e-4
 # A mechanism whose equivalent mass is so many times that at the start nearly locks: tables would
 # not follow it.
 LOCKING = 4.0
+# Work of an actuator on motions besides the raising, over its force, that counts as none.
+_NO_WORK = 1e-9
 
 
 @dataclass(frozen=True)
@@ -119,6 +121,7 @@ def reduce_mechanism(
     tolerance: float | None = None,
     name: str = "",
     blowing: Sequence[Force] = (),
+    places: Places | None = None,
 ) -> ReducedMechanism:
     """Tables of a mechanism for heights of the point ``at`` of a body.
 
@@ -135,6 +138,8 @@ def reduce_mechanism(
         to half a millimetre; None for the given heights alone
     name : of the pantograph, for messages
     blowing : forces of the air, of which the tables have a column of their own
+    places : those of earlier calls with this system but for the force of an actuator, and with the
+        same ``body`` and ``at``; they are found once
 
     Raises
     ------
@@ -145,12 +150,12 @@ def reduce_mechanism(
     if len(table) < 4 or np.any(np.diff(table) <= 0.0):
         raise InputError(f"A mechanism is reduced for at least four growing heights, not {table}.")
     # Heights are visited from the one that is nearest to the start, each from its neighbour.
+    raised, more = (places or Places(None)).of(system, body, at)
     motion = system.assemble(system.start() if start is None else start).motion
     first = int(np.argmin(np.abs(table - point(motion, body, at).value[2])))
-    raised = _Raised(system, body, at, blowing)
-    places = [raised.to(table[first], motion)]
+    found = [raised.to(table[first], motion)]
     for way in (table[first + 1 :], table[:first][::-1]):
-        there = places[0]
+        there = found[0]
         for height in way:
             try:
                 there = raised.from_near(height, there)
@@ -158,45 +163,105 @@ def reduce_mechanism(
                 if not as_far_as_it_goes:
                     raise
                 break
-            if as_far_as_it_goes and there.columns[0] > LOCKING * places[0].columns[0]:
+            if as_far_as_it_goes and there.columns[0] > LOCKING * found[0].columns[0]:
                 break
-            places.append(there)
-    if len(places) < 4:
+            found.append(there)
+    if len(found) < 4:
         raise InputError(
             f"The mechanism moves by less than {4 * np.diff(table).min():g} m from the height of "
             f"{table[first]:g} m before it locks or comes apart."
         )
-    places.sort(key=lambda place: place.height)
+    found.sort(key=lambda place: place.height)
     if tolerance is not None:
-        places = _refined(raised, places, tolerance)
-    reached = np.array([place.height for place in places])
-    masses, lifts, dampings, carried, blown = np.array([place.columns for place in places]).T
-    own = blown if blowing else None
-    return ReducedMechanism(reached, masses, lifts, dampings, name, carried, own)
+        found = _refined(raised, more, found, tolerance)
+    masses, dampings, carried = np.array([place.columns for place in found]).T
+    lifts = np.array([raised.lift(place, more) for place in found])
+    if np.isnan(lifts).any():  # the actuator moves more than the raising: nothing can be shared
+        options = heights, at, start, as_far_as_it_goes, tolerance, name, blowing
+        return reduce_mechanism(system, body, *options)
+    blown = None
+    if blowing:
+        blown = np.array(
+            [sum(p.way @ f.generalised(p.motion, 0.0) for f in blowing) for p in found]
+        )
+    reached = np.array([place.height for place in found])
+    return ReducedMechanism(reached, masses, lifts, dampings, name, carried, blown)
+
+
+class Places:
+    """Places of a mechanism at rest that were found so far, for any constant force of an actuator.
+
+    Parameters
+    ----------
+    actuator : its name, None if all forces stay as they are
+    """
+
+    def __init__(self, actuator: str | None) -> None:
+        self._actuator = actuator
+        self._raised: _Raised | None = None
+
+    def of(self, system: System, body: str, at: Vector) -> tuple[_Raised, float]:
+        """The mechanism with the places found before, and what its actuator pushes more [N]."""
+        actuator = None if self._actuator is None else system.force(self._actuator)
+        assert actuator is None or isinstance(actuator, Actuator)
+        if self._raised is None:
+            self._raised = _Raised(system, body, at, actuator)
+        return self._raised, 0.0 if actuator is None else _push(actuator) - self._raised.push
+
+
+def _push(actuator: Actuator) -> float:
+    assert not callable(actuator.force)
+    return actuator.force
 
 
 class _Place(NamedTuple):
-    """A mechanism at rest at a ``height``: ``columns`` (5,) of its tables there, and its ``way``
-    (6 n,), the displacement per metre of height."""
+    """A mechanism at rest at a ``height``: ``columns`` (3,) of its tables there but for the lift
+    [N], and its ``way`` (6 n,), the displacement per metre of height."""
 
     height: float
     motion: Motion
     columns: np.ndarray
+    lift: float
     way: np.ndarray
 
 
 class _Raised:
-    """A system with the point ``at`` of a body held at heights that follow one another."""
+    """A system with the point ``at`` of a body held at heights that follow one another.
 
-    def __init__(
-        self, system: System, body: str, at: Vector, blowing: Sequence[Force] = ()
-    ) -> None:
-        self._system, self._height, self._blowing = system, 0.0, tuple(blowing)
+    Attributes
+    ----------
+    push : force of ``actuator`` in the system [N]
+    """
+
+    def __init__(self, system: System, body: str, at: Vector, actuator: Actuator | None) -> None:
+        self._system, self._height = system, 0.0
         # Its law reads the height of the moment, so that the system is made once.
         self._held = system.with_joints(PrescribedPoint("height", body, self._law, at))
+        self._places: dict[float, _Place] = {}
+        self._gains: dict[float, float] = {}
+        self._actuator, self.push = actuator, 0.0 if actuator is None else _push(actuator)
 
     def _law(self, time: float) -> Law:
         return Law(self._height, 0.0, 0.0)
+
+    def lift(self, place: _Place, more: float) -> float:
+        """Upward force at a place if the actuator pushes with so much ``more`` [N]; no number
+        where that changes the place."""
+        if not more:
+            return place.lift
+        if place.height not in self._gains:
+            self._gains[place.height] = self._gain(place)
+        return place.lift + more * self._gains[place.height]
+
+    def _gain(self, place: _Place) -> float:
+        """Upward force at a place per force of the actuator."""
+        assert self._actuator is not None
+        pull = self._actuator.line(place.motion).gradient
+        self._height = place.height
+        free = null_space(self._held.constraints(place.motion, 0.0).jacobian)
+        if np.abs(free.T @ pull).max(initial=0.0) > _NO_WORK * np.abs(pull).max():
+            return np.nan
+        return float(place.way @ pull)
 
     def from_near(self, height: float, near: _Place) -> _Place:
         """The system at rest with the point at a height [m], from a place near by."""
@@ -207,7 +272,13 @@ class _Raised:
 
     def to(self, height: float, near: Motion) -> _Place:
         """The system at rest with the point at a height [m], assembled from a motion near by."""
-        system, self._height = self._system, float(height)
+        height = float(height)
+        if height not in self._places:
+            self._places[height] = self._found(height, near)
+        return self._places[height]
+
+    def _found(self, height: float, near: Motion) -> _Place:
+        system, self._height = self._system, height
         motion, _ = at_rest(self._held, near)
         jacobian = self._held.constraints(motion, 0.0).jacobian
         # Of all velocities with unit speed of the point those of least kinetic energy.
@@ -218,27 +289,27 @@ class _Raised:
         damping = lift - way @ system.generalised_forces(motion.with_velocities(way), 0.0)
         # Where the third of the six numbers of a body is its velocity upward.
         carried = system.mass[2::6] @ way[2::6]
-        blown = sum(float(way @ force.generalised(motion, 0.0)) for force in self._blowing)
-        columns = np.array([system.mass @ way**2, lift, damping, carried, blown])
-        return _Place(float(height), motion, columns, way)
+        columns = np.array([system.mass @ way**2, damping, carried])
+        return _Place(height, motion, columns, float(lift), way)
 
 
-def _refined(raised: _Raised, places: list[_Place], tolerance: float) -> list[_Place]:
+def _refined(raised: _Raised, more: float, places: list[_Place], tolerance: float) -> list[_Place]:
     """The same with further heights in between where splines miss the lift, such as at stops."""
     doubtful = list(pairwise(places))
     while doubtful:
-        lift = CubicSpline([p.height for p in places], [p.columns[1] for p in places])
-        missed = set()
-        for low, high in doubtful:
-            if high.height - low.height > 2.0 * FINEST:
-                middle = 0.5 * (low.height + high.height)
-                there = raised.from_near(middle, low)
-                if abs(lift(middle) - there.columns[1]) > tolerance:
-                    missed.add(middle)
-                    places.append(there)
-        places.sort(key=lambda place: place.height)
+        lift = CubicSpline([p.height for p in places], [raised.lift(p, more) for p in places])
+        wide = [(low, high) for low, high in doubtful if high.height - low.height > 2.0 * FINEST]
+        between = [raised.from_near(0.5 * (low.height + high.height), low) for low, high in wide]
+        expected = lift([place.height for place in between])
+        missed = [
+            place
+            for place, value in zip(between, expected, strict=True)
+            if abs(value - raised.lift(place, more)) > tolerance
+        ]
+        places = sorted([*places, *missed], key=lambda place: place.height)
         # A new height changes the spline next to it and, by a quarter, one interval on.
-        new = [k for k, place in enumerate(places) if place.height in missed]
+        heights = {place.height for place in missed}
+        new = [k for k, place in enumerate(places) if place.height in heights]
         near = {i for k in new for i in range(max(k - 2, 0), min(k + 2, len(places) - 1))}
         doubtful = [(places[i], places[i + 1]) for i in sorted(near)]
     return places

@@ -130,31 +130,43 @@ def held_force(system: System, holder: Joint, start: Motion, time: float = 0.0) 
     ``holder``, for instance a `PrescribedPoint`, is added to the joints; the force is positive
     in the direction in which the held coordinate grows.
     """
-    held = system.with_joints(holder)
-    rest = equilibrium(held, start, time)
-    rows = held.row_ranges[holder.name]
-    (multiplier,) = rest.multipliers[rows]
-    return float(multiplier)
+    return _pressed(system, holder, start, time)[0]
+
+
+def _pressed(system: System, holder: Joint, start: Motion, time: float) -> tuple[float, Motion]:
+    """The force of ``held_force``, and the place at rest."""
+    rest = equilibrium(system.with_joints(holder), start, time)
+    return float(rest.multipliers[-1]), rest.motion
 
 
 class Calibration(NamedTuple):
     """``actuator_force`` [N], > 0 pushing its points apart; ``static_force`` [N] that it gives;
     ``gain``, static force per actuator force; ``force_before`` [N], the static force that the
-    actuator gave with the force that stood in its data."""
+    actuator gave with the force that stood in its data; ``motion`` at rest."""
 
     actuator_force: float
     static_force: float
     gain: float
     force_before: float
+    motion: Motion
 
 
 def calibrate_actuator(
-    system: System, actuator: str, holder: Joint, start: Motion, static_force: float
+    system: System,
+    actuator: str,
+    holder: Joint,
+    start: Motion,
+    static_force: float,
+    near: Calibration | None = None,
 ) -> Calibration:
     """The constant actuator force with which the system presses with ``static_force`` on a holder.
 
     By virtual work at the place where the holder keeps the system. Held, an actuator may still
     move springs in series with it, so that the force is corrected until it is right to 1e-9.
+
+    Parameters
+    ----------
+    near : what was found for another static force of the same system [N], to begin with
 
     Raises
     ------
@@ -164,26 +176,28 @@ def calibrate_actuator(
     before = system.force(actuator)
     if not isinstance(before, Actuator) or callable(before.force):
         raise InputError(f"Force {actuator!r} is no actuator with a constant force.")
-    force = before.force
 
-    def pressed(push: float) -> float:
-        changed = system.with_force_changed(actuator, force=push)
-        return held_force(changed, holder, start)
+    def pressed(push: float, start: Motion) -> tuple[float, Motion]:
+        return _pressed(system.with_force_changed(actuator, force=push), holder, start, 0.0)
 
-    had = pressed(force)
-    unit_force = max(1.0, abs(force))
-    gain = (pressed(force + unit_force) - had) / unit_force
-    if abs(gain) < 1e-9:
-        raise InputError(
-            f"Actuator {actuator!r} does not act on the {holder.name}: move its points off what "
-            "it turns about, or to other bodies."
-        )
-    push, reached = force, had
+    if near is None:
+        push = before.force
+        had, start = pressed(push, start)
+        unit_force = max(1.0, abs(push))
+        gain = (pressed(push + unit_force, start)[0] - had) / unit_force
+        if abs(gain) < 1e-9:
+            raise InputError(
+                f"Actuator {actuator!r} does not act on the {holder.name}: move its points off "
+                "what it turns about, or to other bodies."
+            )
+        reached = had
+    else:
+        push, reached, gain, had, start = near
     for _ in range(20):
         push += (static_force - reached) / gain
-        reached = pressed(push)
+        reached, start = pressed(push, start)
         if abs(reached - static_force) <= 1e-9 * max(1.0, abs(static_force)):
-            return Calibration(push, reached, gain, had)
+            return Calibration(push, reached, gain, had, start)
     raise RunBroken(
         f"Actuator {actuator!r} would need {push:.3g} N for a static force of {static_force:g} N, "
         "which is beyond calculation: check its points, springs and stops."

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import lru_cache
 
 from catenary.base.errors import InputError
 from catenary.meshgen.line import Line
 from catenary.meshgen.topologies import free, named  # noqa: F401  register themselves
 from catenary.meshgen.topologies.line_data import LineData
 from catenary.meshgen.topologies.overlaps import with_overlaps
-from catenary.meshgen.topologies.registry import registered
+from catenary.meshgen.topologies.registry import Topology, registered
 
 
 def make_line(data: LineData) -> Line:
@@ -27,6 +28,12 @@ def make_line(data: LineData) -> Line:
     for part in topology.parts:
         if getattr(data, part) is None:
             raise InputError(f"the topology {data.topology} needs {part}")
+    return _made(topology, data)
+
+
+@lru_cache(maxsize=16)
+def _made(topology: Topology, data: LineData) -> Line:
+    """The line of a topology: checks and runs of a scene ask for it many times."""
     data.check()
     line = topology.make(data)
     line = line if data.overlaps is None else with_overlaps(line, data.overlaps)

@@ -58,10 +58,10 @@ def build(
     )
     model.form = form
     model.hanging_at_arms = np.zeros(mesh.steady_arms.size)
-    model.missing = model.droppers_at(model.simulated.missing)
-    model.broken = model.missing | model.droppers_at(model.simulated.loose)
-    if broken is not None:
-        model.broken |= broken
+    model.missing, model.broken = np.zeros((2, mesh.droppers.shape[0]), dtype=bool)
+    model.missing[model.droppers_at(model.simulated.missing)] = True
+    model.broken[model.droppers_at(model.simulated.loose)] = True
+    model.broken |= model.missing if broken is None else model.missing | broken
     model.dropper_gap = np.zeros(mesh.droppers.shape[0]) if gap is None else gap
     model.terms_of = {effect.name: 0 for effect in active}
     builder = ModelBuilder(model, before)

@@ -6,6 +6,7 @@ by the effects, each of which adds its own through a ``ModelBuilder``.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
@@ -205,13 +206,11 @@ class Model:
     def dropper_stiffness(self) -> np.ndarray:
         return np.where(self.broken, 0.0, self.dropper_pieces.slope)
 
-    def droppers_at(self, places: tuple[float, ...]) -> np.ndarray:
-        """Which droppers stand nearest to places [m], (n_droppers,) bool."""
+    def droppers_at(self, places: Sequence[float]) -> np.ndarray:
+        """Numbers of the droppers that stand nearest to places [m], (n_places,) int."""
         x = self.mesh.x(self.mesh.droppers[:, 1])
-        found = np.zeros(x.size, dtype=bool)
-        for place in places:
-            found[int(np.argmin(np.abs(x - place)))] = True
-        return found
+        away = np.abs(x[:, None] - np.reshape(places, (1, -1)))
+        return away.argmin(axis=0) if x.size else np.zeros(0, dtype=np.int64)
 
     @property
     def dropper_damping(self) -> np.ndarray:

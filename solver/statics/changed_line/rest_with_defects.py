@@ -53,8 +53,7 @@ def errors_of_length(problem: Problem, cut: Model) -> np.ndarray:
     if errors is None:
         return np.zeros(n)
     found = errors.of(n)
-    for x, error in errors.given:
-        found[cut.droppers_at((x,))] += error
+    np.add.at(found, cut.droppers_at([x for x, _ in errors.given]), [e for _, e in errors.given])
     return found
 
 

@@ -14,6 +14,7 @@ from catenary.mbs.air import Airflow
 from catenary.mbs.build import Operation, make_pantograph, raising_data
 from catenary.mbs.mechanism.pantograph_data import MultibodyData, describe, reduced, stand
 from catenary.mbs.mechanism.reduced_pantograph import RaisingPantograph
+from catenary.mbs.mechanism.reduction import Places, reduce_mechanism
 from catenary.mbs.rigid.bodies import SPACE, Body
 from catenary.mbs.rigid.forces import Actuator, BumpStop, Gravity, PointForce, SpringDamper
 from catenary.mbs.rigid.joints import Prismatic, Revolute
@@ -132,6 +133,50 @@ def test_what_is_set_up_is_set_up_once() -> None:
     assert again == DATA and again is not DATA
     assert stand(again) is stand(DATA)
     assert reduced(again) is reduced(DATA)
+
+
+def test_another_static_force_has_the_tables_of_its_own_calculation() -> None:
+    """What was found for one static force serves another; under another name it does not."""
+    stop = BumpStop("stop", SPACE, "mast", longest=1.25, stiffness=1e5)
+    first = replace(DATA, system=SYSTEM.with_forces(stop))
+    reduced(first)
+    again = replace(first, static_force=151.0)
+    alone = replace(again, name="another")
+    found, expected = stand(again), stand(alone)
+    # Both are calibrated to 1e-9 of the static force.
+    check("jack [N]", found.actuator_force, expected.actuator_force, within=1e-6)
+    check("head", found.head, expected.head, within=1e-6)
+    assert found.static_force == pytest.approx(151.0, rel=1e-9)
+    assert found.n_freedoms == expected.n_freedoms
+    tables, own = reduced(again), reduced(alone)
+    assert list(tables.heights) == pytest.approx(list(own.heights), abs=1e-12)
+    assert tables.lifts[0] == pytest.approx(151.0 + HEAD * G, rel=1e-8)
+    for name in ("masses", "lifts", "dampings"):
+        check(name, getattr(tables, name), getattr(own, name), within=1e-6)
+
+
+def test_places_that_an_actuator_moves_are_found_anew() -> None:
+    """A jack that pushes the mast through a float on a spring: the float goes where it pushes."""
+    float_mass, stiffness = 4.0, 2000.0
+    system = System(
+        (SYSTEM.bodies[0], Body("float", float_mass, (1.0, 1.0, 1.0), (0.0, 0.0, 0.8))),
+        (SYSTEM.joints[0], slide("rail", "mast", "float")),
+        (
+            Gravity((MAST, float_mass), G),
+            Actuator("jack", SPACE, "float", force=300.0),
+            SpringDamper(
+                "spring", "float", "mast", (0.0, 0.0, -2.0), (0.0, 0.0, 0.0), stiffness, 2.2
+            ),
+            BumpStop("stop", SPACE, "float", longest=1.0, stiffness=5000.0),
+        ),
+    )
+    heights, places = np.linspace(0.9, 1.3, 9), Places("jack")
+    for force in (300.0, 500.0):
+        pushed = system.with_force_changed("jack", force=force)
+        found = reduce_mechanism(pushed, "mast", heights, places=places)
+        expected = reduce_mechanism(pushed, "mast", heights)
+        # At rest to 1e-9 of the largest force.
+        check(f"lifts at {force} N [N]", found.lifts, expected.lifts, within=1e-6)
 
 
 def test_leaving_the_tables_ends_the_run_with_heights_and_name() -> None:
