@@ -57,7 +57,7 @@ ROOMS = {
         "studies.tolerance", "studies.pantograph_response", "studies.accuracy", "studies.hard",
         "studies.scaling", "studies.sensitivity", "studies.identification", "studies.stability",
         "studies.effect_cost", "studies.waves", "studies.case_study", "studies.questions",
-        "studies.paper",
+        "studies.paper", "studies.reference",
         "ambrosio2012", "cli", FACE,
     ),
 }  # fmt: skip
