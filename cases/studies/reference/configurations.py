@@ -32,6 +32,8 @@ class Configuration:
     train : ONE pantograph, or TWO 200 m apart
     assignments : ``key=value`` each, that make it of the case
     data : where the inputs come from, and which of them are ours
+    steps : time steps [ms], finest first
+    elements : elements between neighbouring droppers, finest first
     """
 
     name: str
@@ -42,6 +44,8 @@ class Configuration:
     train: str
     assignments: tuple[str, ...]
     data: str
+    steps: tuple[float, ...]
+    elements: tuple[int, ...]
 
     @property
     def words(self) -> str:
@@ -81,6 +85,7 @@ def configurations(names: Sequence[str] = ()) -> list[Configuration]:
 
 
 def _every() -> Iterator[Configuration]:
+    levels = table()["levels"]
     for model in table()["models"]:
         for speed in model["speeds_km_h"]:
             for train in (ONE, TWO):
@@ -93,4 +98,10 @@ def _every() -> Iterator[Configuration]:
                     train,
                     (f"train.speed_km_h={speed:g}", *(model["pair"] if train == TWO else ())),
                     model["data"],
+                    tuple(levels["dt_ms"]),
+                    tuple(
+                        model.get("pair_elements_per_gap", levels["elements_per_gap"])
+                        if train == TWO
+                        else levels["elements_per_gap"]
+                    ),
                 )

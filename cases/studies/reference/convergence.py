@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,11 +14,11 @@ from catenary.cases.studies.sweep.jobs import OF_PANTOGRAPH, STATISTICS, Ended, 
 from catenary.cases.studies.sweep.variants import Variant
 from catenary.postproc.report.study_table import Column
 
-FINEST, FURTHER = "finest", "further_on"
-# By name of a level, how much coarser step and mesh are than the finest ones: places in the lists
-# of models.toml.
-_LEVELS = {FINEST: (0, 0), "step_2": (1, 0), "step_4": (2, 0), "mesh_2": (0, 1), "mesh_4": (0, 2)}
-STEP_CHAIN, MESH_CHAIN = (FINEST, "step_2", "step_4"), (FINEST, "mesh_2", "mesh_4")
+# Levels as places in a configuration's lists of steps and meshes, and the chains of three that have
+# one of the two alike.
+FINEST = (0, 0)
+STEP_CHAIN, MESH_CHAIN = (FINEST, (1, 0), (2, 0)), (FINEST, (0, 1), (0, 2))
+_LEVELS = (*STEP_CHAIN, *MESH_CHAIN[1:])
 LINE, UPLIFT, HISTORY = "line", "max_uplift_mm", "force_history_N"
 # Figures of a solution: of each pantograph, and of the line.
 OF_FORCE = tuple(column for column in OF_PANTOGRAPH if column.name != "arcing_percent")
@@ -42,29 +42,28 @@ def jobs_of(chosen: Sequence[Configuration]) -> list[Job]:
     return [job for one in chosen for job in _jobs(one)]
 
 
-def run_name(configuration: Configuration, level: str) -> str:
-    """The name of the run of a level, and of its folder."""
-    return f"{configuration.name}__{level}"
+def run_name(one: Configuration, level: tuple[int, int], further: bool = False) -> str:
+    """The name of the run of a level, and of its folder; ``further`` on along a longer line."""
+    name = f"{one.name}__{one.steps[level[0]]:g}ms_{one.elements[level[1]]}"
+    return f"{name}_further_on" if further else name
 
 
-def _jobs(one: Configuration) -> list[Job]:
-    levels = table()["levels"]
-    own: dict[str, list[str]] = {}
-    for name, (step, mesh) in _LEVELS.items():
-        dt, elements = levels["dt_ms"][step], levels["elements_per_gap"][mesh]
-        own[name] = [f"numerics.dt_s={1e-3 * dt:g}", f"mesh.elements_per_gap={elements}"]
-    scene, spans = one.scene(), levels["further_spans"]
-    further = spans * span_lengths(scene.line)[0]
-    own[FURTHER] = [
-        *own[MESH_CHAIN[2]],
+def _jobs(one: Configuration) -> Iterator[Job]:
+    scene, spans = one.scene(), table()["levels"]["further_spans"]
+    way = spans * span_lengths(scene.line)[0]
+    moved = (
         f"line.n_spans={scene.line.n_spans + spans}",
-        f"evaluation.from_m={scene.evaluation.from_m + further:g}",
-        f"evaluation.to_m={scene.evaluation.to_m + further:g}",
-    ]
-    return [
-        Job(Variant(run_name(one, name), tuple(words)), one.scene(*words), keep_results=False)
-        for name, words in own.items()
-    ]
+        f"evaluation.from_m={scene.evaluation.from_m + way:g}",
+        f"evaluation.to_m={scene.evaluation.to_m + way:g}",
+    )
+    for level, further in (*((level, False) for level in _LEVELS), (MESH_CHAIN[2], True)):
+        words = (
+            f"numerics.dt_s={1e-3 * one.steps[level[0]]:g}",
+            f"mesh.elements_per_gap={one.elements[level[1]]}",
+            *(moved if further else ()),
+        )
+        variant = Variant(run_name(one, level, further), words)
+        yield Job(variant, one.scene(*words), keep_results=False)
 
 
 def figures_of(summary: Mapping[str, Any]) -> dict[tuple[str, str], float]:
@@ -97,24 +96,24 @@ def statistics(one: Configuration, ended: Mapping[str, Ended]) -> list[dict[str,
     ----------
     ended : runs by name, all done
     """
-    runs = {name: ended[run_name(one, name)] for name in (*_LEVELS, FURTHER)}
-    of = {name: figures_of(run.summary) for name, run in runs.items()}
+    runs = {level: ended[run_name(one, level)] for level in _LEVELS}
+    of = {level: figures_of(run.summary) for level, run in runs.items()}
+    moved = figures_of(ended[run_name(one, MESH_CHAIN[2], further=True)].summary)
     rows = []
     for (place, quantity), value in of[FINEST].items():
         bars = []
         for chain in (STEP_CHAIN, MESH_CHAIN):
-            fine, middle, coarse = (of[name][place, quantity] for name in chain)
+            fine, middle, coarse = (of[level][place, quantity] for level in chain)
             bars.append(extrapolated_error(abs(middle - fine), abs(coarse - middle)))
-        start = of[FURTHER][place, quantity] - of[MESH_CHAIN[2]][place, quantity]
+        start = moved[place, quantity] - of[MESH_CHAIN[2]][place, quantity]
         rows.append(_row(one, place, quantity, value, bars, start))
     for number, pantograph in enumerate(runs[FINEST].summary["pantographs"]):
         bars = []
         for chain in (STEP_CHAIN, MESH_CHAIN):
             fine, middle, coarse = (
-                np.array(runs[name].measured["histories"][number]) for name in chain
+                np.array(runs[level].measured["histories"][number]) for level in chain
             )
-            near, far = rms(middle - fine), rms(coarse - middle)
-            bars.append(extrapolated_error(near, far))
+            bars.append(extrapolated_error(rms(middle - fine), rms(coarse - middle)))
         rows.append(_row(one, pantograph["name"], HISTORY, 0.0, bars, None))
     return rows
 

@@ -57,12 +57,14 @@ def write(folder: Path, chosen: Sequence[Configuration], ended: Sequence[Ended])
             "data": one.data,
             "case": one.case,
             "assignments": list(one.assignments),
+            "dt_ms": one.steps[0],
+            "elements_per_gap": one.elements[0],
             "scene": resolved(one.scene()),
         }
     metadata = {
         "licence": "CC-BY-4.0",
         "catenary": version("catenary"),
-        "levels": table()["levels"],
+        "further_spans": table()["levels"]["further_spans"],
         "filter": "low-pass of EN 50317: Butterworth of order 6, 20 Hz, zero phase",
         "configurations": described,
     }
