@@ -102,7 +102,8 @@ def _closing(found: Validation) -> list[str]:
     deviations = [row for row in found.rows if row["quantity"] == "std_N" and row["reference"]]
     worst = max(abs(row["difference"]) / row["reference"] for row in deviations)
     return [
-        f"Standard deviations differ from the reference solutions by at most {100 * worst:.2f} %.",
+        "With step and mesh of the shipped cases, standard deviations differ from the reference "
+        f"solutions by at most {100 * worst:.1f} %.",
         _BORROWED,
         f"{UNCOMPARED_SAYS}. This statement replaces no assessment.",
     ]
