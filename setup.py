@@ -192,6 +192,8 @@ setup(
             "*/reference/*.csv",
             "*/study.toml",
             "studies/hard/hard.toml",
+            "studies/reference/*.toml",
+            "studies/reference/data/*",
             "*/*.py",
         ],
         "catenary.postproc": [

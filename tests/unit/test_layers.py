@@ -58,7 +58,7 @@ ROOMS = {
         "studies.scaling", "studies.sensitivity", "studies.measured",
         "studies.identification", "studies.stability",
         "studies.effect_cost", "studies.waves", "studies.case_study", "studies.questions",
-        "studies.full_report", "studies.paper",
+        "studies.full_report", "studies.paper", "studies.reference",
         "ambrosio2012", "cli", FACE,
     ),
 }  # fmt: skip

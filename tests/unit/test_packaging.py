@@ -74,6 +74,8 @@ def data() -> list[Path]:
         "cases/*/reference/*.csv",
         "cases/*/study.toml",
         "cases/studies/hard/hard.toml",
+        "cases/studies/reference/*.toml",
+        "cases/studies/reference/data/*",
         "postproc/report/templates/*",
         "postproc/paraview/*.template",
         "postproc/standards/books/*.toml",

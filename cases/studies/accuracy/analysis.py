@@ -162,14 +162,14 @@ def uncertainties(
         near = compare(middle, fine, reference)[1]
         far = compare(coarse, middle, reference)[1]
         for name in told:
-            told[name] += _extrapolated(near.get(name, math.inf), far.get(name, math.inf))
+            told[name] += extrapolated_error(near.get(name, math.inf), far.get(name, math.inf))
     return told
 
 
 _SAFETY, _HIGHEST_ORDER, _LOWEST_ORDER, _WITHOUT_ORDER = 1.25, 2.0, 0.5, 3.0
 
 
-def _extrapolated(near: float, far: float) -> float:
+def extrapolated_error(near: float, far: float) -> float:
     """The error of the finest of three runs from what neighbours differ by."""
     if near == 0.0 or math.isinf(near) or math.isinf(far):
         return near

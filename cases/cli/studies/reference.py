@@ -1,0 +1,155 @@
+"""The verbs ``reference``, ``judge`` and ``validate``, about the reference solutions."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from catenary.cases.cli.app import Force, Jobs, Out, Strict, Verbose, app, begin, folder_option
+from catenary.cases.result_folder.output_folder import refuse_table
+from catenary.cases.terminal import console
+
+if TYPE_CHECKING:
+    from catenary.cases.studies.reference.configurations import Configuration
+    from catenary.cases.studies.sweep.jobs import Job
+
+
+@app.command(
+    "reference",
+    help="Make the reference solutions anew: models of EN 50318 at two speeds under one and two "
+    "pantographs, refined in step and mesh, with error bars. Takes an hour; the same command "
+    "continues what was stopped.",
+    epilog="Example: catenary reference ac_simple -o results/reference -j 0",
+)
+@console.guarded
+def reference(
+    out: Out,
+    names: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="NAME",
+            help="Models (ac_simple, ac_stitched, dc_simple) or configurations "
+            "(ac_simple_275_one); all if absent.",
+        ),
+    ] = None,
+    n_jobs: Jobs = 1,
+    force: Force = False,
+    verbose: Verbose = False,
+) -> int:
+    """Collective."""
+    from catenary.cases.studies.reference.configurations import configurations
+    from catenary.cases.studies.reference.convergence import jobs_of
+
+    def read() -> tuple[tuple[list[Configuration], list[Job]], list[str]]:
+        chosen = configurations(names or ())
+        return (chosen, jobs_of(chosen)), []
+
+    comm, (chosen, jobs), arguments = begin(read, verbose, lambda made: made[1][0].scene)
+    from catenary.base.parallel import on_root
+    from catenary.cases.result_folder.folder_lock import held
+    from catenary.cases.studies.accuracy.runs import RUNS, measure
+    from catenary.cases.studies.reference import solutions
+    from catenary.cases.studies.sweep.jobs import RunOptions, interrupted
+    from catenary.cases.studies.sweep.run_jobs import run_jobs
+
+    options = RunOptions(force, arguments, console.say, n_jobs)
+    with held(out, comm, "catenary reference"):
+        ended = run_jobs(jobs, out / RUNS, comm, options, measure=measure)
+        if interrupted(ended):
+            console.complain("the study was interrupted; the same command continues it")
+            return console.BROKEN
+        files = on_root(comm, lambda: solutions.write(out, chosen, ended), takes_long=True)
+    console.say("\n".join(map(str, files)))
+    return console.DONE
+
+
+@app.command(
+    "judge",
+    help="Compare results of any program with the reference solutions: differences, error bars, "
+    "tolerances of EN 50318, verdicts.",
+    epilog="Example: catenary judge forces.csv --of ac_simple_275_one -o results/judged",
+)
+@console.guarded
+@console.serial
+def judge(
+    files: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="FILE",
+            help="CSV files: forces (place_m or time_s, pantograph_N or leading_N and trailing_N) "
+            "or statistics (configuration, of, quantity, value).",
+        ),
+    ],
+    configuration: Annotated[
+        str | None,
+        typer.Option(
+            "--of", metavar="NAME", help="Configuration of the files, such as ac_simple_275_one."
+        ),
+    ] = None,
+    unfiltered: Annotated[
+        bool,
+        typer.Option("--unfiltered", help="Forces have not passed the 20 Hz filter of EN 50317."),
+    ] = False,
+    out: Annotated[
+        Path | None, folder_option("Folder for page, table and picture; none if absent.")
+    ] = None,
+    strict: Strict = False,
+    force: Force = False,
+) -> int:
+    """Serial."""
+    if out is not None:
+        refuse_table(out / "judged.csv", force)
+    from catenary.cases.studies.reference import pages
+    from catenary.cases.studies.reference.judgement import any_failed
+    from catenary.cases.studies.reference.others_results import read_results
+
+    found = read_results(files, configuration, not unfiltered)
+    console.say(pages.judged_text(found))
+    if out is not None:
+        console.say("\n".join(map(str, pages.write_judged(out, found))))
+    return console.NOT_ACCEPTED if strict and any_failed(pages.rows_of(found)) else console.DONE
+
+
+@app.command(
+    "validate",
+    help="Validate this installation by the steps of EN 50318: line at rest, reference model of "
+    "2002, reference models in the manner of 2018; write the statement with all figures.",
+    epilog="Example: catenary validate -o results/validation -j 0",
+)
+@console.guarded
+def validate(
+    out: Out,
+    n_jobs: Jobs = 1,
+    strict: Strict = False,
+    force: Force = False,
+    verbose: Verbose = False,
+) -> int:
+    """Collective."""
+    from catenary.cases.studies.reference.validation import jobs_of_validation
+
+    def read() -> tuple[list[Job], list[str]]:
+        refuse_table(out / "validation.csv", force)
+        return jobs_of_validation(), []
+
+    comm, jobs, arguments = begin(read, verbose, lambda made: made[0].scene)
+    from catenary.base.parallel import on_root
+    from catenary.cases.result_folder.folder_lock import held
+    from catenary.cases.studies.accuracy.runs import RUNS
+    from catenary.cases.studies.reference import pages
+    from catenary.cases.studies.reference import validation as study
+    from catenary.cases.studies.reference.judgement import any_failed
+    from catenary.cases.studies.sweep.jobs import RunOptions, interrupted
+    from catenary.cases.studies.sweep.run_jobs import run_jobs
+
+    options = RunOptions(force, arguments, console.say, n_jobs)
+    with held(out, comm, "catenary validate"):
+        ended = run_jobs(jobs, out / RUNS, comm, options)
+        if interrupted(ended):
+            console.complain("the validation was interrupted; the same command continues it")
+            return console.BROKEN
+        found = on_root(comm, lambda: study.validate(ended), takes_long=True)
+        files = on_root(comm, lambda: pages.write_validation(out, found), takes_long=True)
+    console.say("\n" + pages.validation_text(found) + "\n\n" + "\n".join(map(str, files)))
+    return console.NOT_ACCEPTED if strict and any_failed(found.rows) else console.DONE

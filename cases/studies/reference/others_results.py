@@ -1,0 +1,187 @@
+"""Results of any program, as CSV files: forces along the track, or a table of statistics."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from scipy.interpolate import CubicSpline
+
+from catenary.base.errors import InputError
+from catenary.cases.scene.input.plain_text import plain
+from catenary.cases.scene.problem import problem_of
+from catenary.cases.studies.identification.measurement import read_table
+from catenary.cases.studies.reference.convergence import HISTORY, OF_FORCE, rms
+from catenary.cases.studies.reference.solutions import PLACE, Solution, read
+from catenary.postproc.evaluate import filters
+from catenary.postproc.evaluate.statistics import contact_statistics
+
+TIME = "time_s"
+_QUANTITY, _VALUE, _OF, _CONFIGURATION = "quantity", "value", "of", "configuration"
+# Spacing at which extremes of a curve below 20 Hz are looked for [m].
+_FINE = 0.02
+# Samples are equidistant if their spacings differ by less than this part.
+_EVEN = 0.02
+# A filter leaves 1e-4 of what is beyond a record's end after so many periods of its cut-off.
+_SETTLED = 6.0
+_FROM_STATISTICS = {
+    "mean_N": "mean", "std_N": "std", "std_0_5_N": "std_0_5", "std_5_20_N": "std_5_20",
+    "stat_max_N": "stat_max", "stat_min_N": "stat_min", "max_N": "maximum", "min_N": "minimum",
+    "loss_percent": "loss_percent",
+}  # fmt: skip
+
+
+@dataclass
+class Others:
+    """Figures beside a solution.
+
+    Attributes
+    ----------
+    solution : with which they are compared
+    figures : by place of the pantograph, or ``LINE``, and quantity, in its unit
+    forces : (n,) below 20 Hz at the places of the solution by place of the pantograph [N]
+    remarks : sentences on what limits the comparison
+    """
+
+    solution: Solution
+    figures: dict[tuple[str, str], float] = field(default_factory=dict)
+    forces: dict[str, np.ndarray] = field(default_factory=dict)
+    remarks: list[str] = field(default_factory=list)
+
+
+def read_results(
+    files: Sequence[Path], configuration: str | None, is_filtered: bool
+) -> list[Others]:
+    """What files hold, an entry for each configuration. Not collective.
+
+    A file with a column ``quantity`` is a table of statistics with ``of``, ``value`` and, unless
+    ``configuration`` is given, ``configuration``. Others have ``place_m`` or ``time_s``, since the
+    start of the run, and a force ``leading_N``, ``trailing_N`` or ``pantograph_N`` each.
+
+    Parameters
+    ----------
+    configuration : which one files are of
+    is_filtered : whether forces have passed the 20 Hz filter of EN 50317
+
+    Raises
+    ------
+    InputError
+        If a file is neither, or does not fit the configuration.
+    """
+    found: dict[str, Others] = {}
+    for path in files:
+        table, name = read_table(path), str(path)
+        if _QUANTITY in table:
+            _add_statistics(found, table, name, configuration)
+        else:
+            if configuration is None:
+                raise InputError(
+                    f"{name} holds no statistics: name the configuration of its forces, such as "
+                    "--of ac_simple_275_one"
+                )
+            one = found.setdefault(configuration, Others(read(configuration)))
+            _add_forces(one, table, name, is_filtered)
+    return list(found.values())
+
+
+def _add_statistics(
+    found: dict[str, Others], table: pd.DataFrame, name: str, configuration: str | None
+) -> None:
+    needed = [_OF, _QUANTITY, _VALUE] + ([] if configuration else [_CONFIGURATION])
+    for column in needed:
+        if column not in table:
+            raise InputError(
+                f'{name} has no column "{column}": a table of statistics has {", ".join(needed)}'
+            )
+    values = _numbers(table, name, _VALUE)
+    for row, value in zip(table.to_dict("records"), values.tolist(), strict=True):
+        of, quantity = str(row[_OF]), str(row[_QUANTITY])
+        own = configuration or str(row[_CONFIGURATION])
+        one = found.setdefault(own, Others(read(own)))
+        if (of, quantity) not in one.solution.figures:
+            known = ", ".join(q for place, q in one.solution.figures if place == of)
+            places = ", ".join(dict.fromkeys(place for place, _ in one.solution.figures))
+            raise InputError(
+                f'{name} has "{plain(quantity, 60)}" of "{plain(of, 60)}": {own} has '
+                + (f"of it {known}" if known else f"figures of {places}")
+            )
+        one.figures[of, quantity] = value
+
+
+def _add_forces(one: Others, table: pd.DataFrame, name: str, is_filtered: bool) -> None:
+    solution = one.solution
+    there = [of for of in solution.forces if f"{of}_N" in table]
+    if not there:
+        raise InputError(
+            f"{name} has no column {' or '.join(f'{of}_N' for of in solution.forces)}, the forces "
+            f"of {solution.configuration.name}"
+        )
+    for of in there:
+        place, dt = _places_of(solution, of, table, name)
+        force = _numbers(table, name, f"{of}_N")
+        start, end = solution.stretch
+        if place[0] > start + 1e-6 or place[-1] < end - 1e-6:
+            raise InputError(
+                f"{name} covers {place[0]:.1f} to {place[-1]:.1f} m; {solution.configuration.name} "
+                f"is evaluated from {start:g} to {end:g} m"
+            )
+        if is_filtered:
+            curve = CubicSpline(place, force)
+            fine = curve(np.linspace(start, end, 1 + round((end - start) / _FINE)))
+            mean, std = float(fine.mean()), float(fine.std())
+            own = {
+                "mean_N": mean, "std_N": std, "max_N": float(fine.max()),
+                "min_N": float(fine.min()), "stat_max_N": mean + 3 * std,
+                "stat_min_N": mean - 3 * std,
+            }  # fmt: skip
+        else:
+            _remark_on_ends(one, of, place, dt)
+            found = contact_statistics(of, place, force, np.zeros_like(force), dt, solution.stretch)
+            own = {key: getattr(found, word) for key, word in _FROM_STATISTICS.items()}
+            curve = CubicSpline(place, filters.low_pass(force, dt))
+        one.figures |= {(of, column.name): own[column.name] for column in OF_FORCE
+                        if column.name in own}  # fmt: skip
+        one.forces[of] = curve(solution.place)
+        one.figures[of, HISTORY] = rms(one.forces[of] - solution.forces[of])
+
+
+def _places_of(
+    solution: Solution, of: str, table: pd.DataFrame, name: str
+) -> tuple[np.ndarray, float]:
+    """Places of the samples [m], and the time between two [s]."""
+    train = problem_of(solution.configuration.scene()).train
+    if PLACE in table:
+        place = _numbers(table, name, PLACE)
+    elif TIME in table:
+        number = list(solution.forces).index(of)
+        start = train.start - train.placements[number].behind
+        place = start + train.speed * _numbers(table, name, TIME)
+    else:
+        raise InputError(f"{name} has neither a column {PLACE} nor {TIME}")
+    spacing = (place[-1] - place[0]) / max(place.size - 1, 1)
+    if place.size < 2 or spacing <= 0 or np.ptp(np.diff(place)) > 2 * _EVEN * spacing + 2e-4:
+        raise InputError(f"{name} must have equidistant samples in ascending order")
+    return np.linspace(place[0], place[-1], place.size), spacing / train.speed
+
+
+def _remark_on_ends(one: Others, of: str, place: np.ndarray, dt: float) -> None:
+    start, end = one.solution.stretch
+    speed = (place[1] - place[0]) / dt
+    reach = _SETTLED / filters.CUT_OFF * speed
+    beyond = min(start - place[0], place[-1] - end)
+    if beyond < reach:
+        one.remarks.append(
+            f"The record of the {of} goes on only {beyond:.1f} m beyond the stretch: the 20 Hz "
+            f"filter needs {reach:.0f} m, and the force near its end is distorted."
+        )
+
+
+def _numbers(table: pd.DataFrame, name: str, column: str) -> np.ndarray:
+    values = pd.to_numeric(table[column], errors="coerce").to_numpy(dtype=float)
+    wrong = np.flatnonzero(~np.isfinite(values))
+    if wrong.size:
+        raise InputError(f'{name} has in row {wrong[0] + 1} of column "{column}" no finite number')
+    return np.asarray(values)

@@ -1,0 +1,155 @@
+"""What ``judge`` and ``validate`` leave and print: a page, its tables, a text."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from matplotlib.figure import Figure
+
+from catenary.cases.studies.reference.judgement import FAILED, NOT_JUDGED, counts, judged, table_of
+from catenary.cases.studies.reference.others_results import Others
+from catenary.cases.studies.reference.validation import Step, Validation
+from catenary.postproc.evaluate.wording import UNCOMPARED_SAYS
+from catenary.postproc.files.disk import plain, write_all
+from catenary.postproc.report.page import page
+from catenary.postproc.report.pictures import figures
+from catenary.postproc.report.sections.section import Picture, Section, Text
+
+JUDGED, VALIDATION = "judged", "validation"
+_BORROWED = (
+    "The bands of EN 50318:2018 for its reference models are not publicly known: figures are "
+    "judged by what the standard allows between a simulation and a line test."
+)
+
+
+def rows_of(others: Sequence[Others]) -> list[dict[str, Any]]:
+    """Judged rows of results of any program."""
+    return [row for one in others for row in judged(one.solution, one.figures)]
+
+
+def judged_text(others: Sequence[Others]) -> str:
+    """The table of a judgement, its counts and remarks, for a terminal."""
+    rows = rows_of(others)
+    remarks = [f"REMARK      {text}" for one in others for text in one.remarks]
+    lines = [table_of(rows, "").text(), "", counts(rows), _BORROWED, UNCOMPARED_SAYS, *remarks]
+    return "\n".join(lines)
+
+
+def write_judged(folder: Path, others: Sequence[Others]) -> list[Path]:
+    """Write page, CSV, JSON and pictures of a judgement; returns the files. Not collective."""
+    rows = rows_of(others)
+    table = table_of(rows, "Figures")
+    pictures: dict[str, bytes] = {}
+    for one in others:
+        if one.forces:
+            name = one.solution.configuration.name
+            pictures |= figures.painted(name, lambda one=one: draw_forces(one))
+    sections = []
+    for one in others:
+        name = one.solution.configuration.name
+        own = replace(table, rows=judged(one.solution, one.figures), title="")
+        blocks = [Text(one.solution.configuration.data), own]
+        blocks += [Text(text, "remark") for text in one.remarks]
+        shown = [Picture(name, "Contact force, 20 Hz low-pass, along the track", _nothing)]
+        sections.append(Section(one.solution.configuration.words, blocks, shown))
+    lead = f"{counts(rows)} {_BORROWED} {UNCOMPARED_SAYS}."
+    content: dict[str, bytes | str] = {f"{name}.png": data for name, data in pictures.items()}
+    content[f"{JUDGED}.csv"] = table.csv()
+    content[f"{JUDGED}.json"] = _json({"figures": table.records(), "summary": counts(rows)})
+    content[f"{JUDGED}.html"] = page("Beside the reference solutions", lead, sections, pictures)
+    return write_all(folder, content)
+
+
+def _nothing() -> None:
+    """Pictures are made before the page."""
+
+
+@figures.own_style()
+def draw_forces(one: Others) -> Figure:
+    """Forces of a program beside those of the reference, a panel for each pantograph."""
+    n = len(one.forces)
+    figure, panels = figures.stacked(0.7 + 2.7 * n, n, shared=True)
+    for axes, (of, force) in zip(panels, one.forces.items(), strict=True):
+        solution = one.solution
+        figures.curve(axes, solution.place, solution.forces[of], 0, "reference")
+        figures.curve(axes, solution.place, force, 1, "judged")
+        figures.tidy(axes, "", "contact force [N]", of.capitalize())
+        figures.legend_above(axes)
+    panels[-1].set_xlabel("position along the track [m]")
+    return figure
+
+
+def validation_text(found: Validation) -> str:
+    """The statement for a terminal: each step in a line, and what fails."""
+    lines = [f"{found.installation['program']}, {found.installation['machine']}", ""]
+    for number, step in enumerate(found.steps, start=1):
+        lines.append(f"{number}. {step.title}: {_said(step)}")
+        failed = [row for row in step.rows if row["verdict"] == FAILED]
+        if failed:
+            lines.append(table_of(failed, "").text())
+    return "\n".join([*lines, "", *_closing(found)])
+
+
+def _said(step: Step) -> str:
+    return counts(step.rows) if step.rows else f"{NOT_JUDGED}: {step.why}."
+
+
+def _closing(found: Validation) -> list[str]:
+    deviations = [row for row in found.rows if row["quantity"] == "std_N" and row["reference"]]
+    worst = max(abs(row["difference"]) / row["reference"] for row in deviations)
+    return [
+        "With step and mesh of the shipped cases, standard deviations differ from the reference "
+        f"solutions by at most {100 * worst:.1f} %.",
+        _BORROWED,
+        f"{UNCOMPARED_SAYS}. This statement replaces no assessment.",
+    ]
+
+
+def write_validation(folder: Path, found: Validation) -> list[Path]:
+    """Write the statement as page, Markdown, CSV and JSON; returns the files. Not collective."""
+    table = table_of(found.rows, "")
+    statement = {
+        "installation": found.installation,
+        "steps": [{"title": step.title, "said": _said(step)} for step in found.steps],
+        "figures": table.records(),
+        "closing": _closing(found),
+    }
+    content: dict[str, bytes | str] = {
+        f"{VALIDATION}.csv": table.csv(),
+        f"{VALIDATION}.json": _json(statement),
+        f"{VALIDATION}.md": _markdown(found),
+        f"{VALIDATION}.html": page(
+            "Validation by EN 50318", " ".join(_closing(found)), _sections(found), {}
+        ),
+    }
+    return write_all(folder, content)
+
+
+def _shown(step: Step) -> list[dict[str, Any]]:
+    """Rows that people read: those with limits."""
+    return [row for row in step.rows if row["verdict"] != NOT_JUDGED]
+
+
+def _sections(found: Validation) -> Iterator[Section]:
+    for number, step in enumerate(found.steps, start=1):
+        blocks: list[Any] = [Text(_said(step))]
+        if rows := _shown(step):
+            blocks.append(table_of(rows, ""))
+        yield Section(f"{number}. {step.title}", blocks)
+
+
+def _markdown(found: Validation) -> str:
+    parts = [f"{found.installation['program']}, {found.installation['machine']}"]
+    for number, step in enumerate(found.steps, start=1):
+        parts.append(f"## {number}. {step.title}\n\n{_said(step)}")
+        if rows := _shown(step):
+            parts.append(table_of(rows, "").markdown())
+    return "\n\n".join(["# Validation by EN 50318", *parts, *_closing(found)]) + "\n"
+
+
+def _json(content: dict[str, Any]) -> str:
+    return json.dumps(plain(content), indent=1) + "\n"

@@ -1,0 +1,148 @@
+"""The validation of this installation by the steps of EN 50318."""
+
+from __future__ import annotations
+
+import csv
+import platform
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from importlib.metadata import version
+from typing import Any
+
+from catenary.base.errors import RunBroken
+from catenary.cases.scene.input.case_files import find_case
+from catenary.cases.scene.load import load_scene
+from catenary.cases.studies.reference.configurations import RECORDED, configurations
+from catenary.cases.studies.reference.convergence import LINE, UPLIFT, figures_of
+from catenary.cases.studies.reference.judgement import bounds_of, judged, judged_row, limits
+from catenary.cases.studies.reference.solutions import read
+from catenary.cases.studies.sweep.jobs import Ended, Job
+from catenary.cases.studies.sweep.variants import Variant
+
+# Quantities of accepted_ranges.csv by their names here.
+_OF_RANGES = {
+    "mean": "mean_N",
+    "standard_deviation": "std_N",
+    "statistical_maximum": "stat_max_N",
+    "statistical_minimum": "stat_min_N",
+    "maximum": "max_N",
+    "minimum": "min_N",
+    "loss_of_contact": "loss_percent",
+    "support_uplift": UPLIFT,
+}
+_ELASTICITY = ("elasticity_max_mm_per_N", "elasticity_min_mm_per_N")
+
+
+@dataclass(frozen=True)
+class Step:
+    """A step of the validation: title, rows of ``judgement.COLUMNS``, and why there are none."""
+
+    title: str
+    rows: Sequence[dict[str, Any]]
+    why: str = ""
+
+
+@dataclass(frozen=True)
+class Validation:
+    """All steps in their order, and what was validated by name."""
+
+    steps: Sequence[Step]
+    installation: dict[str, str]
+
+    @property
+    def rows(self) -> list[dict[str, Any]]:
+        """The rows of all steps."""
+        return [row for step in self.steps for row in step.rows]
+
+
+def jobs_of_validation() -> list[Job]:
+    """The runs: reference models as their cases are shipped. Not collective."""
+    case = limits()["ranges"]["case"]
+    jobs = []
+    for speed in sorted({row["speed_km_h"] for row in _reference(case, "accepted_ranges.csv")}):
+        words = (f"train.speed_km_h={speed}",)
+        scene = load_scene(case, [*words, *RECORDED])
+        jobs.append(Job(Variant(f"{case}_{speed}", words), scene, keep_results=False))
+    jobs += [
+        Job(Variant(one.name, one.assignments), one.scene(), keep_results=False)
+        for one in configurations()
+    ]
+    return jobs
+
+
+def validate(ended: Sequence[Ended]) -> Validation:
+    """The validation from its runs. Not collective.
+
+    Parameters
+    ----------
+    ended : of ``jobs_of_validation``
+
+    Raises
+    ------
+    RunBroken
+        If one broke.
+    """
+    for run in ended:
+        if not run.done:
+            raise RunBroken(f"the run {run.variant.name} broke: {run.outcome}")
+    summaries = {run.variant.name: run.summary for run in ended}
+    rules = limits()
+    references, elasticity, models = [], [], set()
+    for one in configurations():
+        figures, solution = figures_of(summaries[one.name]), read(one.name)
+        at_rest = {(LINE, name): figures.pop((LINE, name)) for name in _ELASTICITY}
+        references += judged(solution, figures)
+        if one.model not in models:  # all configurations of a model have one line
+            elasticity += judged(solution, at_rest, rules["elasticity"])
+            models.add(one.model)
+    steps = [
+        Step(rules["rest"]["title"], _lengths(summaries)),
+        Step(rules["elasticity"]["title"], elasticity),
+        Step(rules["ranges"]["title"], _in_ranges(summaries)),
+        Step(rules["reference"]["title"], references),
+        Step(rules["line_test"]["title"], [], rules["line_test"]["why"]),
+    ]
+    installation = {
+        "program": f"catenary {version('catenary')}",
+        "machine": f"{platform.system()} {platform.machine()}, Python {platform.python_version()}",
+    }
+    return Validation(steps, installation)
+
+
+def _lengths(summaries: Mapping[str, Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Lengths of the droppers of a middle span beside the nominal ones [mm]."""
+    rule = limits()["rest"]
+    case = rule["case"]
+    first = next(one.name for one in configurations() if one.case == case)
+    found = summaries[first]["static"]["dropper_lengths_m"]
+    rows = []
+    for number, (length, nominal) in enumerate(
+        zip(found, _reference(case, "dropper_lengths.csv"), strict=True), start=1
+    ):
+        wanted = 1e3 * float(nominal["length_m"])
+        quantity = f"length of dropper {number} [mm]"
+        bounds = bounds_of(rule, wanted)
+        row = judged_row(case, LINE, quantity, 1e3 * length, bounds, rule)
+        rows.append(row | {"reference": wanted, "difference": 1e3 * length - wanted})
+    return rows
+
+
+def _in_ranges(summaries: Mapping[str, Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Figures of the reference model of EN 50318:2002 within its accepted ranges."""
+    rule, rows = limits()["ranges"], []
+    case = rule["case"]
+    for accepted in _reference(case, "accepted_ranges.csv"):
+        name = f"{case}_{accepted['speed_km_h']}"
+        quantity = _OF_RANGES[accepted["quantity"]]
+        figures = figures_of(summaries[name])
+        (key,) = (key for key in figures if key[1] == quantity)
+        bounds = float(accepted["lower"]), float(accepted["upper"])
+        rows.append(judged_row(name, key[0], quantity, figures[key], bounds, rule))
+    return rows
+
+
+def _reference(case: str, name: str) -> list[dict[str, str]]:
+    """Rows of a file in ``reference`` of a shipped case, without its comments."""
+    path = find_case(case).parent / "reference" / name
+    lines = path.read_text(encoding="utf-8").splitlines()
+    return list(csv.DictReader(line for line in lines if not line.startswith("#")))
