@@ -68,15 +68,20 @@ def highest_speeds(
 
     own, comm = checked(scene), alone()
     from catenary.cases.process.interrupts import Interrupted
-    from catenary.cases.studies.questions.highest_speed import Speeds, find_speeds
-    from catenary.cases.studies.questions.speed_output import table_of_criteria
+    from catenary.cases.studies.questions.highest_speed import (
+        Speeds,
+        find_speeds,
+        table_of_criteria,
+    )
     from catenary.cases.studies.sweep.jobs import RunOptions
+    from catenary.cases.studies.sweep.together import Marching
 
     speeds = Speeds(float(slowest), float(fastest), float(step), float(within))
     with options_of(own.petsc.given()) as options:
         plan = RunOptions(petsc=options, n_jobs=jobs)
+        marching = Marching(draft_of(scene), None, comm, plan)
         try:
-            found = find_speeds(draft_of(scene), (), speeds, list(criteria), None, comm, plan)
+            found = find_speeds(marching, own.case.name, speeds, list(criteria))
         except Interrupted as stopped:
             raise KeyboardInterrupt from stopped
     return pd.DataFrame(table_of_criteria(found).records())
@@ -129,14 +134,15 @@ def separations(
     own, comm = checked(scene), alone()
     from catenary.cases.process.interrupts import Interrupted
     from catenary.cases.studies.questions.separation import Distances, find_separations
-    from catenary.cases.studies.questions.separation_output import table_of
     from catenary.cases.studies.sweep.jobs import RunOptions
+    from catenary.cases.studies.sweep.together import Marching
 
     distances = Distances(float(nearest), float(farthest), float(step))
     with options_of(own.petsc.given()) as options:
         plan = RunOptions(petsc=options, n_jobs=jobs)
+        marching = Marching(draft_of(scene), None, comm, plan)
         try:
-            found = find_separations(draft_of(scene), own, (), distances, None, comm, plan)
+            found = find_separations(marching, own, distances)
         except Interrupted as stopped:
             raise KeyboardInterrupt from stopped
-    return pd.DataFrame(table_of(found).records())
+    return pd.DataFrame(found.table().records())

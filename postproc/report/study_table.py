@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, NamedTuple
 
 from catenary.postproc.files.csv_text import csv_text, number_text
@@ -157,6 +158,44 @@ def texts_table(
 def rows_csv(rows: Sequence[Row]) -> str:
     """Rows with the same keys, at least one, as CSV text."""
     return StudyTable([Column(name) for name in rows[0]], rows).csv()
+
+
+# What a file of a study holds, see ``write_files``.
+Content = StudyTable | Mapping[str, Any] | Sequence[Row] | Callable[[], Any] | str | bytes
+
+
+def write_files(folder: Path, content: Mapping[str, Content]) -> list[Path]:
+    """Write what a study leaves, all files or none; returns their paths. Not collective.
+
+    Parameters
+    ----------
+    folder : made if it is not there
+    content : by names of files. A table, or rows with the same keys, become CSV, a mapping JSON,
+        and what a function draws a picture, which is left out if it draws none or fails; texts and
+        bytes are written as they are
+
+    Raises
+    ------
+    RunBroken
+        If the disk refuses.
+    """
+    from catenary.postproc.files.disk import plain, write_all
+
+    files: dict[str, bytes | str] = {}
+    for name, own in content.items():
+        if isinstance(own, str | bytes):
+            files[name] = own
+        elif isinstance(own, StudyTable):
+            files[name] = own.csv()
+        elif isinstance(own, Mapping):
+            files[name] = json.dumps(plain(own), indent=1, ensure_ascii=False) + "\n"
+        elif callable(own):
+            from catenary.postproc.report.pictures import figures
+
+            files |= figures.painted(name, own)
+        else:
+            files[name] = rows_csv(own)
+    return write_all(folder, files)
 
 
 def remark_lines(runs: Iterable[tuple[str, Sequence[str]]]) -> list[str]:

@@ -37,11 +37,6 @@ ACCURACY = ["--axes", "dt,dropper", "--quick", "--repeats", "2", "--target", "3%
 # Words, table, and columns with times, which depend on the machine.
 STUDIES = {
     "hard": (["hard", "undamped_line", "speed_0.7", "--short"], "hard.csv", ()),
-    "waves": (
-        ["waves", CASE, "--separations", "20,25", *SET, "evaluation.to_m=230"],
-        "separations.csv",
-        ("wall_s",),
-    ),
     "cost": (
         ["plan", CASE, "--cost", "--only", "dropper_slackening", "--rounds", "1", *SET],
         "cost.csv",
@@ -94,7 +89,6 @@ def test_a_stability_map_is_the_same_in_two_processes(tmp_path: Path) -> None:
     ("words", "told"),
     [
         (["run", CASE, "-o", "out", "-j", "2"], "-j and --part belong to --study"),
-        (["waves", CASE, "-o", "out", "-j", "2"], "-j belongs to --separations"),
         (["plan", CASE, "-j", "2"], "-j belongs to plan --cost"),
         (["sweep", CASE, "-o", "out", "-j", "-1"], "greater than or equal to 0"),
     ],

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from catenary.cases.cli.app import Force, Jobs, RunWords, Verbose, app, begin, folder_option
+from catenary.cases.cli.app import Force, Jobs, RunWords, Verbose, app, begin, folder_option, tell
 from catenary.cases.result_folder.output_folder import refuse_table
 from catenary.cases.terminal import console
 
@@ -21,8 +21,8 @@ TABLE = "separation.csv"
 @app.command(
     "separation",
     help="Find good and bad distances of two pantographs: deviation, least force and uplift over "
-    "the distance, and where acceptance criteria fail. The same command continues one that was "
-    "stopped.",
+    "the distance, where acceptance criteria fail, and which waves explain it. The same command "
+    "continues one that was stopped.",
     epilog="Example: catenary separation en50318_2002 -o results/distances --from 50 --to 200 "
     "--step 5",
 )
@@ -45,30 +45,27 @@ def separation(
     verbose: Verbose = False,
 ) -> int:
     """Collective."""
-    from catenary.cases.scene.load import load_scene, read_draft
-    from catenary.cases.studies.questions.separation import Distances, find_separations
+    from catenary.cases.studies.questions import separation as question
 
-    distances = Distances(nearest, farthest, step)
+    distances = question.Distances(nearest, farthest, step)
 
-    def read() -> tuple[tuple[Draft, list[str], Scene], list[str]]:
+    def read() -> tuple[tuple[Draft, Scene], list[str]]:
         distances.values()
         if out is not None:
             refuse_table(out / TABLE, force)
-        changes, options = words.split()
-        draft = read_draft(words.case)
-        draft = draft.shortened() if words.shortened else draft
-        return (draft, changes, load_scene(draft, changes)), options
+        draft, options = words.draft()
+        return (draft, draft.scene()), options
 
-    comm, (draft, changes, scene), arguments = begin(read, verbose, lambda made: made[2])
-    from catenary.cases.studies.questions import separation_output
-    from catenary.cases.studies.questions.marching import kept_in
+    comm, (draft, scene), arguments = begin(read, verbose, lambda made: made[1])
+    from catenary.base.parallel import on_root
+    from catenary.cases.studies.records import held_study
     from catenary.cases.studies.sweep.jobs import RunOptions
+    from catenary.cases.studies.sweep.together import Marching
 
-    options = RunOptions(force, arguments, console.say, n_jobs)
-    with kept_in(out, comm, f"catenary separation {words.case}") as write:
-        found = find_separations(draft, scene, changes, distances, out, comm, options)
-        files = write(lambda folder: separation_output.write(folder, found))
-    console.say("\n" + separation_output.as_text(found))
-    if files:
-        console.say("\n" + "\n".join(map(str, files)))
+    marching = Marching(draft, out, comm, RunOptions(force, arguments, console.say, n_jobs))
+    with held_study(out, comm, f"catenary separation {words.case}") as (_, write):
+        found = question.find_separations(marching, scene, distances)
+        period = on_root(comm, lambda: question.period_in(found, scene), takes_long=True)
+        files = write(lambda folder: question.write(folder, found, period))
+    tell(question.as_text(found, period), files)
     return console.DONE

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from catenary.cases.cli.app import Force, Jobs, RunWords, Verbose, app, begin, folder_option
+from catenary.cases.cli.app import Force, Jobs, RunWords, Verbose, app, begin, folder_option, tell
 from catenary.cases.result_folder.output_folder import refuse_table
 from catenary.cases.terminal import console
 
@@ -55,31 +55,25 @@ def speed(
     verbose: Verbose = False,
 ) -> int:
     """Collective."""
-    from catenary.cases.scene.load import load_scene, read_draft
-    from catenary.cases.studies.questions.highest_speed import Speeds
+    from catenary.cases.studies.questions import highest_speed as question
 
-    speeds = Speeds(slowest, fastest, step, within)
+    speeds = question.Speeds(slowest, fastest, step, within)
 
-    def read() -> tuple[tuple[Draft, list[str], Scene], list[str]]:
+    def read() -> tuple[tuple[Draft, Scene], list[str]]:
         speeds.first()
         if out is not None:
             refuse_table(out / TABLE, force)
-        changes, options = words.split()
-        draft = read_draft(words.case)
-        draft = draft.shortened() if words.shortened else draft
-        return (draft, changes, load_scene(draft, changes)), options
+        draft, options = words.draft()
+        return (draft, draft.scene()), options
 
-    comm, (draft, changes, _), arguments = begin(read, verbose, lambda made: made[2])
-    from catenary.cases.studies.questions import speed_output
-    from catenary.cases.studies.questions.highest_speed import find_speeds
-    from catenary.cases.studies.questions.marching import kept_in
+    comm, (draft, scene), arguments = begin(read, verbose, lambda made: made[1])
+    from catenary.cases.studies.records import held_study
     from catenary.cases.studies.sweep.jobs import RunOptions
+    from catenary.cases.studies.sweep.together import Marching
 
-    options = RunOptions(force, arguments, console.say, n_jobs)
-    with kept_in(out, comm, f"catenary speed {words.case}") as write:
-        found = find_speeds(draft, changes, speeds, criterion or [], out, comm, options)
-        files = write(lambda folder: speed_output.write(folder, found))
-    console.say("\n" + speed_output.as_text(found))
-    if files:
-        console.say("\n" + "\n".join(map(str, files)))
+    marching = Marching(draft, out, comm, RunOptions(force, arguments, console.say, n_jobs))
+    with held_study(out, comm, f"catenary speed {words.case}") as (_, write):
+        found = question.find_speeds(marching, scene.case.name, speeds, criterion or [])
+        files = write(lambda folder: question.write(folder, found))
+    tell(question.as_text(found), files)
     return console.DONE

@@ -7,7 +7,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from catenary.cases.cli.app import Force, Jobs, RunWords, Verbose, app, begin, folder_option
+from catenary.cases.cli.app import Force, Jobs, RunWords, Verbose, app, begin, folder_option, tell
 from catenary.cases.result_folder.output_folder import refuse_table
 from catenary.cases.terminal import console
 
@@ -38,18 +38,17 @@ def what_if(
 ) -> int:
     """Collective."""
     from catenary.base.parallel import on_root
-    from catenary.cases.studies.questions.what_if import differences, jobs_of, run
+    from catenary.cases.studies.questions import what_if as question
 
     def read() -> tuple[tuple[list[Job], list[str]], list[str]]:
         changes, options = words.split()
-        jobs = jobs_of(words.case, changes, words.shortened)
+        jobs = question.jobs_of(words.case, changes, words.shortened)
         if out is not None:
             refuse_table(out / PAGE, force)
         return (jobs, changes), options
 
     comm, (jobs, changes), arguments = begin(read, verbose, lambda made: made[0][0].scene)
     from catenary.cases.result_folder.folder_lock import held
-    from catenary.cases.studies.questions import what_if_output
     from catenary.cases.studies.sweep.jobs import RunOptions
 
     options = RunOptions(force, arguments, console.say, n_jobs)
@@ -61,12 +60,10 @@ def what_if(
                 lambda: Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="catenary_"))),
             )
         stack.enter_context(held(folder, comm, f"catenary what-if {words.case}"))
-        ended = run(jobs, folder, comm, options)
-        found = on_root(comm, lambda: differences(changes, ended, folder), takes_long=True)
+        ended = question.run(jobs, folder, comm, options)
+        found = on_root(comm, lambda: question.differences(changes, ended, folder), takes_long=True)
         files = []
         if out is not None:
-            files = on_root(comm, lambda: what_if_output.write(folder, found), takes_long=True)
-    console.say("\n" + what_if_output.as_text(found))
-    if files:
-        console.say("\n" + "\n".join(map(str, files)))
+            files = on_root(comm, lambda: question.write(folder, found), takes_long=True)
+    tell(question.as_text(found), files)
     return console.DONE

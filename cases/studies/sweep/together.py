@@ -6,6 +6,7 @@ import hashlib
 import json
 import time
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -18,7 +19,7 @@ from catenary.cases.scene.input.faults import UnfitScene
 from catenary.cases.scene.load import Draft, read_draft
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.records import KeptRows
-from catenary.cases.studies.sweep.jobs import Ended, RunOptions, scene_of
+from catenary.cases.studies.sweep.jobs import Ended, RunOptions, interrupted, scene_of
 from catenary.cases.studies.sweep.part import Part
 from catenary.cases.studies.sweep.variants import Variant
 from catenary.postproc.files.run_schema import DONE, INTERRUPTED
@@ -133,6 +134,33 @@ def run_ensemble(
     except Interrupted:
         ended.append(Ended(variants[len(ended)], INTERRUPTED))
     return ended
+
+
+@dataclass
+class Marching:
+    """Marches variants of a case again and again; ``out``, ``comm`` and ``options`` are those of
+    ``run_ensemble``."""
+
+    draft: Draft
+    out: Path | None
+    comm: Any
+    options: RunOptions
+
+    def of(self, variants: Sequence[Variant]) -> list[Ended]:
+        """How each variant ended, in their order. Collective.
+
+        Raises
+        ------
+        InputError
+            If none of them can be run.
+        Interrupted
+            If a signal came.
+        """
+        ended = run_ensemble(ensemble_of(self.draft, variants), self.out, self.comm, self.options)
+        self.options = self.options._replace(force=False)  # which would forget these
+        if interrupted(ended):
+            raise Interrupted("the study was interrupted; the same command continues it")
+        return ended
 
 
 class _March:

@@ -40,7 +40,6 @@ from catenary.postproc.read.guard import examined
 from catenary.postproc.read.results import Results
 from catenary.postproc.report.pictures import figures
 from catenary.postproc.report.study_table import rows_csv
-from catenary.solver.statics.elasticity import middle_span
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest
 from catenary.solver.time_loop.views.observers import Observer
 from catenary.solver.waves.excitation import MovingForce
@@ -152,13 +151,6 @@ def study_obstacles(scene: Scene, folder: Path, force: bool) -> tuple[str, list[
         for one in results
     ]
     return "\n".join(lines), write_all(folder, content)
-
-
-def theory_of(scene: Scene) -> tuple[WaveTheory, float]:
-    """What theory says of a scene's line, and the length of its middle span [m]. Not collective."""
-    problem = problem_of(scene)
-    first, last = middle_span(problem.line)
-    return wave_theory(problem, line_at_rest(problem, mesh_of(scene))), last - first
 
 
 def _numbers_in(data: FilmData, rest: LineAtRest) -> np.ndarray:
