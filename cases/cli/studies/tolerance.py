@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from catenary.cases.cli.app import Assignments, Case, Force, Jobs, Out, app
-from catenary.cases.cli.studies.optimise import TaskFile, draft_of
+from catenary.cases.cli.app import Assignments, Case, Force, Jobs, Out, SceneWords, app, tell
+from catenary.cases.cli.studies.optimise import TaskFile
 from catenary.cases.result_folder.output_folder import refuse_table
 from catenary.cases.terminal import console
 
@@ -26,20 +26,18 @@ def tolerance(
     force: Force = False,
 ) -> int:
     """Serial."""
-    from catenary.cases.result_folder.folder_lock import held
-    from catenary.cases.studies.records import KeptRows
-    from catenary.cases.studies.scene_sets.evaluate import workers
-    from catenary.cases.studies.scene_sets.task_file import read_task
+    from catenary.cases.studies.records import held_study
+    from catenary.cases.studies.scene_sets.evaluation import workers
+    from catenary.cases.studies.scene_sets.task_tables import read_task
     from catenary.cases.studies.tolerance import output, study
     from catenary.cases.studies.tolerance.task import ToleranceTask
 
     refuse_table(out / output.TABLE, force)
-    plan = study.make_plan(draft_of(case, assignments), read_task(task_file, ToleranceTask))
-    with held(out, console.alone(), f"catenary tolerance {case}"):
-        kept = KeptRows(out, force)
-        with workers(n_jobs) as pool:
-            found = study.find_tolerances(plan, pool, kept, console.say)
-        files = output.write(out, plan, found)
-        kept.forget()
-    console.say("\n" + output.as_text(plan, found) + "\n\n" + "\n".join(map(str, files)))
+    draft, _ = SceneWords(case, assignments=assignments).draft()
+    plan = study.make_plan(draft, read_task(task_file, ToleranceTask))
+    command = f"catenary tolerance {case}"
+    with held_study(out, console.alone(), command, force) as (kept, write), workers(n_jobs) as pool:
+        found = study.find_tolerances(plan, pool, kept, console.say)
+        files = write(lambda folder: output.write(folder, plan, found))
+    tell(output.as_text(plan, found), files)
     return console.DONE

@@ -9,9 +9,13 @@ from catenary.base.errors import InputError
 from catenary.cases.scene.load import Draft
 from catenary.cases.scene.problem import line_of
 from catenary.cases.studies.optimise.task import OptimiseTask
-from catenary.cases.studies.scene_sets.evaluate import BROKE
-from catenary.cases.studies.scene_sets.evaluation import Evaluation, Wanted, identity
-from catenary.cases.studies.scene_sets.figures import OF_EACH_PANTOGRAPH
+from catenary.cases.studies.scene_sets.evaluation import (
+    BROKE,
+    OF_EACH_PANTOGRAPH,
+    Evaluation,
+    Wanted,
+    identity,
+)
 from catenary.cases.studies.scene_sets.scene_set import (
     DIRECTIONS,
     ErrorSamples,

@@ -9,12 +9,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from catenary.base.errors import InputError
-from catenary.cases.scene.keys.error_sentences import unknown_key
-from catenary.cases.scene.keys.keys import is_known, known_keys
 from catenary.cases.scene.problem import resolved
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.optimise.task import VariableTable
-from catenary.cases.studies.scene_sets.scene_values import is_number, value_at
+from catenary.cases.studies.sweep.variants import check_key, is_number, value_at
 
 # Keys whose entries are places along a span: of two that are symmetric one moves against the other.
 _PLACES = "positions_m"
@@ -125,9 +123,7 @@ def variables_of(tables: Sequence[VariableTable], scene: Scene) -> Variables:
 
 
 def _value(tables: dict[str, Any], key: str, where: str) -> Any:
-    known = known_keys(Scene)
-    if not is_known(key, known):
-        raise InputError(unknown_key(key, f"in {where}", known))
+    check_key(key, f"in {where}")
     found = value_at(tables, key)
     numbers = found if isinstance(found, list) and found else [found]
     if not all(is_number(one) for one in numbers):

@@ -106,6 +106,36 @@ def text_of(value: Any) -> str:
     return text
 
 
+def value_at(tables: Any, key: str) -> Any:
+    """What nested tables have under a dotted key, in which numbers are entries of lists; else None.
+
+    Parameters
+    ----------
+    tables : of a scene, as ``resolved`` gives them
+    """
+    here = tables
+    for part in key.split("."):
+        if isinstance(here, list) and part.isdigit() and int(part) < len(here):
+            here = here[int(part)]
+        else:
+            here = here.get(part) if isinstance(here, dict) else None
+    return here
+
+
+def is_number(value: Any) -> bool:
+    """Whether a value is a number, which true and false are not."""
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def check_key(key: str, where: str) -> None:
+    """Raise InputError if no scene has a dotted key, which stands at ``where``."""
+    from catenary.cases.scene.scene import Scene
+
+    known = known_keys(Scene)
+    if not is_known(key, known):
+        raise InputError(unknown_key(key, where, known))
+
+
 def _quoted(value: Any) -> str:
     """The same within a list or a table, where texts stand in quotes."""
     return json.dumps(value) if isinstance(value, str) else text_of(value)
@@ -223,11 +253,6 @@ def read_named(path: Path) -> dict[str, list[str]]:
 
 def check_keys(variants: Sequence[Variant], where: str) -> None:
     """Raise InputError if an assignment of a variant has an unknown key."""
-    from catenary.cases.scene.scene import Scene
-
-    known = known_keys(Scene)
     for variant in variants:
         for assignment in variant.assignments:
-            key, _ = parse_assignment(assignment, f"variant {variant.name}:")
-            if not is_known(key, known):
-                raise InputError(unknown_key(key, where, known))
+            check_key(parse_assignment(assignment, f"variant {variant.name}:")[0], where)

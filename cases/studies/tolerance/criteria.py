@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 
 from catenary.base.errors import InputError
-from catenary.cases.studies.scene_sets.bounds import BoundTable
-from catenary.cases.studies.scene_sets.evaluate import BROKE
-from catenary.cases.studies.scene_sets.figures import values_of
+from catenary.cases.studies.scene_sets.evaluation import BROKE, values_of
+from catenary.cases.studies.scene_sets.task_tables import BoundTable
 
 # A row for each thing that is measured of a run, such as a pantograph: its criterion and margin.
 Margins = dict[str, list[float]]

@@ -9,12 +9,10 @@ from typing import Any
 import numpy as np
 
 from catenary.base.errors import InputError
-from catenary.cases.scene.keys.error_sentences import unknown_key
-from catenary.cases.scene.keys.keys import is_known, known_keys
 from catenary.cases.scene.keys.units import length_from_mm, unit_of
 from catenary.cases.scene.problem import line_of, resolved
 from catenary.cases.scene.scene import Scene
-from catenary.cases.studies.scene_sets.scene_values import is_number, value_at
+from catenary.cases.studies.sweep.variants import check_key, is_number, value_at
 from catenary.cases.studies.tolerance.task import (
     DropperErrors,
     ErrorKind,
@@ -139,9 +137,7 @@ def _group(table: ErrorKind, scene: Scene, where: str) -> Group:
 
 
 def _of_key(table: KeyErrors, tables: dict[str, Any], where: str) -> Group:
-    known = known_keys(Scene)
-    if not is_known(table.key, known):
-        raise InputError(unknown_key(table.key, f"in {where}", known))
+    check_key(table.key, f"in {where}")
     value = value_at(tables, table.key)
     number = table.entry
     own = value

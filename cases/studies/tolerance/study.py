@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from catenary.base.errors import InputError
+from catenary.cases.process.workers import Pool
 from catenary.cases.scene.load import Draft
 from catenary.cases.studies.records import KeptRows
-from catenary.cases.studies.scene_sets.evaluate import Workers
 from catenary.cases.studies.scene_sets.evaluation import Evaluation, Wanted
 from catenary.cases.studies.scene_sets.scene_set import SceneSet, members_of
 from catenary.cases.studies.tolerance.criteria import Margins, least, margins_of, names_of
@@ -104,7 +104,7 @@ def make_plan(draft: Draft, task: ToleranceTask) -> Plan:
 
 def find_tolerances(
     plan: Plan,
-    workers: Workers | None = None,
+    pool: Pool[Any] | None = None,
     kept: KeptRows | None = None,
     say: Callable[[str], None] = lambda line: None,
 ) -> list[Tolerance]:
@@ -112,7 +112,7 @@ def find_tolerances(
 
     Parameters
     ----------
-    workers : processes that share the runs, None for this one
+    pool : processes that share the runs, None for this one
     kept : runs that are not made again
     say : called with lines on the way
 
@@ -121,7 +121,7 @@ def find_tolerances(
     InputError
         If a run of the line without errors broke, or nothing is judged.
     """
-    search = _Search(plan, Evaluation(workers, kept), say)
+    search = _Search(plan, Evaluation(pool, kept), say)
     found: list[Tolerance] = []
     for varied in search.varied:
         for criterion in search.criteria:

@@ -1,13 +1,20 @@
-"""Bounds on statistics of runs."""
+"""Tables that files of studies over sets of scenes share, and how such a file is read."""
 
 from __future__ import annotations
 
-from typing import Annotated
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, TypeVar
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, Field, ValidationError, model_validator
 
+from catenary.cases.scene.input.faults import Origin, SceneError, text_faults
+from catenary.cases.scene.input.toml_input import read_toml
+from catenary.cases.scene.keys.error_sentences import schema_faults
 from catenary.cases.scene.keys.table import Table
 from catenary.cases.studies.sweep.jobs import STATISTICS
+
+OwnTable = TypeVar("OwnTable", bound=Table)
 
 
 def _is_statistic(name: str) -> str:
@@ -52,3 +59,26 @@ class BoundTable(Table):
         bound = self.at_most if self.at_least is None else self.at_least
         assert bound is not None
         return abs(bound) if abs(bound) >= 1.0 else 100.0
+
+
+def read_task(task: Path | Mapping[str, Any], model: type[OwnTable]) -> OwnTable:
+    """The checked content of a task: a TOML file, or its nested tables.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, or with all faults of its keys.
+    """
+    if isinstance(task, Mapping):
+        raw, origin = dict(task), Origin("the table of the task")
+    else:
+        raw, origin = read_toml(task), Origin(str(task))
+    faults, more = text_faults(raw, origin), 0
+    try:
+        table = model.model_validate(raw)
+    except ValidationError as failed:
+        of_schema, more = schema_faults(failed, raw, model, origin)
+        faults += of_schema
+    if faults:
+        raise SceneError(faults, more)
+    return table
