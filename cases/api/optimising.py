@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from catenary.cases.studies.optimise.task import OptimiseTask
 from catenary.cases.studies.records import KeptRows
-from catenary.cases.studies.scene_sets.task_tables import read_task
+from catenary.cases.studies.task_files import read_task
 from catenary.cases.studies.tolerance.task import ToleranceTask
 from catenary.runs import _line, _nothing
 from catenary.scenes import Scene, SceneLike, draft_of, plain_value, scene_of

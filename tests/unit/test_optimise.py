@@ -25,7 +25,7 @@ from catenary.cases.studies.optimise.task import OptimiseTask, VariableTable
 from catenary.cases.studies.optimise.variables import variables_of
 from catenary.cases.studies.scene_sets import evaluation
 from catenary.cases.studies.scene_sets.evaluation import BROKE
-from catenary.cases.studies.scene_sets.task_tables import read_task
+from catenary.cases.studies.task_files import read_task
 from catenary.cases.studies.tolerance.study import make_plan
 from catenary.cases.studies.tolerance.task import ToleranceTask
 

@@ -20,7 +20,8 @@ from catenary.cases.scene.problem import line_of
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.scene_sets import evaluation
 from catenary.cases.studies.scene_sets.evaluation import BROKE
-from catenary.cases.studies.scene_sets.task_tables import BoundTable, read_task
+from catenary.cases.studies.scene_sets.scene_set import BoundTable
+from catenary.cases.studies.task_files import read_task
 from catenary.cases.studies.tolerance.criteria import least, margins_of
 from catenary.cases.studies.tolerance.errors import Group, groups_of
 from catenary.cases.studies.tolerance.output import as_text, installer_table

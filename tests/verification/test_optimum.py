@@ -16,7 +16,7 @@ from catenary.cases.studies.optimise.checks import AS_IS, FINER_MESH, SHORTER_ST
 from catenary.cases.studies.optimise.task import OptimiseTask
 from catenary.cases.studies.scene_sets.evaluation import BROKE, Evaluation, evaluate, workers
 from catenary.cases.studies.scene_sets.scene_set import BACKWARD, SceneSet, SetTable, members_of
-from catenary.cases.studies.scene_sets.task_tables import read_task
+from catenary.cases.studies.task_files import read_task
 from catenary.cases.studies.tolerance import study as tolerating
 from catenary.cases.studies.tolerance.task import ToleranceTask
 

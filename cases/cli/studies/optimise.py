@@ -38,7 +38,7 @@ def optimise(
     """Serial."""
     from catenary.cases.studies.optimise import study
     from catenary.cases.studies.optimise.task import OptimiseTask
-    from catenary.cases.studies.scene_sets.task_tables import read_task
+    from catenary.cases.studies.task_files import read_task
 
     refuse_table(out / "optimise.json", force)
     draft, _ = SceneWords(case, assignments=assignments).draft()

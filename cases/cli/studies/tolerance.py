@@ -28,7 +28,7 @@ def tolerance(
     """Serial."""
     from catenary.cases.studies.records import held_study
     from catenary.cases.studies.scene_sets.evaluation import workers
-    from catenary.cases.studies.scene_sets.task_tables import read_task
+    from catenary.cases.studies.task_files import read_task
     from catenary.cases.studies.tolerance import output, study
     from catenary.cases.studies.tolerance.task import ToleranceTask
 

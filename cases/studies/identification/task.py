@@ -2,18 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
-from pydantic import Field, ValidationError, model_validator
+from pydantic import Field, model_validator
 
-from catenary.base.errors import InputError
-from catenary.cases.scene.input.faults import Origin
-from catenary.cases.scene.input.plain_text import plain
-from catenary.cases.scene.input.toml_input import read_toml
-from catenary.cases.scene.keys.error_sentences import schema_faults
-from catenary.cases.scene.keys.keys import nearest
 from catenary.cases.scene.keys.table import Table
 
 _UNITS = {"N": 1.0, "kN": 1e3, "m": 1.0, "cm": 1e-2, "mm": 1e-3, "km": 1e3, "s": 1.0, "ms": 1e-3}
@@ -128,54 +120,3 @@ class Task(Table):
         if not self.parameters and self.droppers is None:
             raise ValueError("must have [[parameters]] or [droppers] to look for")
         return self
-
-
-_KEYS: dict[str, Sequence[str]] = {
-    "": list(Task.model_fields),
-    "measured": list(Measured.model_fields),
-    "measured.place": list(Place.model_fields),
-    "measured.time": list(Time.model_fields),
-    "measured.force": list(Force.model_fields),
-    "measured.head_height": list(Height.model_fields),
-    "parameters": list(Sought.model_fields),
-    "droppers": list(Droppers.model_fields),
-}
-
-
-def read_task(path: Path) -> Task:
-    """The task of a file. Not collective.
-
-    Raises
-    ------
-    InputError
-        As ``task_of``, and if it is no TOML.
-    """
-    return task_of(read_toml(path), str(path))
-
-
-def task_of(raw: dict[str, Any], name: str) -> Task:
-    """The task of nested tables, which sentences call ``name``.
-
-    Raises
-    ------
-    InputError
-        If it is none: one sentence about its first fault.
-    """
-    try:
-        return Task.model_validate(raw)
-    except ValidationError as failed:
-        first = min(failed.errors(), key=lambda one: one["type"] != "extra_forbidden")
-        if first["type"] == "extra_forbidden":
-            raise InputError(_unknown(first["loc"], name)) from failed
-        faults, _ = schema_faults(failed, raw, Task, Origin(name))
-        raise InputError(faults[0].sentence.replace("the scene in ", "the task in ")) from failed
-
-
-def _unknown(location: tuple[int | str, ...], name: str) -> str:
-    *above, last = (str(part) for part in location)
-    known = _KEYS[".".join(part for part in above if not part.isdigit())]
-    near = nearest(last, list(known))
-    key = plain(".".join([*above, last]), 100)
-    return f"{key} in {name} is unknown: " + (
-        f"did you mean {near}?" if near else f"it takes {', '.join(known)}"
-    )

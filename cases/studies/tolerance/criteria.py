@@ -9,7 +9,7 @@ import numpy as np
 
 from catenary.base.errors import InputError
 from catenary.cases.studies.scene_sets.evaluation import BROKE, values_of
-from catenary.cases.studies.scene_sets.task_tables import BoundTable
+from catenary.cases.studies.scene_sets.scene_set import BoundTable
 
 # A row for each thing that is measured of a run, such as a pantograph: its criterion and margin.
 Margins = dict[str, list[float]]
