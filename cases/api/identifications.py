@@ -116,9 +116,10 @@ def identify(
     comm = alone()  # starts MPI as one process, before anything imports it
     from catenary.cases.studies.identification import output
     from catenary.cases.studies.identification.study import identify as identified
-    from catenary.cases.studies.identification.task import read_task, task_of
+    from catenary.cases.studies.identification.task import Task
+    from catenary.cases.studies.task_files import read_task
 
-    wanted = task_of(dict(task), "the task") if isinstance(task, Mapping) else read_task(Path(task))
+    wanted = read_task(task if isinstance(task, Mapping) else Path(task), Task)
     samples = measured if isinstance(measured, pd.DataFrame) else Path(measured)
     found = identified(own, samples, wanted, comm)
     tables = [

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from catenary.cases.studies.optimise.task import OptimiseTask
 from catenary.cases.studies.records import KeptRows
-from catenary.cases.studies.scene_sets.task_file import read_task
+from catenary.cases.studies.task_files import read_task
 from catenary.cases.studies.tolerance.task import ToleranceTask
 from catenary.runs import _line, _nothing
 from catenary.scenes import Scene, SceneLike, draft_of, plain_value, scene_of
@@ -98,8 +99,7 @@ def optimise(
         Folder into which all is written that ``catenary optimise -o`` writes. Runs that are kept
         there are not made again.
     jobs : int
-        Processes that share the runs, 0 for one on each core. With more than one a script needs
-        ``if __name__ == "__main__":`` about its work.
+        Processes that share the runs, 0 for one on each core.
     force : bool
         Whether results in ``out`` are replaced.
     progress : bool
@@ -129,14 +129,13 @@ def optimise(
     """
     from catenary.cases.result_folder.output_folder import refuse_table
     from catenary.cases.studies.optimise import output, study
-    from catenary.cases.studies.scene_sets.evaluate import workers
 
     scene = scene_of(scene)
     if out is not None:
         refuse_table(Path(out) / output.RECORD, force)
     plan = study.make_plan(draft_of(scene), _task(task, OptimiseTask))
     kept = KeptRows(None if out is None else Path(out), force)
-    with workers(jobs) as pool:
+    with _workers(jobs) as pool:
         found = study.optimise(plan, pool, kept, _line if progress else _nothing)
     if out is not None:
         output.write(Path(out), plan, found)
@@ -208,20 +207,32 @@ def tolerance(
     import pandas as pd
 
     from catenary.cases.result_folder.output_folder import refuse_table
-    from catenary.cases.studies.scene_sets.evaluate import workers
     from catenary.cases.studies.tolerance import output, study
 
     if out is not None:
         refuse_table(Path(out) / output.TABLE, force)
     plan = study.make_plan(draft_of(scene), _task(task, ToleranceTask))
     kept = KeptRows(None if out is None else Path(out), force)
-    with workers(jobs) as pool:
+    with _workers(jobs) as pool:
         found = study.find_tolerances(plan, pool, kept, _line if progress else _nothing)
     if out is not None:
         output.write(Path(out), plan, found)
         kept.forget()
     rows: Sequence[Mapping[str, Any]] = output.table_of(found).records()
     return pd.DataFrame(rows)
+
+
+@contextmanager
+def _workers(jobs: int) -> Iterator[Any]:
+    """Processes that share runs; a signal to them is one to this process."""
+    from catenary.cases.process.interrupts import Interrupted
+    from catenary.cases.studies.scene_sets.evaluation import workers
+
+    try:
+        with workers(jobs) as pool:
+            yield pool
+    except Interrupted as stopped:
+        raise KeyboardInterrupt from stopped
 
 
 def _task(task: Task, model: Any) -> Any:

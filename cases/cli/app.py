@@ -16,8 +16,9 @@ from catenary.cases.cli import completion
 from catenary.cases.terminal import console
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
+    from catenary.cases.scene.load import Draft
     from catenary.cases.scene.scene import Scene
 
 T = TypeVar("T")
@@ -120,6 +121,13 @@ class SceneWords:
         if options:
             raise InputError(f"{options[0]} after -- is a PETSc option; only run takes those")
         return changes
+
+    def draft(self) -> tuple[Draft, list[str]]:
+        """The case with its assignments, not checked, and options for PETSc. Not collective."""
+        from catenary.cases.scene.load import read_draft
+
+        changes, options = self.split()
+        return read_draft(self.case, changes, self.shortened), options
 
     def load(self, *further: str) -> Scene:
         """The scene, with further assignments. Not collective."""
@@ -236,3 +244,10 @@ def begin(
 
     console.at_end(warn)
     return comm, what, arguments
+
+
+def tell(text: str, files: Sequence[Path]) -> None:
+    """Print what a study found, and the files that it has written. Not collective."""
+    console.say("\n" + text)
+    if files:
+        console.say("\n" + "\n".join(map(str, files)))

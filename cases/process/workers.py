@@ -19,7 +19,7 @@ import time
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from multiprocessing import Pipe
 from multiprocessing.connection import wait
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, Generic, NamedTuple, TypeVar
 
 from catenary.base.errors import CatenaryError, InputError, RunBroken
 from catenary.base.parallel import launched_by_mpirun, wait_for_all
@@ -132,7 +132,8 @@ def each(
     elif comm.size > 1:
         yield from _on_ranks(function, list(items), comm)
     else:
-        yield from _in_processes(function, items, n_at_once, initialise)
+        with Pool(n_at_once, function, initialise) as pool:
+            yield from pool.of(items)
 
 
 def in_order(outcomes: Iterable[Outcome]) -> Iterator[Outcome]:
@@ -210,51 +211,79 @@ def _gathered(own: Iterator[Outcome], comm: Any) -> Iterator[Outcome]:
                 yield theirs
 
 
-def _in_processes(
-    function: Callable[[T, Any], Any],
-    items: Iterable[T],
-    n_at_once: int,
-    initialise: Callable[[], object] | None,
-) -> Iterator[Outcome]:
-    left = enumerate(items)
-    idle: list[_Process] = []
-    busy: list[_Process] = []
-    gone: list[_Process] = []
-    more, stopped_at = True, 0.0
-    try:
-        with StopRequest() as stop:
-            while True:
-                while more and not stop() and len(busy) < n_at_once:
-                    number, item = next(left, (-1, None))
-                    more = number >= 0
-                    if more:
-                        idle = [one for one in idle if one.is_there()]
-                        one = idle.pop() if idle else _Process(initialise, function)
-                        busy.append(one)
-                        one.begin(number, item)
-                if not busy:
-                    return
-                if stop() and not stopped_at:
-                    stopped_at = time.monotonic()
-                    for one in busy:
-                        one.stop()
-                if stopped_at and time.monotonic() > stopped_at + _GRACE:
-                    return
-                ready = wait([one.connection for one in busy], _LOOK)
-                for one in [one for one in busy if one.connection in ready]:
-                    outcome = one.received()
-                    if outcome is None:  # a line of its log
-                        continue
-                    busy.remove(one)
-                    (idle if one.goes_on else gone).append(one)
-                    if not (stopped_at and isinstance(outcome.error, WorkerLost)):
-                        yield outcome
-    finally:
-        for one in busy:
-            one.stop()
-        last = (stopped_at or time.monotonic()) + _GRACE
-        for one in (*idle, *busy, *gone):
-            one.end(last)
+class Pool(Generic[T]):
+    """Processes that last from one series of items to the next. A context manager; not collective.
+
+    Parameters
+    ----------
+    n : how many there are at most; they start when there is work
+    function, initialise : as of ``each``
+    """
+
+    def __init__(
+        self,
+        n: int,
+        function: Callable[[T, Any], Any],
+        initialise: Callable[[], object] | None = None,
+    ) -> None:
+        self.n = n
+        self._function, self._initialise = function, initialise
+        self._idle: list[_Process] = []
+
+    def of(self, items: Iterable[T]) -> Iterator[Outcome]:
+        """What the function gives for each item, as of ``each``."""
+        left = enumerate(items)
+        busy: list[_Process] = []
+        gone: list[_Process] = []
+        more, stopped_at = True, 0.0
+        try:
+            with StopRequest() as stop:
+                while True:
+                    while more and not stop() and len(busy) < self.n:
+                        number, item = next(left, (-1, None))
+                        more = number >= 0
+                        if more:
+                            busy.append(self._process())
+                            busy[-1].begin(number, item)
+                    if not busy:
+                        return
+                    if stop() and not stopped_at:
+                        stopped_at = time.monotonic()
+                        for one in busy:
+                            one.stop()
+                    if stopped_at and time.monotonic() > stopped_at + _GRACE:
+                        return
+                    ready = wait([one.connection for one in busy], _LOOK)
+                    for one in [one for one in busy if one.connection in ready]:
+                        outcome = one.received()
+                        if outcome is None:  # a line of its log
+                            continue
+                        busy.remove(one)
+                        (self._idle if one.goes_on else gone).append(one)
+                        if not (stopped_at and isinstance(outcome.error, WorkerLost)):
+                            yield outcome
+        finally:
+            for one in busy:
+                one.stop()
+            _end((*busy, *gone), stopped_at)
+
+    def _process(self) -> _Process:
+        """One that has nothing to do, or a new one."""
+        self._idle = [one for one in self._idle if one.is_there()]
+        return self._idle.pop() if self._idle else _Process(self._initialise, self._function)
+
+    def __enter__(self) -> Pool[T]:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        _end(self._idle)
+
+
+def _end(processes: Sequence[_Process], stopped_at: float = 0.0) -> None:
+    """Wait for the end of processes that were stopped at a time of the monotonic clock [s]."""
+    last = (stopped_at or time.monotonic()) + _GRACE
+    for one in processes:
+        one.end(last)
 
 
 class _Process:

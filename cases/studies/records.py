@@ -13,6 +13,7 @@ import logging
 import shutil
 import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -162,3 +163,37 @@ class _Keeping:
         rows = self._function(item, comm)
         on_root(comm, lambda: self._kept.keep(depends_on, rows))
         return rows
+
+
+@contextmanager
+def held_study(
+    out: Path | None, comm: Any, command: str, force: bool = False
+) -> Iterator[tuple[KeptRows, Callable[[Callable[[Path], list[Path]]], list[Path]]]]:
+    """Hold the folder of a study: its kept rows, and what writes its files in their place.
+
+    Collective.
+
+    Parameters
+    ----------
+    out : the folder, None to keep and write nothing
+    command : what this process does, for others that want the folder
+    force : forget what is kept there
+    """
+    from catenary.cases.result_folder.folder_lock import held
+
+    if out is None:
+        yield KeptRows(None), lambda write: []
+        return
+
+    def written(write: Callable[[Path], list[Path]]) -> list[Path]:
+        def work() -> list[Path]:
+            files = write(out)
+            kept.forget()
+            return files
+
+        files: list[Path] = on_root(comm, work, takes_long=True)
+        return files
+
+    with held(out, comm, command):
+        kept = KeptRows(out, force and comm.rank == 0)
+        yield kept, written

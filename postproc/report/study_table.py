@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, NamedTuple
 
 from catenary.postproc.files.csv_text import csv_text, number_text
@@ -157,6 +158,51 @@ def texts_table(
 def rows_csv(rows: Sequence[Row]) -> str:
     """Rows with the same keys, at least one, as CSV text."""
     return StudyTable([Column(name) for name in rows[0]], rows).csv()
+
+
+# What a file of a study holds, see ``write_files``.
+Content = StudyTable | Mapping[str, Any] | Sequence[Row] | Callable[[], Any] | str | bytes
+
+
+def write_files(folder: Path, content: Mapping[str, Content]) -> list[Path]:
+    """Write what a study leaves, all files or none; returns their paths. Not collective.
+
+    Parameters
+    ----------
+    folder : made if it is not there
+    content : by names of files. A table, or rows with the same keys, become CSV, a mapping JSON,
+        and what a function draws a picture; no rows, and a picture that there is none of or that
+        fails, are left out; texts and bytes are written as they are
+
+    Raises
+    ------
+    RunBroken
+        If the disk refuses.
+    """
+    from catenary.postproc.files.disk import write_all
+
+    files: dict[str, bytes | str] = {}
+    for name, own in content.items():
+        if isinstance(own, str | bytes):
+            files[name] = own
+        elif isinstance(own, StudyTable):
+            files[name] = own.csv()
+        elif isinstance(own, Mapping):
+            files[name] = json_text(own)
+        elif callable(own):
+            from catenary.postproc.report.pictures import figures
+
+            files |= figures.painted(name, own)
+        elif own:
+            files[name] = rows_csv(own)
+    return write_all(folder, files)
+
+
+def json_text(record: Mapping[str, Any]) -> str:
+    """A record as the text of a JSON file."""
+    from catenary.postproc.files.disk import plain
+
+    return json.dumps(plain(record), indent=1, ensure_ascii=False) + "\n"
 
 
 def remark_lines(runs: Iterable[tuple[str, Sequence[str]]]) -> list[str]:

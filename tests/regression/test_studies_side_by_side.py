@@ -11,6 +11,7 @@ from mpi4py import MPI
 from program import SHORT_SCENE, catenary
 
 from catenary.cases.scene.input.case_files import shipped
+from catenary.cases.scene.load import read_draft
 from catenary.cases.studies.records import KeptRows
 from catenary.cases.studies.stability.map import Grid, make_map
 
@@ -37,11 +38,6 @@ ACCURACY = ["--axes", "dt,dropper", "--quick", "--repeats", "2", "--target", "3%
 # Words, table, and columns with times, which depend on the machine.
 STUDIES = {
     "hard": (["hard", "undamped_line", "speed_0.7", "--short"], "hard.csv", ()),
-    "waves": (
-        ["waves", CASE, "--separations", "20,25", *SET, "evaluation.to_m=230"],
-        "separations.csv",
-        ("wall_s",),
-    ),
     "cost": (
         ["plan", CASE, "--cost", "--only", "dropper_slackening", "--rounds", "1", *SET],
         "cost.csv",
@@ -83,7 +79,13 @@ def test_tables_are_the_same_for_any_number_at_a_time(study: str, tmp_path: Path
 def test_a_stability_map_is_the_same_in_two_processes(tmp_path: Path) -> None:
     grid = Grid((1e6, 1e7), (2.0,), (1e6,), (2.0,))
     one, two = (
-        make_map(CASE, [], True, MPI.COMM_SELF, grid, kept=KeptRows(tmp_path / str(n)), n_at_once=n)
+        make_map(
+            read_draft(CASE, (), True),
+            MPI.COMM_SELF,
+            grid,
+            kept=KeptRows(tmp_path / str(n)),
+            n_at_once=n,
+        )
         for n in (1, 2)
     )
     assert one == two
@@ -94,7 +96,6 @@ def test_a_stability_map_is_the_same_in_two_processes(tmp_path: Path) -> None:
     ("words", "told"),
     [
         (["run", CASE, "-o", "out", "-j", "2"], "-j and --part belong to --study"),
-        (["waves", CASE, "-o", "out", "-j", "2"], "-j belongs to --separations"),
         (["plan", CASE, "-j", "2"], "-j belongs to plan --cost"),
         (["sweep", CASE, "-o", "out", "-j", "-1"], "greater than or equal to 0"),
     ],

@@ -17,10 +17,17 @@ import catenary
 from catenary.base.errors import InputError
 from catenary.cases.cli.main import app
 from catenary.cases.scene.load import read_draft
-from catenary.cases.studies.questions.highest_speed import ALL, KEY, Speeds, SpeedStudy, find_speeds
-from catenary.cases.studies.questions.marching import Marching
-from catenary.cases.studies.questions.speed_output import as_text, table_of_criteria
+from catenary.cases.studies.questions.highest_speed import (
+    ALL,
+    KEY,
+    Speeds,
+    SpeedStudy,
+    as_text,
+    find_speeds,
+    table_of_criteria,
+)
 from catenary.cases.studies.sweep.jobs import AS_USUAL, Ended
+from catenary.cases.studies.sweep.together import Marching
 from catenary.cases.studies.sweep.variants import Variant
 
 CASE = "en50318_2002"
@@ -62,7 +69,8 @@ def searched(
         return ended
 
     monkeypatch.setattr(Marching, "of", of)
-    found = find_speeds(read_draft(CASE), (), speeds, wanted, None, MPI.COMM_SELF, AS_USUAL)
+    marching = Marching(read_draft(CASE), None, MPI.COMM_SELF, AS_USUAL)
+    found = find_speeds(marching, CASE, speeds, wanted)
     return found, marched
 
 

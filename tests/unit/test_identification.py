@@ -24,9 +24,10 @@ from catenary.cases.studies.identification.measurement import Measurement
 from catenary.cases.studies.identification.noise import Whitening, correlation
 from catenary.cases.studies.identification.posterior import posterior_of
 from catenary.cases.studies.identification.residuals import innovations_of, judge
-from catenary.cases.studies.identification.task import task_of
+from catenary.cases.studies.identification.task import Task
 from catenary.cases.studies.measured.description import Measured
 from catenary.cases.studies.measured.table_file import read_table
+from catenary.cases.studies.task_files import checked_table
 from catenary.postproc.evaluate import filters
 
 CASE = "en50318_2002"
@@ -277,9 +278,9 @@ SOUGHT = [{"key": FORCE, "deviation": 4.0}]
         ({"measured": {"place": {"column": "x"}}, "parameters": SOUGHT},
          "must name the column of force, of head_height, or of both"),
         ({"measured": {**MEASURED, "filter_hz": 20.0}, "parameters": SOUGHT},
-         "measured.filter_hz in t.toml is unknown: did you mean filter_Hz?"),
+         "measured.filter_hz in t.toml is unknown; did you mean measured.filter_Hz?"),
         ({"measured": MEASURED, "parameters": [{"key": FORCE, "sigma": 4.0}]},
-         "parameters.0.sigma in t.toml is unknown: it takes key, deviation, mean"),
+         "parameters.0.sigma in t.toml is unknown"),
         ({"measured": MEASURED, "parameters": [{"key": FORCE, "deviation": 0.0}]},
          "parameters.0.deviation is 0.0 in t.toml; it must be greater than 0"),
         ({"measured": MEASURED, "droppers": {"spans": [], "deviation_mm": 2.0}}, "droppers.spans"),
@@ -289,7 +290,7 @@ SOUGHT = [{"key": FORCE, "deviation": 4.0}]
 )  # fmt: skip
 def test_a_wrong_task_is_told_in_one_sentence(task: dict[str, Any], told: str) -> None:
     with pytest.raises(InputError) as raised:
-        task_of(task, "t.toml")
+        checked_table(task, Task, "t.toml")
     assert told in str(raised.value) and "\n" not in str(raised.value)
     assert "t.toml" in str(raised.value)
 

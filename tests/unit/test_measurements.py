@@ -19,8 +19,9 @@ from catenary.base.errors import InputError
 from catenary.cases.cli.main import app
 from catenary.cases.run.runner import run_case
 from catenary.cases.scene.load import load_scene
-from catenary.cases.studies.measured.description import Description, validated
+from catenary.cases.studies.measured.description import Description
 from catenary.cases.studies.measured.passages import passage_of
+from catenary.cases.studies.task_files import checked_table
 from catenary.postproc.evaluate.compare import compare
 from catenary.postproc.evaluate.span_differences import SpanSums, differences, span_sums
 from catenary.postproc.measurements.alignment import align, correlation_time
@@ -66,7 +67,7 @@ def found_in(run: Path, table: pd.DataFrame, folder: Path = Path(), **tables: An
     """What a description tells of a table."""
     tables.setdefault("measured", PLACES)
     with Results(run) as results:
-        own = validated(Description, tables, "m.toml", "the description")
+        own = checked_table(tables, Description, "m.toml")
         return compare_with(results, passage_of(table, Path("m.csv"), own, folder, results))
 
 

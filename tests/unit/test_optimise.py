@@ -20,13 +20,12 @@ from catenary.cases.scene.load import Draft, read_draft
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.optimise import output, study
 from catenary.cases.studies.optimise.checks import AS_IS, Row, change, not_improved, trap
-from catenary.cases.studies.optimise.droppers import dropper_table
-from catenary.cases.studies.optimise.rest import least_forces
+from catenary.cases.studies.optimise.droppers import dropper_table, least_forces
 from catenary.cases.studies.optimise.task import OptimiseTask, VariableTable
 from catenary.cases.studies.optimise.variables import variables_of
 from catenary.cases.studies.scene_sets import evaluation
-from catenary.cases.studies.scene_sets.evaluate import BROKE
-from catenary.cases.studies.scene_sets.task_file import read_task
+from catenary.cases.studies.scene_sets.evaluation import BROKE
+from catenary.cases.studies.task_files import read_task
 from catenary.cases.studies.tolerance.study import make_plan
 from catenary.cases.studies.tolerance.task import ToleranceTask
 

@@ -15,11 +15,15 @@ from catenary.cases.cli.main import app
 from catenary.cases.scene.load import load_scene
 from catenary.cases.studies.questions.separation import (
     Distances,
-    Pair,
+    Period,
     SeparationStudy,
-    _variant,
+    as_text,
+    period_of,
+    variant_of,
 )
-from catenary.cases.studies.questions.separation_output import as_text
+from catenary.cases.studies.waves.theory import WaveTheory
+from catenary.postproc.report.study_table import Row
+from catenary.solver.waves.bloch import BlochWaves
 
 CASE = "en50318_2002"
 
@@ -48,31 +52,64 @@ def test_what_is_no_range_is_refused(words: list[str], told: str) -> None:
 
 def test_the_train_ends_as_much_later_as_it_is_longer() -> None:
     scene = load_scene(CASE, ["train.end_m=900"])
-    assert _variant(scene, "reference", 50.0).assignments[:2] == (
+    assert variant_of(scene, 50.0).assignments[:2] == (
         "train.start_m=140", "train.end_m=950",
     )  # fmt: skip
 
 
-def pair(at: float, std: tuple[float, float], *failed: str, outcome: str = "done") -> Pair:
-    return Pair(at, outcome, std, (1.0, 1.0), (0.0, 0.0), 50.0, failed, ())
+def pair(
+    at: float | None, leading: float, trailing: float | None, *failed: str, outcome: str = "done"
+) -> Row:
+    row = {"separation_m": at, "outcome": outcome, "max_uplift_mm": 50.0, "remarks": []}
+    return row | {"std_leading_N": leading, "std_trailing_N": trailing, "failed": [*failed]} | {
+        f"{name}_{place}_{unit}": 0.0
+        for name, unit in (("min", "N"), ("loss", "percent"))
+        for place in ("leading", "trailing")
+    }  # fmt: skip
 
 
 def test_the_worse_pantograph_decides_and_failing_stretches_are_joined() -> None:
-    alone = Pair(None, "done", (20.0,), (1.0,), (0.0,), 50.0, (), ())
-    pairs = (
-        pair(30, (20.0, 40.0), "arcing"),
-        pair(40, (20.0, 41.0), "arcing"),
-        pair(50, (39.0, 10.0)),
-        pair(60, (70.0, 20.0), "arcing"),
-        pair(70, (0.0, 0.0), outcome="is too far"),
-    )
-    study = SeparationStudy("case", "kind", 250.0, alone, pairs)
-    best, worst = study.best(), study.worst()
-    assert best is not None and worst is not None
-    assert (best.separation, worst.separation) == (50, 60)
-    text = as_text(study)
+    rows = [
+        pair(None, 20.0, None),
+        pair(30, 20.0, 40.0, "arcing"),
+        pair(40, 20.0, 41.0, "arcing"),
+        pair(50, 39.0, 10.0),
+        pair(60, 70.0, 20.0, "arcing"),
+        pair(70, 0.0, 0.0, outcome="is too far"),
+    ]
+    study = SeparationStudy("case", "kind", 250.0, rows)
+    ranked = study.by_deviation
+    assert [row["separation_m"] for row in ranked] == [50, 30, 40, 60]
+    nowhere = Period(np.nan, np.nan, np.full(2, np.nan), 91.0)
+    text = as_text(study, nowhere)
     assert "arcing: at 30-40, 60 m" in text
     assert "1 of 5 distances could not be run, the first is 70 m: is too far" in text
+    assert "fewer than 12 distances; waves travel back every 91 m." in text and "nan" not in text
+
+
+SPEED, WAVES, SPAN = 80.0, 120.0, 50.0
+BAND = (1.0, 1.25)
+
+
+def theory() -> WaveTheory:
+    frequency = np.array([[BAND[0]], [BAND[1]]])
+    empty = np.zeros((2, 1, 0), dtype=complex)
+    waves = BlochWaves(SPAN, np.array([0.0, np.pi]), frequency, frequency, empty, np.zeros(0))
+    return WaveTheory(SPEED, WAVES, (), 0.2, 0.4, 2.0, waves, "")
+
+
+@pytest.mark.parametrize("period", [45.0, 72.0])
+def test_a_period_is_found_in_a_decaying_curve(period: float) -> None:
+    d = np.linspace(31.0, 400.0, 40)
+    sigma = 60.0 + 30.0 * np.exp(-d / 250.0) * np.sin(2 * np.pi * d / period + 0.7)
+    found = period_of(d, sigma, theory(), SPAN)
+    # Reaches of the fit are not that of the curve.
+    assert found.fitted == pytest.approx(period, rel=0.02) and found.explains > 0.98
+    np.testing.assert_allclose(found.ringing, [SPEED / BAND[1], SPEED / BAND[0]])
+    assert found.travel == pytest.approx(SPAN * (WAVES + SPEED) / WAVES)
+    assert np.isnan(period_of(d[:5], sigma[:5], theory(), SPAN).fitted)
+    study = SeparationStudy("case", "kind", 250.0, [pair(None, 1.0, None), pair(30, 1.0, 2.0)])
+    assert f"A period of {period:.0f} m explains" in as_text(study, found)
 
 
 def test_the_command_agrees_with_runs_by_hand(tmp_path: Path) -> None:
@@ -103,6 +140,10 @@ def test_the_command_agrees_with_runs_by_hand(tmp_path: Path) -> None:
     record = json.loads((tmp_path / "separation.json").read_text())
     worse = {float(r["separation_m"]): float(r["std_trailing_N"]) for r in (near, far)}
     assert record["worst_separation_m"] == max(worse, key=lambda at: worse[at])
+    # 250 km/h over the lowest pass band; 69.4 m/s and 121.7 m/s on spans of 60 m.
+    assert record["travel_m"] == pytest.approx(60 * (1 + 250 / 3.6 / np.sqrt(20e3 / 1.35)))
+    low, high = record["ringing_m"]
+    assert 40 < low < high < 100 and record["fitted_period_m"] is None
     assert (tmp_path / "separation.png").is_file()
 
 

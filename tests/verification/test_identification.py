@@ -25,9 +25,10 @@ from catenary.cases.studies.identification.output import as_text, verdict
 from catenary.cases.studies.identification.posterior import posterior_of
 from catenary.cases.studies.identification.residuals import innovations_of, judge
 from catenary.cases.studies.identification.study import Identification, identify
-from catenary.cases.studies.identification.task import task_of
+from catenary.cases.studies.identification.task import Task
 from catenary.cases.studies.measured.table_file import read_table
 from catenary.cases.studies.sensitivity.parameters import ChangedScenes
+from catenary.cases.studies.task_files import read_task
 
 FORCE_NOISE, HEIGHT_NOISE = 5.0, 5e-3
 CASE = "en50318_2002"
@@ -73,7 +74,7 @@ def identified(
     filtered: bool = True,
 ) -> Identification:
     """What is found of these."""
-    task = task_of(task_with(priors, spans, filtered), "the task")
+    task = read_task(task_with(priors, spans, filtered), Task)
     return identify(scene, file, task, MPI.COMM_SELF)
 
 
@@ -165,7 +166,7 @@ def test_widths_are_right_in_repeated_linear_trials(tmp_path: Path) -> None:
     problem = problem_of(scenes.scene)
     parameters = [*(scenes.parameter(key) for key in FEW), *scenes.droppers_of([3])]
     prior = np.array([*FEW.values(), *[2.0] * 9])
-    columns = task_of(task_with(FEW, [3], True), "the task").measured
+    columns = read_task(task_with(FEW, [3], True), Task).measured
     measurement = Measurement(
         read_table(file), "m", columns, problem.train.speed, 65.0, problem.evaluation
     )

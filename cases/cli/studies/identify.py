@@ -49,17 +49,17 @@ def identify(
 ) -> int:
     """Serial."""
     from catenary.cases.result_folder.output_folder import refuse_table
-    from catenary.cases.studies.identification.task import read_task
+    from catenary.cases.studies.identification.task import Task
+    from catenary.cases.studies.task_files import read_task
 
-    wanted = read_task(task)
+    wanted = read_task(task, Task)
     scene = SceneWords(case, extras, assignments, shortened).load()
     from catenary.cases.studies.identification.output import PARAMETERS, as_text, files_of
     from catenary.cases.studies.identification.study import identify as identified
-    from catenary.postproc.files.disk import write_all
+    from catenary.postproc.report.study_table import write_files
 
     refuse_table(out / PARAMETERS, force)
     found = identified(scene, measured, wanted, console.alone())
     console.say(as_text(found))
-    for path in write_all(out, files_of(found)):
-        console.say(f"{path}")
+    console.say("\n".join(map(str, write_files(out, files_of(found)))))
     return console.DONE

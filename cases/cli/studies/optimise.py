@@ -1,32 +1,19 @@
-"""The verb ``optimise``."""
+"""The verbs ``optimise`` and ``tolerance``: studies over sets of scenes, by a task in a file."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-from catenary.cases.cli.app import Assignments, Case, Force, Jobs, Out, app
+from catenary.cases.cli.app import Assignments, Case, Force, Jobs, Out, SceneWords, app, tell
 from catenary.cases.result_folder.output_folder import refuse_table
 from catenary.cases.terminal import console
-
-if TYPE_CHECKING:
-    from catenary.cases.scene.load import Draft
 
 TaskFile = Annotated[
     Path, typer.Argument(metavar="FILE", help="TOML file with the task.", show_default=False)
 ]
-
-
-def draft_of(case: str, assignments: list[str] | None) -> Draft:
-    """The case with its assignments, not shortened."""
-    from catenary.cases.scene.input.faults import COMMAND_LINE
-    from catenary.cases.scene.input.toml_input import parse_assignment
-    from catenary.cases.scene.load import read_draft
-
-    pairs = [parse_assignment(text) for text in assignments or []]
-    return read_draft(case).assigned((key, value, COMMAND_LINE) for key, value in pairs)
 
 
 @app.command(
@@ -51,22 +38,55 @@ def optimise(
     """Serial."""
     from catenary.cases.studies.optimise import study
     from catenary.cases.studies.optimise.task import OptimiseTask
-    from catenary.cases.studies.records import KeptRows
-    from catenary.cases.studies.scene_sets.task_file import read_task
+    from catenary.cases.studies.task_files import read_task
 
     refuse_table(out / "optimise.json", force)
-    plan = study.make_plan(draft_of(case, assignments), read_task(task_file, OptimiseTask))
+    draft, _ = SceneWords(case, assignments=assignments).draft()
+    plan = study.make_plan(draft, read_task(task_file, OptimiseTask))
     for sentence in plan.warnings:
         console.warn(sentence)
-    from catenary.cases.result_folder.folder_lock import held
     from catenary.cases.studies.optimise import output
-    from catenary.cases.studies.scene_sets.evaluate import workers
+    from catenary.cases.studies.records import held_study
+    from catenary.cases.studies.scene_sets.evaluation import workers
 
-    with held(out, console.alone(), f"catenary optimise {case}"):
-        kept = KeptRows(out, force)
-        with workers(n_jobs) as pool:
-            found = study.optimise(plan, pool, kept, console.say)
-        files = output.write(out, plan, found)
-        kept.forget()
-    console.say("\n" + output.as_text(plan, found) + "\n\n" + "\n".join(map(str, files)))
+    command = f"catenary optimise {case}"
+    with held_study(out, console.alone(), command, force) as (kept, write), workers(n_jobs) as pool:
+        found = study.optimise(plan, pool, kept, console.say)
+        files = write(lambda folder: output.write(folder, plan, found))
+    tell(output.as_text(plan, found), files)
+    return console.DONE
+
+
+@app.command(
+    "tolerance",
+    help="Find how far droppers, heights, tensions or any numbers of a scene may be off for each "
+    "acceptance criterion to hold with 99 %: by samples of errors, and in the worst case. The same "
+    "command continues one that was stopped.",
+    epilog="Example: catenary tolerance en50318_2002 installation.toml -o results/tolerance",
+)
+@console.guarded
+@console.serial
+def tolerance(
+    case: Case,
+    task_file: TaskFile,
+    out: Out,
+    assignments: Assignments = None,
+    n_jobs: Jobs = 1,
+    force: Force = False,
+) -> int:
+    """Serial."""
+    from catenary.cases.studies.records import held_study
+    from catenary.cases.studies.scene_sets.evaluation import workers
+    from catenary.cases.studies.task_files import read_task
+    from catenary.cases.studies.tolerance import output, study
+    from catenary.cases.studies.tolerance.task import ToleranceTask
+
+    refuse_table(out / output.TABLE, force)
+    draft, _ = SceneWords(case, assignments=assignments).draft()
+    plan = study.make_plan(draft, read_task(task_file, ToleranceTask))
+    command = f"catenary tolerance {case}"
+    with held_study(out, console.alone(), command, force) as (kept, write), workers(n_jobs) as pool:
+        found = study.find_tolerances(plan, pool, kept, console.say)
+        files = write(lambda folder: output.write(folder, plan, found))
+    tell(output.as_text(plan, found), files)
     return console.DONE

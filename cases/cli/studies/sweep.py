@@ -19,6 +19,7 @@ from catenary.cases.cli.app import (
     Verbose,
     app,
     begin,
+    tell,
 )
 from catenary.cases.result_folder.output_folder import refuse_impossible
 from catenary.cases.terminal import console
@@ -80,14 +81,15 @@ def sweep(
     verbose: Verbose = False,
 ) -> int:
     """Collective."""
-    from catenary.cases.studies.sweep.jobs import RunOptions, check_statistics
-    from catenary.cases.studies.sweep.part import parse_part
+    from catenary.cases.studies.sampling.samples import samples
+    from catenary.cases.studies.sampling.tables import read_sampling
+    from catenary.cases.studies.sweep.jobs import RunOptions, check_statistics, parse_part
     from catenary.cases.studies.sweep.sweep import run_part, run_sweep, sweep_of
 
     own = None if part is None else parse_part(part)
 
     def read() -> tuple[tuple[Sweep, SamplingTable | None], list[str]]:
-        changes, options = words.split()
+        draft, options = words.draft()
         check_statistics(_names(plotted))
         sampling = None
         if sample is None:
@@ -97,21 +99,12 @@ def sweep(
                 "--sample makes all variants itself: give neither --vary nor --variants"
             )
         else:
-            variants, sampling = _sampled(words, changes, sample)
-
-        case, short = words.case, words.shortened
+            sampling = read_sampling(sample)
+            variants = samples(sampling, draft.scene(), str(sample))
         if reports and only_statistics:
             raise InputError("--only-statistics leaves nothing that --reports could draw")
-        made = sweep_of(
-            case,
-            variants,
-            out,
-            changes,
-            short,
-            full_report=reports,
-            only_statistics=only_statistics,
-            force=force,
-        )
+        kept = {"full_report": reports, "only_statistics": only_statistics, "force": force}
+        made = sweep_of(draft, variants, out, **kept)
         return (made, sampling), options
 
     comm, (made, sampling), arguments = begin(read, verbose, lambda made: made[0].first)
@@ -129,12 +122,11 @@ def sweep(
     from catenary.cases.studies.sweep import output as sweep_output
 
     if sampling is None:
-        console.say("\n" + sweep_output.as_text(ended))
+        text = sweep_output.as_text(ended)
     else:
         text, more = _evaluated(ended, sampling, out, comm, command, drawn)
         files = [*files, *more]
-        console.say("\n" + text)
-    console.say("\n" + "\n".join(str(path) for path in files))
+    tell(text, files)
     return verdict(ended, "sweep")
 
 
@@ -157,19 +149,6 @@ def read_variants(vary: Sequence[str] | None, named: Path | None) -> list[Varian
     table = {} if named is None else read_named(named)
     check_keys(product([], table), f"in {named}")
     return product(varied, table)
-
-
-def _sampled(
-    words: RunWords, changes: list[str], file: Path
-) -> tuple[list[Variant], SamplingTable]:
-    """The variants of a sampling file, and its tables."""
-    from catenary.cases.scene.load import load_scene
-    from catenary.cases.studies.sampling.samples import samples
-    from catenary.cases.studies.sampling.tables import read_sampling
-
-    sampling = read_sampling(file)
-    scene = load_scene(words.case, changes, words.shortened)
-    return samples(sampling, scene, str(file)), sampling
 
 
 def _evaluated(
@@ -203,7 +182,7 @@ def run_study(
 ) -> int:
     """What ``catenary run CASE --study`` does; returns the exit code. Collective."""
     from catenary.cases.studies.case_study import Plan, find_study, make_plan
-    from catenary.cases.studies.sweep.part import parse_part
+    from catenary.cases.studies.sweep.jobs import parse_part
 
     own = None if part is None else parse_part(part)
 
@@ -222,7 +201,7 @@ def run_study(
 
     options = RunOptions(force, arguments, console.say, n_jobs)
     if own is not None:
-        return verdict(case_study.run_part(plan, own, out, comm, options), "study")
+        return verdict(case_study.run(plan, out, comm, options, own)[1], "study")
     with held(out, comm, f"catenary run {words.case} --study"):
         report, ended = case_study.run(plan, out, comm, options)
     if report is not None:

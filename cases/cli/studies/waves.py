@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from catenary.base.errors import InputError
-from catenary.cases.cli.app import Force, Jobs, SceneWords, app, folder_option
+from catenary.cases.cli.app import Force, SceneWords, app, folder_option
 from catenary.cases.result_folder.output_folder import refuse_impossible, refuse_table
 from catenary.cases.terminal import console
 
@@ -59,7 +59,7 @@ class Excited:
     help="Analyse wave propagation along a line under a train, a moving force, a pulse or a "
     "hammer: motion over place and time, in the frame of the train, and over wavenumber and "
     "frequency, energy ahead and behind, beside the waves, pass bands and group velocities of the "
-    "periodic line.",
+    "periodic line. `catenary separation` shows how two pantographs act on each other.",
     epilog="Example: catenary waves en50318_2002 -o results/waves; catenary waves results/waves; "
     "catenary waves en50318_2002 --excite hammer --at-m 630 -o results/hammer",
 )
@@ -83,14 +83,6 @@ def waves(
             "beside theory, and nothing else.",
         ),
     ] = False,
-    separations: Annotated[
-        str | None,
-        typer.Option(
-            metavar="FROM:TO:COUNT",
-            help="Run two pantographs at these separations [m] and one alone, and draw how the "
-            "leading one acts on the trailing one, and nothing else.",
-        ),
-    ] = None,
     window_error: Annotated[
         str | None,
         typer.Option(
@@ -104,10 +96,9 @@ def waves(
         typer.Option(
             "--vary",
             metavar="KEY=V1,V2,...",
-            help="With --separations or --window-error: a curve for each value.",
+            help="With --window-error: a curve for each value.",
         ),
     ] = None,
-    n_jobs: Jobs = 1,
     force: Force = False,
 ) -> int:
     """Serial."""
@@ -126,25 +117,13 @@ def waves(
         )
     if obstacles and not train:
         raise InputError("--obstacles runs pulses of its own; leave --excite away")
-    if vary and separations is None and window_error is None:
-        raise InputError(
-            "--vary belongs to --separations and --window-error; vary other runs with catenary "
-            "sweep"
-        )
-    if n_jobs != 1 and separations is None:
-        raise InputError("-j belongs to --separations; all else is one run")
-    if separations is not None and window_error is not None:
-        raise InputError("--separations and --window-error are two studies; give one")
-    for option, text in (("--separations", separations), ("--window-error", window_error)):
-        if text is None:
-            continue
+    if vary and window_error is None:
+        raise InputError("--vary belongs to --window-error; vary other runs with catenary sweep")
+    if window_error is not None:
         if obstacles or not train:
-            raise InputError(f"{option} runs the train; leave --obstacles and --excite away")
+            raise InputError("--window-error runs the train; leave --obstacles and --excite away")
         if out is None:
             raise InputError("-o is missing; it names the folder of the runs")
-    if separations is not None and out is not None:
-        return _separations(words, out, separations, vary or [], n_jobs, force)
-    if window_error is not None and out is not None:
         return _window_error(words, out, window_error, vary or [], force)
     if (folder / "run.h5").is_file():
         if obstacles:
@@ -175,45 +154,20 @@ def waves(
     return console.DONE
 
 
-def _separations(
-    words: WaveWords, out: Path, text: str, vary: list[str], n_jobs: int, force: bool
-) -> int:
-    """What --separations does; returns the exit code."""
-    from catenary.cases.cli.studies.sweep import verdict
-    from catenary.cases.process.petsc_options import start_petsc
-    from catenary.cases.result_folder.folder_lock import held
-    from catenary.cases.studies.sweep.jobs import RunOptions
-    from catenary.cases.studies.sweep.output import remarks_of
-    from catenary.cases.studies.sweep.variants import check_keys, parse_vary, product
-    from catenary.cases.studies.waves import separation
-    from catenary.cases.studies.waves.study import theory_of
-
-    refuse_impossible(out)
-    values = separation.parse_separations(text)
-    varied = [parse_vary(one) for one in vary]
-    check_keys(product(varied, {}) if varied else [], "on the command line (--vary)")
-    scene, case = words.load(), words.case
-    jobs = separation.jobs_of(case, scene, values, varied, words.changes, words.shortened)
-    comm = console.alone()
-    start_petsc([])
-    with held(out, comm, f"catenary waves {case} --separations {text}"):
-        ended = separation.run(jobs, out, comm, RunOptions(force, (), console.say, n_jobs))
-        theory, span = theory_of(scene)
-        files = separation.write(out, ended, theory, span)
-    said = separation.as_text(separation.curves_of(ended), theory, span)
-    lines = [*([said] if said else []), *remarks_of(ended), *map(str, files)]
-    console.say("\n" + "\n".join(lines))
-    return verdict(ended, "curve")
-
-
 def _window_error(words: WaveWords, out: Path, text: str, vary: list[str], force: bool) -> int:
     """What --window-error does; returns the exit code."""
     from catenary.cases.process.petsc_options import start_petsc
-    from catenary.cases.studies.sweep.variants import check_keys, parse_vary, product
+    from catenary.cases.studies.sweep.variants import (
+        check_keys,
+        parse_vary,
+        product,
+        whole_numbers,
+    )
     from catenary.cases.studies.waves import window_error
 
     refuse_table(out / window_error.TABLE, force)
-    sizes = window_error.parse_sizes(text)
+    bounds = window_error.LEAST, window_error.MOST
+    sizes = whole_numbers(text, window_error.OPTION, *bounds, "8,16,24,40,54")
     variants = product([parse_vary(one) for one in vary], {}) if vary else []
     check_keys(variants, "on the command line (--vary)")
     scenes = [(one.name, words.load(*one.assignments)) for one in variants]

@@ -8,15 +8,217 @@ is, and no difference is an error.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from catenary.base.errors import InputError
 from catenary.cases.scene.input.faults import shown
-from catenary.cases.studies.accuracy import models
-from catenary.cases.studies.accuracy.axis import DISCRETISATION, MODEL, Axis, Level, Reference
 
 if TYPE_CHECKING:
     from catenary.cases.scene.scene import Scene
+
+
+DISCRETISATION, MODEL = "discretisation", "model"
+
+
+@dataclass(frozen=True)
+class Level:
+    """One setting of an axis.
+
+    Attributes
+    ----------
+    name : short, unique within its axis
+    assignments : ``key=value`` each, on top of the scene
+    sizes : what is refined, by name: ``dt`` [s], ``h`` as a share of a gap; empty if nothing is
+    quick : whether the level also belongs to the short form of the axis
+    """
+
+    name: str
+    assignments: tuple[str, ...]
+    sizes: tuple[tuple[str, float], ...] = ()
+    quick: bool = False
+
+    def size(self, name: str) -> float | None:
+        """The value of one of ``sizes``, None if it has none."""
+        return dict(self.sizes).get(name)
+
+
+@dataclass(frozen=True)
+class Reference:
+    """What the levels of a discretisation axis are compared with, and what it is measured by.
+
+    Attributes
+    ----------
+    level : finer than every level of the axis in all that it refines
+    chains : for each size three levels, of which each has half the fineness of the one before it;
+        the first is the reference, or has its fineness in that size
+    """
+
+    level: Level
+    chains: tuple[tuple[Level, Level, Level], ...]
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One thing that is varied.
+
+    Attributes
+    ----------
+    name, title : for the option ``--axes`` and for headings
+    kind : ``DISCRETISATION`` or ``MODEL``
+    levels : the levels for a scene, quick ones only on request; none where it has nothing to vary
+    reference : for a scene, the reference of a discretisation axis; None for models, which are
+        compared with the scene as it is
+    refined : which of the levels' sizes an observed order belongs to, "" if none
+    step_alone : for a level of step and mesh, the one with its mesh and the reference's step: what
+        the two differ by is the error of the step, what is left that of the mesh; None if the axis
+        does not refine both
+    """
+
+    name: str
+    title: str
+    kind: str
+    levels: Callable[[Scene], Sequence[Level]]
+    reference: Callable[[bool], Reference] | None = None
+    refined: str = ""
+    step_alone: Callable[[Level], Level] | None = None
+
+    def chosen(self, scene: Scene, quick: bool) -> list[Level]:
+        """The levels of the axis for a scene, in the long or the short form."""
+        return [level for level in self.levels(scene) if level.quick or not quick]
+
+
+_SMALLEST_FIT = 0.5  # [Hz], as the verb ``pantograph`` does
+# Effects that let wires move sideways and along the track.
+_ACROSS, _ALONG = "lateral_motion", "axial_motion"
+# Wires and fittings that a line may do without, by key of ``line``, and the topology that is left.
+_PARTS = {
+    "stitch_wire": "simple",
+    "auxiliary_wire": "simple",
+    "twin": "simple",
+    "bridle": "single",
+    "overlap": None,
+}
+_NEWMARK = ("numerics.integrator=newmark", "numerics.spectral_radius=")
+_NO_LAW = ("contact.restitution=", "contact.hertz_stiffness_N_per_m1_5=",
+           "contact.damping_N_s_per_m=", "contact.least_impact_speed_m_per_s=")  # fmt: skip
+_ELASTIC = (*_NO_LAW, "effects.contact_damping=false")
+
+
+def _level(name: str, *assignments: str, quick: bool = False) -> Level:
+    return Level(name, assignments, quick=quick)
+
+
+def contacts(scene: Scene) -> list[Level]:
+    """Laws of the contact, and stiffnesses of the linear one."""
+    law, stiffness = "contact.law=", "contact.stiffness_N_per_m="
+    lossy = ("contact.restitution=0.6", "effects.contact_damping=true")
+    # Without numerical damping the force of a contact that does not give way alternates.
+    damped = (*_NEWMARK, "numerics.newmark_gamma=0.55", "numerics.newmark_beta=0.28")
+    return [
+        *(
+            _level(f"linear_{k:g}", *_ELASTIC, f"{law}linear", f"{stiffness}{k:g}", quick=quick)
+            for k, quick in ((2e4, False), (5e4, True), (1e5, False), (2e5, True), (1e6, False))
+        ),
+        _level("hertz", *_ELASTIC, f"{law}hertz"),
+        *(
+            _level(f"{name}_0.6", *_NO_LAW, law + name, *lossy)
+            for name in ("lankarani_nikravesh", "hunt_crossley", "flores", "gonthier")
+        ),
+        _level("kinematic_newmark_0.55", *_ELASTIC, stiffness, f"{law}kinematic", *damped),
+    ]
+
+
+def droppers(scene: Scene) -> list[Level]:
+    """Laws of slack droppers."""
+    slack, kept = "effects.dropper_slackening=", "effects.residual_dropper_stiffness="
+    damper, ratio = "line.dropper.slack_damping=", "line.dropper.residual_stiffness_ratio="
+    slackens = (f"{kept}false", f"{slack}true")
+    residual = (f"{slack}true", f"{kept}true", f"{ratio}0.01", f"{damper}released")
+    return [
+        _level("linear", f"{kept}false", f"{slack}false", quick=True),
+        _level("slackening", *slackens, f"{damper}released", quick=True),
+        _level("slackening_damped", *slackens, f"{damper}kept"),
+        _level("residual_0.01", *residual),
+    ]
+
+
+def pantographs(scene: Scene) -> list[Level]:
+    """Lumped chains fitted to the scene's leading kind; a mechanism also with all its bodies.
+
+    A chain is not fitted with more masses than it has: the data say nothing of the others.
+    """
+    kind = scene.train.pantographs[0].name
+    table = scene.pantographs[kind]
+    most = len(table.masses_kg) if table.type == "lumped" else 3
+    levels = [_fitted(scene, kind, n) for n in range(1, min(most, 3) + 1)]
+    if table.type == "multibody":
+        motion = f"pantographs.{kind}.motion"
+        levels.append(_level("reduced", f"{motion}=reduced", quick=True))
+        levels.append(_level("all_bodies", f"{motion}=all_bodies"))
+    return levels
+
+
+def _fitted(scene: Scene, kind: str, n_masses: int) -> Level:
+    """All pantographs of the train as chains fitted to a kind, as the verb ``pantograph`` does."""
+    from catenary.cases.studies.pantograph_response import Range, inline_table, study
+
+    found = study(scene, kind, n_masses, Range(0.1, 25.0, 2, _SMALLEST_FIT))
+    name = f"fitted_{n_masses}"
+    assignments = [f"pantographs.{name}={inline_table(found)}"]
+    for place in range(len(scene.train.pantographs)):
+        own = f"train.pantographs.{place}"
+        assignments += [f"{own}.name={name}", f"{own}.reversed="]
+    return _level(f"fitted_{n_masses}_mass", *assignments, quick=n_masses == 2)
+
+
+def planes(scene: Scene) -> list[Level]:
+    """Planes in which wires move: sideways, and along the track if they have what that needs."""
+    from catenary.cases.scene.checks.effects import RELATIVE_MOTION, needs_relative_motion
+    from catenary.cases.scene.problem import problem_of
+    from catenary.solver.effects import all_effects
+
+    problem = problem_of(scene)
+    with_data = all_effects.registry()[_ALONG].applies(problem)
+    # Twin wires that move as one do so in the vertical plane only.
+    apart = (f"effects.{RELATIVE_MOTION}=true",) if needs_relative_motion(problem, _ACROSS) else ()
+    across, along = f"effects.{_ACROSS}=", f"effects.{_ALONG}="
+    levels = [
+        _level("vertical", f"{across}false", f"{along}false", quick=True),
+        _level("lateral", f"{across}true", f"{along}false", *apart, quick=True),
+    ]
+    if with_data:
+        levels.append(_level("axial", f"{across}false", f"{along}true", *apart))
+        levels.append(_level("three_planes", f"{across}true", f"{along}true", *apart))
+    return levels
+
+
+# Damping of a wire itself, of whole lines as it was measured on their vertical motion (ratios of
+# 0.01 and 0.05 at 1.4 Hz), and so much that no wave comes back from a mast [1/s]; see the README of
+# ac_simple_3d. None was measured on lateral motion.
+_ACROSS_DAMPINGS = (0.003, 0.2, 0.9, 3.0, 10.0)
+
+
+def lateral_dampings(scene: Scene) -> list[Level]:
+    """Dampings of the wires' lateral motion, on their mass alone; none without that motion."""
+    if not scene.switches()[_ACROSS]:
+        return []
+    damping = "line.damping.lateral={{alpha_s=0.0, beta_per_s={:g}}}"
+    return [
+        _level(f"{beta:g}_per_s", damping.format(beta), quick=beta in (0.003, 0.9))
+        for beta in _ACROSS_DAMPINGS
+    ]
+
+
+def parts_of_the_line(scene: Scene) -> list[Level]:
+    """The line without each wire or fitting that it can do without; none of a simple line."""
+    levels = []
+    for part, left in _PARTS.items():
+        if getattr(scene.line, part) is not None:
+            topology = [] if left is None else [f"line.topology={left}"]
+            levels.append(_level(f"without_{part}", f"line.{part}=", *topology, quick=True))
+    return levels
 
 
 def parse_axes(text: str | None) -> list[Axis]:
@@ -120,7 +322,6 @@ def _grid(scene: Scene) -> list[Level]:
 
 # ---- scheme and coupling ------------------------------------------------------------------------
 
-_NEWMARK = ("numerics.integrator=newmark", "numerics.spectral_radius=")
 _ONE_SOLVE = ("numerics.iterations=", "numerics.scheme=one_solve")
 # The paper's correction, so many times in every step, whatever they reach; or until changes are
 # below tolerances, of which the loosest end every step after the first.
@@ -145,65 +346,56 @@ def _one_solve(scene: Scene) -> tuple[str, ...]:
 
 def _newmark(scene: Scene, name: str, gamma: float, beta: float, quick: bool = False) -> Level:
     keys = (f"numerics.newmark_gamma={gamma}", f"numerics.newmark_beta={beta}")
-    return Level(name, (*_one_solve(scene), *_NEWMARK, *keys), quick=quick)
+    return _level(name, *_one_solve(scene), *_NEWMARK, *keys, quick=quick)
 
 
 def _dissipating(integrator: str, radius: float) -> tuple[str, ...]:
-    return (
-        f"numerics.integrator={integrator}",
-        f"numerics.spectral_radius={radius}",
-        "numerics.newmark_gamma=",
-        "numerics.newmark_beta=",
-    )
-
-
-def _alpha(scene: Scene, integrator: str, radius: float) -> Level:
-    keys = _dissipating(integrator, radius)
-    return Level(f"{integrator}_{radius:g}", (*_one_solve(scene), *keys))
-
-
-def _ts_alpha2(scene: Scene, radius: float) -> Level:
-    """PETSc's own stepper, which runs on one rank and takes plain scenes only."""
-    own = _dissipating("generalized_alpha", radius)
-    keys = ("numerics.coupling=", "numerics.iterations=", "numerics.scheme=ts_alpha2")
-    return Level(f"ts_alpha2_{radius:g}", (*keys, *_without_tolerances(scene), *own))
+    own = (f"numerics.integrator={integrator}", f"numerics.spectral_radius={radius}")
+    return (*own, "numerics.newmark_gamma=", "numerics.newmark_beta=")
 
 
 def _schemes(scene: Scene) -> list[Level]:
-    levels = [
+    alphas = [("generalized_alpha", radius) for radius in (0.9, 0.8, 0.5, 0.0)]
+    one, paper = _one_solve(scene), (*_PAPER, *_without_tolerances(scene, ("eps_force_N",)))
+    times = (*paper, "numerics.max_iterations=")
+    # PETSc's own stepper, which runs on one rank and takes plain scenes only.
+    petsc = ("numerics.coupling=", "numerics.iterations=", "numerics.scheme=ts_alpha2",
+             *_without_tolerances(scene))  # fmt: skip
+    return [
         _newmark(scene, "average_acceleration", 0.5, 0.25, True),
         _newmark(scene, "newmark_0.55", 0.55, 0.28, True),
         _newmark(scene, "newmark_0.6", 0.6, 0.3025),
-        *(_alpha(scene, "generalized_alpha", radius) for radius in (0.9, 0.8, 0.5, 0.0)),
-        *(_alpha(scene, "hht", radius) for radius in (0.9, 0.8)),
-        _ts_alpha2(scene, 0.8),
+        *(
+            _level(f"{name}_{radius:g}", *one, *_dissipating(name, radius))
+            for name, radius in (*alphas, ("hht", 0.9), ("hht", 0.8))
+        ),
+        _level("ts_alpha2_0.8", *petsc, *_dissipating("generalized_alpha", 0.8)),
+        *(
+            _level(f"corrected_{n}_times", *times, f"numerics.iterations={n}")
+            for n in (1, 2, 4, 6, 10, 20)
+        ),
+        *(
+            _level(
+                f"corrected_to_{d:g}_m",
+                *paper,
+                f"numerics.eps_d_m={d:g}",
+                f"numerics.eps_v_m_per_s={v:g}",
+            )  # fmt: skip
+            for d, v in _LOOSENESS
+        ),
     ]
-    paper = (*_PAPER, *_without_tolerances(scene, ("eps_force_N",)))
-    levels += [
-        Level(
-            f"corrected_{n}_times",
-            (*paper, "numerics.max_iterations=", f"numerics.iterations={n}"),
-        )
-        for n in (1, 2, 4, 6, 10, 20)
-    ]
-    levels += [
-        Level(
-            f"corrected_to_{eps_d:g}_m",
-            (*paper, f"numerics.eps_d_m={eps_d:g}", f"numerics.eps_v_m_per_s={eps_v:g}"),
-        )
-        for eps_d, eps_v in _LOOSENESS
-    ]
-    return levels
 
 
 def _couplings(scene: Scene) -> list[Level]:
     own = {"implicit": _TOLERANCES, "iterated": _TOLERANCES[:2], "explicit": _TOLERANCES}
     return [
-        Level(
+        _level(
             name,
-            (*_ONE_SOLVE, *_without_tolerances(scene, taken), f"numerics.coupling={name}"),
+            *_ONE_SOLVE,
+            *_without_tolerances(scene, taken),
+            f"numerics.coupling={name}",
             quick=name != "iterated",
-        )
+        )  # fmt: skip
         for name, taken in own.items()
     ]
 
@@ -215,11 +407,13 @@ _ADAPTED = ((1e-3, 1.0), (1e-3, 0.1), (4e-3, 10.0), (4e-3, 1.0), (4e-3, 0.1))
 def _adaptive(scene: Scene) -> list[Level]:
     one = _one_solve(scene)
     return [
-        Level(
+        _level(
             f"{1e3 * dt:g}_ms_{tolerance:g}_N",
-            (*one, f"numerics.dt_s={dt:g}", f"numerics.adaptive_tolerance_N={tolerance:g}"),
+            *one,
+            f"numerics.dt_s={dt:g}",
+            f"numerics.adaptive_tolerance_N={tolerance:g}",
             quick=tolerance == 10.0,
-        )
+        )  # fmt: skip
         for dt, tolerance in _ADAPTED
     ]
 
@@ -238,11 +432,11 @@ _ALL = (
     Axis("scheme", "scheme, at the case's step", DISCRETISATION, _schemes, _fine_step),
     Axis("coupling", "coupling, at the case's step", DISCRETISATION, _couplings, _fine_step),
     Axis("adaptive", "steps halved where a force is wrong", DISCRETISATION, _adaptive, _fine_step),
-    Axis("contact", "contact law and stiffness", MODEL, models.contacts),
-    Axis("dropper", "dropper model", MODEL, models.droppers),
-    Axis("pantograph", "pantograph model", MODEL, models.pantographs),
-    Axis("planes", "planes in which wires move", MODEL, models.planes),
-    Axis("lateral_damping", "damping of lateral motion", MODEL, models.lateral_dampings),
-    Axis("parts", "the line without one of its parts", MODEL, models.parts_of_the_line),
+    Axis("contact", "contact law and stiffness", MODEL, contacts),
+    Axis("dropper", "dropper model", MODEL, droppers),
+    Axis("pantograph", "pantograph model", MODEL, pantographs),
+    Axis("planes", "planes in which wires move", MODEL, planes),
+    Axis("lateral_damping", "damping of lateral motion", MODEL, lateral_dampings),
+    Axis("parts", "the line without one of its parts", MODEL, parts_of_the_line),
 )  # fmt: skip
 AXES = {axis.name: axis for axis in _ALL}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import re
 import shlex
@@ -22,14 +21,17 @@ from catenary.cases.studies.accuracy.analysis import (
     observed_orders,
     pareto,
 )
-from catenary.cases.studies.accuracy.axes import AXES
-from catenary.cases.studies.accuracy.axis import DISCRETISATION, Axis
-from catenary.cases.studies.accuracy.plan import PlannedAxis
-from catenary.cases.studies.accuracy.runs import Measured
+from catenary.cases.studies.accuracy.axes import AXES, DISCRETISATION, Axis
+from catenary.cases.studies.accuracy.runs import Measured, PlannedAxis
 from catenary.postproc.evaluate.wording import counted
-from catenary.postproc.files.disk import plain, write_all
 from catenary.postproc.report.pictures import figures
-from catenary.postproc.report.study_table import Column, StudyTable, remark_lines
+from catenary.postproc.report.study_table import (
+    Column,
+    Content,
+    StudyTable,
+    remark_lines,
+    write_files,
+)
 
 TABLE, RECORD, PAGE = "accuracy.csv", "accuracy.json", "accuracy.md"
 PICTURE = "work_precision.png"
@@ -46,14 +48,12 @@ def write(found: Measured, out_dir: Path, target: float) -> list[Path]:
 
     The diagram is left out if no axis of discretisation was varied.
     """
-    content: dict[str, bytes | str] = {
-        TABLE: table_of(found.rows).csv(),
-        RECORD: json.dumps(plain(_record(found, target)), indent=1, ensure_ascii=False) + "\n",
-    }
-    if any(row.done for axis in _precise(found) for row in found.rows_of(axis.name)):
-        content |= figures.painted(PICTURE, lambda: draw(found))
-    content[PAGE] = page(found, advices(found, target), PICTURE if PICTURE in content else "")
-    return write_all(out_dir, content)
+    content: dict[str, Content] = {TABLE: table_of(found.rows), RECORD: _record(found, target)}
+    drawn = any(row.done for axis in _precise(found) for row in found.rows_of(axis.name))
+    if drawn:
+        content[PICTURE] = lambda: draw(found)
+    content[PAGE] = page(found, advices(found, target), PICTURE if drawn else "")
+    return write_files(out_dir, content)
 
 
 def table_of(rows: Sequence[Row], axis: Axis | None = None) -> StudyTable:
@@ -182,16 +182,12 @@ def runs_with_remarks(found: Measured) -> list[tuple[str, Sequence[str]]]:
     for planned in found.plan.axes:
         for level, name in planned.runs.items():
             words.setdefault(name, []).append(f"{planned.axis.name} {in_words(level)}")
+    own = {name: name.rpartition("__") for name in found.remarks}
+    whole = {name: f"{axis} {in_words(level)}".strip() for name, (axis, _, level) in own.items()}
     return [
-        (" or ".join(words.get(name, [_whole_in_words(name)])), remarks)
+        (" or ".join(words.get(name, [whole[name]])), remarks)
         for name, remarks in found.remarks.items()
     ]
-
-
-def _whole_in_words(name: str) -> str:
-    """The name of a run as axis and level in words."""
-    axis, _, level = name.rpartition("__")
-    return f"{axis} {in_words(level)}".strip()
 
 
 def uncertainty_text(planned: PlannedAxis, percent: Mapping[str, float]) -> str:
@@ -292,16 +288,14 @@ def _precise(found: Measured) -> list[Axis]:
 def _record(found: Measured, target: float) -> dict[str, Any]:
     axes = []
     for planned in found.plan.axes:
-        rows = found.rows_of(planned.axis.name)
-        size = planned.axis.refined
+        axis, rows = planned.axis, found.rows_of(planned.axis.name)
+        size = axis.refined
         axes.append(
-            {
-                "name": planned.axis.name,
-                "title": planned.axis.title,
-                "kind": planned.axis.kind,
+            {name: getattr(axis, name) for name in ("name", "title", "kind")}
+            | {
                 "reference": planned.reference,
                 "reference_chains": planned.chains,
-                "reference_uncertainty_percent": found.uncertainty.get(planned.axis.name),
+                "reference_uncertainty_percent": found.uncertainty.get(axis.name),
                 "orders": {q: observed_orders(rows, size, q) for q in _ADVISED} if size else {},
                 "pareto": [row.level for row in pareto(rows)],
             }

@@ -11,7 +11,7 @@ from catenary.cases.scene.input.case_files import find_case
 from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.problem import resolved
 from catenary.cases.scene.scene import Scene
-from catenary.cases.studies.accuracy.axis import MODEL, Axis, Level, Reference
+from catenary.cases.studies.accuracy.axes import MODEL, Axis, Level, Reference
 from catenary.cases.studies.sweep.jobs import Job
 from catenary.cases.studies.sweep.variants import Variant, slug
 from catenary.postproc.files.disk import plain
@@ -121,9 +121,7 @@ def _planned(axis: Axis, scene: Scene, jobs: _Jobs, quick: bool) -> Iterator[Pla
     if axis.reference is not None:
         pair: Reference = axis.reference(quick)
         reference = jobs.add(axis.name, pair.level)
-        chains = tuple(
-            tuple(jobs.add(axis.name, level) for level in chain) for chain in pair.chains
-        )
+        chains = tuple(tuple(jobs.add(axis.name, one) for one in chain) for chain in pair.chains)
     else:
         reference, chains = jobs.add(axis.name, AS_IT_IS), ()
     runs, refused, step_alone = {}, {}, {}

@@ -13,13 +13,13 @@ from itertools import product
 from pathlib import Path
 from typing import Literal
 
-from pydantic import Field, ValidationError, model_validator
+from pydantic import Field, model_validator
 
 from catenary.base.errors import InputError
-from catenary.cases.scene.input.toml_input import read_toml
 from catenary.cases.scene.keys.table import Table
 from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.scene import Scene
+from catenary.cases.studies.task_files import read_task
 
 TABLE = Path(__file__).resolve().with_name("hard.toml")
 # The correction's own tolerances, far below what is compared: where wires move along the track,
@@ -173,12 +173,7 @@ def collection() -> Collection:
     InputError
         If the table is wrong.
     """
-    try:
-        found = Collection.model_validate(read_toml(TABLE))
-    except ValidationError as error:
-        first = error.errors()[0]
-        place = ".".join(str(part) for part in first["loc"])
-        raise InputError(f"{TABLE}: {place}: {first['msg']}") from error
+    found = read_task(TABLE, Collection)
     names = [case.name for case in found.all_cases()]
     if len(set(names)) != len(names):
         raise InputError(f"{TABLE} has two cases of one name")

@@ -8,18 +8,13 @@ from typing import Any
 import numpy as np
 
 from catenary.base.errors import InputError
-from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.problem import problem_of
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.identification.measurement import FORCE, Measurement
 from catenary.cases.studies.sensitivity.parameters import ChangedScenes, Parameter
-from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest
-from catenary.solver.statics.stability_of_rest import refuse_lost_wire
+from catenary.cases.studies.sensitivity.study import change_by, parts_of, sound_rest
+from catenary.solver.statics.line_at_rest import LineAtRest
 from catenary.solver.tangents.march import Tangents, march_with_tangents
-from catenary.solver.tangents.set_up import Change, SetUp, differentiate, set_up_of
-
-# What derivatives of all steps may take before the march is made again for the next parameters [B].
-_BYTES = 2**28
+from catenary.solver.tangents.set_up import Change, SetUp, set_up_of
 
 
 class FittedMarch:
@@ -74,12 +69,10 @@ class FittedMarch:
         at_rest = self._at_rest(by)
         now = set_up_of(self._comm, at_rest)
         changes = self._changes(by, at_rest, now)
-        n_results = 2 * len(now.heads) + at_rest.mesh.steady_arms.size
-        most = max(1, _BYTES // (8 * len(now.drives) * n_results))
         parts: list[list[np.ndarray]] = []
-        for first in range(0, len(changes), most):
+        for part in parts_of(changes, at_rest, now):
             self._progress("march with tangents")
-            marched = march_with_tangents(self._comm, at_rest, changes[first : first + most])
+            marched = march_with_tangents(self._comm, at_rest, changes[part])
             position = marched.position[:, self._number]
             parts.append(
                 [
@@ -115,9 +108,7 @@ class FittedMarch:
             ) from error
 
     def _at_rest(self, by: Sequence[float]) -> LineAtRest:
-        found = _at_rest_of(self._changed(by))
-        refuse_lost_wire(found.model, found.form)
-        return found
+        return sound_rest(self._changed(by))
 
     def _changes(self, by: Sequence[float], at_rest: LineAtRest, now: SetUp) -> list[Change]:
         """Derivatives of the set-up. Those by lengths of droppers, in which the line at rest is
@@ -128,16 +119,7 @@ class FittedMarch:
             change = self._kept.get(key)
             if change is None:
                 self._progress(key)
-                own = scenes.parameter(key)
-
-                def set_up(step: float, own: Parameter = own) -> SetUp:
-                    changed = scenes.changed(own, step)
-                    if own.is_of_train:
-                        problem = problem_of(changed)
-                        return set_up_of(self._comm, at_rest.under(problem), len(now.drives), now)
-                    return set_up_of(self._comm, _at_rest_of(changed), len(now.drives))
-
-                change = differentiate(set_up, now, own.step, key)
+                change = change_by(scenes.parameter(key), scenes, at_rest, now, self._comm)
                 if change.start.size or change.speed:
                     raise InputError(
                         f"{key} moves the pantograph along the track: where it was is measured, "
@@ -147,7 +129,3 @@ class FittedMarch:
                     self._kept[key] = change
             changes.append(change)
         return changes
-
-
-def _at_rest_of(scene: Scene) -> LineAtRest:
-    return line_at_rest(problem_of(scene), mesh_of(scene))

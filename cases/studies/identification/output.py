@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-import json
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
 
+from catenary.cases.studies.identification.measurement import UNITS
 from catenary.cases.studies.identification.residuals import RARE, Judged
 from catenary.cases.studies.identification.study import Identification
-from catenary.postproc.report.study_table import Column, StudyTable
+from catenary.postproc.report.study_table import Column, Content, StudyTable
 
 PARAMETERS, CORRELATION = "parameters.csv", "correlation.csv"
 DIRECTIONS, RESIDUALS, SUMMARY = "directions.csv", "residuals.csv", "identification.json"
 _MOST_DIRECTIONS, _MOST_PAIRS, _MOST_PARTS = 5, 5, 4
 _CORRELATED, _LEAST_PART = 0.5, 0.2
-# A posterior that is this part of its prior or more comes from the prior.
-_UNCHANGED = 0.9
 
 
 def parameters_table(found: Identification) -> StudyTable:
@@ -31,22 +30,20 @@ def parameters_table(found: Identification) -> StudyTable:
         Column("deviation", "+-", ".2g"),
         Column("of_prior", "of prior", ".0%"),
     ]
-    return StudyTable(
-        columns,
-        [
-            {
-                "parameter": one.name,
-                "unit": one.unit,
-                "prior": one.mean,
-                "prior_deviation": one.deviation,
-                "shown": _rounded(float(value), float(width)),
-                "found": float(value),
-                "deviation": float(width),
-                "of_prior": float(width / one.deviation),
-            }
-            for one, value, width in zip(found.unknowns, found.values, found.widths, strict=True)
-        ],
-    )
+    rows = [
+        {
+            "parameter": one.name,
+            "unit": one.unit,
+            "prior": one.mean,
+            "prior_deviation": one.deviation,
+            "shown": _rounded(float(value), float(width)),
+            "found": float(value),
+            "deviation": float(width),
+            "of_prior": float(width / one.deviation),
+        }
+        for one, value, width in zip(found.unknowns, found.values, found.widths, strict=True)
+    ]
+    return StudyTable(columns, rows)
 
 
 def _rounded(value: float, width: float) -> str:
@@ -56,49 +53,37 @@ def _rounded(value: float, width: float) -> str:
     return text.removeprefix("-") if not text.strip("-0.") else text
 
 
+def _table(heads: Sequence[str], rows: Iterable[Sequence[Any]]) -> StudyTable:
+    """A table for files."""
+    cells = [dict(zip(heads, row, strict=True)) for row in rows]
+    return StudyTable([Column(name) for name in heads], cells)
+
+
 def correlation_table(found: Identification) -> StudyTable:
     """The posterior correlations, a row and a column for each unknown."""
     names = [one.name for one in found.unknowns]
-    columns = [Column("parameter"), *(Column(name) for name in names)]
-    rows = [
-        {"parameter": name, **dict(zip(names, map(float, row), strict=True))}
-        for name, row in zip(names, found.posterior.correlation, strict=True)
-    ]
-    return StudyTable(columns, rows)
+    rows = zip(names, found.posterior.correlation.tolist(), strict=True)
+    return _table(["parameter", *names], ([name, *row] for name, row in rows))
 
 
 def directions_table(found: Identification) -> StudyTable:
     """Directions of the parameters, in deviations of their priors, the best known first."""
-    names = [one.name for one in found.unknowns]
-    columns = [Column("direction"), Column("information"), *(Column(name) for name in names)]
-    rows = [
-        {
-            "direction": number + 1,
-            "information": float(information),
-            **dict(zip(names, map(float, direction), strict=True)),
-        }
-        for number, (information, direction) in enumerate(
-            zip(found.posterior.information, found.posterior.directions.T, strict=True)
-        )
-    ]
-    return StudyTable(columns, rows)
+    heads = ["direction", "information", *(one.name for one in found.unknowns)]
+    own = found.posterior.information.tolist(), found.posterior.directions.T.tolist()
+    pairs = enumerate(zip(*own, strict=True), start=1)
+    return _table(heads, ([n, information, *direction] for n, (information, direction) in pairs))
 
 
 def residuals_table(found: Identification) -> StudyTable:
     """Places, and of each signal what was measured and what the found parameters give, with the
     bias that was found."""
-    columns, values = [Column("place_m")], [found.place]
+    heads, values = ["place_m"], [found.place]
     biases = {one.name: value for one, value in zip(found.unknowns, found.values, strict=True)}
     for signal, modelled in zip(found.signals, found.modelled, strict=True):
-        name = signal.name.replace(" ", "_")
-        unit = "N" if signal.name == "force" else "m"
-        columns += [Column(f"measured_{name}_{unit}"), Column(f"modelled_{name}_{unit}")]
+        name = f"{signal.name.replace(' ', '_')}_{UNITS[signal.name]}"
+        heads += [f"measured_{name}", f"modelled_{name}"]
         values += [signal.values, modelled + biases.get(f"bias of {signal.name}", 0.0)]
-    names = [column.name for column in columns]
-    return StudyTable(
-        columns,
-        [dict(zip(names, map(float, row), strict=True)) for row in zip(*values, strict=True)],
-    )
+    return _table(heads, np.column_stack(values).tolist())
 
 
 def as_text(found: Identification) -> str:
@@ -208,12 +193,12 @@ def summary_of(found: Identification) -> dict[str, Any]:
     }
 
 
-def files_of(found: Identification) -> dict[str, str]:
+def files_of(found: Identification) -> dict[str, Content]:
     """Content of all files by name."""
     return {
-        PARAMETERS: parameters_table(found).csv(),
-        CORRELATION: correlation_table(found).csv(),
-        DIRECTIONS: directions_table(found).csv(),
-        RESIDUALS: residuals_table(found).csv(),
-        SUMMARY: json.dumps(summary_of(found), indent=2) + "\n",
+        PARAMETERS: parameters_table(found),
+        CORRELATION: correlation_table(found),
+        DIRECTIONS: directions_table(found),
+        RESIDUALS: residuals_table(found),
+        SUMMARY: summary_of(found),
     }

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 from pydantic import Field, model_validator
 
-from catenary.cases.scene.input.toml_input import read_toml
 from catenary.cases.scene.keys.table import Table
-from catenary.cases.studies.measured.description import NAME, POSITIVE, Measured, validated
+from catenary.cases.studies.measured.description import NAME, POSITIVE, Measured
 
 
 class Sought(Table):
@@ -51,25 +49,3 @@ class Task(Table):
             if signal is not None and signal.noise is None:
                 raise ValueError(f"must have measured.{name}.noise, which weighs the samples")
         return self
-
-
-def read_task(path: Path) -> Task:
-    """The task of a file. Not collective.
-
-    Raises
-    ------
-    InputError
-        As ``task_of``, and if it is no TOML.
-    """
-    return task_of(read_toml(path), str(path))
-
-
-def task_of(raw: dict[str, Any], name: str) -> Task:
-    """The task of nested tables, which sentences call ``name``.
-
-    Raises
-    ------
-    InputError
-        If it is none: one sentence about its first fault.
-    """
-    return validated(Task, raw, name, "the task")

@@ -3,25 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Literal
 
-from pydantic import Field, ValidationError, model_validator
+from pydantic import Field, model_validator
 
-from catenary.base.errors import InputError
-from catenary.cases.scene.input.faults import Origin
-from catenary.cases.scene.input.plain_text import plain
-from catenary.cases.scene.input.toml_input import read_toml
-from catenary.cases.scene.keys.error_sentences import schema_faults
-from catenary.cases.scene.keys.keys import nearest, tables_in
 from catenary.cases.scene.keys.table import Table
+from catenary.cases.studies.task_files import read_task
 
 _UNITS = {"N": 1.0, "kN": 1e3, "m": 1.0, "cm": 1e-2, "mm": 1e-3, "km": 1e3, "s": 1.0, "ms": 1e-3}
 POSITIVE = Annotated[float, Field(gt=0.0, le=1e9)]
 _NOT_NEGATIVE = Annotated[float, Field(ge=0.0, le=1e9)]
 NAME = Annotated[str, Field(min_length=1, max_length=100)]
 _NUMBER = Annotated[int, Field(ge=1, le=100)]
-
-T = TypeVar("T", bound=Table)
 
 
 class _Column(Table):
@@ -154,36 +147,4 @@ def read_description(path: Path) -> Description:
     InputError
         If it is none.
     """
-    return validated(Description, read_toml(path), str(path), "the description")
-
-
-def validated(model: type[T], raw: dict[str, Any], name: str, kind: str) -> T:
-    """A table made of nested ones, which sentences call ``kind`` in ``name``.
-
-    Raises
-    ------
-    InputError
-        If it is none: one sentence about its first fault.
-    """
-    try:
-        return model.model_validate(raw)
-    except ValidationError as failed:
-        first = min(failed.errors(), key=lambda one: one["type"] != "extra_forbidden")
-        if first["type"] == "extra_forbidden":
-            raise InputError(_unknown(model, first["loc"], name)) from failed
-        faults, _ = schema_faults(failed, raw, model, Origin(name))
-        raise InputError(faults[0].sentence.replace("the scene in ", f"{kind} in ")) from failed
-
-
-def _unknown(model: type[Table], location: tuple[int | str, ...], name: str) -> str:
-    *above, last = (str(part) for part in location)
-    table = model
-    for part in above:
-        if not part.isdigit():
-            table = tables_in(table.model_fields[part].annotation)[0][0]
-    known = list(table.model_fields)
-    near = nearest(last, known)
-    key = plain(".".join([*above, last]), 100)
-    return f"{key} in {name} is unknown: " + (
-        f"did you mean {near}?" if near else f"it takes {', '.join(known)}"
-    )
+    return read_task(path, Description)

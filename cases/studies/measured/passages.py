@@ -13,9 +13,9 @@ from catenary.cases.studies.measured.description import (
     Force,
     Tolerances,
     Uplift,
-    validated,
 )
 from catenary.cases.studies.measured.table_file import column_of, places_of, read_table
+from catenary.cases.studies.task_files import checked_table
 from catenary.postproc.measurements.passage import MeasuredForce, MeasuredUplift, Passage
 from catenary.postproc.read.results import Results
 
@@ -46,7 +46,7 @@ def usual_description(table: pd.DataFrame, path: Path) -> Description:
             f"{path} has no columns of the usual names, place_m or time_s and force_N: describe "
             "its columns with --description"
         )
-    return validated(Description, {"measured": measured}, str(path), "the description")
+    return checked_table({"measured": measured}, Description, str(path))
 
 
 def passage_of(

@@ -1,4 +1,4 @@
-"""Lengths of droppers before and after a change of a scene, as an installer needs them."""
+"""Droppers of an optimum: lengths before and after, as an installer needs them; forces at rest."""
 
 from __future__ import annotations
 
@@ -8,8 +8,11 @@ from typing import Any
 import numpy as np
 
 from catenary.cases.run.at_rest.static_table import static_table
+from catenary.cases.run.scene_mesh import mesh_of
+from catenary.cases.scene.problem import problem_of
 from catenary.cases.scene.scene import Scene
 from catenary.postproc.report.study_table import Column, StudyTable
+from catenary.solver.statics.line_at_rest import stable_form
 
 _COLUMNS = (
     Column("span", "span", "d"),
@@ -29,27 +32,23 @@ def dropper_table(shipped: Scene, optimum: Scene) -> StudyTable:
     Both scenes have as many droppers in each span. Not collective.
     """
     before, after = _droppers(shipped), _droppers(optimum)
+    moved = 1e3 * (after["in_span"] - before["in_span"])
+    cut = 1e3 * before["length"], 1e3 * after["length"], 1e3 * (after["length"] - before["length"])
     rows: list[Mapping[str, Any]] = []
     number: dict[int, int] = {}
-    for i, (x, span) in enumerate(zip(after["in_span"], after["span"], strict=True)):
+    for i, span in enumerate(after["span"].tolist()):
         number[span] = number.get(span, 0) + 1
-        rows.append(
-            {
-                "span": int(span) + 1,
-                "dropper": number[span],
-                "wires": after["wires"][i],
-                "in_span_m": float(x),
-                "moved_mm": 1e3 * float(x - before["in_span"][i]),
-                "shipped_mm": 1e3 * float(before["length"][i]),
-                "length_mm": 1e3 * float(after["length"][i]),
-                "change_mm": 1e3 * float(after["length"][i] - before["length"][i]),
-            }
-        )
+        figures = (after["in_span"][i], moved[i], *(own[i] for own in cut))
+        cells = (span + 1, number[span], after["wires"][i], *map(float, figures))
+        rows.append(dict(zip((column.name for column in _COLUMNS), cells, strict=True)))
     return StudyTable(_COLUMNS, rows, "Lengths of droppers")
 
 
-def of_one_span(table: StudyTable, span: int) -> StudyTable:
-    """The rows of a span, by its number from 1."""
+def of_middle_span(table: StudyTable) -> StudyTable:
+    """The rows of the span in the middle of those with droppers: those at the ends hang
+    otherwise."""
+    spans = sorted({int(row["span"]) for row in table.rows})
+    span = spans[len(spans) // 2]
     rows = [row for row in table.rows if row["span"] == span]
     return StudyTable(table.columns, rows, f"Lengths of droppers in span {span}")
 
@@ -59,14 +58,33 @@ def _droppers(scene: Scene) -> dict[str, Any]:
     table = static_table(scene)
     order = np.argsort(table["dropper_x"], kind="stable")
     span = table["dropper_span"].astype(int)[order]
-    wires = zip(table["dropper_upper"][order], table["dropper_lower"][order], strict=True)
+    ends = (table[f"dropper_{end}"][order].astype(str) for end in ("upper", "lower"))
     return {
         "span": span,
         "in_span": table["dropper_x"][order] - table["support_x"][span],
         "length": table["dropper_length"][order],
-        "wires": [f"{_text(upper)} to {_text(lower)}" for upper, lower in wires],
+        "wires": [f"{upper} to {lower}" for upper, lower in zip(*ends, strict=True)],
     }
 
 
-def _text(name: Any) -> str:
-    return name.decode() if isinstance(name, bytes) else str(name)
+def least_forces(scene: Scene) -> np.ndarray:
+    """The least force at rest of the first, second, ... droppers of all spans [N].
+
+    Forces are linear in pre-sag, so that a search which knows their slopes takes no step to a line
+    that cannot hang. Not collective.
+
+    Raises
+    ------
+    InputError
+        If the line cannot hang.
+    """
+    problem, mesh = problem_of(scene), mesh_of(scene)
+    form = stable_form(problem, mesh)[1]
+    x, masts = mesh.x(mesh.droppers[:, 1]), problem.line.support_positions
+    order = np.argsort(x, kind="stable")
+    span = np.searchsorted(masts, x[order], side="right")
+    first = np.searchsorted(span, span)  # where the droppers of each one's span begin
+    number = np.arange(span.size) - first
+    found = np.full(int(number.max(initial=-1)) + 1, np.inf)
+    np.minimum.at(found, number, form.dropper_force[order])
+    return found

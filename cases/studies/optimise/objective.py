@@ -9,13 +9,11 @@ from typing import Any
 import numpy as np
 
 from catenary.base.errors import InputError
-from catenary.cases.studies.optimise.rest import least_forces
+from catenary.cases.studies.optimise.droppers import least_forces
 from catenary.cases.studies.optimise.task import ObjectiveTable
 from catenary.cases.studies.optimise.variables import Variables
-from catenary.cases.studies.scene_sets.bounds import BoundTable
-from catenary.cases.studies.scene_sets.evaluation import Evaluation, Wanted
-from catenary.cases.studies.scene_sets.figures import reason, values_of
-from catenary.cases.studies.scene_sets.scene_set import SceneSet
+from catenary.cases.studies.scene_sets.evaluation import BROKE, Evaluation, Wanted, values_of
+from catenary.cases.studies.scene_sets.scene_set import BoundTable, SceneSet
 
 # A violation of a constraint smaller than this share of its scale is round-off of a search.
 SLACK = 1e-6
@@ -196,16 +194,16 @@ class Problem:
 
     def _figures(self, summary: dict[str, Any]) -> tuple[np.ndarray, np.ndarray] | str:
         """Objective and margins of a run, or why it has none."""
-        own = values_of(summary, self.objective.statistic)
-        if own is None:
-            return reason(summary)
-        margins: list[float] = []
-        for one in self.constraints:
-            values = values_of(summary, one.statistic)
-            if values is None:
-                return reason(summary)
-            margins += [one.margin(value) / one.scale for value in values]
-        return np.array(own), np.array(margins)
+        objective = values_of(summary, self.objective.statistic)
+        bounded = [values_of(summary, one.statistic) for one in self.constraints]
+        if objective is None or None in bounded:
+            return str(summary.get(BROKE, "the run has no such statistic"))
+        margins = [
+            one.margin(value) / one.scale
+            for one, values in zip(self.constraints, bounded, strict=True)
+            for value in values or ()
+        ]
+        return np.array(objective), np.array(margins)
 
 
 def _moved(change: np.ndarray, i: int, by: float) -> np.ndarray:

@@ -11,30 +11,31 @@ import numpy as np
 
 from catenary.cases.scene.keys.units import unit_of
 from catenary.cases.studies.optimise.checks import AS_IS, COMPARED, Row, change
-from catenary.cases.studies.optimise.droppers import of_one_span
+from catenary.cases.studies.optimise.droppers import of_middle_span
 from catenary.cases.studies.optimise.objective import Point
 from catenary.cases.studies.optimise.study import Optimum, Plan
 from catenary.cases.studies.sweep.variants import text_of
-from catenary.postproc.files.csv_text import csv_text
-from catenary.postproc.files.disk import plain, write_all
-from catenary.postproc.report.study_table import Column, StudyTable
+from catenary.postproc.report.study_table import Column, Content, StudyTable, write_files
 
 RECORD, PAGE, KEYS = "optimise.json", "optimise.md", "optimum.toml"
 DROPPERS, CHECKS, HISTORY = "droppers", "checks", "history"
+# Where a row of checks is, with heads for people.
+_PLACES = {"check": "check", "scene": "scene", "pantograph": "pantograph", "searched": "",
+           "outcome": ""}  # fmt: skip
 
 
 def write(out_dir: Path, plan: Plan, found: Sequence[Optimum]) -> list[Path]:
     """Write all tables of an optimisation; returns the files. Not collective."""
-    content: dict[str, bytes | str] = {
-        RECORD: json.dumps(plain(record(plan, found)), indent=1, ensure_ascii=False) + "\n",
+    content: dict[str, Content] = {
+        RECORD: record(plan, found),
         PAGE: markdown(plan, found),
         KEYS: keys_text(found),
     }
     for one in found:
-        content[f"{DROPPERS}_{one.method}.csv"] = one.droppers.csv()
-        content[f"{CHECKS}_{one.method}.csv"] = checks_table(one.rows).csv()
-        content[f"{HISTORY}_{one.method}.csv"] = history_csv(plan, one.history)
-    return write_all(out_dir, content)
+        content[f"{DROPPERS}_{one.method}.csv"] = one.droppers
+        content[f"{CHECKS}_{one.method}.csv"] = checks_table(one.rows)
+        content[f"{HISTORY}_{one.method}.csv"] = history_table(plan, one.history)
+    return write_files(out_dir, content)
 
 
 def record(plan: Plan, found: Sequence[Optimum]) -> dict[str, Any]:
@@ -70,19 +71,20 @@ def keys_text(found: Sequence[Optimum]) -> str:
     return "\n".join(["# Keys of the optima, for `catenary sweep CASE --variants`.", *lines, ""])
 
 
-def history_csv(plan: Plan, history: Sequence[Point]) -> str:
+def history_table(plan: Plan, history: Sequence[Point]) -> StudyTable:
     """All points of a search in their order: objective, violation, changes of the variables."""
-    heads = ["objective", "violation", *(one.name for one in plan.variables.components)]
-    heads.append("broke")
-    rows = (
-        [_finite(point.value), _finite(point.violation), *point.change.tolist(), point.broke]
-        for point in history
-    )
-    return csv_text(heads, rows)
+    names = [one.name for one in plan.variables.components]
+    heads = ("objective", "violation", *names, "broke")
+    rows = [
+        (_finite(one.value), _finite(one.violation), *one.change.tolist(), one.broke)
+        for one in history
+    ]
+    cells = [dict(zip(heads, row, strict=True)) for row in rows]
+    return StudyTable([Column(name) for name in heads], cells)
 
 
-def _finite(value: float) -> float | str:
-    return value if np.isfinite(value) else ""
+def _finite(value: float) -> float | None:
+    return value if np.isfinite(value) else None
 
 
 def variables_table(plan: Plan, one: Optimum) -> StudyTable:
@@ -113,40 +115,34 @@ def variables_table(plan: Plan, one: Optimum) -> StudyTable:
     return StudyTable(columns, rows, "Variables")
 
 
+def _compared(heads: Mapping[str, str]) -> list[Column]:
+    """Two columns for each figure that is compared, under its head and an arrow."""
+    return [
+        Column(f"{design}_{name}", head if design == "shipped" else "->", ".4g")
+        for name, head in heads.items()
+        for design in ("shipped", "optimum")
+    ]
+
+
 def checks_table(rows: Sequence[Row]) -> StudyTable:
     """A row for each pantograph of each scene under each check."""
-    columns = [
-        Column("check", "check"),
-        Column("scene", "scene"),
-        Column("pantograph", "pantograph"),
-        Column("searched"),
-        Column("outcome"),
-    ]
     table: list[dict[str, Any]] = []
     for row in rows:
-        cells: dict[str, Any] = {"check": row.check, "scene": row.scene, "outcome": row.outcome}
-        cells |= {"pantograph": row.pantograph, "searched": row.searched}
+        cells = {name: getattr(row, name) for name in _PLACES}
         for name in COMPARED:
             cells[f"shipped_{name}"] = row.shipped.get(name)
             cells[f"optimum_{name}"] = row.optimum.get(name)
         done = row.outcome == "done"
         cells["std_change_percent"] = 100.0 * change(row, "std_N") if done else None
         table.append(cells)
-    for name in COMPARED:
-        columns += [Column(f"shipped_{name}", name, ".4g"), Column(f"optimum_{name}", "->", ".4g")]
-    columns.append(Column("std_change_percent", "std [%]", "+.1f"))
-    return StudyTable(columns, table, "Checks")
+    columns = [Column(name, head) for name, head in _PLACES.items()]
+    columns += _compared({name: name for name in COMPARED})
+    return StudyTable([*columns, Column("std_change_percent", "std [%]", "+.1f")], table, "Checks")
 
 
 def checks_in_short(rows: Sequence[Row]) -> StudyTable:
     """A row for each check and direction: the worst figures of their scenes and pantographs."""
-    columns = [Column("check", "check"), Column("direction", "direction"), Column("n", "rows", "d")]
-    for name, sign in COMPARED.items():
-        word = "max" if sign > 0 else "min"
-        columns.append(Column(f"shipped_{name}", f"{word} {name}", ".4g"))
-        columns.append(Column(f"optimum_{name}", "->", ".4g"))
-    columns.append(Column("least", "std by [%]", "+.1f"))
-    columns.append(Column("most", "to", "+.1f"))
+    worst = {name: max if sign > 0 else min for name, sign in COMPARED.items()}
     groups: dict[tuple[str, str], list[Row]] = {}
     for row in rows:
         if row.outcome == "done":
@@ -155,17 +151,18 @@ def checks_in_short(rows: Sequence[Row]) -> StudyTable:
     for (check, direction), own in groups.items():
         cells: dict[str, Any] = {"check": check, "n": len(own)}
         cells["direction"] = direction if own[0].searched else f"{direction} (not searched)"
-        for name, sign in COMPARED.items():
-            worst = max if sign > 0 else min
-            for head, designs in (
-                ("shipped", [row.shipped for row in own]),
-                ("optimum", [row.optimum for row in own]),
-            ):
-                given = [design[name] for design in designs if name in design]
-                cells[f"{head}_{name}"] = worst(given, default=None)
+        for name, of in worst.items():
+            for design in ("shipped", "optimum"):
+                values = [getattr(row, design).get(name) for row in own]
+                given = [value for value in values if value is not None]
+                cells[f"{design}_{name}"] = of(given, default=None)
         by = [100.0 * change(row, "std_N") for row in own]
-        cells |= {"least": min(by), "most": max(by)}
-        table.append(cells)
+        table.append(cells | {"least": min(by), "most": max(by)})
+    columns = [
+        *(Column("check", "check"), Column("direction", "direction"), Column("n", "rows", "d")),
+        *_compared({name: f"{of.__name__} {name}" for name, of in worst.items()}),
+        *(Column("least", "std by [%]", "+.1f"), Column("most", "to", "+.1f")),
+    ]
     return StudyTable(columns, table, "Checks")
 
 
@@ -188,14 +185,8 @@ def tables_of(plan: Plan, one: Optimum) -> list[StudyTable]:
     tables = [variables_table(plan, one)]
     rows = one.droppers.rows
     if any(abs(row["change_mm"]) > 1e-6 or abs(row["moved_mm"]) > 1e-6 for row in rows):
-        tables.append(of_one_span(one.droppers, _middle_span(rows)))
+        tables.append(of_middle_span(one.droppers))
     return [*tables, checks_in_short(one.rows)]
-
-
-def _middle_span(rows: Sequence[Mapping[str, Any]]) -> int:
-    """The span in the middle of those with droppers: those at the ends hang otherwise."""
-    spans = sorted({int(row["span"]) for row in rows})
-    return spans[len(spans) // 2]
 
 
 def as_text(plan: Plan, found: Sequence[Optimum]) -> str:

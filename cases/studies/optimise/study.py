@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from catenary.base.errors import InputError
+from catenary.cases.process.workers import Pool
 from catenary.cases.scene.input.toml_input import REMOVED
 from catenary.cases.scene.load import Draft
 from catenary.cases.scene.scene import Scene
@@ -27,10 +28,9 @@ from catenary.cases.studies.optimise.search import search
 from catenary.cases.studies.optimise.task import OptimiseTask
 from catenary.cases.studies.optimise.variables import Variables, variables_of
 from catenary.cases.studies.records import KeptRows
-from catenary.cases.studies.scene_sets.evaluate import Workers
 from catenary.cases.studies.scene_sets.evaluation import Evaluation
 from catenary.cases.studies.scene_sets.scene_set import FORWARD, SceneSet, members_of
-from catenary.cases.studies.scene_sets.scene_values import value_at
+from catenary.cases.studies.sweep.variants import value_at
 from catenary.postproc.report.study_table import StudyTable
 
 # Shares of an optimum's changes that are tried in whole units.
@@ -147,7 +147,7 @@ def _may_lean(scenes: SceneSet, variables: Variables) -> bool:
 
 def optimise(
     plan: Plan,
-    workers: Workers | None = None,
+    pool: Pool[Any] | None = None,
     kept: KeptRows | None = None,
     say: Callable[[str], None] = lambda line: None,
 ) -> list[Optimum]:
@@ -155,7 +155,7 @@ def optimise(
 
     Parameters
     ----------
-    workers : processes that share the runs, None for this one
+    pool : processes that share the runs, None for this one
     kept : runs that are not made again
     say : called with lines on the way
 
@@ -164,7 +164,7 @@ def optimise(
     InputError
         If the case as shipped has no figures to begin with.
     """
-    evaluation = Evaluation(workers, kept)
+    evaluation = Evaluation(pool, kept)
     return [_by(method, plan, evaluation, say) for method in plan.task.search.methods]
 
 

@@ -9,12 +9,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from catenary.base.errors import InputError
-from catenary.cases.scene.keys.error_sentences import unknown_key
-from catenary.cases.scene.keys.keys import is_known, known_keys
 from catenary.cases.scene.problem import resolved
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.optimise.task import VariableTable
-from catenary.cases.studies.scene_sets.scene_values import is_number, value_at
+from catenary.cases.studies.sweep.variants import check_key, is_number, value_at
 
 # Keys whose entries are places along a span: of two that are symmetric one moves against the other.
 _PLACES = "positions_m"
@@ -125,9 +123,7 @@ def variables_of(tables: Sequence[VariableTable], scene: Scene) -> Variables:
 
 
 def _value(tables: dict[str, Any], key: str, where: str) -> Any:
-    known = known_keys(Scene)
-    if not is_known(key, known):
-        raise InputError(unknown_key(key, f"in {where}", known))
+    check_key(key, f"in {where}")
     found = value_at(tables, key)
     numbers = found if isinstance(found, list) and found else [found]
     if not all(is_number(one) for one in numbers):
@@ -166,20 +162,17 @@ def _component(
         low, high = table.change
     else:
         assert table.bounds is not None
-        own = [value[entry] for entry in entries] if entries else [value]
+        own = np.array([value[entry] for entry in entries] if entries else [value])
         least, most = table.bounds
-        outside = [one for one in own if not least <= one <= most]
-        if outside:
+        outside = own[(own < least) | (own > most)]
+        if outside.size:
             raise InputError(
                 f"variables.{number}.bounds are {least:g} and {most:g}, but {table.key} has "
                 f"{outside[0]:g} in the case, where the search begins"
             )
-        both = signs or (1,)
-        downs = [
-            one - least if sign > 0 else most - one for one, sign in zip(own, both, strict=True)
-        ]
-        ups = [most - one if sign > 0 else one - least for one, sign in zip(own, both, strict=True)]
-        low, high = -min(downs), min(ups)
+        up = np.array(signs or (1,)) > 0
+        low = -float(np.where(up, own - least, most - own).min())
+        high = float(np.where(up, most - own, own - least).min())
         if high <= low:
             raise InputError(f"variables.{number}.bounds leave {table.key} no change")
     step = table.step or _USUAL_STEP * (high - low)

@@ -8,19 +8,33 @@ stretches that the first, even division shows, and bisects each of their ends.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from math import ceil
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
+from matplotlib.figure import Figure
+
 from catenary.base.errors import InputError
 from catenary.cases.scene.input.faults import shown
-from catenary.cases.scene.load import Draft
-from catenary.cases.studies.questions.marching import Marching
-from catenary.cases.studies.sweep.jobs import Ended, RunOptions
-from catenary.cases.studies.sweep.variants import Variant, VariedKey, product
+from catenary.cases.studies.sweep.jobs import STATISTICS, Ended
+from catenary.cases.studies.sweep.output import remarks_of, table_of
+from catenary.cases.studies.sweep.together import Marching
+from catenary.cases.studies.sweep.variants import VariedKey, product
+from catenary.postproc.report.pictures import figures
+from catenary.postproc.report.study_table import Column, Row, StudyTable, write_files
 
 KEY = "train.speed_km_h"
 ALL = "all criteria"
+TABLE, RUNS, RECORD, PICTURE = "speed.csv", "speeds.csv", "speed.json", "speed.png"
+# Statistic of a panel, and the criteria whose limits stand in it.
+_PANELS = (
+    ("std_N", "standard deviation"),
+    ("max_N", "maximum contact force"),
+    ("min_N", "minimum contact force"),
+    ("max_uplift_mm", "contact-wire uplift"),
+)
 # Speeds of the first division at most, and the bounds of a scene's speed [km/h].
 MOST, _SLOWEST, _FASTEST = 2000, 1.0, 1000.0
 
@@ -119,21 +133,14 @@ class SpeedStudy(NamedTuple):
     ended: tuple[Ended, ...]
 
 
-def find_speeds(
-    draft: Draft,
-    overrides: Sequence[str],
-    speeds: Speeds,
-    wanted: Sequence[str],
-    out: Path | None,
-    comm: Any,
-    options: RunOptions,
-) -> SpeedStudy:
+def find_speeds(marching: Marching, case: str, speeds: Speeds, wanted: Sequence[str]) -> SpeedStudy:
     """March the speeds, and find where the criteria hold. Collective.
 
     Parameters
     ----------
+    marching : of the case
+    case : its name
     wanted : parts of names of criteria, all criteria if there are none
-    out : folder that keeps what is marched, so that the same call continues; None to keep nothing
 
     Raises
     ------
@@ -142,19 +149,18 @@ def find_speeds(
     Interrupted
         If a signal came.
     """
-    march = Marching(draft, overrides, out, comm, options)
-    first = speeds.first()
-    ended = dict(zip(first, march.of(_variants(first)), strict=True))
+
+    def marched(own: Sequence[float]) -> dict[float, Ended]:
+        variants = product([VariedKey(KEY, tuple(f"{speed:.8g}" for speed in own))], {})
+        return dict(zip(own, marching.of(variants), strict=True))
+
+    ended = marched(speeds.first())
     names, not_judged = _criteria(ended, wanted)
     while more := _between(ended, [ALL, *names], names, speeds.within):
-        ended |= zip(more, march.of(_variants(more)), strict=True)
+        ended |= marched(more)
     found = tuple(_holds(ended, name, names) for name in (ALL, *names))
     in_order = tuple(ended[speed] for speed in sorted(ended))
-    return SpeedStudy(march.case, speeds, found, tuple(not_judged), in_order)
-
-
-def _variants(speeds: Sequence[float]) -> list[Variant]:
-    return product([VariedKey(KEY, tuple(f"{speed:.8g}" for speed in speeds))], {})
+    return SpeedStudy(case, speeds, found, tuple(not_judged), in_order)
 
 
 def _criteria(ended: dict[float, Ended], wanted: Sequence[str]) -> tuple[list[str], list[str]]:
@@ -219,9 +225,126 @@ def _holds(ended: dict[float, Ended], name: str, names: Sequence[str]) -> Holds:
     if name == ALL and failed is not None:
         stopped = tuple(n for n in names if not _is_held(failed, n, names))
         stopped = stopped if failed.done else (failed.outcome,)
-    return Holds(name, tuple(stretches), by, _unit(ended, name), stopped)
-
-
-def _unit(ended: dict[float, Ended], name: str) -> str:
     rows = (_row(one, name) for one in ended.values())
-    return next((str(row["unit"]) for row in rows if row is not None), "")
+    unit = next((str(row["unit"]) for row in rows if row is not None), "")
+    return Holds(name, tuple(stretches), by, unit, stopped)
+
+
+def table_of_criteria(study: SpeedStudy) -> StudyTable:
+    """A row for each criterion: from where it holds to the highest speed, and what ends it."""
+    columns = [
+        Column("criterion", "criterion"),
+        Column("holds_from_km_h", "holds from", ".1f"),
+        Column("highest_km_h", "to [km/h]", ".1f"),
+        Column("fails_at_km_h", "fails at", ".1f"),
+        Column("value", "with", ".4g"),
+        Column("limit", "limit", ".4g"),
+        Column("unit", "unit"),
+        Column("more_stretches_km_h", "holds again"),
+        Column("stopped_by"),
+    ]
+    return StudyTable(columns, [_cells(one, study.speeds.slowest) for one in study.holds])
+
+
+def _cells(one: Holds, slowest: float) -> Row:
+    first = one.stretches[0] if one.stretches else None
+    value, limit = one.fails_by or (None, None)
+    return {
+        "criterion": one.criterion,
+        "holds_from_km_h": None if first is None else first.slowest,
+        "highest_km_h": None if first is None else first.fastest,
+        "fails_at_km_h": slowest if first is None else first.fails_at,
+        "value": value,
+        "limit": limit,
+        "unit": one.unit,
+        "more_stretches_km_h": [f"{own.slowest:g}-{own.fastest:g}" for own in one.stretches[1:]],
+        "stopped_by": list(one.stopped_by),
+    }
+
+
+def as_text(study: SpeedStudy) -> str:
+    """The answer in a sentence, and the table of criteria."""
+    speeds, whole = study.speeds, study.holds[0]
+    counted = f"{len(study.holds) - 1} criteria judged here"
+    where = f"from {speeds.slowest:g} to {speeds.fastest:g} km/h"
+    if not study.holds[1:]:
+        answer = f"No criterion is judged {where}."
+    elif not whole.stretches:
+        answer = f"At no speed {where} all {counted} hold."
+    else:
+        first = whole.stretches[0]
+        answer = f"All {counted} hold from {first.slowest:.1f} to {first.fastest:.1f} km/h"
+        if first.fails_at is None:
+            answer += ", the end of the range."
+        else:
+            answer += f"; at {first.fails_at:.1f} km/h fails: {'; '.join(whole.stopped_by)}."
+    lines = [f"{study.case}, {len(study.ended)} speeds {where}. {answer}", ""]
+    lines += [table_of_criteria(study).text(), ""]
+    if study.not_judged:
+        lines.append(f"Not judged: {'; '.join(study.not_judged)}.")
+    refused = [one for one in study.ended if not one.done]
+    if refused:
+        slowest, fastest = refused[0].variant.varied[KEY], refused[-1].variant.varied[KEY]
+        lines.append(
+            f"{len(refused)} speeds from {slowest} to {fastest} km/h could not be run and count as "
+            f"failed; the first: {refused[0].outcome}"
+        )
+    lines.append(
+        "Trains run in the direction of the scene alone. Stretches narrower than "
+        f"{speeds.step:g} km/h may be missed."
+    )
+    return "\n".join([*lines, *remarks_of(study.ended)])
+
+
+def write(folder: Path, study: SpeedStudy) -> list[Path]:
+    """Write tables, record and picture; returns the files. Not collective."""
+    criteria, runs = table_of_criteria(study), table_of(study.ended)
+    record = {
+        "case": study.case,
+        **{f"{name}_km_h": value for name, value in study.speeds._asdict().items()},
+        "criteria": criteria.records(),
+        "not_judged": study.not_judged,
+        "runs": runs.records(),
+    }
+    drawn = partial(draw, study)
+    return write_files(folder, {TABLE: criteria, RUNS: runs, RECORD: record, PICTURE: drawn})
+
+
+def draw(study: SpeedStudy) -> Figure | None:
+    """Deviation, extremes and uplift over speed with their limits; speeds at which all criteria
+    hold are shaded. None if fewer than two speeds could be run."""
+    rows = [row for row in table_of(study.ended).rows if row["outcome"] == "done"]
+    if len({row[KEY] for row in rows}) < 2:
+        return None
+    figure = figures.new_figure(0.6 + 2.0 * len(_PANELS))
+    panels = figure.subplots(len(_PANELS), 1, sharex=True)
+    names = list(dict.fromkeys(row["pantograph"] for row in rows))
+    for (statistic, criterion), axes in zip(_PANELS, panels, strict=True):
+        for stretch in study.holds[0].stretches:
+            axes.axvspan(stretch.slowest, stretch.fastest, color=figures.SHADE, zorder=0)
+        of_line = statistic == "max_uplift_mm"
+        for number, name in enumerate(names[:1] if of_line else names):
+            own = [row for row in rows if row["pantograph"] == name]
+            y = [np.nan if row[statistic] is None else row[statistic] for row in own]
+            label = None if of_line else name
+            figures.curve(axes, [row[KEY] for row in own], y, number, label, "o-")
+        # Limits of all criteria whose names begin so, as one look of dashed lines.
+        for places in _limits(study, criterion):
+            axes.plot(*zip(*places, strict=True), "--", color=figures.LIMIT, linewidth=1.0)
+        figures.tidy(axes, "", STATISTICS[statistic].meaning)
+    if any(_limits(study, criterion) for _, criterion in _PANELS):
+        panels[0].plot([], [], "--", color=figures.LIMIT, linewidth=1.0, label="limit")
+    figures.legend_above(panels[0], columns=min(len(names) + 1, 4))
+    panels[-1].set_xlabel("train speed [km/h]")
+    return figure
+
+
+def _limits(study: SpeedStudy, criterion: str) -> list[list[tuple[float, float]]]:
+    """Speed and limit [km/h], the criterion's unit, of each criterion whose name begins so."""
+    limits: dict[str, list[tuple[float, float]]] = {}
+    for one in study.ended:
+        for row in one.summary.get("acceptance", []):
+            if row["criterion"].startswith(criterion) and row["limit"] is not None:
+                place = (float(one.variant.varied[KEY]), float(row["limit"]))
+                limits.setdefault(row["criterion"], []).append(place)
+    return list(limits.values())

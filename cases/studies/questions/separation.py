@@ -1,27 +1,59 @@
 """Distance between two pantographs: their statistics over it, best and worst, and what fails.
 
 The trailing pantograph starts at ``train.start_m`` at every distance, so that it runs the same way;
-the leading one is that far ahead. One pantograph alone is marched beside them, for reference.
+the leading one is that far ahead. One pantograph alone is marched beside them, for reference. Two
+lengths explain which distances are bad:
+
+- **ringing**: a span that the leading one has passed rings in the lowest pass band of the line.
+  The trailing one comes after the time d / v and finds it at the phase 2 pi f d / v, so that good
+  and bad distances repeat every v / f;
+- **travel**: waves of the leading one run back along the contact wire with c. What meets the
+  trailing one was sent d c / (c + v) ahead of it, so that the place in the span from which it came
+  repeats every L (c + v) / c.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
 from math import floor
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from matplotlib.figure import Figure
 
 from catenary.base.errors import InputError
-from catenary.cases.scene.load import Draft
 from catenary.cases.scene.scene import Scene
-from catenary.cases.studies.questions.marching import Marching
-from catenary.cases.studies.sweep.jobs import Ended, RunOptions
+from catenary.cases.studies.sweep.jobs import Ended
 from catenary.cases.studies.sweep.output import failed_criteria
+from catenary.cases.studies.sweep.together import Marching
 from catenary.cases.studies.sweep.variants import Variant, text_of
+from catenary.postproc.report.pictures import figures
+from catenary.postproc.report.study_table import (
+    Column,
+    Row,
+    StudyTable,
+    remark_lines,
+    write_files,
+)
 
+if TYPE_CHECKING:
+    from catenary.cases.studies.waves.theory import WaveTheory
+
+TABLE, RECORD, PICTURE = "separation.csv", "separation.json", "separation.png"
 # Most distances of a study, and the bounds of a distance [m].
 MOST, _LEAST, _FARTHEST = 2000, 1.0, 1000.0
-DISTANCE = "separation_m"
+DISTANCE, PLACES = "separation_m", ("leading", "trailing")
+_UPLIFT = "max_uplift_mm"
+_OF_BOTH = (
+    ("std_{}_N", "std {} [N]", ".1f", "std_N"),
+    ("min_{}_N", "min {} [N]", ".1f", "min_N"),
+    ("loss_{}_percent", "loss {} [%]", ".2f", "loss_percent"),
+)
+_MOST_ROWS, _MOST_REMARKS = 40, 4  # on a terminal; files have all
+_LEAST_FOR_PERIOD = 12  # distances from which a period can be read
 
 
 class Distances(NamedTuple):
@@ -53,83 +85,58 @@ class Distances(NamedTuple):
         return [round(self.nearest + number * self.step, 4) for number in range(count)]
 
 
-class Pair(NamedTuple):
-    """Statistics at a distance, or of one pantograph alone; None where it could not be run.
-
-    Attributes
-    ----------
-    separation : [m], None of one alone
-    outcome : "done", or the sentence of what is wrong
-    std, least : of the leading and trailing pantograph; of one alone a single value [N]
-    uplift : largest at steady arms, of both passages [mm]
-    loss : loss of contact of both [%]
-    failed : acceptance criteria that fail
-    remarks : what decides the results
-    """
-
-    separation: float | None
-    outcome: str
-    std: tuple[float | None, ...]
-    least: tuple[float | None, ...]
-    loss: tuple[float | None, ...]
-    uplift: float | None
-    failed: tuple[str, ...]
-    remarks: tuple[str, ...]
-
-
-class SeparationStudy(NamedTuple):
+@dataclass(frozen=True)
+class SeparationStudy:
     """What a study of distances found.
 
     Attributes
     ----------
     case, kind, speed : names of case and pantograph, train speed [km/h]
-    alone : one pantograph
-    pairs : ascending in distance
+    rows : of one pantograph alone, whose distance is None, then of each distance, ascending, with
+        the columns of ``table``; figures are None where a distance could not be run
     """
 
     case: str
     kind: str
     speed: float
-    alone: Pair
-    pairs: tuple[Pair, ...]
+    rows: Sequence[Row]
 
     @property
-    def done(self) -> list[Pair]:
+    def pairs(self) -> Sequence[Row]:
+        """The rows of two pantographs."""
+        return self.rows[1:]
+
+    @property
+    def done(self) -> list[Row]:
         """The distances that could be run."""
-        return [pair for pair in self.pairs if pair.outcome == "done"]
-
-    def best(self) -> Pair | None:
-        """The pair whose larger deviation is least; None if no deviation is known."""
-        return min(self._known, key=_larger, default=None)
-
-    def worst(self) -> Pair | None:
-        """The pair whose larger deviation is largest; None if no deviation is known."""
-        return max(self._known, key=_larger, default=None)
+        return [row for row in self.pairs if row["outcome"] == "done"]
 
     @property
-    def _known(self) -> list[Pair]:
-        return [pair for pair in self.done if None not in pair.std]
+    def by_deviation(self) -> list[Row]:
+        """Those with statistics, by the larger deviation of the two, the best first."""
+        names = [f"std_{place}_N" for place in PLACES]
+        known = [row for row in self.done if all(row[name] is not None for name in names)]
+        return sorted(known, key=lambda row: max(row[name] for name in names))
+
+    def table(self) -> StudyTable:
+        """A row for each distance, and one of a single pantograph."""
+        both = [
+            Column(name.format(place), head.format(place), form)
+            for name, head, form, _ in _OF_BOTH
+            for place in PLACES
+        ]
+        columns = [Column(DISTANCE, "distance [m]", "g"), Column("outcome"), *both]
+        columns += [Column(_UPLIFT, "uplift [mm]", ".1f"), Column("failed", "failed")]
+        return StudyTable([*columns, Column("remarks")], self.rows)
 
 
-def _larger(pair: Pair) -> float:
-    return max(value for value in pair.std if value is not None)
-
-
-def find_separations(
-    draft: Draft,
-    scene: Scene,
-    overrides: Sequence[str],
-    distances: Distances,
-    out: Path | None,
-    comm: Any,
-    options: RunOptions,
-) -> SeparationStudy:
+def find_separations(marching: Marching, scene: Scene, distances: Distances) -> SeparationStudy:
     """March one pantograph alone and two at each distance. Collective.
 
     Parameters
     ----------
-    scene : the checked one of draft and overrides; all pantographs are of the kind of its first
-    out : folder that keeps what is marched, so that the same call continues; None to keep nothing
+    marching : of the case
+    scene : the case, checked; all pantographs are of the kind of its first
 
     Raises
     ------
@@ -138,20 +145,18 @@ def find_separations(
     Interrupted
         If a signal came.
     """
-    values = distances.values()
+    values = (None, *distances.values())
+    ended = marching.of([variant_of(scene, value) for value in values])
+    rows = [_row(*both) for both in zip(values, ended, strict=True)]
     kind = scene.train.pantographs[0].name
-    marching = Marching(draft, overrides, out, comm, options)
-    ended = marching.of([_variant(scene, kind, value) for value in (None, *values)])
-    found = [_pair(*both) for both in zip((None, *values), ended, strict=True)]
-    return SeparationStudy(
-        scene.case.name, kind, scene.train.speed_km_h, found[0], tuple(found[1:])
-    )
+    return SeparationStudy(scene.case.name, kind, scene.train.speed_km_h, rows)
 
 
-def _variant(scene: Scene, kind: str, separation: float | None) -> Variant:
+def variant_of(scene: Scene, separation: float | None) -> Variant:
+    """The scene with two pantographs so far apart [m], or with one alone."""
+    kind = scene.train.pantographs[0].name
     if separation is None:
-        train = text_of([{"name": kind}])
-        return Variant("alone", (f"train.pantographs={train}",))
+        return Variant("alone", (f"train.pantographs={text_of([{'name': kind}])}",))
     train = text_of([{"name": kind}, {"name": kind, "behind_m": separation}])
     ahead = [f"train.start_m={scene.train.start_m + separation:.10g}"]
     if scene.train.end_m is not None:  # of the leading one, too
@@ -159,15 +164,192 @@ def _variant(scene: Scene, kind: str, separation: float | None) -> Variant:
     return Variant(f"{separation:g}m", (*ahead, f"train.pantographs={train}"))
 
 
-def _pair(separation: float | None, one: Ended) -> Pair:
-    rows = one.summary.get("pantographs", [])
-    return Pair(
-        separation,
-        one.outcome,
-        tuple(row["std_N"] for row in rows),
-        tuple(row["min_N"] for row in rows),
-        tuple(row["loss_percent"] for row in rows),
-        one.summary.get("supports", {}).get("max_uplift_mm"),
-        tuple(failed_criteria(one.summary)),
-        tuple(one.remarks),
+def _row(separation: float | None, one: Ended) -> Row:
+    row: dict[str, Any] = {DISTANCE: separation, "outcome": one.outcome}
+    found = one.summary.get("pantographs", [])
+    for number, place in enumerate(PLACES):
+        for name, _, _, key in _OF_BOTH:
+            row[name.format(place)] = found[number][key] if number < len(found) else None
+    uplift = one.summary.get("supports", {}).get(_UPLIFT)
+    return row | {_UPLIFT: uplift, "failed": failed_criteria(one.summary), "remarks": one.remarks}
+
+
+class Period(NamedTuple):
+    """What explains good and bad distances, all [m]; NaN where there is no answer.
+
+    Attributes
+    ----------
+    fitted : period of a decaying wave fitted to the deviation of the trailing one
+    explains : share of its variance that the fit explains [-]
+    ringing : (2,) v / f at the ends of the lowest pass band
+    travel : L (c + v) / c
+    """
+
+    fitted: float
+    explains: float
+    ringing: np.ndarray
+    travel: float
+
+
+def period_in(study: SeparationStudy, scene: Scene) -> Period:
+    """The period of a study, and what theory says of the line of its scene. Not collective."""
+    from catenary.cases.run.scene_mesh import mesh_of
+    from catenary.cases.scene.problem import problem_of
+    from catenary.cases.studies.waves.theory import wave_theory
+    from catenary.solver.statics.elasticity import middle_span
+    from catenary.solver.statics.line_at_rest import line_at_rest
+
+    problem = problem_of(scene)
+    first, last = middle_span(problem.line)
+    theory = wave_theory(problem, line_at_rest(problem, mesh_of(scene)))
+    known = [row for row in study.done if row["std_trailing_N"] is not None]
+    d, sigma = (np.array([row[name] for row in known]) for name in (DISTANCE, "std_trailing_N"))
+    return period_of(d, sigma, theory, last - first)
+
+
+def period_of(d: np.ndarray, sigma: np.ndarray, theory: WaveTheory, span: float) -> Period:
+    """What deviations repeat themselves with, and what theory offers.
+
+    Parameters
+    ----------
+    d : (n,) distances, ascending [m]
+    sigma : (n,) deviations of the trailing pantograph [N]
+    theory : of the line
+    span : its length [m]
+    """
+    bands = theory.bands()
+    ringing = theory.speed / bands[0, ::-1] if bands.size else np.full(2, np.nan)
+    travel = span * (theory.wave_speed + theory.speed) / theory.wave_speed
+    if d.size < _LEAST_FOR_PERIOD:
+        return Period(np.nan, np.nan, ringing, travel)
+    # Shorter ones than two distances cannot be seen, longer ones not be told from a trend.
+    shortest, longest = 2.0 * float(np.median(np.diff(d))), 0.5 * float(np.ptp(d))
+    best = (np.inf, np.nan)
+    for period in np.linspace(shortest, longest, 400).tolist():
+        for reach in np.ptp(d) * np.array([0.25, 0.5, 1.0, 2.0, 10.0]):
+            fade, phase = np.exp(-d / reach), 2 * np.pi * d / period
+            basis = np.stack([np.ones_like(d), fade, fade * np.cos(phase), fade * np.sin(phase)], 1)
+            weights, *_ = np.linalg.lstsq(basis, sigma, rcond=None)
+            best = min(best, (float(((sigma - basis @ weights) ** 2).sum()), period))
+    whole = float(((sigma - sigma.mean()) ** 2).sum())
+    return Period(best[1], 1.0 - best[0] / max(whole, 1e-300), ringing, travel)
+
+
+def as_text(study: SeparationStudy, period: Period) -> str:
+    """Best and worst distance in sentences, the table where it is short, and what fails."""
+    lines = [f"{study.case}: two pantographs {study.kind} at {study.speed:g} km/h."]
+    ranked = study.by_deviation
+    if not ranked:
+        lines.append(f"At no distance there are statistics of both: {study.pairs[0]['outcome']}")
+        return "\n".join(lines)
+    alone = study.rows[0]
+    if alone["outcome"] == "done":
+        told = _told(alone["std_leading_N"])
+        lines.append(f"One alone: deviation {told}{_uplift(alone)}.")
+    for word, row in (("Least", ranked[0]), ("Largest", ranked[-1])):
+        both = " and ".join(f"{place} {_told(row[f'std_{place}_N'])}" for place in PLACES)
+        lines.append(f"{word} deviation at {row[DISTANCE]:g} m: {both}{_uplift(row)}.")
+    names = dict.fromkeys(name for row in study.done for name in row["failed"])
+    lines += [f"FAILED      {name}: at {_stretches(study.done, name)} m" for name in names]
+    if not names:
+        lines.append("All criteria that are judged hold at all distances.")
+    lines.append(_explained(period))
+    refused = [row for row in study.pairs if row["outcome"] != "done"]
+    if refused:
+        lines.append(
+            f"{len(refused)} of {len(study.pairs)} distances could not be run, the first is "
+            f"{refused[0][DISTANCE]:g} m: {refused[0]['outcome']}"
+        )
+    lines.append("")
+    if len(study.pairs) <= _MOST_ROWS:
+        lines += [study.table().text(), ""]
+    remarks = remark_lines((f"{row[DISTANCE]:g} m", row["remarks"]) for row in study.pairs)
+    lines += remarks[:_MOST_REMARKS]
+    if len(remarks) > _MOST_REMARKS:
+        lines.append(f"{len(remarks) - _MOST_REMARKS} more remarks; {RECORD} has all of them.")
+    return "\n".join(lines)
+
+
+def _told(deviation: float | None) -> str:
+    return "not known" if deviation is None else f"{deviation:.1f} N"
+
+
+def _uplift(row: Row) -> str:
+    return "" if row[_UPLIFT] is None else f", uplift {row[_UPLIFT]:.1f} mm"
+
+
+def _explained(period: Period) -> str:
+    """What the deviation repeats itself with, and what theory offers."""
+    low, high = period.ringing
+    found = f"No period is found in fewer than {_LEAST_FOR_PERIOD} distances"
+    if np.isfinite(period.fitted):
+        share = 100 * period.explains
+        found = (
+            f"A period of {period.fitted:.0f} m explains {share:.0f} % of the variance of the "
+            "trailing one's deviation"
+        )
+    rings = f"spans ring every {low:.0f} to {high:.0f} m, " if np.isfinite(low) else ""
+    return f"{found}; {rings}waves travel back every {period.travel:.0f} m."
+
+
+def _stretches(rows: Sequence[Row], name: str) -> str:
+    """Where a criterion fails, neighbouring distances joined: ``31-40, 75``."""
+    runs: list[list[float]] = []
+    fails_before = False
+    for row in rows:
+        fails = name in row["failed"]
+        if fails and not fails_before:
+            runs.append([])
+        if fails:
+            runs[-1].append(row[DISTANCE])
+        fails_before = fails
+    return ", ".join(f"{run[0]:g}-{run[-1]:g}" if len(run) > 1 else f"{run[0]:g}" for run in runs)
+
+
+def write(folder: Path, study: SeparationStudy, period: Period) -> list[Path]:
+    """Write table, record and picture; returns the files. Not collective."""
+    table, ranked = study.table(), study.by_deviation
+    record = {
+        "case": study.case,
+        "pantograph": study.kind,
+        "speed_km_h": study.speed,
+        "best_separation_m": ranked[0][DISTANCE] if ranked else None,
+        "worst_separation_m": ranked[-1][DISTANCE] if ranked else None,
+        "fitted_period_m": period.fitted,
+        "fit_explains": period.explains,
+        "ringing_m": period.ringing,
+        "travel_m": period.travel,
+        "rows": table.records(),
+    }
+    drawn = partial(draw, study, period)
+    return write_files(folder, {TABLE: table, RECORD: record, PICTURE: drawn})
+
+
+def draw(study: SeparationStudy, period: Period) -> Figure | None:
+    """Deviation, least force and uplift over the distance, and as a line those of one pantograph
+    alone; at distances of whole periods of the ringing the ground is shaded. None if fewer than two
+    distances could be run."""
+    done = study.done
+    if len(done) < 2:
+        return None
+    figure, panels = figures.stacked(7.5, 3, shared=False)
+    x = np.array([row[DISTANCE] for row in done])
+    shown = (
+        ("standard deviation [N]", [f"std_{place}_N" for place in PLACES]),
+        ("minimum force [N]", [f"min_{place}_N" for place in PLACES]),
+        ("largest uplift at arms [mm]", [_UPLIFT]),
     )
+    for axes, (label, names) in zip(panels, shown, strict=True):
+        for number, name in enumerate(names):
+            y = np.array([row[name] for row in done], dtype=float)
+            of = PLACES[number] if len(names) > 1 else "both"
+            figures.curve(axes, x, y, number if len(names) > 1 else 2, of, ".-")
+        if (alone := study.rows[0][names[0]]) is not None:
+            axes.axhline(alone, color=figures.GREY, linestyle="--", label="one alone")
+        if np.isfinite(period.ringing).all():
+            for n in range(1, int(x[-1] / period.ringing[0]) + 1):
+                low, high = np.clip(n * period.ringing, x[0], x[-1])
+                axes.axvspan(low, high, color=figures.SHADE, zorder=0)
+        figures.tidy(axes, "distance [m]; shaded: whole periods of the ringing", label)
+        figures.legend_above(axes)
+    return figure

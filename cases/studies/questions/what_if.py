@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import contextlib
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from catenary.base.errors import InputError, RunBroken
 from catenary.cases.process.interrupts import Interrupted
@@ -14,13 +18,22 @@ from catenary.cases.scene.input.toml_input import parse_assignment
 from catenary.cases.studies.sweep.jobs import Ended, Job, RunOptions, interrupted, make_jobs
 from catenary.cases.studies.sweep.run_jobs import run_jobs
 from catenary.cases.studies.sweep.variants import Variant, check_keys
+from catenary.postproc.evaluate import filters
 from catenary.postproc.evaluate import statistics as stats
 from catenary.postproc.evaluate.slack_times import slack_times
 from catenary.postproc.evaluate.statistics import RunStatistics
 from catenary.postproc.read.results import Results
-from catenary.postproc.report.study_table import Column, StudyTable
+from catenary.postproc.report.page import page
+from catenary.postproc.report.pictures import figures
+from catenary.postproc.report.pictures.envelope import thinned
+from catenary.postproc.report.sections.section import Picture, Section, Text
+from catenary.postproc.report.study_table import Column, StudyTable, remark_lines, write_files
 
-AS_IT_IS, CHANGED = "as_it_is", "changed"
+AS_IT_IS, CHANGED, DIFFERENCE = "as_it_is", "changed", "difference"
+WORDS = {AS_IT_IS: "as it is", CHANGED: "changed"}
+PAGE = "what_if.html"
+_FORCE, _UPLIFT = "force", "uplift"
+_MOST_CHANGED = 3  # arms and droppers named on a terminal
 # Arms and droppers are the same ones in both runs where they stand so close [m].
 _SAME_PLACE = 1e-6
 _OF_FORCE = (
@@ -98,32 +111,43 @@ def differences(changes: Sequence[str], ended: Sequence[Ended], out: Path) -> Di
     folders = out / before.variant.name, out / after.variant.name
     with Results(folders[0]) as a, Results(folders[1]) as b:
         of_a, of_b = stats.evaluate(a), stats.evaluate(b)
+        arms, droppers = (of_a.supports, of_b.supports), (of_a.droppers, of_b.droppers)
+        of_arms = [(Column("uplift_mm", "uplift [mm]", ".1f"), [1e3 * one.uplift for one in arms])]
+        of_droppers = [
+            (Column("max_N", "largest [N]", ".1f"), [one.highest for one in droppers]),
+            (Column("min_N", "least [N]", ".1f"), [one.lowest for one in droppers]),
+            (Column("slack_s", "slack [s]", ".3f"), [slack_times(a), slack_times(b)]),
+        ]
         return Differences(
             str(a.attributes["case"]),
             tuple(changes),
             _statistics(of_a, of_b),
-            _supports(of_a, of_b),
-            _droppers(a, b, of_a, of_b),
+            _by_place("Uplift by support", "arm", *arms, of_arms),
+            _by_place("Droppers", "dropper", *droppers, of_droppers),
             _criteria(before.summary, after.summary),
             {one.variant.name: one.remarks for one in ended},
         )
 
 
+def _columns(name: str, head: str, form: str) -> list[Column]:
+    """The columns of a figure as it is, changed, and of the difference."""
+    heads = (f"{head} as it is".strip(), "changed", "difference")
+    forms = (form, form, f"+{form}")
+    keys = (_key(name, one) for one in (AS_IT_IS, CHANGED, DIFFERENCE))
+    return [Column(*one) for one in zip(keys, heads, forms, strict=True)]
+
+
 def _figures(name: str, first: float, second: float) -> dict[str, Any]:
-    """Two values and their difference as columns; None for what is not known."""
-    values = {AS_IT_IS: first, CHANGED: second, "difference": second - first}
+    """Two values and their difference as cells; None for what is not known."""
+    values = {AS_IT_IS: first, CHANGED: second, DIFFERENCE: second - first}
     return {
-        (f"{name}_{key}" if name else key): float(value) if np.isfinite(value) else None
+        _key(name, key): float(value) if np.isfinite(value) else None
         for key, value in values.items()
     }
 
 
-def _columns(name: str, head: str, form: str) -> list[Column]:
-    begin = f"{name}_" if name else ""
-    heads = (f"{head} as it is", "changed", "difference")
-    forms = (form, form, f"+{form}")
-    keys = (AS_IT_IS, CHANGED, "difference")
-    return [Column(begin + key, h.strip(), f) for key, h, f in zip(keys, heads, forms, strict=True)]
+def _key(name: str, of: str) -> str:
+    return f"{name}_{of}" if name else of
 
 
 def _statistics(a: RunStatistics, b: RunStatistics) -> StudyTable:
@@ -144,34 +168,26 @@ def _statistics(a: RunStatistics, b: RunStatistics) -> StudyTable:
     return StudyTable(columns, rows, "Statistics")
 
 
-def _supports(a: RunStatistics, b: RunStatistics) -> StudyTable:
-    rows = [
-        {"x_m": float(a.supports.x[i]), "evaluated": bool(a.supports.evaluated[i])}
-        | _figures("uplift_mm", 1e3 * a.supports.uplift[i], 1e3 * b.supports.uplift[j])
-        for i, j in _pairs(a.supports.x, b.supports.x)
-    ]
-    columns = [Column("x_m", "arm at [m]", ".1f"), *_columns("uplift_mm", "uplift [mm]", ".1f")]
-    return StudyTable([*columns, Column("evaluated", "evaluated")], rows, "Uplift by support")
+def _by_place(
+    title: str, head: str, first: Any, second: Any, of_each: Sequence[tuple[Column, Any]]
+) -> StudyTable:
+    """Figures of arms or droppers that both runs have, by their places.
 
-
-def _droppers(a: Results, b: Results, of_a: RunStatistics, of_b: RunStatistics) -> StudyTable:
-    first, second = of_a.droppers, of_b.droppers
-    slack = slack_times(a), slack_times(b)
-    rows = [
-        {"x_m": float(first.x[i]), "evaluated": bool(first.evaluated[i])}
-        | _figures("max_N", first.highest[i], second.highest[j])
-        | _figures("min_N", first.lowest[i], second.lowest[j])
-        | _figures("slack_s", slack[0][i], slack[1][j])
-        for i, j in _pairs(first.x, second.x)
-    ]
-    columns = [
-        Column("x_m", "dropper at [m]", ".1f"),
-        *_columns("max_N", "largest [N]", ".1f"),
-        *_columns("min_N", "least [N]", ".1f"),
-        *_columns("slack_s", "slack [s]", ".3f"),
-        Column("evaluated", "evaluated"),
-    ]
-    return StudyTable(columns, rows, "Droppers")
+    Parameters
+    ----------
+    first, second : statistics of both runs, with places ``x`` (n,) and what is ``evaluated``
+    of_each : a column, and its values (n,) in each run
+    """
+    rows = []
+    for i, j in _pairs(first.x, second.x):
+        row: dict[str, Any] = {"x_m": float(first.x[i]), "evaluated": bool(first.evaluated[i])}
+        for column, (own, other) in of_each:
+            row |= _figures(column.name, own[i], other[j])
+        rows.append(row)
+    columns = [Column("x_m", f"{head} at [m]", ".1f")]
+    for column, _ in of_each:
+        columns += _columns(column.name, column.head, column.format)
+    return StudyTable([*columns, Column("evaluated", "evaluated")], rows, title)
 
 
 def _pairs(first: np.ndarray, second: np.ndarray) -> list[tuple[int, int]]:
@@ -192,29 +208,117 @@ def _pairs(first: np.ndarray, second: np.ndarray) -> list[tuple[int, int]]:
 
 def _criteria(before: dict[str, Any], after: dict[str, Any]) -> StudyTable:
     second = {row["criterion"]: row for row in after["acceptance"]}
-    rows = [
-        {
-            "criterion": row["criterion"],
-            "unit": row["unit"],
-            "value_as_it_is": row["value"],
-            "limit_as_it_is": row["limit"],
-            "verdict_as_it_is": _word(row["passed"]),
-            "value_changed": other["value"],
-            "limit_changed": other["limit"],
-            "verdict_changed": _word(other["passed"]),
-        }
-        for row in before["acceptance"]
-        if (other := second.get(row["criterion"])) is not None
-    ]
-    columns = [Column("criterion", "criterion")]
-    for run_name, words in ((AS_IT_IS, "as it is"), (CHANGED, "changed")):
+    rows, columns = [], [Column("criterion", "criterion")]
+    for row in before["acceptance"]:
+        if (other := second.get(row["criterion"])) is not None:
+            found = {"criterion": row["criterion"], "unit": row["unit"]}
+            for name, one in ((AS_IT_IS, row), (CHANGED, other)):
+                found |= {f"value_{name}": one["value"], f"limit_{name}": one["limit"]}
+                found[f"verdict_{name}"] = _word(one["passed"])
+            rows.append(found)
+    for name, words in WORDS.items():
         columns += [
-            Column(f"value_{run_name}", words, ".4g"),
-            Column(f"limit_{run_name}", "limit", ".4g"),
-            Column(f"verdict_{run_name}", "verdict"),
+            Column(f"value_{name}", words, ".4g"),
+            Column(f"limit_{name}", "limit", ".4g"),
+            Column(f"verdict_{name}", "verdict"),
         ]
     return StudyTable([*columns, Column("unit", "unit")], rows, "Verdicts")
 
 
 def _word(passed: bool | None) -> str:
     return "not judged" if passed is None else "passed" if passed else "failed"
+
+
+def as_text(found: Differences) -> str:
+    """Statistics, verdicts that change, and what changes most of the line."""
+    lines = [f"{found.case} with {', '.join(found.changes)}", "", found.statistics.text(), ""]
+    rows = found.criteria.rows
+    turned = [row for row in rows if row["verdict_as_it_is"] != row["verdict_changed"]]
+    lines += [
+        f"{row['criterion']}: {row['verdict_as_it_is']} as it is, {row['verdict_changed']} with "
+        "the change"
+        for row in turned
+    ] or ["No verdict changes."]
+    for table, name, what in (
+        (found.supports, "uplift_mm", "Uplift at {x:g} m: {a:.1f} -> {b:.1f} mm"),
+        (found.droppers, "max_N", "Largest force of the dropper at {x:g} m: {a:.1f} -> {b:.1f} N"),
+    ):
+        key = f"{name}_{DIFFERENCE}"
+        places = [row for row in table.rows if row["evaluated"] and row[key] is not None]
+        lines += [
+            what.format(x=row["x_m"], a=row[f"{name}_{AS_IT_IS}"], b=row[f"{name}_{CHANGED}"])
+            for row in sorted(places, key=lambda row: -abs(row[key]))[:_MOST_CHANGED]
+        ]
+    named = [(WORDS[name], said) for name, said in found.remarks.items()]
+    return "\n".join([*lines, *remark_lines(named)])
+
+
+def write(folder: Path, found: Differences) -> list[Path]:
+    """Write the page, its tables and pictures; returns the files. Not collective."""
+    pictures: dict[str, bytes] = {}
+    with Results(folder / AS_IT_IS) as a, Results(folder / CHANGED) as b:
+        for name, draw in ((_FORCE, draw_forces), (_UPLIFT, draw_uplift)):
+            pictures |= figures.painted(name, partial(draw, a, b))
+    title = f"{found.case}: what if {', '.join(found.changes)}"
+    lead = "Differences are those of the changed run minus those of the case as it is."
+    return write_files(
+        folder,
+        {f"{name}.png": data for name, data in pictures.items()}
+        | {
+            "statistics.csv": found.statistics,
+            "supports.csv": found.supports,
+            "droppers.csv": found.droppers,
+            "verdicts.csv": found.criteria,
+            PAGE: page(title, lead, _sections(found), pictures),
+        },
+    )
+
+
+def _sections(found: Differences) -> Iterator[Section]:
+    # Pictures are made before the page.
+    shown = [
+        Picture(_FORCE, "Contact force, 20 Hz low-pass, along the track", lambda: None),
+        Picture(_UPLIFT, "Largest uplift at each steady arm", lambda: None),
+    ]
+    for table in (found.statistics, found.criteria, found.supports, found.droppers):
+        pictures = shown if table is found.statistics else []
+        yield Section(table.title, [replace(table, title="")], pictures)
+    remarks = [
+        Text(text, "remark", f"{WORDS[name]}: ")
+        for name, said in found.remarks.items()
+        for text in said
+    ]
+    if remarks:
+        yield Section("Remarks", remarks)
+
+
+def draw_forces(a: Results, b: Results) -> Figure:
+    """Contact forces of both runs along the track, a panel for each pantograph that both have."""
+    n = min(a.n_pantographs, b.n_pantographs)
+    figure, panels = figures.stacked(0.7 + 2.7 * n, n, shared=True)
+    for p, axes in enumerate(panels):
+        for number, (run, words) in enumerate(zip((a, b), WORDS.values(), strict=True)):
+            force = run.column("contact_force", p)
+            with contextlib.suppress(InputError):  # sampled too slowly; statistics say so
+                force = filters.low_pass(force, run.dt)
+            chosen = thinned(force)
+            x = run.column("contact_position", p)[chosen]
+            figures.curve(axes, x, force[chosen], number, words)
+        axes.axvspan(*a.evaluation, color=figures.SHADE, zorder=0)
+        figures.tidy(axes, "", "contact force [N]", a.pantograph_names()[p].capitalize())
+        figures.legend_above(axes)
+    panels[-1].set_xlabel("position along the track [m]")
+    return figure
+
+
+def draw_uplift(a: Results, b: Results) -> Figure:
+    """Largest uplift at each steady arm of both runs."""
+    figure, (axes,) = figures.stacked(3.2, 1)
+    for number, (run, words) in enumerate(zip((a, b), WORDS.values(), strict=True)):
+        uplift = 1e3 * run.extremes("arm_uplift")[1]
+        order = np.argsort(run.line("arm_x"), kind="stable")
+        figures.curve(axes, run.line("arm_x")[order], uplift[order], number, words, "o-")
+    axes.axvspan(*a.evaluation, color=figures.SHADE, zorder=0)
+    figures.tidy(axes, "position along the track [m]", "largest uplift [mm]")
+    figures.legend_above(axes)
+    return figure

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -13,9 +13,8 @@ from catenary.cases.scene.load import scene_from
 from catenary.cases.scene.problem import problem_of
 from catenary.cases.studies.questions.causes import Causes
 from catenary.cases.studies.questions.worst import Passage, Spot, WorstPlaces, worst_places
-from catenary.postproc.files.disk import write_all
 from catenary.postproc.read.results import Results
-from catenary.postproc.report.study_table import Column, StudyTable
+from catenary.postproc.report.study_table import Column, StudyTable, write_files
 from catenary.solver.statics.elasticity import elasticity
 from catenary.solver.statics.line_at_rest import line_at_rest
 
@@ -129,59 +128,37 @@ def _out(is_out: bool | None) -> str:
 
 def _spans_table(passages: Sequence[Passage], causes: Causes, names: Sequence[str]) -> StudyTable:
     fields = ("std_N", "max_N", "min_N", "loss_percent", "median_std_N", "stands_out")
-    rows = [
-        {
-            "span": one.span + 1,
-            "from_m": one.start,
-            "to_m": one.end,
-            "pantograph": names[one.pantograph],
-            **dict(zip(fields, one[4:], strict=True)),
-            "causes": causes.of_passage(one),
-        }
+    heads = ("span", "from_m", "to_m", "pantograph", *fields, "causes")
+    cells = (
+        (one.span + 1, one.start, one.end, names[one.pantograph], *one[4:], causes.of_passage(one))
         for one in passages
-    ]
-    return _table(("span", "from_m", "to_m", "pantograph", *fields, "causes"), rows)
+    )
+    return _table(heads, cells)
 
 
 def _supports_table(arms: Sequence[Spot], causes: Causes) -> StudyTable:
-    rows = [
-        {
-            "x_m": one.x,
-            "max_uplift_mm": one.value,
-            "median_mm": one.median,
-            "stands_out": one.stands_out,
-            "causes": causes.at(one.x),
-        }
-        for one in arms
-    ]
-    return _table(("x_m", "max_uplift_mm", "median_mm", "stands_out", "causes"), rows)
+    heads = ("x_m", "max_uplift_mm", "median_mm", "stands_out", "causes")
+    return _table(heads, ((*one[1:], causes.at(one.x)) for one in arms))
 
 
 def _droppers_table(places: WorstPlaces, causes: Causes) -> StudyTable:
     slack = {one.number: one for one in places.slack}
-    rows = []
+    cells = []
     for one in places.forces:
-        times = slack.get(one.number)
-        rows.append(
-            {
-                "x_m": one.x,
-                "max_N": one.value,
-                "usual_max_N": one.median,
-                "min_N": float(places.least[one.number]),
-                "slack_s": 0.0 if times is None else times.value,
-                "stands_out": (times is not None and times.stands_out) or one.stands_out,
-                "causes": causes.at(one.x),
-            }
-        )
-    names = ("x_m", "max_N", "usual_max_N", "min_N", "slack_s", "stands_out", "causes")
-    return _table(names, rows)
+        times, least = slack.get(one.number), float(places.least[one.number])
+        stands_out = (times is not None and times.stands_out) or one.stands_out
+        slack_s = 0.0 if times is None else times.value
+        cells.append((one.x, one.value, one.median, least, slack_s, stands_out, causes.at(one.x)))
+    heads = ("x_m", "max_N", "usual_max_N", "min_N", "slack_s", "stands_out", "causes")
+    return _table(heads, cells)
 
 
-def _table(names: Sequence[str], rows: Sequence[dict[str, Any]]) -> StudyTable:
-    return StudyTable([Column(name) for name in names], rows)
+def _table(heads: Sequence[str], cells: Iterable[Sequence[Any]]) -> StudyTable:
+    rows = [dict(zip(heads, own, strict=True)) for own in cells]
+    return StudyTable([Column(name) for name in heads], rows)
 
 
 def write(folder: Path, answer: Answer) -> list[Path]:
     """Write the three tables; returns the files. Not collective."""
     tables = {"spans": answer.spans, "supports": answer.supports, "droppers": answer.droppers}
-    return write_all(folder, {f"worst_{name}.csv": own.csv() for name, own in tables.items()})
+    return write_files(folder, {f"worst_{name}.csv": own for name, own in tables.items()})

@@ -21,7 +21,7 @@ from catenary.cases.studies.sampling.distributions import (
 )
 from catenary.cases.studies.sampling.fields import fields_as_text
 from catenary.cases.studies.sampling.tables import SamplingTable, field_column, list_of
-from catenary.cases.studies.sweep.variants import Variant, text_of
+from catenary.cases.studies.sweep.variants import Variant, is_number, text_of, value_at
 
 
 def sample_name(number: int) -> str:
@@ -55,12 +55,12 @@ def samples(sampling: SamplingTable, scene: Scene, file: str) -> list[Variant]:
         texts = _texts(key, table, column, own, where)
         columns[key] = texts
         above = list_of(key)
-        if above == key or not _is_plain_list(_own_value(above, own)):
+        if above == key or not _is_plain_list(value_at(own, above)):
             assigned.append([f"{key}={text}" for text in texts])
         else:
             lists.setdefault(above, {})[int(key.rpartition(".")[2])] = texts
     for key, entries in lists.items():
-        assigned.append(_assigned_lists(key, _own_value(key, own), entries, len(cube), where))
+        assigned.append(_assigned_lists(key, value_at(own, key), entries, len(cube), where))
     for key, field, column in zip(
         sampling.fields, sampling.fields.values(), cube.T[len(sampling.keys) :], strict=True
     ):
@@ -113,22 +113,11 @@ def _is_plain_list(value: Any) -> bool:
     return isinstance(value, list) and not any(isinstance(one, dict | list) for one in value)
 
 
-def _own_value(key: str, own: dict[str, Any]) -> Any:
-    """The scene's own value of a dotted key, None if it has none."""
-    here: Any = own
-    for part in key.split("."):
-        if isinstance(here, list) and part.isdigit() and int(part) < len(here):
-            here = here[int(part)]
-        else:
-            here = here.get(part) if isinstance(here, dict) else None
-    return here
-
-
 def _own_number(key: str, own: dict[str, Any]) -> float:
     """The scene's own value of a dotted key; ValueError if it has none, with a predicate."""
-    here = _own_value(key, own)
+    here = value_at(own, key)
     if isinstance(here, list) and len(here) == 1:  # one number may be written for a list
         (here,) = here
-    if isinstance(here, bool) or not isinstance(here, int | float):
+    if not is_number(here):
         raise ValueError("needs a mean: the scene has no number of its own there")
     return float(here)

@@ -6,13 +6,13 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, ValidationError, model_validator
+from pydantic import Field, model_validator
 
 from catenary.base.errors import InputError
-from catenary.cases.scene.input.faults import Origin, shown, text_faults
+from catenary.cases.scene.input.faults import shown
 from catenary.cases.scene.input.plain_text import refuse_deep
 from catenary.cases.scene.input.toml_input import read_toml
-from catenary.cases.scene.keys.error_sentences import schema_faults, unknown_key
+from catenary.cases.scene.keys.error_sentences import unknown_key
 from catenary.cases.scene.keys.keys import is_known, known_keys
 from catenary.cases.scene.keys.table import Table
 from catenary.cases.scene.scene import Scene
@@ -26,6 +26,7 @@ from catenary.cases.studies.sampling.distributions import (
     TruncatedNormalTable,
     UniformTable,
 )
+from catenary.cases.studies.task_files import checked_table
 
 MOST_SAMPLES = 100_000
 _Key = Annotated[str, Field(min_length=1, max_length=200)]
@@ -204,22 +205,11 @@ def sampling_of(raw: Mapping[str, Any], file: str) -> SamplingTable:
         If a value or a key is wrong.
     """
     refuse_deep(dict(raw), file)
-    origin = Origin(file)
-    raw = {
+    tables = {
         name: _by_dotted_keys(value) if name in ("keys", "fields") else value
         for name, value in raw.items()
     }
-    faults, more = text_faults(raw, origin), 0
-    try:
-        table = SamplingTable.model_validate(raw)
-    except ValidationError as failed:
-        of_schema, more = schema_faults(failed, raw, SamplingTable, origin)
-        told = {fault.key for fault in faults}
-        faults += [fault for fault in of_schema if fault.key not in told]
-    if faults:
-        others = len(faults) - 1 + more
-        first = faults[0].sentence.removeprefix("the scene in ")  # of no key: of the file
-        raise InputError(first + (f" (and {others} more)" if others else ""))
+    table = checked_table(tables, SamplingTable, file)
     known = known_keys(Scene)
     for key in (*table.keys, *table.fields):
         if key.split(".")[0] == "petsc":

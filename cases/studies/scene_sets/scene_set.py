@@ -1,4 +1,4 @@
-"""Sets of scenes: directions, speeds, trains and samples of errors, each with each."""
+"""Sets of scenes: directions, speeds, trains and samples of errors, each with each; bounds."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal, NamedTuple
 
-from pydantic import Field, field_validator
+from pydantic import AfterValidator, Field, field_validator, model_validator
 
 from catenary.base.errors import InputError
 from catenary.cases.scene.input.toml_input import parse_assignment
@@ -16,6 +16,7 @@ from catenary.cases.scene.line.imperfections import Seed
 from catenary.cases.scene.load import Draft
 from catenary.cases.scene.scene import Scene
 from catenary.cases.scene.turned import turned
+from catenary.cases.studies.sweep.jobs import STATISTICS
 
 FORWARD, BACKWARD = "forward", "backward"
 DIRECTIONS = (FORWARD, BACKWARD)
@@ -23,6 +24,50 @@ Direction = Literal["forward", "backward"]
 MOST_SCENES = 1000
 _LENGTHS = "irregularities.dropper_lengths"
 _WHERE = "in the set of scenes"
+
+
+def _is_statistic(name: str) -> str:
+    if name not in STATISTICS:
+        raise ValueError(f"must be one of {', '.join(STATISTICS)}")
+    return name
+
+
+Statistic = Annotated[str, AfterValidator(_is_statistic)]
+
+
+class BoundTable(Table):
+    """What every pantograph of every scene must keep."""
+
+    statistic: Statistic = Field(description="statistic of a run")
+    at_least: float | None = Field(None, description="least value allowed")
+    at_most: float | None = Field(None, description="greatest value allowed")
+
+    @model_validator(mode="after")
+    def _bounded(self) -> BoundTable:
+        if (self.at_least is None) == (self.at_most is None):
+            raise ValueError("needs at_least or at_most, one of both")
+        return self
+
+    @property
+    def says(self) -> str:
+        """The bound in words."""
+        if self.at_least is not None:
+            return f"{self.statistic} >= {self.at_least:g}"
+        return f"{self.statistic} <= {self.at_most:g}"
+
+    def margin(self, value: float) -> float:
+        """By how much a value is within the bound, in its unit; negative beyond."""
+        if self.at_least is not None:
+            return value - self.at_least
+        assert self.at_most is not None
+        return self.at_most - value
+
+    @property
+    def scale(self) -> float:
+        """What margins may be divided by: the bound, or 100 if that is smaller than 1."""
+        bound = self.at_most if self.at_least is None else self.at_least
+        assert bound is not None
+        return abs(bound) if abs(bound) >= 1.0 else 100.0
 
 
 class ErrorSamples(Table):

@@ -26,6 +26,7 @@ from catenary.cases.scene.keys.units import unit_of
 from catenary.cases.scene.load import scene_from
 from catenary.cases.scene.problem import line_of, resolved
 from catenary.cases.scene.scene import Scene
+from catenary.cases.studies.sweep.variants import is_number, value_at
 
 # Patterns of the parameters that are taken if none are named, in the order in which they are taken.
 USUAL = (
@@ -172,10 +173,10 @@ class ChangedScenes:
         ):
             raise InputError(unknown_key(key, "in --parameter", known))
         if parts[0] == "pantographs" and len(parts) > 2:
-            kind = self._raw["pantographs"].get(parts[1], {})
-            if kind.get("model") is not None:
+            if self._is_ready(parts[1]):
+                model = self._raw["pantographs"][parts[1]]["model"]
                 raise InputError(
-                    f"pantographs.{parts[1]} is the ready {kind['model']}, whose numbers stay: "
+                    f"pantographs.{parts[1]} is the ready {model}, whose numbers stay: "
                     "write its lists in place of model (`catenary list --pantographs`)"
                 )
         values = self._values(key)
@@ -189,13 +190,12 @@ class ChangedScenes:
     def droppers(self) -> list[Parameter]:
         """The length of each dropper in the evaluated stretch."""
         line, evaluation = line_of(self.scene), self.scene.evaluation
-        found = []
-        for span in range(line.n_spans):
-            for number, x in enumerate(line.droppers_of_span(span)):
-                if evaluation.from_m <= x <= evaluation.to_m:
-                    key = f"{_LENGTHS}.{span + 1}.{number + 1}"
-                    found.append(self._length_of(key, span + 1, number + 1))
-        return found
+        return [
+            self.parameter(f"{_LENGTHS}.{span + 1}.{number + 1}")
+            for span in range(line.n_spans)
+            for number, x in enumerate(line.droppers_of_span(span))
+            if evaluation.from_m <= x <= evaluation.to_m
+        ]
 
     def droppers_of(self, spans: Sequence[int]) -> list[Parameter]:
         """The length of each dropper in some spans, counted from 1.
@@ -210,7 +210,7 @@ class ChangedScenes:
             if span > line.n_spans:
                 raise InputError(f"there is no span {span}: the line has {line.n_spans}")
             for number in range(1, len(line.droppers_of_span(span - 1)) + 1):
-                found.append(self._length_of(f"{_LENGTHS}.{span}.{number}", span, number))
+                found.append(self.parameter(f"{_LENGTHS}.{span}.{number}"))
         if not found:
             raise InputError("there are no droppers in the spans whose droppers are looked for")
         return found
@@ -233,18 +233,19 @@ class ChangedScenes:
         """The parameters of the scene that are taken if none are named, without those that are
         zero."""
         on_train = {place["name"] for place in self._raw["train"]["pantographs"]}
-        found = dict.fromkeys(self._usual_keys())
         kept = []
-        for key in found:
-            parts = key.split(".")
-            if parts[0] == "pantographs":
-                kind = self._raw["pantographs"][parts[1]]
-                if parts[1] not in on_train or kind.get("model") is not None:
-                    continue
+        for key in dict.fromkeys(self._usual_keys()):
+            first, second = key.split(".")[:2]
+            if first == "pantographs" and (second not in on_train or self._is_ready(second)):
+                continue
             values = self._values(key)
             if values is not None and any(values):
                 kept.append(Parameter(key, values))
         return kept
+
+    def _is_ready(self, kind: str) -> bool:
+        """Whether a kind of pantograph is a ready one, whose numbers the scene has not."""
+        return self._raw["pantographs"].get(kind, {}).get("model") is not None
 
     def _usual_keys(self) -> Iterator[str]:
         every = list(_numbers(self._raw))
@@ -260,18 +261,13 @@ class ChangedScenes:
                     yield own
 
     def _values(self, key: str) -> tuple[float, ...] | None:
-        try:
-            holder, place = _found(self._raw, key)
-        except (KeyError, IndexError, TypeError, ValueError):
-            return None
+        above, _, place = key.rpartition(".")
+        holder, value = value_at(self._raw, above), value_at(self._raw, key)
         if place == _FORCE and isinstance(holder, dict) and holder.get(_BY_SPEED):
             speeds, forces = np.array(holder[_BY_SPEED]).T
             return (float(np.interp(self._raw["train"]["speed_km_h"], speeds, forces)),)
-        value = holder.get(place) if isinstance(holder, dict) else holder[place]
         values = value if isinstance(value, list) else [value]
-        if not values or not all(_is_number(one) for one in values):
-            return None
-        return tuple(map(float, values))
+        return tuple(map(float, values)) if values and all(map(is_number, values)) else None
 
     @staticmethod
     def _checked(raw: dict[str, Any]) -> Scene:
@@ -284,7 +280,9 @@ def _change(raw: dict[str, Any], parameter: Parameter, by: float) -> None:
         span, number = map(int, dropper.groups())
         _lengthen(raw, span, number, parameter.values[0] + by)
         return
-    holder, place = _found(raw, parameter.key)
+    above, _, last = parameter.key.rpartition(".")
+    holder = value_at(raw, above)
+    place = int(last) if isinstance(holder, list) else last
     if place == _FORCE and holder.get(_BY_SPEED):
         holder[_BY_SPEED] = [[speed, force + by] for speed, force in holder[_BY_SPEED]]
     elif isinstance(holder[place], list):
@@ -301,21 +299,6 @@ def _lengthen(raw: dict[str, Any], span: int, number: int, error: float) -> None
     raw["effects"]["dropper_lengths"] = True
 
 
-def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool)
-
-
-def _found(raw: Any, key: str) -> tuple[Any, Any]:
-    """The table or list that holds a key's last part, and that part as its place there."""
-    here, parts = raw, key.split(".")
-    for part in parts[:-1]:
-        here = here[int(part)] if isinstance(here, list) else here[part]
-    last: Any = int(parts[-1]) if isinstance(here, list) else parts[-1]
-    if isinstance(here, list):
-        here[last]  # raises if there is none
-    return here, last
-
-
 def _numbers(raw: Any, prefix: str = "") -> Iterator[str]:
     """Keys of all numbers, and of all lists of what are no tables."""
     if isinstance(raw, dict):
@@ -324,7 +307,7 @@ def _numbers(raw: Any, prefix: str = "") -> Iterator[str]:
     elif isinstance(raw, list) and raw and isinstance(raw[0], dict):
         for number, value in enumerate(raw):
             yield from _numbers(value, f"{prefix}.{number}")
-    elif _is_number(raw) or isinstance(raw, list):
+    elif is_number(raw) or isinstance(raw, list):
         yield prefix
 
 

@@ -19,7 +19,7 @@ from catenary.postproc.evaluate.statistics import covers
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest
 from catenary.solver.statics.stability_of_rest import refuse_lost_wire
 from catenary.solver.tangents.march import Tangents, march_with_tangents
-from catenary.solver.tangents.set_up import Change, differentiate, set_up_of
+from catenary.solver.tangents.set_up import Change, SetUp, differentiate, set_up_of
 
 # What derivatives of all steps may take before the march is made again for the next parameters [B].
 _BYTES = 2**28
@@ -94,34 +94,22 @@ def sensitivity_of(
     filters.check_sampling(scene.numerics.dt_s)
     scenes = ChangedScenes(scene)
     parameters = parameters_of(scenes, keys, droppers)
-    at_rest = _at_rest(scenes.scene)
-    refuse_lost_wire(at_rest.model, at_rest.form)
+    at_rest = sound_rest(scenes.scene)
     now = set_up_of(comm, at_rest)
-    n_steps = len(now.drives)
     changes: list[Change] = []
     kept, left_out = [], {}
     for parameter in parameters:
         progress(parameter.key)
-
-        def set_up(by: float, parameter: Parameter = parameter) -> Any:
-            changed = scenes.changed(parameter, by)
-            if parameter.is_of_train:
-                return set_up_of(comm, at_rest.under(problem_of(changed)), n_steps, now)
-            return set_up_of(comm, _at_rest(changed), n_steps)
-
         try:
-            changes.append(differentiate(set_up, now, parameter.step, parameter.key))
+            changes.append(change_by(parameter, scenes, at_rest, now, comm))
         except InputError as error:
             if keys or droppers:
                 raise
             left_out[parameter.key] = str(error)
         else:
             kept.append(parameter)
-    n_results = 2 * len(now.heads) + at_rest.mesh.steady_arms.size
-    most = max(1, _BYTES // (8 * n_steps * n_results))
     found: Sensitivity | None = None
-    for first in range(0, max(1, len(kept)), most):
-        part = slice(first, first + most)
+    for part in parts_of(changes, at_rest, now):
         progress("march")
         marched = march_with_tangents(comm, at_rest, changes[part])
         if found is None:
@@ -132,19 +120,57 @@ def sensitivity_of(
     return found
 
 
+def sound_rest(scene: Scene) -> LineAtRest:
+    """The line of a scene at rest; InputError if a wire has lost its tension. Not collective."""
+    found = _at_rest(scene)
+    refuse_lost_wire(found.model, found.form)
+    return found
+
+
 def _at_rest(scene: Scene) -> LineAtRest:
     return line_at_rest(problem_of(scene), mesh_of(scene))
+
+
+def change_by(
+    parameter: Parameter, scenes: ChangedScenes, at_rest: LineAtRest, now: SetUp, comm: Any
+) -> Change:
+    """The derivative of a march's set-up by a parameter. Not collective.
+
+    Parameters
+    ----------
+    scenes : the scene, unchanged
+    at_rest, now : its line and set-up
+
+    Raises
+    ------
+    InputError
+        If there is none.
+    """
+
+    def set_up(by: float) -> SetUp:
+        changed, n_steps = scenes.changed(parameter, by), len(now.drives)
+        if parameter.is_of_train:
+            return set_up_of(comm, at_rest.under(problem_of(changed)), n_steps, now)
+        return set_up_of(comm, _at_rest(changed), n_steps)
+
+    return differentiate(set_up, now, parameter.step, parameter.key)
+
+
+def parts_of(changes: Sequence[Change], at_rest: LineAtRest, now: SetUp) -> Iterator[slice]:
+    """Changes by parts for each of which a march is made: all at once need too much memory. One
+    part, empty, without changes."""
+    n_results = 2 * len(now.heads) + at_rest.mesh.steady_arms.size
+    most = max(1, _BYTES // (8 * len(now.drives) * n_results))
+    for first in range(0, max(1, len(changes)), most):
+        yield slice(first, first + most)
 
 
 def _without_parameters(marched: Tangents, at_rest: LineAtRest) -> Sensitivity:
     statistics = []
     for number, within in _within(marched, at_rest):
         force = filters.low_pass(marched.force[:, number], marched.dt)[within]
-        statistics.append(
-            Statistics(
-                float(force.mean()), float(force.std()), float(force.max()), float(force.min())
-            )
-        )
+        figures = (force.mean(), force.std(), force.max(), force.min())
+        statistics.append(Statistics(*map(float, figures)))
     n = len(statistics)
     middle = [f"no. {place}" for place in range(2, n)]
     names = ["pantograph"] if n == 1 else ["leading", *middle, "trailing"]

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 from catenary.base.errors import InputError
 from catenary.cases.scene.input.faults import UnfitScene, shown
 from catenary.cases.scene.input.toml_input import Assigned
 from catenary.cases.scene.keys.keys import nearest
-from catenary.cases.scene.load import Draft, load_scene
+from catenary.cases.scene.load import Draft, load_scene, read_draft
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.sweep.variants import NAMES, Variant
 from catenary.postproc.report.study_table import Column
@@ -141,17 +142,11 @@ def _refuse_petsc(variant: Variant) -> None:
 
 
 def jobs_and_refused(
-    case: str | Draft,
-    variants: Sequence[Variant],
-    overrides: Sequence[str] = (),
-    shortened: bool = False,
-    *,
-    full_report: bool = False,
+    draft: Draft, variants: Sequence[Variant], full_report: bool = False
 ) -> tuple[list[Job], list[Ended]]:
-    """The jobs of the variants that can be run, and how the others ended. Not collective.
+    """The jobs of the variants of a case that can be run, and how the others ended. Not collective.
 
-    A variant breaks alone if its values do not fit together or are implausible. Arguments as of
-    ``make_jobs``.
+    A variant breaks alone if its values do not fit together or are implausible.
 
     Raises
     ------
@@ -163,7 +158,7 @@ def jobs_and_refused(
     several = len(variants) > 1
     for variant in variants:
         try:
-            scene = scene_of(case, variant, overrides, shortened, several=several)
+            scene = scene_of(draft, variant, several=several)
             jobs.append(Job(variant, scene, full_report))
         except UnfitScene as error:
             refused.append(Ended(variant, str(error)))
@@ -201,21 +196,15 @@ def make_jobs(
     InputError
         If a scene is wrong, with the variant's name if there are several.
     """
-    jobs, refused = jobs_and_refused(case, variants, overrides, shortened, full_report=full_report)
+    draft = read_draft(case, overrides, shortened)
+    jobs, refused = jobs_and_refused(draft, variants, full_report)
     if refused:
         raise InputError(f"variant {refused[0].variant.name}: {refused[0].outcome}")
     return jobs
 
 
-def scene_of(
-    case: str | Draft,
-    variant: Variant,
-    overrides: Sequence[str],
-    shortened: bool = False,
-    *,
-    several: bool,
-) -> Scene:
-    """The checked scene of a variant. Not collective.
+def scene_of(draft: Draft, variant: Variant, several: bool) -> Scene:
+    """The checked scene of a variant of a case. Not collective.
 
     Raises
     ------
@@ -226,10 +215,46 @@ def scene_of(
     """
     _refuse_petsc(variant)
     try:
-        return load_scene(case, overrides, shortened, _assigned(variant))
+        return load_scene(draft, varied=_assigned(variant))
     except UnfitScene:
         raise
     except InputError as error:
         if not several:
             raise
         raise InputError(f"variant {variant.name}: {error}") from error
+
+
+T = TypeVar("T")
+
+
+class Part(NamedTuple):
+    """Every ``n_parts``-th run from the ``number``-th on, counted from 1."""
+
+    number: int
+    n_parts: int
+
+    def of(self, jobs: Sequence[T]) -> list[T]:
+        """Its runs, or pieces of work, among all of a sweep or study."""
+        return list(jobs[self.number - 1 :: self.n_parts])
+
+    @property
+    def folder(self) -> str:
+        """Name of the folder of its table."""
+        return f"part_{self.number}_of_{self.n_parts}"
+
+
+def parse_part(text: str) -> Part:
+    """The part that ``--part`` names.
+
+    Raises
+    ------
+    InputError
+        If it is no I/N with 1 <= I <= N.
+    """
+    found = re.fullmatch(r"(\d{1,7})/(\d{1,7})", text, re.ASCII)
+    part = Part(*map(int, found.groups())) if found else Part(0, 0)
+    if not 1 <= part.number <= part.n_parts:
+        raise InputError(
+            f"--part is {shown(text)}; it must be I/N with I from 1 to N, such as 3/10"
+        )
+    return part

@@ -6,6 +6,7 @@ import hashlib
 import json
 import time
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -15,11 +16,10 @@ from catenary.cases.process.interrupts import Interrupted
 from catenary.cases.process.petsc_options import start_petsc
 from catenary.cases.process.workers import WorkerLost, at_once
 from catenary.cases.scene.input.faults import UnfitScene
-from catenary.cases.scene.load import Draft, read_draft
+from catenary.cases.scene.load import Draft
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.records import KeptRows
-from catenary.cases.studies.sweep.jobs import Ended, RunOptions, scene_of
-from catenary.cases.studies.sweep.part import Part
+from catenary.cases.studies.sweep.jobs import Ended, Part, RunOptions, interrupted, scene_of
 from catenary.cases.studies.sweep.variants import Variant
 from catenary.postproc.files.run_schema import DONE, INTERRUPTED
 
@@ -36,24 +36,17 @@ class Ensemble(NamedTuple):
 
     Attributes
     ----------
-    draft : the case, with its own values for short runs if these are wanted
-    overrides : assignments for all variants
+    draft : the case
     variants : in their order
     first : the scene of the first variant that can be run
     """
 
     draft: Draft
-    overrides: Sequence[str]
     variants: Sequence[Variant]
     first: Scene
 
 
-def ensemble_of(
-    case: str | Path | Draft,
-    variants: Sequence[Variant],
-    overrides: Sequence[str] = (),
-    shortened: bool = False,
-) -> Ensemble:
+def ensemble_of(draft: Draft, variants: Sequence[Variant]) -> Ensemble:
     """An ensemble of which one variant at least can be run; others are looked at when it is their
     turn. Not collective.
 
@@ -63,17 +56,12 @@ def ensemble_of(
         If no variant can be run, or if a value of one that comes before the first such is out of
         bounds.
     """
-    draft = case if isinstance(case, Draft) else read_draft(case)
-    if shortened:
-        draft = draft.shortened()
     refused: CatenaryError | None = None
     for variant in variants:
         try:
-            scene = scene_of(draft, variant, overrides, several=len(variants) > 1)
+            return Ensemble(draft, variants, scene_of(draft, variant, len(variants) > 1))
         except UnfitScene as error:
             refused = refused or error
-            continue
-        return Ensemble(draft, overrides, variants, scene)
     assert refused is not None
     raise InputError(f"variant {variants[0].name}: {refused}") from refused
 
@@ -102,9 +90,9 @@ def run_ensemble(
 
     def depends_on(piece: Sequence[Variant]) -> list[Any]:
         assignments = [[variant.name, *variant.assignments] for variant in piece]
-        return [case, *ensemble.overrides, assignments]
+        return [case, assignments]
 
-    march = _March(ensemble.draft, list(ensemble.overrides))
+    march = _March(ensemble.draft)
     n_at_once = at_once(options.n_jobs, comm)
     if comm.size > 1:  # a march is one rank's: all without -j would do the same
         n_at_once = comm.size
@@ -135,22 +123,49 @@ def run_ensemble(
     return ended
 
 
+@dataclass
+class Marching:
+    """Marches variants of a case again and again; ``out``, ``comm`` and ``options`` are those of
+    ``run_ensemble``."""
+
+    draft: Draft
+    out: Path | None
+    comm: Any
+    options: RunOptions
+
+    def of(self, variants: Sequence[Variant]) -> list[Ended]:
+        """How each variant ended, in their order. Collective.
+
+        Raises
+        ------
+        InputError
+            If none of them can be run.
+        Interrupted
+            If a signal came.
+        """
+        ended = run_ensemble(ensemble_of(self.draft, variants), self.out, self.comm, self.options)
+        self.options = self.options._replace(force=False)  # which would forget these
+        if interrupted(ended):
+            raise Interrupted("the study was interrupted; the same command continues it")
+        return ended
+
+
 class _March:
     """Marches a piece of variants; goes to the processes that do so."""
 
-    def __init__(self, draft: Draft, overrides: list[str]) -> None:
-        self._draft, self._overrides = draft, overrides
+    def __init__(self, draft: Draft) -> None:
+        self._draft = draft
         self._marches: Any = None
 
     def __call__(self, piece: Sequence[Variant], comm: Any) -> list[list[Any]]:
         """Outcome and what is kept of the summary of each. Not collective."""
-        from catenary.cases.studies.ensemble.scenes_on_lines import Marches
+        from catenary.cases.studies.ensemble import Marches
 
         rows: list[list[Any]] = [[] for _ in piece]
         scenes, numbers = [], []
         for number, variant in enumerate(piece):
             try:
-                scenes.append(scene_of(self._draft, variant, self._overrides, several=True))
+                scenes.append(scene_of(self._draft, variant, several=True))
                 numbers.append(number)
             except InputError as error:
                 rows[number] = [str(error), {}]

@@ -70,6 +70,27 @@ def parse_vary(text: str) -> VariedKey:
     return varied_key(key, values)
 
 
+def whole_numbers(text: str, option: str, least: int, most: int, example: str) -> list[int]:
+    """Whole numbers ``a,b,...`` within bounds, ascending.
+
+    Raises
+    ------
+    InputError
+        If it has another form, or names one that is out of bounds, or one twice.
+    """
+    try:
+        values = sorted(int(part) for part in text.split(","))
+    except ValueError:
+        values = []
+    within = bool(values) and least <= values[0] and values[-1] <= most
+    if not within or len(set(values)) < len(values):
+        raise InputError(
+            f"{option} {shown(text)[1:-1]} must be whole numbers from {least} to {most}, each "
+            f"once, as a,b,..., e.g. {example}"
+        )
+    return values
+
+
 def varied_key(key: str, values: tuple[str, ...], option: str = "--vary") -> VariedKey:
     """A key and the texts of its values, at least one; ``option`` names in an error what gave them.
 
@@ -104,6 +125,36 @@ def text_of(value: Any) -> str:
     if isinstance(value, str) and parse_assignment(f"key={text}")[1] != value:
         return json.dumps(value)
     return text
+
+
+def value_at(tables: Any, key: str) -> Any:
+    """What nested tables have under a dotted key, in which numbers are entries of lists; else None.
+
+    Parameters
+    ----------
+    tables : of a scene, as ``resolved`` gives them
+    """
+    here = tables
+    for part in key.split("."):
+        if isinstance(here, list) and part.isdigit() and int(part) < len(here):
+            here = here[int(part)]
+        else:
+            here = here.get(part) if isinstance(here, dict) else None
+    return here
+
+
+def is_number(value: Any) -> bool:
+    """Whether a value is a number, which true and false are not."""
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def check_key(key: str, where: str) -> None:
+    """Raise InputError if no scene has a dotted key, which stands at ``where``."""
+    from catenary.cases.scene.scene import Scene
+
+    known = known_keys(Scene)
+    if not is_known(key, known):
+        raise InputError(unknown_key(key, where, known))
 
 
 def _quoted(value: Any) -> str:
@@ -223,11 +274,6 @@ def read_named(path: Path) -> dict[str, list[str]]:
 
 def check_keys(variants: Sequence[Variant], where: str) -> None:
     """Raise InputError if an assignment of a variant has an unknown key."""
-    from catenary.cases.scene.scene import Scene
-
-    known = known_keys(Scene)
     for variant in variants:
         for assignment in variant.assignments:
-            key, _ = parse_assignment(assignment, f"variant {variant.name}:")
-            if not is_known(key, known):
-                raise InputError(unknown_key(key, where, known))
+            check_key(parse_assignment(assignment, f"variant {variant.name}:")[0], where)

@@ -9,12 +9,10 @@ from typing import Any
 import numpy as np
 
 from catenary.base.errors import InputError
-from catenary.cases.scene.keys.error_sentences import unknown_key
-from catenary.cases.scene.keys.keys import is_known, known_keys
 from catenary.cases.scene.keys.units import length_from_mm, unit_of
 from catenary.cases.scene.problem import line_of, resolved
 from catenary.cases.scene.scene import Scene
-from catenary.cases.studies.scene_sets.scene_values import is_number, value_at
+from catenary.cases.studies.sweep.variants import check_key, is_number, value_at
 from catenary.cases.studies.tolerance.task import (
     DropperErrors,
     ErrorKind,
@@ -139,14 +137,9 @@ def _group(table: ErrorKind, scene: Scene, where: str) -> Group:
 
 
 def _of_key(table: KeyErrors, tables: dict[str, Any], where: str) -> Group:
-    known = known_keys(Scene)
-    if not is_known(table.key, known):
-        raise InputError(unknown_key(table.key, f"in {where}", known))
-    value = value_at(tables, table.key)
-    number = table.entry
-    own = value
-    if number is not None and isinstance(value, list):
-        own = value[number - 1] if number <= len(value) else None
+    check_key(table.key, f"in {where}")
+    value, number = value_at(tables, table.key), table.entry
+    own = value if number is None else value_at(value, str(number - 1))
     if not is_number(own):
         at = "" if number is None else f" at entry {number}"
         raise InputError(f"{where}.key is {table.key}, which has no number{at} in the scene")

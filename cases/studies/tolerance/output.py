@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -11,8 +10,7 @@ from typing import Any
 import numpy as np
 
 from catenary.cases.studies.tolerance.study import ALL, CONFIDENCE, Plan, Tolerance
-from catenary.postproc.files.disk import plain, write_all
-from catenary.postproc.report.study_table import Column, StudyTable
+from catenary.postproc.report.study_table import Column, Content, StudyTable, write_files
 
 TABLE, RECORD, PAGE = "tolerance.csv", "tolerance.json", "tolerance.md"
 
@@ -24,29 +22,19 @@ def write(out_dir: Path, plan: Plan, found: Sequence[Tolerance]) -> list[Path]:
         "task": plan.task.model_dump(exclude_none=True),
         "tolerances": [asdict(one) | {"least_share": one.least_share} for one in found],
     }
-    text = json.dumps(plain(record), indent=1, ensure_ascii=False) + "\n"
-    return write_all(
-        out_dir,
-        {TABLE: table_of(found).csv(), RECORD: text, PAGE: markdown(plan, found)},
-    )
+    content: dict[str, Content] = {TABLE: table_of(found), RECORD: record}
+    return write_files(out_dir, content | {PAGE: markdown(plan, found)})
 
 
 def table_of(found: Sequence[Tolerance]) -> StudyTable:
     """A row for each error and criterion."""
     rows = [
-        {
-            "error": one.error,
-            "criterion": one.criterion,
-            "level": one.level,
+        asdict(one)
+        | {
             "shown": _level(one),
-            "unit": one.unit,
-            "at_most": one.at_most,
-            "kept": one.kept,
-            "n_samples": one.n_samples,
             "samples": f"{one.kept} of {one.n_samples}" if one.level else "",
             "least_share": one.least_share if one.level else None,
-            "linear": _finite(one.linear),
-            "checked": one.checked,
+            "linear": one.linear if np.isfinite(one.linear or 0.0) else None,
         }
         for one in found
     ]
@@ -71,10 +59,6 @@ def _level(one: Tolerance) -> str:
     if not one.level:
         return "not kept without errors" if not one.kept else "none"
     return f"{'at least ' if one.at_most else ''}{one.level:.3g}"
-
-
-def _finite(value: float | None) -> float | None:
-    return value if value is not None and np.isfinite(value) else None
 
 
 def installer_table(plan: Plan, found: Sequence[Tolerance]) -> StudyTable:

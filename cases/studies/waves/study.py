@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from matplotlib.figure import Figure
 from mpi4py import MPI
 
 from catenary.base.errors import RunBroken
@@ -20,27 +19,25 @@ from catenary.cases.scene.load import scene_from
 from catenary.cases.scene.problem import problem_of
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.waves import ends, obstacles, pictures
-from catenary.cases.studies.waves.energy import EnergyMotion, EnergySeen
 from catenary.cases.studies.waves.excited import Asked, Watch, excitation_of, without_train
 from catenary.cases.studies.waves.measured import measured_rows, transmitted
 from catenary.cases.studies.waves.seen import (
+    EnergyMotion,
+    EnergySeen,
     WavesSeen,
     WireMotion,
     course_of,
     places_of,
     waves_seen,
 )
-from catenary.cases.studies.waves.theory import WaveTheory, wave_theory
+from catenary.cases.studies.waves.theory import WaveTheory, row_of, wave_theory
 from catenary.postproc.evaluate.error_indicators import indicate
 from catenary.postproc.evaluate.remarks import all_remarks
-from catenary.postproc.files.disk import write_all
 from catenary.postproc.film.film_data import FilmData, film_data
 from catenary.postproc.film.snapshots import Snapshots
 from catenary.postproc.read.guard import examined
 from catenary.postproc.read.results import Results
-from catenary.postproc.report.pictures import figures
-from catenary.postproc.report.study_table import rows_csv
-from catenary.solver.statics.elasticity import middle_span
+from catenary.postproc.report.study_table import Content, write_files
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest
 from catenary.solver.time_loop.views.observers import Observer
 from catenary.solver.waves.excitation import MovingForce
@@ -145,20 +142,18 @@ def study_obstacles(scene: Scene, folder: Path, force: bool) -> tuple[str, list[
     problem = problem_of(scene)
     rest = line_at_rest(problem, mesh_of(scene))
     results = [obstacles.result_of(one, problem) for one in obstacles.obstacles_of(rest)]
-    content: dict[str, bytes | str] = {OBSTACLES: rows_csv(obstacles.as_rows(results))}
-    content |= figures.painted("obstacles.png", lambda: obstacles.picture(results))
     lines = [
         f"{one.name.replace('_', ' ')}: measured within {100.0 * one.error.max():.2g} % of theory"
         for one in results
     ]
-    return "\n".join(lines), write_all(folder, content)
-
-
-def theory_of(scene: Scene) -> tuple[WaveTheory, float]:
-    """What theory says of a scene's line, and the length of its middle span [m]. Not collective."""
-    problem = problem_of(scene)
-    first, last = middle_span(problem.line)
-    return wave_theory(problem, line_at_rest(problem, mesh_of(scene))), last - first
+    files = write_files(
+        folder,
+        {
+            OBSTACLES: obstacles.as_rows(results),
+            "obstacles.png": lambda: obstacles.picture(results),
+        },
+    )
+    return "\n".join(lines), files
 
 
 def _numbers_in(data: FilmData, rest: LineAtRest) -> np.ndarray:
@@ -181,46 +176,37 @@ def _write(
 ) -> Studied:
     """Pictures and tables of what is seen and what theory says."""
     moving, origin = ("pantographs", "first pantograph") if what == "train" else (what, what)
-    reflections = ends.reflections_of(rest)
+    reflections, spectra = ends.reflections_of(rest), transmitted(theory, seen)
     measured = [
-        *measured_rows(theory, seen), *ends.reflection_rows(reflections, theory.speed)
+        *measured_rows(theory, seen, spectra), *ends.reflection_rows(reflections, theory.speed)
     ]  # fmt: skip
-    content: dict[str, bytes | str] = {
-        "energy.csv": rows_csv(energy_rows(energy, seen)),
-        TABLE: rows_csv([*as_rows(theory), *measured]),
-        "pass_bands.csv": rows_csv(band_rows(theory)),
-    }
-    drawings: dict[str, Callable[[], Figure]] = {
+    content: dict[str, Content] = {
+        "energy.csv": energy_rows(energy, seen),
+        TABLE: [*as_rows(theory), *measured],
+        "pass_bands.csv": band_rows(theory),
         "space_time.png": lambda: pictures.space_time(seen, theory, supports, moving),
         "wavenumbers.png": lambda: pictures.wavenumbers(seen, theory, what),
         "energy.png": lambda: pictures.energy_parts(energy, seen, origin),
     }
     if reflections:
-        drawings["end_reflection.png"] = lambda: ends.picture(
-            reflections, rest.problem.ends, theory.speed
-        )
-        content["end_reflection.csv"] = rows_csv(ends.curve_rows(reflections))
-    spectra = transmitted(theory, seen)
+        both = rest.problem.ends
+        content["end_reflection.png"] = lambda: ends.picture(reflections, both, theory.speed)
+        content["end_reflection.csv"] = ends.curve_rows(reflections)
     if spectra is not None:
-        drawings["transmission.png"] = lambda: pictures.transmission(spectra)
+        content["transmission.png"] = lambda: pictures.transmission(spectra)
     if seen.position.shape[1]:
-        drawings["train_frame.png"] = lambda: pictures.train_frame(
+        content["train_frame.png"] = lambda: pictures.train_frame(
             seen, theory, _BEHIND, _AHEAD, origin
         )
-    for name, draw in drawings.items():
-        content |= figures.painted(name, draw)
-    return Studied(theory, measured, write_all(folder, content), remarks)
+    return Studied(theory, measured, write_files(folder, content), remarks)
 
 
 def energy_rows(energy: EnergySeen, seen: WavesSeen) -> list[Row]:
     """Energy over time: behind, between and ahead of what moves, or of the place of a blow [J]."""
     behind, between, ahead = energy.parts(places_of(seen, energy.time))
-    return [
-        {"time_s": t, "behind_J": b, "between_J": m, "ahead_J": a, "total_J": b + m + a}
-        for t, b, m, a in zip(
-            *(part.tolist() for part in (energy.time, behind, between, ahead)), strict=True
-        )
-    ]
+    columns = energy.time, behind, between, ahead, behind + between + ahead
+    names = ("time_s", "behind_J", "between_J", "ahead_J", "total_J")
+    return [dict(zip(names, row, strict=True)) for row in np.column_stack(columns).tolist()]
 
 
 def as_rows(theory: WaveTheory) -> list[Row]:
@@ -239,21 +225,15 @@ def as_rows(theory: WaveTheory) -> list[Row]:
             ("fastest_group_velocity", speed, "m/s", "of the periodic line up to 20 Hz"),
             ("frequency_of_the_fastest", at, "Hz", "of that wave"),
         ]
-    return [
-        {"name": name, "value": value, "unit": unit, "meaning": meaning}
-        for name, value, unit, meaning in rows
-        if np.isfinite(value)
-    ]
+    return [row_of(*row) for row in rows if np.isfinite(row[1])]
 
 
 def band_rows(theory: WaveTheory) -> list[Row]:
     """Pass bands of the periodic line, and ranges that outrun the train [Hz]."""
-    rows: list[tuple[str, np.ndarray]] = [
-        ("pass band", theory.bands()), ("outruns the train", theory.outrunning())
-    ]  # fmt: skip
+    found = {"pass band": theory.bands(), "outruns the train": theory.outrunning()}
     return [
         {"what": what, "from_Hz": float(low), "to_Hz": float(high)}
-        for what, bands in rows
+        for what, bands in found.items()
         for low, high in bands
     ]
 
