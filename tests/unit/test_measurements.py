@@ -297,7 +297,7 @@ def test_a_file_with_the_usual_names_needs_no_description(
         (
             "[measured]\nplace = { column = 'place_m' }\nforce = { column = 'force_N' }\n"
             "[[others]]\npantograf = 2",
-            "did you mean pantograph?",
+            "did you mean others.0.pantograph?",
         ),
         (
             "[measured]\nplace = { column = 'place_m' }\nforce = { column = 'force_N' }\n"
