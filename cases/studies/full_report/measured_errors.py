@@ -51,7 +51,7 @@ def measured_errors(scene: Scene, folder: Path) -> dict[str, float]:
     if not own:
         raise InputError(
             f"{path} has no run with a step of {1e3 * dt:g} ms and {elements} elements per gap, "
-            "as this one has: vary both with --axes grid"
+            "as this one has: vary both with --axes grid, without --quick"
         )
     known = {quantity: own[0][column] for quantity, column in _COLUMNS.items()}
     return {quantity: abs(error) for quantity, error in known.items() if error is not None}

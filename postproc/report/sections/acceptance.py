@@ -162,8 +162,8 @@ def _criteria(run: EvaluatedRun) -> Iterator[Text | StudyTable]:
         if run.measured
         else "The error is that of the time step, estimated from the record; three times the rms "
         "error of the history for extremes, a dash where there is no estimate. The error of the "
-        f"mesh is not estimated: `catenary accuracy {case} -o STUDY --axes grid` measures it, and "
-        "`catenary report --accuracy STUDY` shows it here."
+        f"mesh is not estimated: measure it by catenary accuracy {case} -o STUDY --axes grid, and "
+        "show it here by catenary report --accuracy STUDY."
     )
     yield Text(f"The margin is the distance from the limit, negative beyond it. {how}")
     if left:
