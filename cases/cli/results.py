@@ -44,10 +44,19 @@ def report(
             help="Write report_interactive.html too: pictures to zoom and read off, 5 MB.",
         ),
     ] = False,
+    accuracy: Annotated[
+        Path | None,
+        typer.Option(
+            "--accuracy",
+            metavar="STUDY",
+            help="Folder of `catenary accuracy --axes grid`, whose errors stand beside the limits.",
+        ),
+    ] = None,
 ) -> None:
     """Serial."""
     records = _records(folder)
     console.alone()  # starts MPI as one process, before anything imports it
+    from catenary.cases.studies.full_report.measured_errors import measured_errors
     from catenary.cases.studies.full_report.scene_of_run import SceneOfRun
     from catenary.cases.studies.full_report.sections import full_sections
     from catenary.postproc.read.results import Results
@@ -58,8 +67,13 @@ def report(
         try:
             scene = SceneOfRun(results)
         except InputError as error:
+            if accuracy is not None:
+                raise
             console.warn(f"the report has no data sheets: {error}")
             scene = None
+    measured: tuple[dict[str, float], str] = ({}, "")
+    if accuracy is not None and scene is not None:
+        measured = measured_errors(scene.scene, accuracy), str(accuracy)
     entries, text = full_sections(scene), scene and scene.input_text
     beside = {INPUT: text} if text else {}
     written = write_report(
@@ -68,6 +82,7 @@ def report(
         records,
         entries,
         beside,
+        measured=measured,
         vector=True,
         on_paper=pdf,
         interactive=interactive,

@@ -73,6 +73,7 @@ def write_report(
     entries: Sequence[SectionEntry] | None = None,
     beside: Mapping[str, str] | None = None,
     *,
+    measured: tuple[Mapping[str, float], str] = ({}, ""),
     vector: bool = False,
     on_paper: bool = False,
     interactive: bool = False,
@@ -89,6 +90,7 @@ def write_report(
     records : what ``evaluate.guard`` found in the file, None to check it here
     entries : the sections, None for those of ``quick_sections``
     beside : texts of further files by name
+    measured : errors of quantities that a study measured, and the study, as ``EvaluatedRun``
     vector : pictures are SVG files instead of PNG files
     on_paper : write ``report.pdf`` too
     interactive : write ``report_interactive.html`` too, whose pictures are Plotly's
@@ -114,7 +116,7 @@ def write_report(
             logger.warning("%s", sentence)
         statistics = stats.evaluate(results)
         criteria = criteria_of(results, statistics)
-        run = EvaluatedRun(results, statistics, criteria)
+        run = EvaluatedRun(results, statistics, criteria, *measured)
         summary = as_json(summarise(results, statistics, criteria, run.indicators))
         content: dict[str, bytes | str] = {"droppers.csv": csv_tables.droppers_csv(results)}
         content |= beside or {}

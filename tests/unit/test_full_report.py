@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import re
 import shutil
 import tomllib
@@ -17,6 +18,10 @@ from catenary.base.errors import InputError
 from catenary.cases.cli.main import app
 from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.problem import resolved
+from catenary.cases.scene.scene import Scene
+from catenary.cases.studies.accuracy.analysis import Row
+from catenary.cases.studies.accuracy.output import table_of
+from catenary.cases.studies.full_report.measured_errors import measured_errors
 from catenary.cases.studies.full_report.scene_of_run import SceneOfRun
 from catenary.postproc.read.results import Results
 from catenary.postproc.report.pictures import interactive
@@ -171,3 +176,44 @@ def test_a_scene_of_another_version_costs_the_data_sheets_alone(
     page = (tmp_path / "report.html").read_text()
     assert 'id="worst"' in page and 'id="line"' not in page and 'id="pantographs"' not in page
     assert not (tmp_path / "input.toml").exists()
+
+
+def study(folder: Path, case: str, **changes: object) -> Path:
+    """The record of an accuracy study, as its own writer makes it."""
+    sizes = {"dt": 1e-3, "h": 1.0 / 8} | changes
+    errors = {"mean": 0.1, "std": -0.25, "max": 3.0, "uplift": 0.5}
+    row = Row("grid", "own", "done", sizes, errors, dict.fromkeys(errors, 1.0))  # type: ignore[arg-type]
+    record = {"case": case, "rows": table_of([row]).records()}
+    (folder / "accuracy.json").write_text(json.dumps(record))
+    return folder
+
+
+def scene_of(step: float, elements: int) -> Scene:
+    return load_scene("ac_simple", [f"numerics.dt_s={step}", f"mesh.elements_per_gap={elements}"])
+
+
+def test_measured_errors_of_the_same_step_and_mesh(tmp_path: Path) -> None:
+    found = measured_errors(scene_of(1e-3, 8), study(tmp_path, "ac_simple"))
+    assert found == {"mean_force": 0.1, "force_std": 0.25, "force_max": 3.0, "arm_uplift": 0.5}
+    with pytest.raises(InputError, match="no run with a step of 2 ms and 8 elements per gap"):
+        measured_errors(scene_of(2e-3, 8), tmp_path)
+    with pytest.raises(InputError, match="no run with a step of 1 ms and 5 elements per gap"):
+        measured_errors(scene_of(1e-3, 5), tmp_path)
+    with pytest.raises(InputError, match="a study of curve, the run is one of ac_simple"):
+        measured_errors(scene_of(1e-3, 8), study(tmp_path, "curve"))
+    (tmp_path / "accuracy.json").write_text("[]")
+    with pytest.raises(InputError, match="is no record of `catenary accuracy`"):
+        measured_errors(scene_of(1e-3, 8), tmp_path)
+
+
+@pytest.mark.process
+def test_a_report_shows_measured_errors(folder: Path, tmp_path: Path) -> None:
+    shutil.copy(folder / "run.h5", tmp_path / "run.h5")
+    with Results(folder) as results:
+        config = results.attributes["config"]
+    sizes = {"dt": config["numerics"]["dt_s"], "h": 1.0 / config["mesh"]["elements_per_gap"]}
+    invoke("report", str(tmp_path), "--accuracy", str(study(tmp_path, "ac_simple", **sizes)))
+    words = words_of((tmp_path / "report.html").read_text())
+    assert "The error is that of step and mesh, from" in words
+    assert re.search(r"maximum contact force passed [\d.]+ < 350.0 [\d.]+ 3.00 N", words)
+    assert re.search(r"uplift at steady arms passed [\d.]+ ≤ 120.0 [\d.]+ 0.50 mm", words)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from functools import partial
 
+import numpy as np
+
 from catenary.base.errors import InputError
 from catenary.cases.studies.full_report import data_sheets, worst_places
 from catenary.cases.studies.full_report.scene_of_run import SceneOfRun
@@ -16,6 +18,9 @@ from catenary.postproc.report.sections.section import (
     SectionEntry,
     Text,
 )
+
+# Snapshots times length of the line [m] of a picture that is quickly drawn.
+_LARGEST = 1e7
 
 
 def _waves(scene: SceneOfRun, run: EvaluatedRun) -> Section:
@@ -33,6 +38,9 @@ def _waves(scene: SceneOfRun, run: EvaluatedRun) -> Section:
         folder, until = results.path.parent, float(data.time[-1])
         with Snapshots(folder, len(data.points), until=until) as snapshots:
             snapshots.need_whole("a space-time picture")
+            size = len(snapshots.times) * float(np.ptp(data.points[:, 0]))
+            if size > _LARGEST:
+                raise InputError("the run is too long for it; catenary waves draws it")
             seen = waves_seen(data, snapshots)
         theory = wave_theory(scene.problem, scene.at_rest)
     except InputError as error:

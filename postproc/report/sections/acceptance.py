@@ -17,6 +17,8 @@ _RELATIONS = {"<=": "≤", "<": "<", ">=": "≥", ">": ">"}
 NAN = float("nan")
 # Error of a quantity over the rms error of the force history.
 _TIMES_RMS = {"mean_force": 1.0, "force_std": 1.0, "force_max": 3.0, "force_min": 3.0}
+# What errors are, estimated and measured.
+_SOURCES = ("estimated error of the time step", "measured error of step and mesh")
 _UNCOMPARED = "not compared with the text"
 _WORDS = {None: "not judged", True: "passed", False: "failed"}
 _BROKEN_OFF = {
@@ -69,12 +71,17 @@ def _sentence(one: Criterion, label: str) -> str:
     return f"{label}: {value} {one.unit}, must be {relation} {limit} {one.unit}"
 
 
-def step_errors(run: EvaluatedRun) -> dict[str, dict[str, float]]:
-    """Estimated errors by the time step, by quantity and pantograph, in the quantity's unit.
+def errors_of(run: EvaluatedRun) -> dict[str, dict[str, float]]:
+    """Errors by quantity and pantograph, in the quantity's unit.
 
-    The rms error of the history of the filtered force bounds the error of its mean and of its
-    deviation. Three times that stands for the error of its extremes, for which there is no bound.
+    Those that an accuracy study measured, or else those by the time step as the record lets
+    estimate them: the rms error of the history of the filtered force bounds the error of its mean
+    and of its deviation. Three times that stands for the error of its extremes, for which there is
+    no bound.
     """
+    if run.measured:
+        names = ["", *(one.name for one in run.statistics.pantographs)]
+        return {quantity: dict.fromkeys(names, error) for quantity, error in run.measured.items()}
     found: dict[str, dict[str, float]] = {}
     for one, error in zip(run.statistics.pantographs, run.indicators.force_error, strict=True):
         for quantity, factor in _TIMES_RMS.items():
@@ -107,26 +114,26 @@ def nearest_limit(run: EvaluatedRun) -> Iterator[str]:
     judged = [
         (one, label)
         for one, label in zip(run.criteria, labels(run.criteria), strict=True)
-        if one.passed is not None and one.limit != 0.0
+        if one.passed is not None
     ]
-    if not judged:
-        return
-    one, label = min(judged, key=lambda pair: abs(_distance(pair[0]) / pair[0].limit))
-    share = 100.0 * _distance(one) / abs(one.limit)
-    yield (
-        f"Nearest to its limit: {label}, with a margin of {_margin(one)} {one.unit} "
-        f"({number(share, decimals_that_tell(share, 0.0, 1))} %)."
-    )
-    errors = step_errors(run)
+    shares = [pair for pair in judged if pair[0].limit != 0.0]
+    if shares:
+        one, label = min(shares, key=lambda pair: abs(_distance(pair[0]) / pair[0].limit))
+        share = 100.0 * _distance(one) / abs(one.limit)
+        yield (
+            f"Nearest to its limit: {label}, with a margin of {_margin(one)} {one.unit} "
+            f"({number(share, decimals_that_tell(share, 0.0, 1))} %)."
+        )
+    errors, what = errors_of(run), _SOURCES[bool(run.measured)]
     turned = [
         f"{label} (margin {_margin(one)}, error {_error(one, errors)} {one.unit})"
         for one, label in judged
         if abs(_distance(one)) <= _error_of(one, errors)
     ]
     if turned:
-        yield f"The estimated error of the time step could turn: {'; '.join(turned)}."
+        yield f"The {what} could turn: {'; '.join(turned)}."
     elif any(np.isfinite(_error_of(one, errors)) for one, _ in judged):
-        yield "The estimated error of the time step is smaller than every margin of the force."
+        yield f"The {what} is smaller than every margin that it is known for."
 
 
 def section(run: EvaluatedRun) -> Section:
@@ -136,7 +143,7 @@ def section(run: EvaluatedRun) -> Section:
 
 def _criteria(run: EvaluatedRun) -> Iterator[Text | StudyTable]:
     rows, left = [], []
-    errors = step_errors(run)
+    errors = errors_of(run)
     for one, label in zip(run.criteria, labels(run.criteria), strict=True):
         if one.absent:
             left.append(f"{label}: because {one.because}")
@@ -149,12 +156,16 @@ def _criteria(run: EvaluatedRun) -> Iterator[Text | StudyTable]:
         rows.append([*first, *of_margin, *words])
     heads = ["criterion", "verdict", "value", "", "limit", "margin", "error", "unit", "source"]
     yield texts_table(heads, rows, {2, 4, 5, 6})
-    yield Text(
-        "The margin is the distance from the limit, negative beyond it. The error is that of the "
-        "time step, estimated from the record; three times the rms error of the history for "
-        "extremes, a dash where there is no estimate. The error of the mesh is not estimated: "
-        f"catenary accuracy {run.results.attributes['case']} measures both."
+    case = run.results.attributes["case"]
+    how = (
+        f"The error is that of step and mesh, from {run.measured_by}."
+        if run.measured
+        else "The error is that of the time step, estimated from the record; three times the rms "
+        "error of the history for extremes, a dash where there is no estimate. The error of the "
+        f"mesh is not estimated: measure it by catenary accuracy {case} -o STUDY --axes grid, and "
+        "show it here by catenary report --accuracy STUDY."
     )
+    yield Text(f"The margin is the distance from the limit, negative beyond it. {how}")
     if left:
         yield Text("for want of data or of a limit:", "open", "Not judged", left)
     speed = number(KMH * run.results.fact("wave_speed"), 0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,8 +12,18 @@ from catenary.postproc.evaluate import filters
 from catenary.postproc.evaluate.slack_times import slack_times
 from catenary.postproc.read.results import Results
 from catenary.postproc.report import csv_tables
-from catenary.postproc.report.sections.section import EvaluatedRun, Picture, Section, Text, number
+from catenary.postproc.report.sections.section import (
+    EvaluatedRun,
+    Folded,
+    Picture,
+    Section,
+    Text,
+    number,
+)
 from catenary.postproc.report.study_table import StudyTable, texts_table
+
+# Rows of a table beyond which it is folded away.
+_MOST = 200
 
 
 def has_statistics(run: EvaluatedRun) -> bool:
@@ -101,7 +112,14 @@ def has_places(run: EvaluatedRun) -> bool:
 
 def places(run: EvaluatedRun) -> Section:
     """Tables of the evaluated supports and droppers."""
-    return Section("Supports and droppers", _tables(run))
+    shown, folded = [], []
+    for table in _tables(run):
+        if len(table.rows) <= _MOST:
+            shown.append(table)
+        else:
+            title = f"{table.title} ({len(table.rows)})"
+            folded.append(Folded(title, replace(table, title="")))
+    return Section("Supports and droppers", shown, folded=folded)
 
 
 def _tables(run: EvaluatedRun) -> Iterator[StudyTable]:

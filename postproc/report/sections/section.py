@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -21,11 +21,19 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class EvaluatedRun:
-    """A run as sections take it: its results, their statistics and the criteria."""
+    """A run as sections take it: its results, their statistics and the criteria.
+
+    Attributes
+    ----------
+    measured : errors of quantities by step and mesh, in their units, where a study measured them
+    measured_by : the study
+    """
 
     results: Results
     statistics: RunStatistics
     criteria: Sequence[Criterion] = ()
+    measured: Mapping[str, float] = field(default_factory=dict)
+    measured_by: str = ""
 
     @cached_property
     def indicators(self) -> Indicators:
