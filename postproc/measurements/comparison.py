@@ -29,6 +29,8 @@ _LEAST_CORRELATION = 0.6
 _BIASES = 3.0
 # What remains is more than the stated noise beyond this factor.
 _MORE_THAN_NOISE = 1.3
+# What is compared has at least so many periods of the cut-off.
+_LEAST_PERIODS = 20
 # A range is widened by noise of deviation 1 by up to so much.
 _WIDENED = 6.0
 # A support is that of the run if it is this near [m].
@@ -199,6 +201,11 @@ class _Comparing:
             self._runs[number] = RunForce(position, force, self._results.dt)
         return self._runs[number]
 
+    def _stretch(self, run: RunForce) -> tuple[float, float]:
+        """Begin and end of what is compared of a pantograph's run [m]."""
+        begin, end = self._passage.stretch
+        return max(begin, float(run.position[0])), min(end, float(run.position[-1]))
+
     def _find(self, kind: str, name: str, text: str, value: float = float("nan")) -> None:
         self.findings.append(Finding(kind, name, text, value))
 
@@ -218,9 +225,14 @@ class _Comparing:
         dt = float(own.place[1] - own.place[0]) / run.speed
         valid = slice(passage.margin(dt), own.place.size - passage.margin(dt))
         place, force = own.place[valid], passage.in_band(force, dt)[valid]
-        if place.size < 20:
+        length = float(place[-1] - place[0]) if place.size else 0.0
+        begin, end = self._stretch(run)
+        least = _LEAST_PERIODS * run.speed / passage.cut_off
+        if min(length, end - begin) < least:
             raise InputError(
-                f"{passage.name} is too short for the filter of {passage.cut_off:g} Hz"
+                f"{passage.name} has {length:.1f} m, and the run is compared from {begin:g} to "
+                f"{end:g} m: both must have at least {least:.0f} m, {_LEAST_PERIODS} periods of "
+                f"{passage.cut_off:g} Hz"
             )
         found = self._aligned(place, force, own.pantograph)
         other = (
@@ -239,8 +251,7 @@ class _Comparing:
             self._errors(found, name, run, own.bias)
             self._noise_floor(found, name, passage.noise_in_band(own.noise, dt))
         at = place if aligned is None else aligned.placed(place)
-        begin, end = passage.stretch
-        within = (at >= max(begin, run.position[0])) & (at <= min(end, run.position[-1]))
+        within = (at >= begin) & (at <= end)
         if np.count_nonzero(within) < 20:
             raise InputError(
                 f"{passage.name} has places from {at[0]:.1f} to {at[-1]:.1f} m, and the run is "
