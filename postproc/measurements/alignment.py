@@ -13,7 +13,7 @@ exact makes it larger.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,6 +28,10 @@ _SAMPLES, _LEAST_OVERLAP, _MOST_REFINED = 8, 0.5, 12
 # Drifts that the search begins from: between two of them ends of a record are off by this part of
 # the shortest wave.
 _LARGEST_DRIFT, _DRIFT_STEP = 0.02, 0.25
+# Forces with other gains are not those of the run.
+_GAINS = (0.3, 3.0)
+# Of a longer stretch [m] the middle is searched; the section that is fitted then grows by so much.
+_SECTION, _GROWTH = 1500.0, 4.0
 # What the file's filter may be, in cut-offs that it should have; beside none.
 _FACTORS = (0.15, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.125, 1.25, 1.5, 2.0, 3.0)
 # Twice the logarithm of a likelihood ratio beyond which the worse model is given up: chance passes
@@ -176,67 +180,93 @@ class _Fit:
         """The run's force if the file's values have passed a filter, beside the one of ours."""
         return self._run.below(passed, None if self._is_filtered else self._cut_off)
 
+    def _section(self, length: float) -> tuple[float, float]:
+        """Begin and end of the middle of the stretch, up to a length [m]."""
+        middle = 0.5 * (self._begin + self._end)
+        half = 0.5 * min(length, self._end - self._begin)
+        return middle - half, middle + half
+
     # ---- search -------------------------------------------------------------------------------
 
     def starts(self, passed: float | None) -> list[tuple[float, float]]:
         """Shifts [m] and drifts to begin from, the likeliest first."""
         step = self._wave / _SAMPLES
-        own = np.arange(self._begin, self._end, step)
+        own = np.arange(*self._section(_SECTION), step)
         if own.size < 2 * _SAMPLES:
             return []
         modelled = self.model(passed)(own)
         middle = 0.5 * (self._place[0] + self._place[-1])
-        length = min(self._end - self._begin, self._place[-1] - self._place[0])
+        length = min(own[-1] - own[0], self._place[-1] - self._place[0])
         n_drifts = int(np.ceil(_LARGEST_DRIFT * 0.5 * length / (_DRIFT_STEP * self._wave)))
-        drifts = np.linspace(-_LARGEST_DRIFT, _LARGEST_DRIFT, 2 * min(n_drifts, 40) + 1)
-        # Shifts are multiples of a step from the one of the middle on the begin of the stretch.
-        least: dict[int, tuple[float, float]] = {}
+        drifts = np.linspace(-_LARGEST_DRIFT, _LARGEST_DRIFT, 2 * n_drifts + 1)
+        # Shifts are multiples of a step from the one of the middle on the begin of the section.
+        rows: list[tuple[int, np.ndarray]] = []
         for drift in drifts:
             moved = self._place - drift * (self._place - middle)
             first = int(np.ceil((moved[0] - middle) / step))
             last = int(np.floor((moved[-1] - middle) / step))
             grid = middle + step * np.arange(first, last + 1)
-            misfits = _misfits(np.interp(grid, moved, self._force), modelled)
-            for number, misfit in enumerate(misfits.tolist(), first - own.size + 1):
-                if misfit < least.get(number, (np.inf, 0.0))[0]:
-                    least[number] = misfit, float(drift)
-        if not least:
+            found = _misfits(np.interp(grid, moved, self._force), modelled)
+            rows.append((first - own.size + 1, found))
+        lowest = min(number for number, _ in rows) - 1
+        size = max(number + row.size for number, row in rows) - lowest + 1
+        values, which = np.full(size, np.inf), np.zeros(size, dtype=int)
+        for number, (first, row) in enumerate(rows):
+            part = slice(first - lowest, first - lowest + row.size)
+            better = row < values[part]
+            values[part][better], which[part][better] = row[better], number
+        if not np.isfinite(values).any():
             return []
-        numbers = np.arange(min(least) - 1, max(least) + 2)
-        values = np.array([least.get(number, (np.inf, 0.0))[0] for number in numbers.tolist()])
         minima = argrelmin(np.where(np.isfinite(values), values, 1e300), order=2)[0]
         if not minima.size:
             minima = np.array([int(values.argmin())])
-        shifts = middle - own[0] + step * numbers[minima]
+        shifts = middle - own[0] + step * (lowest + minima)
         near = int(np.argmin(np.abs(shifts)))
         order = np.argsort(values[minima], kind="stable")[:_MOST_REFINED]
         chosen = dict.fromkeys([*order.tolist(), near])
-        return [(float(shifts[i]), least[int(numbers[minima[i]])][1]) for i in chosen]
+        return [(float(shifts[i]), float(drifts[which[minima[i]]])) for i in chosen]
 
     def chosen(
         self, starts: list[tuple[float, float]], passed: float | None
     ) -> tuple[_Refined | None, tuple[float, ...]]:
         """Of those that fit as well the one next to the file's places, and shifts of the others."""
-        tried = (self.refined(shift, drift, passed) for shift, drift in starts)
-        found = [one for one in tried if one is not None]
-        if not found:
+        # The second time with the samples that belong to the section.
+        lengths = [_SECTION, _SECTION]
+        middle = 0.5 * (self._place[0] + self._place[-1])
+        alike = _likely(
+            self.refined(shift, drift, middle, passed, lengths) for shift, drift in starts
+        )
+        if self._end - self._begin > _SECTION:
+            while lengths[-1] < self._end - self._begin:
+                lengths.append(_GROWTH * lengths[-1])
+            alike = _likely(
+                self.refined(one.shift, one.drift, one.middle, passed, [*lengths[2:], lengths[-1]])
+                for one in alike
+            )
+        if not alike:
             return None, ()
-        best = min(found, key=lambda one: one.cost)
-        alike = [one for one in found if best.certainty_against(one) < CERTAIN]
         own = min(alike, key=lambda one: abs(one.shift))
         others = {round(one.shift, 1) for one in alike if abs(one.shift - own.shift) > self._wave}
         return own, tuple(sorted(others, key=abs))
 
     # ---- refinement ---------------------------------------------------------------------------
 
-    def refined(self, shift: float, drift: float, passed: float | None) -> _Refined | None:
-        """Least squares from a shift and a drift about the middle of the file's record."""
+    def refined(
+        self,
+        shift: float,
+        drift: float,
+        middle: float,
+        passed: float | None,
+        lengths: Sequence[float],
+    ) -> _Refined | None:
+        """Least squares from a shift and a drift about a place of the file, in sections of the
+        stretch of these lengths [m] one after the other; None if it leads to another shift."""
         model = self.model(passed)
         slope = model.derivative()  # type: ignore[attr-defined]
-        middle = 0.5 * (self._place[0] + self._place[-1])
-        for _ in range(2):  # the second time with the samples that belong to the stretch
+        for length in lengths:
+            begin, end = self._section(length)
             at = self._place - shift - drift * (self._place - middle)
-            within = np.flatnonzero((at >= self._begin) & (at <= self._end))
+            within = np.flatnonzero((at >= begin) & (at <= end))
             if within.size < 20:
                 return None
             place, force = self._place[within], self._force[within]
@@ -259,10 +289,11 @@ class _Fit:
                 steep = -x[2] * slope(at)
                 return np.stack([steep, steep * arm / scale, model(at), np.ones(at.size)], axis=1)
 
-            begin = np.array([shift, drift * scale, 1.0, 0.0])
-            found = least_squares(residual, begin, jacobian, method="lm", max_nfev=60)
-            if abs(found.x[0] - shift) > 2.0 * self._wave:
-                return None  # another minimum, which is begun from by itself
+            guess = np.array([shift, drift * scale, 1.0, 0.0])
+            found = least_squares(residual, guess, jacobian, method="lm", max_nfev=60)
+            # Another minimum, which is begun from by itself; or a part that does not swing at all.
+            if abs(found.x[0] - shift) > 2.0 * self._wave or not _GAINS[0] < found.x[2] < _GAINS[1]:
+                return None
             shift, drift = float(found.x[0]), float(found.x[1] / scale)
         rest = -found.fun
         gradient = np.asarray(found.jac) * [1.0, scale, 1.0, 1.0]
@@ -288,7 +319,7 @@ class _Fit:
         at = place - own.shift - own.drift * (place - own.middle)
         modelled = self.model(passed)(at)
         deviations = np.sqrt(
-            np.diag(np.linalg.pinv(own.gradient.T @ own.gradient))
+            np.maximum(np.diag(np.linalg.pinv(own.gradient.T @ own.gradient)), 0.0)
             * np.exp(own.cost)
             * own.rest.size
             / own.n_independent
@@ -347,6 +378,15 @@ class _Fit:
             return stated, certainty, 0.0
         effect = self.model(best)(at) - self.model(stated)(at)
         return best, certainty, float(np.sqrt(np.mean(effect**2)))
+
+
+def _likely(tried: Iterable[_Refined | None]) -> list[_Refined]:
+    """Those fits that are as likely as the best."""
+    found = [one for one in tried if one is not None]
+    if not found:
+        return []
+    best = min(found, key=lambda one: one.cost)
+    return [one for one in found if best.certainty_against(one) < CERTAIN]
 
 
 def _misfits(measured: np.ndarray, modelled: np.ndarray) -> np.ndarray:

@@ -29,6 +29,8 @@ _LEAST_CORRELATION = 0.6
 _BIASES = 3.0
 # What remains is more than the stated noise beyond this factor.
 _MORE_THAN_NOISE = 1.3
+# What is compared has at least so many periods of the cut-off.
+_LEAST_PERIODS = 20
 # A range is widened by noise of deviation 1 by up to so much.
 _WIDENED = 6.0
 # A support is that of the run if it is this near [m].
@@ -199,6 +201,11 @@ class _Comparing:
             self._runs[number] = RunForce(position, force, self._results.dt)
         return self._runs[number]
 
+    def _stretch(self, run: RunForce) -> tuple[float, float]:
+        """Begin and end of what is compared of a pantograph's run [m]."""
+        begin, end = self._passage.stretch
+        return max(begin, float(run.position[0])), min(end, float(run.position[-1]))
+
     def _find(self, kind: str, name: str, text: str, value: float = float("nan")) -> None:
         self.findings.append(Finding(kind, name, text, value))
 
@@ -218,29 +225,21 @@ class _Comparing:
         dt = float(own.place[1] - own.place[0]) / run.speed
         valid = slice(passage.margin(dt), own.place.size - passage.margin(dt))
         place, force = own.place[valid], passage.in_band(force, dt)[valid]
-        if place.size < 20:
+        begin, end = self._stretch(run)
+        length = float(place[-1] - place[0]) if place.size else 0.0
+        least = _LEAST_PERIODS * run.speed / passage.cut_off
+        if min(length, end - begin) < least:
             raise InputError(
-                f"{passage.name} is too short for the filter of {passage.cut_off:g} Hz"
+                f"{passage.name} has {length:.1f} m, and the run is compared from {begin:g} to "
+                f"{end:g} m: both must have at least {least:.0f} m, {_LEAST_PERIODS} periods of "
+                f"{passage.cut_off:g} Hz"
             )
-        found = self._aligned(place, force, own.pantograph)
-        other = (
-            None if found is None else self._other_pantograph(place, force, own.pantograph, found)
-        )
-        aligned = found
-        if other is not None:
-            aligned = None
-            self._find("other pantograph", name, *other)
-        elif found is None or found.correlation < _LEAST_CORRELATION:
-            aligned = None
-            said = "" if found is None else f" (correlation {found.correlation:.2f})"
-            text = f"{name}: the forces are not those of the run{said}: nothing is aligned by them"
-            self._find("unlike", name, text)
-        else:
-            self._errors(found, name, run, own.bias)
-            self._noise_floor(found, name, passage.noise_in_band(own.noise, dt))
+        aligned = self._placed(own, place, force)
+        if aligned is not None:
+            self._errors(aligned, name, run, own.bias)
+            self._noise_floor(aligned, name, passage.noise_in_band(own.noise, dt))
         at = place if aligned is None else aligned.placed(place)
-        begin, end = passage.stretch
-        within = (at >= max(begin, run.position[0])) & (at <= min(end, run.position[-1]))
+        within = (at >= begin) & (at <= end)
         if np.count_nonzero(within) < 20:
             raise InputError(
                 f"{passage.name} has places from {at[0]:.1f} to {at[-1]:.1f} m, and the run is "
@@ -248,9 +247,7 @@ class _Comparing:
             )
         at, force = at[within], force[within]
         modelled = run.below(passage.cut_off)(at)
-        heights = None
-        if own.head_height is not None:
-            heights = self._heights(own, valid, within, at, dt)
+        heights = self._heights(own, valid, within, at, dt)
         self._force_figures(name, at, force, run)
         if heights is not None:
             self._height_figures(name, *heights, own.height_bias)
@@ -258,6 +255,21 @@ class _Comparing:
         self.overlays.append(
             Overlay(name, at, force, modelled, measured_height, run_height, aligned)
         )
+
+    def _placed(self, own: MeasuredForce, place: np.ndarray, force: np.ndarray) -> Alignment | None:
+        """The alignment of a force (n,) at the file's places (n,); None where it is not that of
+        the pantograph, which is found."""
+        name, found = self._names[own.pantograph], self._aligned(place, force, own.pantograph)
+        other = found and self._other_pantograph(place, force, own.pantograph, found)
+        if other:
+            self._find("other pantograph", name, *other)
+            return None
+        if found is None or found.correlation < _LEAST_CORRELATION:
+            said = "" if found is None else f" (correlation {found.correlation:.2f})"
+            text = f"{name}: the forces are not those of the run{said}: nothing is aligned by them"
+            self._find("unlike", name, text)
+            return None
+        return found
 
     def _without_gaps(self, values: np.ndarray, name: str) -> np.ndarray | None:
         """Values with gaps bridged by straight lines; None where too much is missing."""

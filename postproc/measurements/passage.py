@@ -86,13 +86,13 @@ class Passage:
         InputError
             If there are too few samples a second for the filter.
         """
-        if self.is_filtered:
-            return values
         if 2.0 * self.cut_off * dt >= 1.0:
             raise InputError(
                 f"{self.name} has {1.0 / dt:.4g} samples a second, too few for the filter of "
                 f"measured.filter_Hz = {self.cut_off:g}"
             )
+        if self.is_filtered:
+            return values
         return filters.low_pass(values, dt, self.cut_off)
 
     def noise_in_band(self, noise: float, dt: float) -> float:

@@ -141,6 +141,18 @@ def test_gaps_are_bridged_and_told(run: Path, table: pd.DataFrame) -> None:
     assert [(one.kind, one.value) for one in found.findings] == [("gaps", 10.0)]
 
 
+def test_places_that_count_against_the_train_are_turned(run: Path, table: pd.DataFrame) -> None:
+    """Kilometre posts that fall from 12.3 km at the begin of the line."""
+    posts = table.assign(post=12.3 - 1e-3 * table.place_m)
+    place = {"column": "post", "unit": "km", "zero_m": 12300.0, "direction": "against"}
+    found = found_in(run, posts, measured={**PLACES, "place": place})
+    alignment = found.overlays[0].alignment
+    assert found.findings == [] and alignment is not None
+    check("shift", alignment.shift.value, 0.0, within=5.0 * alignment.shift.deviation)
+    with pytest.raises(InputError, match="in ascending order"):
+        found_in(run, posts, measured={**PLACES, "place": {**place, "direction": "with"}})
+
+
 def test_uplifts_are_found_at_their_supports(
     run: Path, table: pd.DataFrame, tmp_path: Path
 ) -> None:
@@ -175,6 +187,28 @@ def test_shifts_that_fit_as_well_are_told() -> None:
     # The smallest shift is taken.
     check("shift", found.shift.value, -2.0, within=5.0 * found.shift.deviation)
     assert 58.0 in np.round(found.other_shifts)
+
+
+def test_a_long_record_is_aligned_from_its_middle_outwards() -> None:
+    """20 km with a drift of 3 in 1000, which is 30 m at its ends."""
+    rng, n, speed, dt = np.random.default_rng(5), 150_000, 70.0, 2e-3
+    position = speed * dt * np.arange(n)
+    sos = signal.butter(4, 12.0, fs=1.0 / dt, output="sos")
+    waves = signal.sosfiltfilt(sos, rng.normal(size=n))
+    force = 120.0 + 20.0 * np.sin(position / 9.0) + 15.0 / waves.std() * waves
+    part = slice(3000, -3000, 3)
+    place = position + 500.0 + 3e-3 * (position - position.mean())
+    measured = force[part] + 5.0 * rng.normal(size=force[part].size)
+    found = align(
+        place[part], measured, RunForce(position, force, dt), (300.0, 20700.0), 20.0, True
+    )
+    assert found is not None
+    # Of the middle of what is compared, by the file's places.
+    expected = 500.0 + 3e-3 * (position[part].mean() - position.mean())
+    check("shift", found.shift.value, expected, within=5.0 * found.shift.deviation + 0.01)
+    # By the file's places, which are longer by the drift.
+    expected = 3e-3 / (1.0 + 3e-3)
+    check("drift", found.drift.value, expected, within=5.0 * found.drift.deviation)
 
 
 @pytest.mark.parametrize("memory", [0.0, 0.8])
@@ -296,13 +330,18 @@ def test_a_file_with_the_usual_names_needs_no_description(
         ),
         (
             "[measured]\nplace = { column = 'place_m' }\nforce = { column = 'force_N' }\n"
+            "filter_Hz = 200.0",
+            "m.csv has 250 samples a second, too few for the filter",
+        ),
+        (
+            "[measured]\nplace = { column = 'place_m' }\nforce = { column = 'force_N' }\n"
             "[[others]]\npantograf = 2",
             "did you mean others.0.pantograph?",
         ),
         (
             "[measured]\nplace = { column = 'place_m' }\nforce = { column = 'force_N' }\n"
             "from_m = 1000.0\nto_m = 2000.0",
-            "they share nothing",
+            "both must have at least 69 m, 20 periods of 20 Hz",
         ),
     ],
 )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Literal
 
+import numpy as np
 from pydantic import Field, model_validator
 
 from catenary.cases.scene.keys.table import Table
@@ -27,9 +28,22 @@ class _Column(Table):
 
 
 class Place(_Column):
-    """The column of places along the track."""
+    """The column of places along the track.
+
+    Attributes
+    ----------
+    zero_m : what the file counts at the begin of the run's line [m]
+    direction : whether it counts with the run's train, or against it
+    """
 
     unit: Literal["m", "km"] = "m"
+    zero_m: float = 0.0
+    direction: Literal["with", "against"] = "with"
+
+    def on_line(self, values: np.ndarray) -> np.ndarray:
+        """Places (n,) along the run's line [m] of the column's values."""
+        sign = 1.0 if self.direction == "with" else -1.0
+        return sign * (values * self.factor - self.zero_m)
 
 
 class Time(_Column):

@@ -108,7 +108,7 @@ def _uplift(own: Uplift, folder: Path) -> MeasuredUplift:
         raise InputError(f"uplift.file is {own.file!r}: name a file beside the description")
     path = folder / own.file
     table = read_table(path)
-    place = column_of(table, str(path), own.place.column) * own.place.factor
+    place = own.place.on_line(column_of(table, str(path), own.place.column))
     largest = column_of(table, str(path), own.largest.column) * own.largest.factor
     return MeasuredUplift(place, largest, (own.largest.noise or 0.0) * own.largest.factor)
 

@@ -82,7 +82,7 @@ def places_of(
         If they are not equidistant, or too few.
     """
     if measured.place is not None:
-        places = column_of(table, path, measured.place.column) * measured.place.factor
+        places = measured.place.on_line(column_of(table, path, measured.place.column))
     else:
         assert measured.time is not None
         times = column_of(table, path, measured.time.column) * measured.time.factor
