@@ -48,7 +48,7 @@ def test_a_filter_is_a_part_or_a_pattern(wanted: str, keys: list[str]) -> None:
         ("line.damping.alpha_s", "required; number from 0 to 10"),
         ("line.contact_wire.tension_N", "number above 0 to 1000000"),
         ("line.dropper.residual_stiffness_ratio", "default 0.0; number from 0 to below 1"),
-        ("mesh.elements_per_gap", "whole number from 1 to 256"),
+        ("mesh.elements_per_gap", "whole number from 1 to 128"),
         ("numerics.integrator", "one of newmark, hht, generalized_alpha"),
         ("evaluation.edition", "one of 2006, 2012, 2020"),
         ("evaluation.system", "one of ac, dc_3kv, dc_1500v"),

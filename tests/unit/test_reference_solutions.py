@@ -201,6 +201,8 @@ def test_a_table_of_statistics_is_judged(tmp_path: Path) -> None:
         ("x,pantograph_N\n1,2\n2,3\n", ONE, "neither a column place_m nor time_s"),
         ("place_m,pantograph_N\n1,2\n1,3\n", ONE, "equidistant samples in ascending order"),
         ("place_m,pantograph_N\n1,2\n2,3\n", ONE, "covers 1.0 to 2.0 m"),
+        ("place_m,pantograph_N\n", ONE, "equidistant samples in ascending order"),
+        ("place_m,pantograph_N\n0,2\n2000,3\n", ONE, "has a sample every 2e.03 m"),
         ("place_m,pantograph_N\n1,2\n2,\n", ONE, 'in row 2 of column "pantograph_N"'),
         ("of,quantity,value\nline,uplift,2\n", ONE, 'has "uplift" of "line"'),
         ("of,quantity,value\nroof,std_N,2\n", ONE, "has figures of pantograph, line"),

@@ -8,14 +8,18 @@ dt^2, so that two grids of which one is twice as fine in both extrapolate by Ric
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from difference_line import Data, DifferenceLine
 from measuring import check, march
 from small_lines import WHOLE, ac_simple_line, mesh_of, numerics, problem_of, train
+from typer.testing import CliRunner
 
-from catenary.cases.studies.reference.solutions import read
+from catenary.cases.cli.main import app
+from catenary.cases.studies.reference.solutions import DATA, read
 from catenary.mbs.lumped_data import LumpedData
 from catenary.postproc.evaluate.filters import low_pass
 
@@ -124,3 +128,21 @@ def test_plain_finite_differences_reach_a_march() -> None:
     within = apart / (2.0**1.5 - 1.0) + 7e-3 * ours.std()
     check("contact force, rms [N]", np.sqrt(np.mean((fine - ours) ** 2)), 0.0, within=within)
     assert within < 0.03 * ours.std()
+
+
+@pytest.mark.study
+@pytest.mark.timeout(3600)
+def test_the_shipped_solutions_are_made_by_the_command(tmp_path: Path) -> None:
+    name = "dc_simple_200_one"
+    done = CliRunner().invoke(app, ["reference", name, "-o", str(tmp_path), "-j", "0"])
+    assert done.exit_code == 0, done.output
+    made, shipped = (pd.read_csv(folder / "statistics.csv") for folder in (tmp_path, DATA))
+    shipped = shipped[shipped["configuration"] == name].reset_index(drop=True)
+    assert made[["of", "quantity"]].equals(shipped[["of", "quantity"]])
+    # Another machine rounds otherwise, far below what step and mesh make.
+    within = 1e-5 + 0.05 * shipped["error_bar"]
+    for column in ("value", "error_bar"):
+        check(column, made[column], shipped[column], within=within)
+    forces = [pd.read_csv(folder / f"{name}.csv") for folder in (tmp_path, DATA)]
+    first, second = (own["pantograph_N"] for own in forces)
+    check("forces [N]", first, second, within=2e-3)

@@ -25,7 +25,7 @@ class MeshTable(Table):
     """The finite-element mesh: made from the line, or the user's own."""
 
     elements_per_gap: int = Field(
-        5, ge=1, le=256, description="elements between neighbouring droppers; 4 to 6 are usual"
+        5, ge=1, le=128, description="elements between neighbouring droppers; 4 to 6 are usual"
     )
     support_refinement: int = Field(
         1, ge=1, le=16, description="factor by which the gaps next to supports are meshed finer"

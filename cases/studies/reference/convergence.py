@@ -101,21 +101,24 @@ def statistics(one: Configuration, ended: Mapping[str, Ended]) -> list[dict[str,
     moved = figures_of(ended[run_name(one, MESH_CHAIN[2], further=True)].summary)
     rows = []
     for (place, quantity), value in of[FINEST].items():
-        bars = []
-        for chain in (STEP_CHAIN, MESH_CHAIN):
-            fine, middle, coarse = (of[level][place, quantity] for level in chain)
-            bars.append(extrapolated_error(abs(middle - fine), abs(coarse - middle)))
+        bars = _bars({level: np.array([own[place, quantity]]) for level, own in of.items()})
         start = moved[place, quantity] - of[MESH_CHAIN[2]][place, quantity]
         rows.append(_row(one, place, quantity, value, bars, start))
     for number, pantograph in enumerate(runs[FINEST].summary["pantographs"]):
-        bars = []
-        for chain in (STEP_CHAIN, MESH_CHAIN):
-            fine, middle, coarse = (
-                np.array(runs[level].measured["histories"][number]) for level in chain
-            )
-            bars.append(extrapolated_error(rms(middle - fine), rms(coarse - middle)))
+        bars = _bars(
+            {level: np.array(run.measured["histories"][number]) for level, run in runs.items()}
+        )
         rows.append(_row(one, pantograph["name"], HISTORY, 0.0, bars, None))
     return rows
+
+
+def _bars(values: Mapping[tuple[int, int], np.ndarray]) -> list[float]:
+    """Errors of step and mesh of (n,) values of the finest level, as their rms."""
+    found = []
+    for fine, middle, coarse in (STEP_CHAIN, MESH_CHAIN):
+        near, far = rms(values[middle] - values[fine]), rms(values[coarse] - values[middle])
+        found.append(extrapolated_error(near, far))
+    return found
 
 
 def rms(values: np.ndarray) -> float:

@@ -161,10 +161,17 @@ def _places_of(
         place = start + train.speed * _numbers(table, name, TIME)
     else:
         raise InputError(f"{name} has neither a column {PLACE} nor {TIME}")
-    spacing = (place[-1] - place[0]) / max(place.size - 1, 1)
-    if place.size < 2 or spacing <= 0 or np.ptp(np.diff(place)) > 2 * _EVEN * spacing + 2e-4:
+    gaps = np.diff(place)
+    spacing = float(gaps.mean()) if gaps.size else 0.0
+    if spacing <= 0 or np.ptp(gaps) > 2 * _EVEN * spacing + 2e-4:
         raise InputError(f"{name} must have equidistant samples in ascending order")
-    return np.linspace(place[0], place[-1], place.size), spacing / train.speed
+    dt = spacing / train.speed
+    if 2.0 * filters.CUT_OFF * dt >= 1.0:
+        raise InputError(
+            f"{name} has a sample every {spacing:.3g} m, {1 / dt:.3g} a second: a force up to "
+            f"{filters.CUT_OFF:g} Hz takes more than {2 * filters.CUT_OFF:g}"
+        )
+    return np.linspace(place[0], place[-1], place.size), dt
 
 
 def _remark_on_ends(one: Others, of: str, place: np.ndarray, dt: float) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ from catenary.postproc.files.disk import plain, write_all
 from catenary.postproc.report.page import page
 from catenary.postproc.report.pictures import figures
 from catenary.postproc.report.sections.section import Picture, Section, Text
+from catenary.postproc.report.study_table import StudyTable
 
 JUDGED, VALIDATION = "judged", "validation"
 _BORROWED = (
@@ -47,12 +49,12 @@ def write_judged(folder: Path, others: Sequence[Others]) -> list[Path]:
     for one in others:
         if one.forces:
             name = one.solution.configuration.name
-            pictures |= figures.painted(name, lambda one=one: draw_forces(one))
+            pictures |= figures.painted(name, partial(draw_forces, one))
     sections = []
     for one in others:
         name = one.solution.configuration.name
         own = replace(table, rows=judged(one.solution, one.figures), title="")
-        blocks = [Text(one.solution.configuration.data), own]
+        blocks: list[Text | StudyTable] = [Text(one.solution.configuration.data), own]
         blocks += [Text(text, "remark") for text in one.remarks]
         shown = [Picture(name, "Contact force, 20 Hz low-pass, along the track", _nothing)]
         sections.append(Section(one.solution.configuration.words, blocks, shown))
@@ -136,7 +138,7 @@ def _shown(step: Step) -> list[dict[str, Any]]:
 
 def _sections(found: Validation) -> Iterator[Section]:
     for number, step in enumerate(found.steps, start=1):
-        blocks: list[Any] = [Text(_said(step))]
+        blocks: list[Text | StudyTable] = [Text(_said(step))]
         if rows := _shown(step):
             blocks.append(table_of(rows, ""))
         yield Section(f"{number}. {step.title}", blocks)

@@ -131,7 +131,7 @@ ASSIGNMENTS = {
     ),
     "half a damping": (["line.damping.per_component.droppers.alpha_s=1"], "beta_per_s"),
     "no elements": (["mesh.elements_per_gap=0"], "at least 1"),
-    "too many elements": (["mesh.elements_per_gap=257"], "at most 256"),
+    "too many elements": (["mesh.elements_per_gap=129"], "at most 128"),
     "mesh made and given": (["mesh.file=own.msh"], "both are given"),
     "missing mesh file": (["mesh.file=own.msh", "mesh.elements_per_gap="], "no such file"),
     "standing still": (["train.speed_km_h=0"], "at least 1 [km/h]"),
