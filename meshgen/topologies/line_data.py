@@ -84,17 +84,14 @@ class ClampedWire:
     """A short wire clamped to another one on both sides of each inner support.
 
     ``length`` from clamp to clamp [m]; of each clamp ``clamp_mass`` [kg], half of it on either
-    wire, and ``clamp_stiffness`` [N/m].
+    wire, and ``clamp_stiffness`` [N/m]. A stitch wire is clamped to the messenger wire and carries
+    the droppers beside the support, a bridle to the contact wire.
     """
 
     conductor: Conductor
     length: float
     clamp_mass: float
     clamp_stiffness: float
-
-
-class StitchWire(ClampedWire):
-    """A wire clamped to the messenger wire, which carries the droppers beside a support."""
 
 
 @dataclass(frozen=True)
@@ -118,10 +115,6 @@ class Twin:
 
     spacing: float
     alternating: bool
-
-
-class Bridle(ClampedWire):
-    """A wire over a support, whose ends are clamped to the contact wire."""
 
 
 @dataclass(frozen=True)
@@ -184,9 +177,9 @@ class LineData(Spans):
     transition_rise: float
     topology: str = "simple"
     auxiliary_wire: AuxiliaryWire | None = None
-    stitch_wire: StitchWire | None = None
+    stitch_wire: ClampedWire | None = None
     twin: Twin | None = None
-    bridle: Bridle | None = None
+    bridle: ClampedWire | None = None
     overlaps: Overlaps | None = None
     messenger_stagger: tuple[float, ...] | None = None
     curve: Curve | None = None

@@ -18,9 +18,8 @@ from pydantic import (
 from catenary.base.errors import InputError
 from catenary.cases.scene.input.toml_input import assign
 from catenary.cases.scene.keys.table import TAKE_AWAY, Table, ascending, exactly_one
-from catenary.cases.scene.train.aerodynamics import AerodynamicsTable
 from catenary.cases.scene.train.head import RollTable, SomeMass, StripsTable
-from catenary.cases.scene.train.laws import LawTable, RegulationTable
+from catenary.cases.scene.train.laws import AerodynamicsTable, LawTable, RegulationTable
 from catenary.cases.scene.train.mechanism import BodyTable, ForceTable, JointTable, Name
 from catenary.mbs.library import READY
 
