@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from catenary.cases.scene.keys.table import TAKE_AWAY, OneOrMore, Table
+from catenary.cases.scene.keys.table import TAKE_AWAY, OneOrMore, Table, stretch, together
 from catenary.cases.scene.line.droppers import DropperTable, Span
 from catenary.cases.scene.line.ends import EndsTable, OverlapTable, TemperatureTable, TensionerTable
 from catenary.cases.scene.line.free import FreeLinkTable, FreeWireTable
@@ -58,8 +58,7 @@ class CurveTable(Table):
 
     @model_validator(mode="after")
     def _consistent(self) -> CurveTable:
-        if (self.from_m is None) != (self.to_m is None):
-            raise ValueError("needs from_m and to_m together, but only one is given")
+        together(self, "from_m", "to_m")
         if self.from_m is None or self.to_m is None:
             if self.transition_m:
                 raise ValueError("takes transition_m with from_m and to_m, where the curve begins")
@@ -86,10 +85,7 @@ class TunnelTable(Table):
 
     @model_validator(mode="after")
     def _has_length(self) -> TunnelTable:
-        if self.to_m <= self.from_m:
-            raise ValueError(
-                f"must end behind its start, but to_m is {self.to_m:g} and from_m {self.from_m:g}"
-            )
+        stretch(self.from_m, self.to_m)
         return self
 
 

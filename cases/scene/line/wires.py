@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from catenary.cases.scene.keys.table import TAKE_AWAY, Table
+from catenary.cases.scene.keys.table import Table, either, together
 from catenary.cases.scene.keys.units import area_from_mm2, length_from_mm, pressure_from_GPa
 from catenary.cases.scene.line.droppers import AuxiliaryDropperTable
 from catenary.meshgen.topologies.line_data import ClampedWire
@@ -72,14 +72,8 @@ class WireTable(Table):
 
     @model_validator(mode="after")
     def _one_stiffness(self) -> Self:
-        if (self.section_mm2 is None) != (self.youngs_modulus_GPa is None):
-            raise ValueError(
-                "needs section_mm2 and youngs_modulus_GPa together, but only one is given"
-            )
-        if self.axial_stiffness_N is not None and self.section_mm2 is not None:
-            raise ValueError(
-                f"takes axial_stiffness_N or section_mm2, but both are given{TAKE_AWAY}"
-            )
+        together(self, "section_mm2", "youngs_modulus_GPa")
+        either(self, "axial_stiffness_N", "section_mm2")
         return self
 
     def stiffness_along(self) -> float | None:

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from catenary.cases.scene.keys.table import TAKE_AWAY, Table
+from catenary.cases.scene.keys.table import Table, either
 from catenary.postproc.record.snapshots.blocks import OTHER_PARTS
 from catenary.postproc.record.snapshots.field_kinds import FIELDS, USUAL_FIELDS
 from catenary.postproc.standards.book import RuleBook
@@ -226,13 +226,8 @@ class OutputTable(Table):
 
     @model_validator(mode="after")
     def _can_be_recorded(self) -> OutputTable:
-        if self.line_channels_every_s is not None and self.line_channels_every_m is not None:
-            raise ValueError(
-                "takes line_channels_every_s or line_channels_every_m, but both are given"
-                + TAKE_AWAY
-            )
-        if self.field_every_s is not None and self.field_every_m is not None:
-            raise ValueError("takes field_every_s or field_every_m, but both are given" + TAKE_AWAY)
+        either(self, "line_channels_every_s", "line_channels_every_m")
+        either(self, "field_every_s", "field_every_m")
         for key in ("line_channels_spans", "field_spans"):
             spans = getattr(self, key)
             if spans is not None and spans[0] > spans[1]:
