@@ -22,7 +22,7 @@ from catenary.solver.time_loop.views import channels
 from catenary.solver.window.choice import Reach, reach_of_motion
 
 if TYPE_CHECKING:
-    from catenary.cases.scene.run.output import OutputTable
+    from catenary.cases.scene.run.case import OutputTable
 
 # Size up to which the line's channels are recorded at every step, and snapshots at their usual
 # cadence, unless the scene says otherwise [B].

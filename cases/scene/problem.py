@@ -9,17 +9,15 @@ from catenary.cases.scene.keys.units import speed_from_km_h
 from catenary.cases.scene.line.ends import ends_of
 from catenary.cases.scene.line.hardware import fittings_of
 from catenary.cases.scene.line.imperfections import defects_of, irregularities_of
-from catenary.cases.scene.line.line import LineTable
+from catenary.cases.scene.line.line import LineTable, tunnels_of
 from catenary.cases.scene.line.line_data import along_of, hanging_table, line_data
-from catenary.cases.scene.line.track import tunnels_of
 from catenary.cases.scene.run.contact import contact_law_of
 from catenary.cases.scene.run.incidents import line_incidents, lowering_of
 from catenary.cases.scene.run.numerics import WindowTable
 from catenary.cases.scene.run.wind import wind_of
 from catenary.cases.scene.scene import Scene
-from catenary.cases.scene.train.aerodynamics import uplift_of
 from catenary.cases.scene.train.head import strips_of, turning_of
-from catenary.cases.scene.train.laws import laws_of, regulation_of
+from catenary.cases.scene.train.laws import laws_of, regulation_of, uplift_of
 from catenary.cases.scene.train.pantograph import MultibodyTable, PantographTable, wanted_force
 from catenary.cases.scene.train.train import vehicle_of
 from catenary.mbs.lumped_data import LumpedData

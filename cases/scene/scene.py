@@ -18,11 +18,10 @@ from catenary.cases.scene.keys.error_sentences import refusal
 from catenary.cases.scene.keys.table import Table
 from catenary.cases.scene.line.imperfections import Defect, IrregularitiesTable
 from catenary.cases.scene.line.line import LineTable
-from catenary.cases.scene.run.case import CaseTable, EvaluationTable
+from catenary.cases.scene.run.case import CaseTable, EvaluationTable, OutputTable
 from catenary.cases.scene.run.contact import ContactTable
 from catenary.cases.scene.run.incidents import Incident
 from catenary.cases.scene.run.numerics import MeshTable, NumericsTable, WindowTable
-from catenary.cases.scene.run.output import OutputTable
 from catenary.cases.scene.run.petsc import PetscTable
 from catenary.cases.scene.run.wind import WindTable
 from catenary.cases.scene.train.mechanism import Name

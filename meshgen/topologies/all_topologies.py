@@ -7,7 +7,7 @@ from functools import lru_cache
 
 from catenary.base.errors import InputError
 from catenary.meshgen.line import Line
-from catenary.meshgen.topologies import free, named  # noqa: F401  register themselves
+from catenary.meshgen.topologies import named  # noqa: F401  (registers)
 from catenary.meshgen.topologies.line_data import LineData
 from catenary.meshgen.topologies.overlaps import with_overlaps
 from catenary.meshgen.topologies.registry import Topology, registered

@@ -1,4 +1,4 @@
-"""Free line: wires and links from tables, and the one way from wires and links to a line.
+"""From wires and links to a line, which all topologies are made by.
 
 What hangs on nothing but its own tension gets a first guess of its sag here; form finding gives the
 heights.
@@ -17,26 +17,11 @@ from catenary.base.errors import InputError
 from catenary.meshgen.hardware import Clamps, Droppers, SteadyArms, Supports
 from catenary.meshgen.line import Line
 from catenary.meshgen.topologies.line_data import FreeDroppers, FreeLink, FreeWire, LineData
-from catenary.meshgen.topologies.registry import register
 from catenary.meshgen.wires import Conductor, End, Piece, Profile, Role, Wire
 
-FREE = "free"
 # Only for the first guess of a sag; equilibrium uses the scene's value [m/s2].
 GRAVITY = 9.81
 _Group = TypeVar("_Group", FreeDroppers, Clamps, SteadyArms, Supports)
-
-
-@register(FREE, ("wires", "links"))
-def free_line(data: LineData) -> Line:
-    """The wires and links of a scene's tables.
-
-    Raises
-    ------
-    InputError
-        As ``line_of``.
-    """
-    assert data.wires is not None and data.links is not None
-    return line_of(data, FREE, data.wires, data.links)
 
 
 def line_of(

@@ -11,7 +11,7 @@ import numpy as np
 from catenary.base.errors import InputError
 from catenary.meshgen.hardware import Clamps, DropperKind, Droppers, SteadyArm, SteadyArms, Supports
 from catenary.meshgen.track import Curve, Spans
-from catenary.meshgen.wires import Conductor, Profile, Role, Section
+from catenary.meshgen.wires import Conductor, Role, Section
 
 # Two cuts of a wire closer than this are taken for a slip of the pen [m].
 SHORTEST_GAP = 1e-3
@@ -84,17 +84,14 @@ class ClampedWire:
     """A short wire clamped to another one on both sides of each inner support.
 
     ``length`` from clamp to clamp [m]; of each clamp ``clamp_mass`` [kg], half of it on either
-    wire, and ``clamp_stiffness`` [N/m].
+    wire, and ``clamp_stiffness`` [N/m]. A stitch wire is clamped to the messenger wire and carries
+    the droppers beside the support, a bridle to the contact wire.
     """
 
     conductor: Conductor
     length: float
     clamp_mass: float
     clamp_stiffness: float
-
-
-class StitchWire(ClampedWire):
-    """A wire clamped to the messenger wire, which carries the droppers beside a support."""
 
 
 @dataclass(frozen=True)
@@ -118,10 +115,6 @@ class Twin:
 
     spacing: float
     alternating: bool
-
-
-class Bridle(ClampedWire):
-    """A wire over a support, whose ends are clamped to the contact wire."""
 
 
 @dataclass(frozen=True)
@@ -184,9 +177,9 @@ class LineData(Spans):
     transition_rise: float
     topology: str = "simple"
     auxiliary_wire: AuxiliaryWire | None = None
-    stitch_wire: StitchWire | None = None
+    stitch_wire: ClampedWire | None = None
     twin: Twin | None = None
-    bridle: Bridle | None = None
+    bridle: ClampedWire | None = None
     overlaps: Overlaps | None = None
     messenger_stagger: tuple[float, ...] | None = None
     curve: Curve | None = None
@@ -208,27 +201,6 @@ class LineData(Spans):
         """Ends of stretches of ``length`` [m] about inner supports, shape (n_spans - 1, 2) [m]."""
         half = 0.5 * length
         return np.add.outer(self.support_positions[1:-1], (-half, half))
-
-    def over_track(self, x: np.ndarray) -> tuple[float, ...]:
-        """Lateral position of what hangs above the contact wire, at places ``x`` [m], straight
-        between supports."""
-        if self.messenger_stagger is None:
-            return (0.0,) * np.size(x)
-        return tuple(np.interp(x, self.support_positions, self.messenger_stagger).tolist())
-
-    @cached_property
-    def profile(self) -> Profile:
-        """Heights wanted of the contact wire: pre-sag is zero at the masts."""
-        masts = self.support_positions
-        x = np.concatenate([masts, self.dropper_x])
-        sag = np.concatenate([np.zeros(masts.size), *self.pre_sag])
-        order = np.argsort(x)
-        return Profile(
-            self.contact_height,
-            tuple(x[order].tolist()),
-            tuple(sag[order].tolist()),
-            (self.whole(self.transition_rise),),
-        )
 
     def whole(self, rise: float) -> Section:
         """The line from anchor to anchor, with a ``rise`` over the transition spans [m]."""
@@ -256,10 +228,6 @@ class LineData(Spans):
             return [np.interp(x, self.support_positions, self.stagger)]
         contact = (wire for wire in self.wires if wire.role is Role.CONTACT)
         return [wire.lateral.at(x) for wire in contact if wire.lateral is not None]
-
-    def target_height(self, x: np.ndarray) -> np.ndarray:
-        """Height that the contact wire is to have without pre-sag, shape as ``x`` [m]."""
-        return self.profile.level(x)
 
     def check(self) -> None:
         """Refuse lists of wrong length and droppers outside their spans.

@@ -1,4 +1,4 @@
-"""The topologies that have names, each as the wires and links of a free line."""
+"""The shipped topologies: which wires and links the line of each has."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from catenary.meshgen.topologies.registry import HUNG, register
 from catenary.meshgen.wires import Conductor, Role
 
 SIMPLE, COMPOUND, STITCHED, SINGLE = "simple", "compound", "stitched", "single"
-TWIN, TWIN_MESSENGER = "twin", "twin_messenger"
+TWIN, TWIN_MESSENGER, FREE = "twin", "twin_messenger", "free"
 AUXILIARY_WIRE, AUXILIARY_DROPPERS = "auxiliary_wire", "auxiliary_droppers"
 STITCH_WIRE, STITCH_DROPPERS, STITCH_CLAMPS = "stitch_wire", "stitch_droppers", "stitch_clamps"
 BRIDLE_WIRE, BRIDLE_CLAMPS = "bridle_wire", "bridle_clamps"
@@ -118,6 +118,19 @@ def single_wire(data: LineData) -> Line:
     carried = BRIDLE_WIRE if bridles else CONTACT_WIRE
     links = _arms(data), _supports(data, carried, holds=CONTACT_WIRE)
     return line_of(data, SINGLE, (_contact(data), *bridles), links)
+
+
+@register(FREE, ("wires", "links"))
+def free_line(data: LineData) -> Line:
+    """The wires and links of a scene's tables.
+
+    Raises
+    ------
+    InputError
+        As ``line_of``.
+    """
+    assert data.wires is not None and data.links is not None
+    return line_of(data, FREE, data.wires, data.links)
 
 
 def _wire(

@@ -10,7 +10,7 @@ from small_lines import en50318_line
 
 from catenary.meshgen.hardware import DropperKind
 from catenary.meshgen.line import Line
-from catenary.meshgen.topologies.line_data import AuxiliaryWire, LineData, StitchWire
+from catenary.meshgen.topologies.line_data import AuxiliaryWire, ClampedWire, LineData
 from catenary.meshgen.topologies.named import AUXILIARY_WIRE, STITCH_WIRE, simple_catenary
 from catenary.meshgen.topologies.registry import register, unregister
 from catenary.meshgen.wires import Conductor, Piece, Role, Wire
@@ -66,6 +66,6 @@ def data_of(topology: str, n_spans: int = 6, bending: float = 1.0) -> LineData:
             DropperKind(2e5, None, 0.0, 0.0, 0.0),
             (above,) * n_spans,
         ),
-        stitch_wire=StitchWire(Conductor(3.5e3, 0.31, 0.0), 2.0 * STITCH_HALF, 0.38, 1e7),
+        stitch_wire=ClampedWire(Conductor(3.5e3, 0.31, 0.0), 2.0 * STITCH_HALF, 0.38, 1e7),
         support_stiffness=5e5,
     )

@@ -11,7 +11,7 @@ from measuring import check
 from paper_pantograph import corrections, data, number_at, table
 
 from catenary.cases.run.describe.pantographs import header_words, kind_lines
-from catenary.cases.scene.checks.train import check_pantographs
+from catenary.cases.scene.checks.pantographs import check_pantographs
 from catenary.cases.scene.input.toml_input import read_toml
 from catenary.cases.scene.keys.keys import is_known, known_keys
 from catenary.cases.scene.load import load_scene

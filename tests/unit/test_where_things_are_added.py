@@ -19,6 +19,7 @@ from catenary.cases.cli.app import Force, RunWords, SceneWords, app
 from catenary.cases.scene.load import load_scene
 from catenary.cases.terminal import console
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
+from catenary.meshgen.topologies.all_topologies import make_line
 from catenary.meshgen.wires import Profile
 from catenary.postproc.report.study_table import Column, StudyTable
 from catenary.solver.effects.build_model import build
@@ -104,7 +105,7 @@ def test_an_effect_sets_target_heights_and_lifts_limits() -> None:
     with registered(Effect("hump", "a hump", "heights", "test", False, law=law, lifts=lifts)):
         model, form = find_form(problem_of(line, HANGING | {"hump"}), mesh)
         assert model.terms_of["hump"] == 2
-        risen = rise(line.profile, mesh.x(lower))
+        risen = rise(make_line(line).wire("contact_wire").profile, mesh.x(lower))
         # Rounding of heights of 5.5 m.
         assert form.height[lower] - flat == pytest.approx(risen, abs=1e-14)
         load_scene("en50318_2002", [*fast, "effects.hump=true"])

@@ -15,7 +15,7 @@ from catenary.meshgen.hardware import SteadyArm
 from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE, LineMesh
 from catenary.meshgen.topologies.all_topologies import make_line
-from catenary.meshgen.topologies.line_data import Bridle, LineData, Overlaps, Twin
+from catenary.meshgen.topologies.line_data import ClampedWire, LineData, Overlaps, Twin
 from catenary.meshgen.topologies.named import BRIDLE_WIRE, second
 from catenary.meshgen.topologies.overlaps import of_next
 from catenary.meshgen.wires import Conductor, Role
@@ -90,7 +90,7 @@ def test_two_simple_catenaries_side_by_side_hang_like_one() -> None:
     assert np.isin(mesh.supports, mesh.wires[MESSENGER_WIRE]).sum() == 3
 
 
-def single(bridle: Bridle | None = None) -> LineData:
+def single(bridle: ClampedWire | None = None) -> LineData:
     """Spans of 30 m of a string of 0.95 kg/m at 10 kN, on supports that hardly give."""
     n = 8
     return replace(
@@ -134,7 +134,7 @@ def test_a_single_string_sags_and_gives_way_as_a_closed_form_says() -> None:
 def test_a_bridle_hangs_as_statics_says() -> None:
     """The support's force, the weight of a span, hangs on two halves of the bridle; between its
     clamps the contact wire has what the bridle leaves of its tension."""
-    bridle = Bridle(Conductor(2e3, 0.31, 0.0), 8.0, 0.4, 1e9)
+    bridle = ClampedWire(Conductor(2e3, 0.31, 0.0), 8.0, 0.4, 1e9)
     line = make_line(single(bridle))
     read = []
     for n in (8, 16):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from catenary.cases.scene.checks.train import reaches_below
+from catenary.cases.scene.checks.pantographs import reaches_below
 from catenary.cases.scene.input.faults import Fault
 from catenary.cases.scene.line.imperfections import (
     DropperDefectTable,

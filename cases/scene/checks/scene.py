@@ -13,44 +13,16 @@ from pathlib import Path
 from typing import Any
 
 from catenary.base.errors import InputError
-from catenary.cases.scene.checks.air import (
-    check_crosswind,
-    check_tunnels,
-    check_uplift,
-    check_wind,
-    has_front,
-)
-from catenary.cases.scene.checks.defects import check_defects, check_incidents
-from catenary.cases.scene.checks.effects import (
-    check_chosen_act,
-    check_effect_data,
-    check_effect_names,
-    check_idle,
-    check_requirements_of_chosen,
-    check_requirements_of_defaults,
-    check_twins,
-)
-from catenary.cases.scene.checks.free import check_free_droppers
-from catenary.cases.scene.checks.line import (
-    check_dropper_lengths,
-    check_droppers_inside_spans,
-    check_names,
-    check_parts,
-    check_topology,
-)
-from catenary.cases.scene.checks.mesh_size import size_faults
-from catenary.cases.scene.checks.motion import check_along, check_ends, check_lateral
-from catenary.cases.scene.checks.numerics import (
-    check_contact,
-    check_iterations,
-    check_scheme,
-    check_window,
-)
-from catenary.cases.scene.checks.train import (
-    check_laws,
-    check_mechanisms,
-    check_pantographs,
-    check_vehicle,
+from catenary.cases.scene.checks import (
+    air,
+    defects,
+    effects,
+    free,
+    mesh_size,
+    motion,
+    numerics,
+    pantographs,
+    topology,
 )
 from catenary.cases.scene.input.faults import Fault, Origin, SceneError, UnfitScene
 from catenary.cases.scene.keys.error_sentences import unknown_key
@@ -85,52 +57,52 @@ def check(scene: Scene) -> None:
 def faults_of(scene: Scene) -> list[Fault]:
     """All in which a scene contradicts itself."""
     found = _Findings()
-    whole = found.collect(check_topology, scene)
+    whole = found.collect(topology.check_topology, scene)
     for of_tables in _OF_TABLES:
         found.collect(of_tables, scene)
     if found.collect(_pantograph_names, scene):
-        found.collect(check_pantographs, scene)
-        found.collect(check_scheme, scene)
-        found.collect(check_laws, scene)
+        found.collect(pantographs.check_pantographs, scene)
+        found.collect(numerics.check_scheme, scene)
+        found.collect(pantographs.check_laws, scene)
     # What is too large is not made, and what follows from a wrong unit is not reported.
-    sound = not whole or found.collect(size_faults, scene)
+    sound = not whole or found.collect(mesh_size.size_faults, scene)
     sound = sound and found.collect(usual_faults, scene)
     line = _line(scene, found) if sound and whole else None
     if line is None:
         return found.faults
-    if not found.collect(check_parts, scene, line):
+    if not found.collect(topology.check_parts, scene, line):
         return found.faults
-    if not found.collect(check_names, scene, line):
+    if not found.collect(topology.check_names, scene, line):
         return found.faults
     of_lines = (
-        check_dropper_lengths,
+        topology.check_dropper_lengths,
         check_recorded_parts,
-        check_tunnels,
-        check_crosswind,
-        check_wind,
+        air.check_tunnels,
+        air.check_crosswind,
+        air.check_wind,
         _speed,
-        check_defects,
-        check_idle,
+        defects.check_defects,
+        effects.check_idle,
     )
     for of_line in of_lines:
         found.collect(of_line, scene, line)
     if found.collect(_running, scene, line) and found.collect(_evaluation, scene):
         found.collect(_raising, scene)
-        found.collect(check_ends, scene, line)
-        found.collect(check_along, scene, line)
+        found.collect(motion.check_ends, scene, line)
+        found.collect(motion.check_along, scene, line)
     if found.faults:
         return found.faults
     # What may need multibody systems stands last: other faults are reported at once.
-    if found.collect(check_mechanisms, scene, line):
-        found.collect(check_uplift, scene)
-        found.collect(check_requirements_of_defaults, scene)
-        found.collect(check_vehicle, scene, line)
-        if found.collect(check_incidents, scene, line):
-            found.collect(check_window, scene)
+    if found.collect(pantographs.check_mechanisms, scene, line):
+        found.collect(air.check_uplift, scene)
+        found.collect(effects.check_requirements_of_defaults, scene)
+        found.collect(pantographs.check_vehicle, scene, line)
+        if found.collect(defects.check_incidents, scene, line):
+            found.collect(numerics.check_window, scene)
     if not found.faults:
         # They ask the problem, which is made of a sound scene only.
-        found.collect(check_chosen_act, scene)
-        found.collect(check_twins, scene)
+        found.collect(effects.check_chosen_act, scene)
+        found.collect(effects.check_twins, scene)
     return found.faults
 
 
@@ -158,8 +130,8 @@ def _line(scene: Scene, found: _Findings) -> LineData | None:
 
     def make() -> Iterator[Fault]:
         lines.append(line_data_of(scene))
-        yield from check_droppers_inside_spans(scene, lines[0])
-        yield from check_free_droppers(scene, lines[0])
+        yield from topology.check_droppers_inside_spans(scene, lines[0])
+        yield from free.check_free_droppers(scene, lines[0])
 
     return lines[0] if found.collect(make) else None
 
@@ -176,7 +148,7 @@ def _pantograph_names(scene: Scene) -> Iterator[Fault]:
     for i, place in enumerate(scene.train.pantographs):
         if place.name not in scene.pantographs:
             yield from scene.among(f"train.pantographs.{i}.name", scene.pantographs)
-        elif place.reversed and not has_front(scene.pantographs[place.name]):
+        elif place.reversed and not air.has_front(scene.pantographs[place.name]):
             yield scene.refused(
                 f"train.pantographs.{i}.reversed",
                 f"{place.name} is a chain of lumped masses, with no front but what "
@@ -388,12 +360,12 @@ def _faults(value: Any, parts: list[str], key: str, origin: Origin) -> Iterator[
 # Checks that need no other one.
 _OF_TABLES: tuple[Callable[[Scene], Iterator[Fault]], ...] = (
     _test_keys,
-    check_effect_names,
-    check_requirements_of_chosen,
-    check_effect_data,
-    check_lateral,
-    check_contact,
-    check_iterations,
+    effects.check_effect_names,
+    effects.check_requirements_of_chosen,
+    effects.check_effect_data,
+    motion.check_lateral,
+    numerics.check_contact,
+    numerics.check_iterations,
     _separations,
     _standard,
     _mesh_file,

@@ -37,6 +37,33 @@ def exactly_one(table: Table, *names: str) -> None:
         raise ValueError(f"needs exactly one of {', '.join(names)}, but {but}")
 
 
+def either(table: Table, one: str, other: str) -> None:
+    """Raise ``ValueError`` if two keys have other values than those they have when absent."""
+    fields = type(table).model_fields
+    if all(getattr(table, name) != fields[name].default for name in (one, other)):
+        raise ValueError(f"takes {one} or {other}, but both are given{TAKE_AWAY}")
+
+
+def together(table: Table, one: str, other: str) -> None:
+    """Raise ``ValueError`` if one of two keys is given alone."""
+    if (getattr(table, one) is None) != (getattr(table, other) is None):
+        raise ValueError(f"needs {one} and {other} together, but only one is given")
+
+
+def stretch(start: float, end: float) -> None:
+    """Raise ``ValueError`` unless ``to_m`` lies behind ``from_m``."""
+    if end <= start:
+        raise ValueError(f"must end behind its start, but to_m is {end:g} and from_m {start:g}")
+
+
+def band(shortest: float, longest: float) -> None:
+    """Raise ``ValueError`` unless there are wavelengths from ``shortest_m`` to ``longest_m``."""
+    if longest <= shortest:
+        raise ValueError(
+            f"must have waves, but longest_m is {longest:g} and shortest_m {shortest:g}"
+        )
+
+
 def ascending(values: Sequence[float], what: str) -> None:
     """Raise ``ValueError`` unless each value is greater than the one before."""
     for before, after in zip(values, values[1:], strict=False):

@@ -10,7 +10,7 @@ from pydantic import AfterValidator, Field, model_validator
 
 from catenary.base.errors import InputError
 from catenary.cases.scene.input.faults import Origin
-from catenary.cases.scene.keys.table import PAIR, TAKE_AWAY, Table, ascending, exactly_one
+from catenary.cases.scene.keys.table import PAIR, Table, ascending, either, exactly_one, together
 from catenary.cases.scene.keys.units import length_from_mm
 from catenary.meshgen.hardware import DropperKind
 
@@ -118,8 +118,7 @@ class HangingTable(Table):
     def _placed(self) -> HangingTable:
         exactly_one(self, "stiffness_N_per_m", "axial_stiffness_N", "curve")
         exactly_one(self, *self.PLACED_BY)
-        if (self.count is None) != (self.spacing_m is None):
-            raise ValueError("needs count and spacing_m together, but only one is given")
+        together(self, "count", "spacing_m")
         if self.patterns is not None:
             lengths = [p.span_m for p in self.patterns if p.span_m is not None]
             ascending(lengths, "patterns by span_m")
@@ -127,8 +126,7 @@ class HangingTable(Table):
             twice = [one for one, other in pairwise(numbers) if one == other]
             if twice:
                 raise ValueError(f"must have one pattern for span {twice[0]}, not several")
-        if self.positions_m is not None:
-            ascending(self.positions_m, "positions_m")
+        ascending(self.positions_m or [], "positions_m")
         return self
 
 
@@ -157,8 +155,7 @@ class DropperTable(HangingTable):
 
     @model_validator(mode="after")
     def _pre_sag(self) -> DropperTable:
-        if self.pre_sag_mm is not None and self.pre_sag_mid_mm is not None:
-            raise ValueError(f"takes pre_sag_mm or pre_sag_mid_mm, but both are given{TAKE_AWAY}")
+        either(self, "pre_sag_mm", "pre_sag_mid_mm")
         if self.patterns is not None:
             if self.pre_sag_mm is not None:
                 raise ValueError("with patterns takes pre_sag_mm in each pattern, not here")

@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
-from catenary.cases.scene.keys.table import TAKE_AWAY, OneOrMore, Table, ascending
+from catenary.cases.scene.keys.table import OneOrMore, Table, ascending, either
 from catenary.cases.scene.line.droppers import DropperTable
 from catenary.cases.scene.line.hardware import SteadyArmTable, SupportTable
 from catenary.cases.scene.line.wires import WireTable
@@ -95,21 +95,15 @@ class FreeWireTable(WireTable):
 
     @model_validator(mode="after")
     def _consistent(self) -> FreeWireTable:
-        if self.stretches_m is not None and self.from_supports_m is not None:
-            raise ValueError(f"takes stretches_m or from_supports_m, but both are given{TAKE_AWAY}")
+        either(self, "stretches_m", "from_supports_m")
         if self.supports is not None and self.from_supports_m is None:
             raise ValueError("takes supports with from_supports_m, which is not given")
-        for key in ("height_m", "stagger_m"):
-            if self.course_m is not None and getattr(self, key) is not None:
-                raise ValueError(f"takes course_m or {key}, but both are given{TAKE_AWAY}")
-        if self.supports is not None:
-            ascending(self.supports, "supports")
-        if self.course_m is not None:
-            ascending([point[0] for point in self.course_m], "course_m along the line")
-        if self.from_supports_m is not None:
-            ascending(self.from_supports_m, "from_supports_m")
-        if self.stretches_m is not None:
-            ascending([x for stretch in self.stretches_m for x in stretch], "stretches_m")
+        either(self, "course_m", "height_m")
+        either(self, "course_m", "stagger_m")
+        ascending(self.supports or [], "supports")
+        ascending([point[0] for point in self.course_m or []], "course_m along the line")
+        ascending(self.from_supports_m or [], "from_supports_m")
+        ascending([x for stretch in self.stretches_m or [] for x in stretch], "stretches_m")
         return self
 
 
@@ -145,8 +139,7 @@ class FreeDroppersTable(DropperTable):
                     f"must give one pre_sag_mm per dropper, but there are {len(self.pre_sag_mm)} "
                     f"values for {len(self.at_m)} droppers"
                 )
-        if self.spans is not None:
-            ascending(self.spans, "spans")
+        ascending(self.spans or [], "spans")
         return self
 
 
@@ -187,8 +180,7 @@ class _AtSupports(Table):
 
     @model_validator(mode="after")
     def _one_way(self) -> _AtSupports:
-        if self.supports is not None and self.at_m is not None:
-            raise ValueError(f"takes supports or at_m, but both are given{TAKE_AWAY}")
+        either(self, "supports", "at_m")
         for key in ("supports", "at_m"):
             ascending(getattr(self, key) or [], key)
         return self

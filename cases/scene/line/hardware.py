@@ -7,7 +7,7 @@ from typing import Literal
 
 from pydantic import Field, model_validator
 
-from catenary.cases.scene.keys.table import TAKE_AWAY, Table
+from catenary.cases.scene.keys.table import Table, either
 from catenary.cases.scene.keys.units import angle_from_deg
 from catenary.meshgen.hardware import Fittings, SteadyArm
 
@@ -65,37 +65,21 @@ class SteadyArmTable(Table):
     )
 
     @model_validator(mode="after")
-    def _one_stop(self) -> SteadyArmTable:
+    def _consistent(self) -> SteadyArmTable:
         if self.uplift_stop_stiffness_N_per_m is not None and self.uplift_stop_m is None:
             raise ValueError(
                 "has an uplift_stop_stiffness_N_per_m, but no uplift_stop_m; give both, or neither"
             )
-        return self
-
-    @model_validator(mode="after")
-    def _one_height(self) -> SteadyArmTable:
-        if self.holds_height and self.inclination_deg is not None:
-            raise ValueError(
-                f"takes holds_height or inclination_deg, but both are given{TAKE_AWAY}"
-            )
-        return self
-
-    @model_validator(mode="after")
-    def _has_a_bar(self) -> SteadyArmTable:
-        for key in ("inclination_deg", "registration_stiffness_N_per_m"):
-            if getattr(self, key) is not None and not self.length_m:
+        either(self, "holds_height", "inclination_deg")
+        either(self, "stiffness_N_per_m", "stiffness_by_radial_force")
+        bar = {
+            "inclination_deg": self.inclination_deg is not None,
+            "registration_stiffness_N_per_m": self.registration_stiffness_N_per_m is not None,
+            "stiffness_by_radial_force = true": self.stiffness_by_radial_force,
+        }
+        for key, given in bar.items():
+            if given and not self.length_m:
                 raise ValueError(f"needs length_m above 0 for {key}")
-        return self
-
-    @model_validator(mode="after")
-    def _one_stiffness(self) -> SteadyArmTable:
-        if self.stiffness_by_radial_force and self.stiffness_N_per_m:
-            raise ValueError(
-                "takes stiffness_N_per_m or stiffness_by_radial_force, but both are given"
-                f"{TAKE_AWAY}"
-            )
-        if self.stiffness_by_radial_force and not self.length_m:
-            raise ValueError("needs length_m above 0 for stiffness_by_radial_force = true")
         return self
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
-from catenary.cases.scene.keys.table import PAIR, TAKE_AWAY, Table, within
+from catenary.cases.scene.keys.table import PAIR, TAKE_AWAY, Table, band, within
 from catenary.cases.scene.keys.units import angle_from_deg, length_from_mm
 from catenary.meshgen.line import Line
 from catenary.solver.problem import defects as solver
@@ -58,11 +58,7 @@ class HeightTable(Table):
     def _consistent(self) -> HeightTable:
         if self.standard_deviation_mm is None and self.by_place is None:
             raise ValueError("needs standard_deviation_mm or by_place, but none is given")
-        if self.longest_m <= self.shortest_m:
-            raise ValueError(
-                f"must have waves, but longest_m is {self.longest_m:g} and shortest_m "
-                f"{self.shortest_m:g}"
-            )
+        band(self.shortest_m, self.longest_m)
         given = [name for name in ("from_m", "to_m") if getattr(self, name) is not None]
         if given and self.standard_deviation_mm is None:
             raise ValueError(f"must not have {given[0]} without standard_deviation_mm{TAKE_AWAY}")

@@ -1,29 +1,92 @@
-"""The line from anchor to anchor: its table. Keys carry their unit where it is not obvious."""
+"""The line from anchor to anchor and the track beneath, curve and tunnels: tables, curves in SI."""
 
 from __future__ import annotations
 
-from typing import Annotated
+import math
+from collections.abc import Sequence
+from typing import Annotated, Literal
 
+import numpy as np
 from pydantic import Field, model_validator
 
-from catenary.cases.scene.keys.table import TAKE_AWAY, OneOrMore, Table
+from catenary.cases.scene.keys.table import TAKE_AWAY, OneOrMore, Table, stretch, together
 from catenary.cases.scene.line.droppers import DropperTable, Span
 from catenary.cases.scene.line.ends import EndsTable, OverlapTable, TemperatureTable, TensionerTable
 from catenary.cases.scene.line.free import FreeLinkTable, FreeWireTable
 from catenary.cases.scene.line.hardware import FittingTable, SteadyArmTable, SupportTable
-from catenary.cases.scene.line.track import CurveTable, TunnelTable
 from catenary.cases.scene.line.wires import (
     AuxiliaryWireTable,
-    BridleTable,
+    ClampedWireTable,
     DampingTable,
-    StitchWireTable,
     TwinTable,
     WireTable,
 )
+from catenary.mbs.air import Tunnel
 from catenary.meshgen.topologies.all_topologies import registered
+from catenary.meshgen.track import Curve
 
 MidPoint = Annotated[float, Field(gt=0, le=2e6)]
 Stagger = Annotated[float, Field(ge=-2, le=2)]
+
+
+class CurveTable(Table):
+    """A curve, over the whole line or a stretch of it."""
+
+    radius_m: float = Field(ge=100, le=100_000, description="radius of the circle")
+    side: Literal["left", "right"] = Field(
+        "left", description="where its centre is, seen in running direction"
+    )
+    cant_mm: float = Field(
+        0.0, ge=0, le=200, description="height of the outer rail above the inner one"
+    )
+    rail_distance_mm: float = Field(
+        1500.0, ge=600, le=2000, description="distance of the rails' middles, over which cant is"
+    )
+    from_m: float | None = Field(
+        None,
+        ge=0,
+        le=1e7,
+        description="start of the curve, transition included; the whole line's if absent",
+    )
+    to_m: float | None = Field(None, gt=0, le=1e7, description="end of the curve, likewise")
+    transition_m: float = Field(
+        0.0,
+        ge=0,
+        le=2000,
+        description="length at both ends over which curvature and cant grow evenly",
+    )
+
+    @model_validator(mode="after")
+    def _consistent(self) -> CurveTable:
+        together(self, "from_m", "to_m")
+        if self.from_m is None or self.to_m is None:
+            if self.transition_m:
+                raise ValueError("takes transition_m with from_m and to_m, where the curve begins")
+            return self
+        if self.to_m <= self.from_m + 2.0 * self.transition_m:
+            raise ValueError(
+                f"must end behind both transitions: to_m ({self.to_m:g}) must be greater than "
+                f"{self.from_m + 2.0 * self.transition_m:g} m"
+            )
+        return self
+
+
+class TunnelTable(Table):
+    """A tunnel: aerodynamic forces on pantographs are larger in it, and there is no wind."""
+
+    from_m: float = Field(ge=0, le=1e6, description="place of its first portal")
+    to_m: float = Field(ge=0, le=1e6, description="place of its second portal")
+    force_factor: float = Field(
+        1.0, ge=0.1, le=10, description="aerodynamic forces in it over those on the open line"
+    )
+    portal_m: float = Field(
+        20.0, ge=0, le=1000, description="length behind each portal in which they change"
+    )
+
+    @model_validator(mode="after")
+    def _has_length(self) -> TunnelTable:
+        stretch(self.from_m, self.to_m)
+        return self
 
 
 class TransitionTable(Table):
@@ -93,9 +156,9 @@ class LineTable(Table):
     auxiliary_wire: AuxiliaryWireTable | None = Field(
         None, description="wire between messenger and contact wire"
     )
-    stitch_wire: StitchWireTable | None = Field(None, description="stitch wires at the supports")
+    stitch_wire: ClampedWireTable | None = Field(None, description="stitch wires at the supports")
     twin: TwinTable | None = Field(None, description="two contact wires in place of one")
-    bridle: BridleTable | None = Field(None, description="bridles of a single contact wire")
+    bridle: ClampedWireTable | None = Field(None, description="bridles of a single contact wire")
     dropper: DropperTable | None = Field(None, description="droppers of the contact wire")
     wires: list[FreeWireTable] | None = Field(
         None, min_length=1, max_length=100, description="wires of a free line"
@@ -153,3 +216,17 @@ class LineTable(Table):
                     f"but lists {len(given)}"
                 )
         return self
+
+
+def curve_of(table: CurveTable) -> Curve:
+    """The curve of the track."""
+    to_left = 1.0 if table.side == "left" else -1.0
+    first = -np.inf if table.from_m is None else table.from_m
+    last = np.inf if table.to_m is None else table.to_m
+    tilt = math.asin(table.cant_mm / table.rail_distance_mm)
+    return Curve(to_left / table.radius_m, tilt, (first, last), table.transition_m)
+
+
+def tunnels_of(tables: Sequence[TunnelTable]) -> tuple[Tunnel, ...]:
+    """Tunnels of a line."""
+    return tuple(Tunnel(t.from_m, t.to_m, t.force_factor, t.portal_m) for t in tables)

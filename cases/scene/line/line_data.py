@@ -18,14 +18,12 @@ from catenary.cases.scene.line.free import (
     FreeWireTable,
 )
 from catenary.cases.scene.line.hardware import SteadyArmTable, steady_arm
-from catenary.cases.scene.line.line import LineTable
-from catenary.cases.scene.line.track import curve_of
+from catenary.cases.scene.line.line import LineTable, curve_of
 from catenary.cases.scene.line.wires import (
     AuxiliaryWireTable,
     WireTable,
-    bridle_of,
+    clamped_wire_of,
     conductor,
-    stitch_wire_of,
 )
 from catenary.meshgen.hardware import Clamps, SteadyArms, Supports
 from catenary.meshgen.topologies.line_data import (
@@ -83,9 +81,9 @@ def line_data(table: LineTable, origin: Origin) -> LineData:
         transition_rise=table.transition.rise_m,
         topology=table.topology,
         auxiliary_wire=_optional(lambda own: _auxiliary(own, origin, spans), table.auxiliary_wire),
-        stitch_wire=_optional(stitch_wire_of, table.stitch_wire),
+        stitch_wire=_optional(clamped_wire_of, table.stitch_wire),
         twin=_optional(lambda own: Twin(own.spacing_m, own.droppers == "alternating"), table.twin),
-        bridle=_optional(bridle_of, table.bridle),
+        bridle=_optional(clamped_wire_of, table.bridle),
         overlaps=overlaps_of(table),
         wires=wires,
         links=links,

@@ -6,10 +6,10 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from catenary.cases.scene.keys.table import TAKE_AWAY, Table
+from catenary.cases.scene.keys.table import Table, either, together
 from catenary.cases.scene.keys.units import area_from_mm2, length_from_mm, pressure_from_GPa
 from catenary.cases.scene.line.droppers import AuxiliaryDropperTable
-from catenary.meshgen.topologies.line_data import Bridle, StitchWire
+from catenary.meshgen.topologies.line_data import ClampedWire
 from catenary.meshgen.wires import EXPANSION_OF_COPPER, Conductor
 
 
@@ -72,14 +72,8 @@ class WireTable(Table):
 
     @model_validator(mode="after")
     def _one_stiffness(self) -> Self:
-        if (self.section_mm2 is None) != (self.youngs_modulus_GPa is None):
-            raise ValueError(
-                "needs section_mm2 and youngs_modulus_GPa together, but only one is given"
-            )
-        if self.axial_stiffness_N is not None and self.section_mm2 is not None:
-            raise ValueError(
-                f"takes axial_stiffness_N or section_mm2, but both are given{TAKE_AWAY}"
-            )
+        together(self, "section_mm2", "youngs_modulus_GPa")
+        either(self, "axial_stiffness_N", "section_mm2")
         return self
 
     def stiffness_along(self) -> float | None:
@@ -100,8 +94,8 @@ class AuxiliaryWireTable(WireTable):
     )
 
 
-class StitchWireTable(WireTable):
-    """A wire clamped to the messenger wire on both sides of each inner support."""
+class ClampedWireTable(WireTable):
+    """A wire over each inner support, clamped to another one on both sides of it."""
 
     length_m: float = Field(gt=0, le=100, description="length from clamp to clamp")
     clamp_kg: float = Field(0.0, ge=0, le=100, description="mass of each of its two clamps")
@@ -119,16 +113,6 @@ class TwinTable(Table):
     )
 
 
-class BridleTable(WireTable):
-    """A wire over each inner support, whose ends are clamped to a single contact wire."""
-
-    length_m: float = Field(gt=0, le=100, description="length from clamp to clamp")
-    clamp_kg: float = Field(0.0, ge=0, le=100, description="mass of each of its two clamps")
-    clamp_stiffness_N_per_m: float = Field(
-        1e7, gt=0, le=1e10, description="stiffness of each clamp, in tension and compression"
-    )
-
-
 def conductor(table: WireTable) -> Conductor:
     """The conductor of a wire."""
     return Conductor(
@@ -142,13 +126,8 @@ def conductor(table: WireTable) -> Conductor:
     )
 
 
-def stitch_wire_of(table: StitchWireTable) -> StitchWire:
-    """The stitch wires of a line."""
-    return StitchWire(
+def clamped_wire_of(table: ClampedWireTable) -> ClampedWire:
+    """Stitch wires or bridles."""
+    return ClampedWire(
         conductor(table), table.length_m, table.clamp_kg, table.clamp_stiffness_N_per_m
     )
-
-
-def bridle_of(table: BridleTable) -> Bridle:
-    """The bridles of a line."""
-    return Bridle(conductor(table), table.length_m, table.clamp_kg, table.clamp_stiffness_N_per_m)

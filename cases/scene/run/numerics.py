@@ -142,10 +142,11 @@ class NumericsTable(Table):
                 "must have 2 newmark_beta >= newmark_gamma to be stable for every step, but "
                 f"newmark_beta is {self.newmark_beta:g} and newmark_gamma is {self.newmark_gamma:g}"
             )
+        self._can_halve()
+        self._has_its_spectral_radius()
         return self
 
-    @model_validator(mode="after")
-    def _can_halve(self) -> NumericsTable:
+    def _can_halve(self) -> None:
         smallest = self.smallest_dt_s
         if self.adaptive_tolerance_N is None:
             if smallest is not None:
@@ -153,7 +154,7 @@ class NumericsTable(Table):
                     "must not give smallest_dt_s without adaptive_tolerance_N, which halves steps"
                     + TAKE_AWAY
                 )
-            return self
+            return
         if self.scheme == "ts_alpha2":
             raise ValueError(
                 "must not give adaptive_tolerance_N with scheme ts_alpha2, in which PETSc keeps a "
@@ -164,10 +165,8 @@ class NumericsTable(Table):
                 f"must have smallest_dt_s from dt_s / {MOST_DIVIDED} to dt_s / 2, which is from "
                 f"{self.dt_s / MOST_DIVIDED:g} to {0.5 * self.dt_s:g} s, not {smallest:g}"
             )
-        return self
 
-    @model_validator(mode="after")
-    def _has_its_spectral_radius(self) -> NumericsTable:
+    def _has_its_spectral_radius(self) -> None:
         radius = self.spectral_radius
         own = (self.newmark_beta, self.newmark_gamma)
         if self.scheme == "ts_alpha2" and own != AVERAGE_ACCELERATION[:2]:
@@ -182,7 +181,7 @@ class NumericsTable(Table):
                     "must not give spectral_radius, which belongs to integrators hht and "
                     "generalized_alpha, with newmark, whose damping is newmark_gamma" + TAKE_AWAY
                 )
-            return self
+            return
         if radius is None:
             raise ValueError(
                 f"must give spectral_radius with integrator {self.integrator}, for instance 0.8"
@@ -197,7 +196,6 @@ class NumericsTable(Table):
                 "must not give newmark_beta and newmark_gamma, which belong to integrator newmark, "
                 f"with {self.integrator}, whose parameters follow from spectral_radius" + TAKE_AWAY
             )
-        return self
 
     @model_serializer(mode="wrap")
     def _acting(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:

@@ -6,7 +6,7 @@ from typing import Literal
 
 from pydantic import Field, model_validator
 
-from catenary.cases.scene.keys.table import TAKE_AWAY, Table
+from catenary.cases.scene.keys.table import TAKE_AWAY, Table, stretch
 from catenary.cases.scene.keys.units import angle_from_deg
 from catenary.solver.problem.wind import Gusts, Profile, Stretch, Wind, friction_velocity_of
 
@@ -28,10 +28,7 @@ class WindStretchTable(Table):
 
     @model_validator(mode="after")
     def _has_length(self) -> WindStretchTable:
-        if self.to_m <= self.from_m:
-            raise ValueError(
-                f"must end behind its start, but to_m is {self.to_m:g} and from_m {self.from_m:g}"
-            )
+        stretch(self.from_m, self.to_m)
         return self
 
 

@@ -18,9 +18,8 @@ from pydantic import (
 from catenary.base.errors import InputError
 from catenary.cases.scene.input.toml_input import assign
 from catenary.cases.scene.keys.table import TAKE_AWAY, Table, ascending, exactly_one
-from catenary.cases.scene.train.aerodynamics import AerodynamicsTable
 from catenary.cases.scene.train.head import RollTable, SomeMass, StripsTable
-from catenary.cases.scene.train.laws import LawTable, RegulationTable
+from catenary.cases.scene.train.laws import AerodynamicsTable, LawTable, RegulationTable
 from catenary.cases.scene.train.mechanism import BodyTable, ForceTable, JointTable, Name
 from catenary.mbs.library import READY
 
@@ -210,7 +209,7 @@ class MultibodyTable(_Pressing):
     )
 
     @model_validator(mode="after")
-    def _pressed(self) -> MultibodyTable:
+    def _consistent(self) -> MultibodyTable:
         given = [
             name
             for name in ("static_force_N", "static_force_by_speed")
@@ -227,10 +226,6 @@ class MultibodyTable(_Pressing):
                 f"must not have {given[0]} with calibrate = false, because the static force "
                 f"follows from the actuator{TAKE_AWAY}"
             )
-        return self
-
-    @model_validator(mode="after")
-    def _pitching(self) -> MultibodyTable:
         if self.strips.pitch_inertia_kg_m2 is not None:
             raise ValueError(
                 "must not have strips.pitch_inertia_kg_m2, because the pitch of its head follows "
@@ -241,23 +236,22 @@ class MultibodyTable(_Pressing):
                 "must not have strips.rake_deg, because its head is pressed where a strip "
                 f"that is square to the track is{TAKE_AWAY}"
             )
-        return self
-
-    @model_validator(mode="after")
-    def _moved(self) -> MultibodyTable:
         if self.motion == "all_bodies":
             if self.strips.mass_kg is not None:
                 raise ValueError(
                     "must not have strips.mass_kg with motion = all_bodies, because strips on "
                     f"springs of their own are no bodies{TAKE_AWAY}"
                 )
-            return self
         for key in _OF_ALL_BODIES:
-            if key in self.model_fields_set:
+            if self.motion == "reduced" and key in self.model_fields_set:
                 raise ValueError(
                     f"must not have {key} with motion = reduced, because it acts only with "
                     f"motion = all_bodies{TAKE_AWAY}"
                 )
+        for correction in self.corrections:
+            _number_at(self, correction.key)
+        if self.as_published and not self.corrections:
+            raise ValueError("must list corrections if as_published is true")
         return self
 
     @model_serializer(mode="wrap")
@@ -266,14 +260,6 @@ class MultibodyTable(_Pressing):
         plain: dict[str, Any] = handler(self)
         idle = _OF_ALL_BODIES if self.motion == "reduced" else ()
         return {key: value for key, value in plain.items() if key not in idle}
-
-    @model_validator(mode="after")
-    def _corrected(self) -> MultibodyTable:
-        for correction in self.corrections:
-            _number_at(self, correction.key)
-        if self.as_published and not self.corrections:
-            raise ValueError("must list corrections if as_published is true")
-        return self
 
     def in_force(self) -> MultibodyTable:
         """The same with the published numbers in place, if ``as_published``.

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
-from catenary.cases.scene.keys.table import PAIR, TAKE_AWAY, Table, within
+from catenary.cases.scene.keys.table import PAIR, TAKE_AWAY, Table, band, within
 from catenary.cases.scene.keys.units import angle_from_deg
 from catenary.mbs.vehicle.base_motion import Harmonic, Source, VehicleMotion
 from catenary.mbs.vehicle.base_motion import Table as MotionOf
@@ -111,11 +111,7 @@ class IrregularityTable(Table):
 
     @model_validator(mode="after")
     def _consistent(self) -> IrregularityTable:
-        if self.longest_m <= self.shortest_m:
-            raise ValueError(
-                f"must have waves, but longest_m is {self.longest_m:g} and shortest_m "
-                f"{self.shortest_m:g}"
-            )
+        band(self.shortest_m, self.longest_m)
         return self
 
 

@@ -16,6 +16,7 @@ from counted_effects import (
 from small_lines import BARE, mesh_of
 
 from catenary.meshgen.mesh import LineMesh
+from catenary.meshgen.topologies.all_topologies import make_line
 from catenary.solver.effects.build_model import build
 from catenary.solver.problem.problem import Damping
 from catenary.solver.statics.form_finding.equilibrium import find_form
@@ -62,7 +63,9 @@ def test_form_finding_knows_pre_sag_and_transitions_only_if_asked(mesh: LineMesh
     lower = mesh.droppers[:, 1]
     level, line = 5.08, full_line()
     sag = np.concatenate([np.asarray(span) for span in line.pre_sag])
-    rise = line.target_height(mesh.x(lower)) - level
+    profile = make_line(line).wire("contact_wire").profile
+    assert profile is not None
+    rise = profile.level(mesh.x(lower)) - level
     for names, expected in (
         (whole, level + rise - sag),
         (whole - {"pre_sag"}, level + rise),
