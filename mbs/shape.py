@@ -1,4 +1,4 @@
-"""A pantograph as lines to be drawn: the bodies of a mechanism, or lumped masses on their springs.
+"""A pantograph as lines to be drawn: the bodies of a mechanism, or arms that carry lumped masses.
 
 Points count along the track from the pantograph's place, across it and up from the top of rail. Of
 each there are two places: at rest, with the head at the height of the wire at rest, and now.
@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from itertools import pairwise
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -30,10 +29,13 @@ BODY, HEAD, SPRING = 0, 1, 2
 _HALF_STRIP, _BEYOND = 0.8, 0.15
 # Heights over which a mechanism is drawn, to either side of its working height, and their distance.
 _REACH, _SPACING = 0.6, 0.1
-# How far the roof is below the head of lumped masses [m]; half the size of a mass, the turns of a
-# spring and half their width.
-BELOW_HEAD = 1.6
-_HALF_MASS, _TURNS, _HALF_TURN = (0.7, 0.06), 8, 0.35
+# Arms of lumped masses [m]: how far the roof is below the head, and the apex of the arms; the arms;
+# how far the foot stands ahead of the head, towards the knee; half the base and half the apex.
+BELOW_HEAD, _APEX = 1.6, 0.25
+LOWER_ARM, UPPER_ARM, _FOOT_AHEAD = 1.55, 1.75, 0.6
+_HALF_BASE, _HALF_APEX = (0.7, 0.55), 0.4
+# Turns of a spring between apex and head, and half their width [m].
+_TURNS, _HALF_TURN = 4, 0.08
 
 
 class Pose(NamedTuple):
@@ -46,12 +48,14 @@ class Pose(NamedTuple):
 class Shape(Protocol):
     """A pantograph as lines: ``cells`` (m, 2) of its points, and what each is of, ``kinds`` (m,).
 
-    Its base is ``below`` [m] under the head where it stands at rest.
+    Its base is ``below`` [m] under the head where it stands at rest. ``schematic`` says whether
+    its arms are a drawing of what the model has no shape for.
     """
 
     cells: np.ndarray
     kinds: np.ndarray
     below: float
+    schematic: bool
 
     def pose(self, places: np.ndarray, base: float, head: float, wire: float) -> Pose:
         """Where the points are.
@@ -78,40 +82,41 @@ def shape_of(data: LumpedData | MultibodyData) -> Shape:
 
 
 class LumpedShape:
-    """Masses one below the other, each as a box, with springs between them down to the roof."""
+    """Lumped masses as a pantograph that could have them: head, apex and knee of two arms, base.
+
+    Masses have heights and no shape. The first is the head, the second the apex; the knee moves as
+    a mass halfway between apex and roof does, of three masses the third.
+    """
+
+    schematic = True
 
     def __init__(self, data: LumpedData) -> None:
         self._n, self.below = data.n_masses, BELOW_HEAD
-        low = -BELOW_HEAD * np.arange(self._n + 1) / self._n
-        parts: list[tuple[np.ndarray, np.ndarray]] = [
-            _head_lines(data.strips.contact_offsets, data.strips.length)
-        ]
-        # Which mass each point belongs to: the head is 0, the roof n.
-        shares: list[np.ndarray] = [np.zeros(len(parts[0][0]))]
-        kinds: list[np.ndarray] = [np.full(len(parts[0][1]), HEAD)]
-        for mass in range(1, self._n):
-            points, cells = _box(low[mass])
-            parts.append((points, cells))
-            shares.append(np.full(len(points), float(mass)))
-            kinds.append(np.full(len(cells), BODY))
-        for upper, lower in pairwise(range(self._n + 1)):
-            gap = _HALF_MASS[1]
-            points, cells, share = _spring(low[upper] - gap * (upper > 0), low[lower] + gap)
-            parts.append((points, cells))
-            shares.append(upper + share)
-            kinds.append(np.full(len(cells), SPRING))
-        self._points, self.cells = _joined(parts)
-        self._share, self.kinds = np.concatenate(shares), np.concatenate(kinds)
+        head = _head_lines(data.strips.contact_offsets, data.strips.length)
+        arms = _arms()
+        spring = _spring(0.0, -_APEX)
+        self._points, self.cells = _joined([head, arms, spring[:2]])
+        apex = 1.0 if self._n > 1 else 0.0
+        roof = float(self._n)
+        # Which mass each point moves with: the head is 0, the roof n.
+        of_arms = [apex] * 3 + [0.5 * (apex + roof)] + [roof] * 5
+        self._share = np.concatenate([np.zeros(len(head[0])), of_arms, apex * spring[2]])
+        self.kinds = np.repeat([HEAD, BODY, SPRING], [len(own[1]) for own in (head, arms, spring)])
 
     def pose(self, places: np.ndarray, base: float, head: float, wire: float) -> Pose:
-        """Where the points are, see `Shape`; springs are drawn longer than they are."""
-        lower = places[places.size - self._n + 1 :] if self._n > 1 else np.zeros(0)
+        """Where the points are, see `Shape`."""
+        lower = places[places.size - self._n + 1 :] if self._n > 1 and places.size else np.zeros(0)
         # All masses are at one height with the springs relaxed; the last place is the roof's.
         lifted = np.concatenate([[head], lower, [wire + base]]) - wire
         rest = self._points + np.array([0.0, 0.0, wire])
         now = rest.copy()
-        now[:, 2] += np.interp(self._share, np.arange(self._n + 1), lifted)
+        now[:, 2] += np.interp(self._share, np.linspace(0.0, self._n, lifted.size), lifted)
         return Pose(rest, now)
+
+
+def schematic() -> Shape:
+    """The shape of a pantograph of which nothing but the height of the head is known."""
+    return LumpedShape(LumpedData((1.0,), (1.0,), (0.0,)))
 
 
 @dataclass(frozen=True)
@@ -129,6 +134,8 @@ class _Points:
 
 class MechanismShape:
     """The bodies of a mechanism, each as the shortest lines through the points of its joints."""
+
+    schematic = False
 
     def __init__(self, data: MultibodyData) -> None:
         standing = stand(data)
@@ -249,12 +256,23 @@ def _head_lines(offsets: tuple[float, ...], length: float | None) -> tuple[np.nd
     return np.array(points), np.array(cells)
 
 
-def _box(height: float) -> tuple[np.ndarray, np.ndarray]:
-    """A mass as the outline of a box."""
-    half, up = _HALF_MASS
-    corners = [(-half, -up), (half, -up), (half, up), (-half, up)]
-    points = np.array([(x, 0.0, height + z) for x, z in corners])
-    return points, np.array([[0, 1], [1, 2], [2, 3], [3, 0]])
+def _arms() -> tuple[np.ndarray, np.ndarray]:
+    """Two arms from the base to the apex: points of apex, knee and base, and their lines."""
+    foot, apex = np.array([_FOOT_AHEAD, -BELOW_HEAD]), np.array([0.0, -_APEX])
+    distance = float(np.hypot(*(apex - foot)))
+    # Law of cosines: how far along the line from foot to apex the knee stands, and beside it.
+    along = (LOWER_ARM**2 - UPPER_ARM**2 + distance**2) / (2.0 * distance)
+    unit = (apex - foot) / distance
+    beside = np.sqrt(LOWER_ARM**2 - along**2) * np.array([unit[1], -unit[0]])
+    knee = foot + along * unit + beside
+    length, half = _HALF_BASE
+    base = [(x, y, -BELOW_HEAD) for x in (-length, length) for y in (-half, half)]
+    points = [
+        (0.0, -_HALF_APEX, -_APEX), (0.0, 0.0, -_APEX), (0.0, _HALF_APEX, -_APEX),
+        (knee[0], 0.0, knee[1]), (foot[0], 0.0, -BELOW_HEAD), *base,
+    ]  # fmt: skip
+    cells = [(0, 1), (1, 2), (1, 3), (0, 3), (2, 3), (3, 4), (5, 6), (7, 8), (5, 7), (6, 8)]
+    return np.array(points), np.array(cells)
 
 
 def _spring(top: float, bottom: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -10,7 +10,7 @@ import typer
 from catenary.base.errors import InputError
 from catenary.cases.cli.app import Force, RunFolder, app, folder_option
 from catenary.cases.terminal import console
-from catenary.postproc.film.view import View
+from catenary.postproc.film.wish import View
 
 if TYPE_CHECKING:
     from catenary.mbs.shape import Shape
@@ -22,7 +22,11 @@ Motion = Annotated[
     typer.Option("--motion", min=1, max=1e5, help="Factor by which motions are drawn larger."),
 ]
 FromWhere = Annotated[
-    View, typer.Option(help="From the side, from above, or from behind the train.")
+    View | None,
+    typer.Option(
+        help="From the side, from the side and above, from above, or from behind the train; "
+        "oblique if absent where wires lie beside each other, side otherwise."
+    ),
 ]
 
 
@@ -165,8 +169,8 @@ def _compare_measured(
 @app.command(
     "animate",
     help="Make a film of a run, film.mp4 and film.gif: the line and its pantographs, the contact "
-    "force beneath. Each picture is a snapshot of fields.h5.",
-    epilog="Example: catenary animate results/en300 --from 2 --to 6",
+    "force beneath, from the snapshots of fields.h5.",
+    epilog="Example: catenary animate results/en300 --from 2 --to 6 --camera trailing",
 )
 @console.guarded
 @console.serial
@@ -179,8 +183,17 @@ def animate(
         float | None, typer.Option("--to", min=0, max=1e7, help="Simulated time to end at [s].")
     ] = None,
     rate: Annotated[
-        float, typer.Option("--fps", min=1, max=120, help="Snapshots shown a second.")
+        float, typer.Option("--fps", min=1, max=120, help="Pictures shown a second.")
     ] = 25.0,
+    every: Annotated[
+        float | None,
+        typer.Option(
+            "--every-m",
+            min=1e-3,
+            max=1e4,
+            help="Travel of the train between two pictures; a hundredth of their width if absent.",
+        ),
+    ] = None,
     width: Annotated[
         float | None,
         typer.Option(
@@ -188,13 +201,20 @@ def animate(
         ),
     ] = None,
     motion: Motion = None,
-    view: FromWhere = View.SIDE,
+    view: FromWhere = None,
+    camera: Annotated[
+        str | None,
+        typer.Option(
+            help="Pantograph that the camera goes with: its name, or its number from the front; "
+            "the middle of all if absent."
+        ),
+    ] = None,
 ) -> None:
     """Serial."""
-    from catenary.postproc.film.animate import Wish
     from catenary.postproc.film.animate import animate as make_film
+    from catenary.postproc.film.wish import Wish
 
-    wish = Wish(start, end, rate, width, motion, view)
+    wish = Wish(start, end, rate, every, width, motion, view, camera)
     records = _records(folder)
     shapes = _shapes(folder, records)
     film = make_film(folder, wish, records, not console.is_quiet(), shapes)
@@ -205,12 +225,17 @@ def animate(
     )
     console.say("\n".join(map(str, film.files)))
     console.say(f"{film.n_pictures} pictures; the film runs {pace} than the train.")
+    if not film.smooth:
+        console.warn(
+            f"snapshots are {film.apart:.2g} m apart, and each is a picture; for a smooth film "
+            "run the scene again with output.field_every_m=1"
+        )
 
 
 @app.command(
     "paraview",
     help="Write paraview/view.py into the folder of a run: a script that opens it in ParaView, "
-    "from the side, with pantographs, forces and masts, heights and motions drawn larger.",
+    "with pantographs, forces and masts, heights and motions drawn larger.",
     epilog="Example: catenary paraview results/en300",
 )
 @console.guarded
@@ -218,7 +243,7 @@ def animate(
 def paraview(
     folder: RunFolder,
     motion: Motion = None,
-    view: FromWhere = View.SIDE,
+    view: FromWhere = None,
     state: Annotated[
         bool,
         typer.Option(help="Let ParaView write view.pvsm, which opens the same without Python."),
@@ -228,14 +253,21 @@ def paraview(
     import shutil
 
     from catenary.postproc.paraview.open_in_paraview import write_script
-    from catenary.postproc.paraview.state import write_state
+    from catenary.postproc.paraview.state import PROGRAM, write_state
 
     records = _records(folder)
     script, *others = write_script(folder, records, motion, _shapes(folder, records), view)
-    made, why = write_state(script) if state else (None, "")
-    console.say("\n".join(map(str, (script, *others, *([made] if made else [])))))
-    if why and shutil.which("paraview") is not None:
-        console.warn(why)
+    console.say("\n".join(map(str, (script, *others))))
+    if state and shutil.which(PROGRAM) is not None:
+        console.say(
+            f"Waiting for {PROGRAM}, which starts ParaView to write view.pvsm: some ten seconds "
+            "(--no-state leaves it out)."
+        )
+        made, why = write_state(script)
+        if made:
+            console.say(str(made))
+        else:
+            console.warn(why)
     console.say(f"Open it with: paraview --script={script}")
     if shutil.which("paraview") is None:
         console.warn("paraview is not on this machine (Debian, Ubuntu: apt-get install paraview)")

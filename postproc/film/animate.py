@@ -1,34 +1,29 @@
-"""Makes the film of a run: chooses its pictures, draws them one by one, writes them."""
+"""Makes the film of a run: chooses the times of its pictures, draws and writes them one by one."""
 
 from __future__ import annotations
 
-import ctypes
-import os
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from tqdm import tqdm
 
 from catenary.base.errors import InputError
 from catenary.mbs.shape import Shape
+from catenary.postproc.film import drawing
+from catenary.postproc.film.chart import ForceChart, RingingChart
 from catenary.postproc.film.film_data import FilmData, film_data
-from catenary.postproc.film.pantograph_shape import MovingPantographs
-from catenary.postproc.film.projection import Picture, Projection, Scale
+from catenary.postproc.film.projection import Picture, Projection
+from catenary.postproc.film.scenery import COLOURS, DROPPER_FORCES, MOTIONS, SLACK, Scenery
 from catenary.postproc.film.snapshots import Snapshots
-from catenary.postproc.film.view import View
+from catenary.postproc.film.wish import Wish
 from catenary.postproc.read.records import Records
 from catenary.postproc.read.results import Results
 from catenary.solver.waves.excitation import Blow
 
-_EGL = "libEGL.so.1"
 MP4, GIF = "film.mp4", "film.gif"
-SIZE = (1280, 720)
-# Shares of the picture's height that line and force have.
-_SHARES = (0.62, 0.38)
 # Length of line in a picture beside one pantograph [m].
 _WIDTH = 110.0
 _LEAST_WIDTH = 5.0
@@ -36,27 +31,14 @@ _LEAST_WIDTH = 5.0
 _BEHIND = 0.55
 # How far a picture may reach beyond what the snapshots have [m].
 _NEAR = 3.0
-
-
-@dataclass(frozen=True)
-class Wish:
-    """What is wanted of a film; None leaves it to the run.
-
-    Attributes
-    ----------
-    start, end : from and to in simulated time [s]
-    rate : pictures a second, each a snapshot
-    width : length of line in a picture [m]
-    motion : by what factor motions are drawn larger
-    view : where the line is looked at from
-    """
-
-    start: float | None = None
-    end: float | None = None
-    rate: float = 25.0
-    width: float | None = None
-    motion: float | None = None
-    view: View = View.SIDE
+# Travel between two pictures, as a share of what they show.
+_TRAVEL = 0.01
+# Snapshots that are farther apart than this are not interpolated [m]: the wire is bent where a
+# head is, and between two places it would be bent at both.
+SMOOTH_UP_TO = 4.0
+_SAME = 1e-9
+# Rows of droppers' forces that are looked through for the largest.
+_SAMPLED = 100
 
 
 @dataclass(frozen=True)
@@ -68,11 +50,15 @@ class Film:
     files : MP4 and GIF
     n_pictures : that it has
     slowed : how many times slower than the train it runs
+    apart : travel of the train between two snapshots [m]
+    smooth : whether there are pictures between snapshots, or these are not too far apart
     """
 
     files: tuple[Path, Path]
     n_pictures: int
     slowed: float
+    apart: float
+    smooth: bool
 
 
 def animate(
@@ -88,34 +74,37 @@ def animate(
     ----------
     records : what ``guard.examined`` found in the result file
     progress : whether a bar shows how far it is, if standard error is a terminal
-    shapes : of the pantographs, None for a schematic
+    shapes : of the pantographs, None for schematics
 
     Raises
     ------
     InputError
-        If there is nothing to be shown, or no library that draws.
+        If there is nothing to be shown, or no library that encodes films.
     """
-    _check_libraries()
+    try:
+        from catenary.postproc.film import video
+    except ImportError as error:
+        raise InputError(
+            f"a film needs {error.name}, which is not installed: pip install 'catenary[film]'"
+        ) from error
     with Results(folder, records) as results:
         data = film_data(results)
         with Snapshots(folder, len(data.points), until=float(data.time[-1])) as snapshots:
-            numbers = chosen(snapshots.times, wish)
-            pantographs = MovingPantographs(data, snapshots, shapes)
-            from catenary.postproc.film import video
-            from catenary.postproc.film.line_view import SLACK
-
-            pictures = tqdm(
-                _pictures(data, results, snapshots, numbers, wish, pantographs),
-                total=numbers.size,
+            made = Pictures(results, Scenery(data, snapshots, shapes), snapshots, wish)
+            shown = tqdm(
+                made,
+                total=len(made),
                 desc="film",
                 unit="picture",
                 disable=not (progress and sys.stderr.isatty()),
                 file=sys.stderr,
             )
             files = folder / MP4, folder / GIF
-            count = video.write(pictures, SIZE, wish.rate, *files, later=[SLACK])
-            apart = float(np.diff(snapshots.times[numbers]).mean())
-    return Film(files, count, 1.0 / (apart * wish.rate))
+            colours = (*COLOURS[: data.n_pantographs], *MOTIONS, *DROPPER_FORCES, SLACK)
+            count = video.write(shown, drawing.SIZE, wish.rate, *files, colours)
+            seconds = float(np.diff(made.times).mean())
+            apart = data.speed * float(np.diff(snapshots.times).mean())
+    return Film(files, count, 1.0 / (seconds * wish.rate), apart, apart <= SMOOTH_UP_TO)
 
 
 def chosen(times: np.ndarray, wish: Wish) -> np.ndarray:
@@ -128,7 +117,7 @@ def chosen(times: np.ndarray, wish: Wish) -> np.ndarray:
     """
     start = times[0] if wish.start is None else wish.start
     end = times[-1] if wish.end is None else wish.end
-    numbers = np.flatnonzero((times >= start - 1e-9) & (times <= end + 1e-9))
+    numbers = np.flatnonzero((times >= start - _SAME) & (times <= end + _SAME))
     if numbers.size < 2:
         raise InputError(
             f"there are not two snapshots from {start:g} to {end:g} s; they reach from "
@@ -137,168 +126,154 @@ def chosen(times: np.ndarray, wish: Wish) -> np.ndarray:
     return numbers
 
 
-def _check_libraries() -> None:
-    """Raise InputError where pictures cannot be drawn or written."""
-    try:
-        import imageio_ffmpeg  # noqa: F401
-        import pyvista  # noqa: F401
-    except ImportError as error:
-        raise InputError(
-            f"a film needs {error.name}, which is not installed: pip install 'catenary[film]'"
-        ) from error
-    if sys.platform.startswith("linux"):
-        try:
-            ctypes.CDLL(_EGL)
-        except OSError as error:
-            raise InputError(
-                f"a film needs {_EGL}, with which pictures are drawn without a screen: "
-                "apt-get install libegl1"
-            ) from error
-        # Without this VTK looks for a screen first, and complains that there is none.
-        os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
+def times_of_pictures(shown: np.ndarray, speed: float, every: float) -> np.ndarray:
+    """Times of the pictures, such that the train goes equally far between them.
 
-
-def _pictures(
-    data: FilmData,
-    results: Results,
-    snapshots: Snapshots,
-    numbers: np.ndarray,
-    wish: Wish,
-    pantographs: MovingPantographs,
-) -> Iterator[np.ndarray]:
-    """The pictures (height, width, 3) uint8 of the snapshots, in order."""
-    import pyvista
-
-    from catenary.postproc.film.force_curve import ForceCurve, RingingCurve
-    from catenary.postproc.film.line_view import LineView
-
-    times = snapshots.times[numbers]
-    rows = data.row_at(float(times[0])), data.row_at(float(times[-1])) + 1
-    width = wish.width or _fitting(data, snapshots, numbers)
-    _check_width(data, snapshots, numbers, width)
-    picture = _picture(data, pantographs, width, wish.view)
-    scale = picture.scale(data, snapshots, numbers, wish.motion)
-    plotter = pyvista.Plotter(
-        shape=(2, 1), row_weights=_SHARES, window_size=SIZE, off_screen=True, border=False
-    )
-    plotter.set_background("white")
-    plotter.subplot(0, 0)
-    projection = Projection(wish.view, scale)
-    colours = picture.colours(snapshots, numbers)
-    view = LineView(plotter, data, projection, colours, pantographs, snapshots)
-    plotter.enable_parallel_projection()
-    words = plotter.add_text(" ", position=(12, 12), font_size=10, color="black")
-    plotter.subplot(1, 0)
-    curve: ForceCurve | RingingCurve
-    if isinstance(data.excitation, Blow):
-        curve = RingingCurve(plotter, data, data.excitation, snapshots, numbers)
-    else:
-        curve = ForceCurve(plotter, data, rows)
-    # A chart has its place in the picture when it was drawn once.
-    plotter.show(auto_close=False)
-    plotter.subplot(0, 0)
-    slack_times = results.line_time if results.has("dropper_force") else np.zeros(0)
-    try:
-        for number, time in zip(numbers.tolist(), times.tolist(), strict=True):
-            row = data.row_at(time)
-            middle = float(data.position[row].mean())
-            low, high = middle - _BEHIND * width, middle + (1.0 - _BEHIND) * width
-            curve.update(row, low, high)
-            slack = _slack(results, slack_times, time)
-            view.update(row, snapshots.displacement(number), slack, pantographs.poses(number))
-            words.input = _words(data, projection, row)
-            _aim(plotter.camera, curve.sides(), (low, high), picture, scale)
-            plotter.render()
-            yield np.asarray(plotter.image)[..., :3]
-    finally:
-        plotter.close()
-
-
-def _check_width(data: FilmData, snapshots: Snapshots, numbers: np.ndarray, width: float) -> None:
-    """Raise InputError if pictures would show more of the line than the snapshots have."""
-    x = data.points[data.wires[data.contact], 0]
-    for number in numbers[[0, -1]].tolist():
-        middle = float(data.position[data.row_at(float(snapshots.times[number]))].mean())
-        begin, end = snapshots.shown(number)
-        low = max(middle - _BEHIND * width, x[0])
-        high = min(middle + (1.0 - _BEHIND) * width, x[-1])
-        if begin > low + _NEAR or end < high - _NEAR:
-            raise InputError(
-                f"a picture of {width:g} m shows the line from {low:.0f} to {high:.0f} m at "
-                f"t = {snapshots.times[number]:g} s, and the snapshots have it from {begin:.0f} to "
-                f"{end:.0f} m only; take a smaller --width-m, or a larger output.field_window_m"
-            )
-
-
-def _fitting(data: FilmData, snapshots: Snapshots, numbers: np.ndarray) -> float:
-    """Length of line that pictures show if none is asked for: less where snapshots have less."""
-    width = _WIDTH + 1.1 * float(np.ptp(data.position[0]))
-    x = data.points[:, 0]
-    for number in numbers[[0, numbers.size // 2, -1]].tolist():
-        middle = float(data.position[data.row_at(float(snapshots.times[number]))].mean())
-        begin, end = snapshots.shown(number)
-        if begin > x.min() + _NEAR:
-            width = min(width, (middle - begin) / _BEHIND)
-        if end < x.max() - _NEAR:
-            width = min(width, (end - middle) / (1.0 - _BEHIND))
-    return max(width, _LEAST_WIDTH)
-
-
-def _picture(data: FilmData, pantographs: MovingPantographs, width: float, view: View) -> Picture:
-    """What pictures hold. From behind, and from above, the train's roof is their lower end."""
-    aspect = SIZE[0] / (_SHARES[0] * SIZE[1])
-    high = float(data.points[:, 2].max()) + 0.6
-    low = pantographs.roof - 1.2
-    if view is View.ALONG:
-        # Lengths are not seen: one metre of height is one metre of the picture.
-        width = aspect * (high - low)
-    return Picture(view, width, aspect, low, high)
-
-
-def _slack(results: Results, times: np.ndarray, time: float) -> np.ndarray | None:
-    """Whether each dropper carries nothing at a time; None where that is not recorded."""
-    if not times.size:
-        return None
-    row = min(int(times.searchsorted(time)), times.size - 1)
-    force = results.rows("dropper_force", slice(row, row + 1))
-    return np.asarray(force[0] <= 0.0)
-
-
-def _words(data: FilmData, projection: Projection, row: int) -> str:
-    scale = projection.scale
-    stretched = "widths" if projection.view is View.PLAN else "heights"
-    forces = ", ".join(f"{force:.0f} N" for force in data.force[row])
-    speed = f"{3.6 * data.speed:.0f} km/h   " if data.speed else ""
-    return (
-        f"t = {data.time[row]:.2f} s   {speed}{forces}   "
-        f"{stretched} x {scale.size:g}, motion x {scale.motion:g}"
-    )
-
-
-def _aim(
-    camera: Any,
-    sides: tuple[float, float],
-    shown: tuple[float, float],
-    picture: Picture,
-    scale: Scale,
-) -> None:
-    """Point the camera so that places along the track stand above those of the chart.
+    Each snapshot is a picture where they are too far apart to be interpolated, and where nothing
+    travels.
 
     Parameters
     ----------
-    sides : columns of the picture between which the chart reaches along ``shown`` [px]
-    shown : places along the track, from and to [m]
+    shown : times of the snapshots [s]
+    speed : of the train [m/s]
+    every : travel of the train between two pictures [m]
     """
-    (left, right), (low, high) = sides, shown
-    height = _SHARES[0] * SIZE[1]
-    if picture.view is View.ALONG:
-        metres_a_pixel, x = scale.size * (picture.high - picture.low) / height, 0.0
-    else:
-        metres_a_pixel = (high - low) / max(right - left, 1.0)
-        x = low + (0.5 * SIZE[0] - left) * metres_a_pixel
-    z = 0.5 * scale.size * (picture.low + picture.high)
-    if picture.view is View.PLAN:
-        z = 0.0
-    camera.position, camera.focal_point = (x, -1000.0, z), (x, 0.0, z)
-    camera.up, camera.parallel_scale = (0.0, 0.0, 1.0), 0.5 * height * metres_a_pixel
-    camera.clipping_range = (1.0, 3000.0)
+    apart = speed * float(np.diff(shown).mean())
+    if speed == 0.0 or apart > SMOOTH_UP_TO:
+        return shown
+    return np.arange(shown[0], shown[-1] + _SAME, every / speed)
+
+
+def followed(data: FilmData, camera: str | None) -> list[int]:
+    """Pantographs that the camera goes with.
+
+    Raises
+    ------
+    InputError
+        If there is none of that name or number.
+    """
+    if camera is None:
+        return list(range(data.n_pantographs))
+    if camera in data.names:
+        return [data.names.index(camera)]
+    if camera.isdigit() and 1 <= int(camera) <= data.n_pantographs:
+        return [int(camera) - 1]
+    raise InputError(
+        f"--camera is {camera!r}; this run has {', '.join(map(repr, data.names))}, "
+        f"or a number from 1 to {data.n_pantographs}"
+    )
+
+
+class Pictures:
+    """The pictures of a film, drawn as they are asked for; (height, width, 4) uint8 each, valid
+    until the next one. Not collective.
+
+    Attributes
+    ----------
+    times : of the pictures [s]
+    drawing : on which they are drawn
+
+    Raises
+    ------
+    InputError
+        If the wish does not fit the run.
+    """
+
+    def __init__(
+        self, results: Results, scenery: Scenery, snapshots: Snapshots, wish: Wish
+    ) -> None:
+        self._results, self._scenery, self._snapshots = results, scenery, snapshots
+        data = scenery.data
+        self._followed = followed(data, wish.camera)
+        numbers = chosen(snapshots.times, wish)
+        shown = snapshots.times[numbers]
+        view = wish.view or scenery.best_view
+        self._width = width = self._fitting(numbers, wish.width)
+        every = wish.every or _TRAVEL * width
+        self.times = times_of_pictures(shown, data.speed, every)
+        picture = Picture.of(view, data, scenery.roof, width, drawing.ASPECT)
+        extremes = snapshots.extremes(numbers)
+        projection = Projection(
+            view, picture.scale(data, extremes, wish.motion), scenery.roof + 0.5
+        )
+        self._dropper_time = results.line_time if results.has("dropper_force") else np.zeros(0)
+        self.drawing = drawing.Drawing(
+            scenery, picture, projection, picture.colours(extremes), self._strongest(shown)
+        )
+        self.chart: ForceChart | RingingChart
+        if isinstance(data.excitation, Blow):
+            blow = data.excitation
+            self.chart = RingingChart(self.drawing.chart, data, blow, snapshots, numbers)
+        else:
+            rows = data.row_at(float(shown[0])), data.row_at(float(shown[-1])) + 1
+            self.chart = ForceChart(self.drawing.chart, data, rows, width)
+        self.drawing.moving += self.chart.moving
+
+    def __len__(self) -> int:
+        return self.times.size
+
+    def __iter__(self) -> Iterator[np.ndarray]:
+        for time in self.times.tolist():
+            self.show(time)
+            yield self.drawing.pixels()
+
+    def show(self, time: float) -> None:
+        """Put everything where it is at a time [s]."""
+        data = self._scenery.data
+        row, frame = data.row_at(time), self._snapshots.frame(time)
+        low, high = self._span(row, self._width)
+        self.chart.update(row, low, high)
+        beside = self._scenery.beside(time, frame)
+        self.drawing.update(row, frame.moved, beside, self._dropper_forces(time), (low, high))
+        speed = f"   {3.6 * data.speed:.0f} km/h" if data.speed else ""
+        self.drawing.words.set_text(f"t = {data.time[row]:.2f} s{speed}")
+
+    def _span(self, row: int, width: float) -> tuple[float, float]:
+        """Line in a picture of a width, from and to [m]."""
+        middle = float(self._scenery.data.position[row, self._followed].mean())
+        return middle - _BEHIND * width, middle + (1.0 - _BEHIND) * width
+
+    def _fitting(self, numbers: np.ndarray, wanted: float | None) -> float:
+        """Length of line that pictures show: what is wanted, or less where snapshots have less."""
+        data, snapshots = self._scenery.data, self._snapshots
+        width = wanted or _WIDTH + 1.1 * float(np.ptp(data.position[0, self._followed]))
+        x = data.points[data.wires[data.contact], 0]
+        for number in numbers[[0, numbers.size // 2, -1]].tolist():
+            time = float(snapshots.times[number])
+            row = data.row_at(time)
+            low, high = np.clip(self._span(row, width), x[0], x[-1])
+            middle = float(data.position[row, self._followed].mean())
+            begin, end = snapshots.shown(number)
+            if begin <= low + _NEAR and end >= high - _NEAR:
+                continue
+            if wanted is not None:
+                raise InputError(
+                    f"a picture of {width:g} m shows the line from {low:.0f} to {high:.0f} m at "
+                    f"t = {time:g} s, and the snapshots have it from {begin:.0f} to {end:.0f} m "
+                    "only; take a smaller --width-m, or a larger output.field_window_m"
+                )
+            if begin > low + _NEAR:
+                width = min(width, (middle - begin) / _BEHIND)
+            if end < high - _NEAR:
+                width = min(width, (end - middle) / (1.0 - _BEHIND))
+        return max(width, _LEAST_WIDTH)
+
+    def _strongest(self, shown: np.ndarray) -> float | None:
+        """Largest force of a dropper while the film runs, of many records in some of them [N]."""
+        if not self._dropper_time.size:
+            return None
+        first, last = self._dropper_time.searchsorted(shown[[0, -1]])
+        rows = np.unique(np.linspace(first, max(first, last - 1), _SAMPLED).astype(int))
+        found = [float(np.nanmax(self._dropper_row(row), initial=0.0)) for row in rows.tolist()]
+        largest = float(np.quantile(found, 0.98))
+        return float(f"{largest:.2g}") if largest > 0.0 else None
+
+    def _dropper_row(self, row: int) -> np.ndarray:
+        row = min(row, self._dropper_time.size - 1)
+        return np.asarray(self._results.rows("dropper_force", slice(row, row + 1))[0])
+
+    def _dropper_forces(self, time: float) -> np.ndarray | None:
+        """Force of each dropper at a time, NaN where it is not recorded [N]."""
+        if not self._dropper_time.size:
+            return None
+        return self._dropper_row(int(self._dropper_time.searchsorted(time - _SAME)))

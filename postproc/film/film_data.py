@@ -81,6 +81,11 @@ class FilmData:
         """Name of the contact wire that is lowest at rest at a place along the track [m]."""
         return self.contacts[int(self._at_rest(np.array([x]))[:, 0].argmin())]
 
+    def contacts_at(self, x: float) -> list[str]:
+        """Names of the contact wires at a place along the track, all beyond their ends [m]."""
+        there = [n for n in self.contacts if self._is_there(n, np.array([x]))[0]]
+        return there or self.contacts
+
     def _at_rest(self, x: np.ndarray) -> np.ndarray:
         """Heights of the contact wires (n_wires, n) [m], inf where a wire is absent; extrapolated
         where all are."""

@@ -1,8 +1,7 @@
 """How places and motions of a line become points of a picture, by where it is looked at from.
 
-Pictures lie in VTK's plane of x and z, and y is the layer: what has a smaller one is in front. A
-line is a thousand times longer than it moves: heights and widths are drawn larger than lengths, and
-motions from rest larger still. Both factors stand in the picture.
+A line is a thousand times longer than it moves: heights and widths are drawn larger than lengths,
+and motions from rest larger still. All factors stand in the picture.
 """
 
 from __future__ import annotations
@@ -13,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from catenary.postproc.film.film_data import FilmData
-from catenary.postproc.film.snapshots import Snapshots
-from catenary.postproc.film.view import View
+from catenary.postproc.film.wish import View
+from catenary.postproc.record.snapshots.blocks import BESIDE
 
 # Share of the room between the wires that the largest motion fills in a drawing.
 _SHARE = 0.4
@@ -25,14 +24,20 @@ _BESIDE, _LEAST, _BEYOND = 1.0, 1.3, 0.6
 _LEAST_ABOVE = 0.8
 # Motions smaller than this are drawn as if they were that large [m].
 _SMALLEST = 1e-4
+# From the right and above: how far along the track, and up, what is a metre to the left is drawn.
+_DEPTH = 0.25, 0.35
+# From behind: how far the eye is behind the first thing seen, and the nearest that it sees [m].
+EYE, _NEAREST = 12.0, 1.5
 
 
 @dataclass(frozen=True)
 class Scale:
-    """Factors of a drawing: of heights and widths at rest, and of motions from there [-]."""
+    """Factors of a drawing: of heights and widths at rest, of motions from there, and of lengths of
+    pantographs along the track, which are tall and thin otherwise [-]."""
 
     size: float
     motion: float
+    along: float = 1.0
 
     def drawn(self, rest: np.ndarray, moved: np.ndarray | float = 0.0) -> np.ndarray:
         """Height or width in the drawing of what rests at one [m] and has moved [m]."""
@@ -41,39 +46,46 @@ class Scale:
 
 @dataclass(frozen=True)
 class Projection:
-    """A view with its scale."""
+    """A view with its scale; from behind, with the height at which lines along the track meet."""
 
     view: View
     scale: Scale
+    horizon: float = 0.0
 
-    def seen(self, rest: np.ndarray, moved: np.ndarray | float, layer: float) -> np.ndarray:
-        """Points of the picture, (n, 3), of points at rest that have moved.
+    def seen(
+        self, rest: np.ndarray, moved: np.ndarray | float = 0.0, eye: float = 0.0
+    ) -> np.ndarray:
+        """Points of the picture, (n, 2), of points at rest that have moved.
 
         Lengths along the track, and motions along it, are drawn as they are.
 
         Parameters
         ----------
         rest, moved : (n, 3) along the track, to the left and upward [m]
-        layer : of the picture
+        eye : place along the track from where it is looked at from behind [m]
         """
         moved = np.broadcast_to(moved, rest.shape)
         aside, up = (self.scale.drawn(rest[:, axis], moved[:, axis]) for axis in (1, 2))
         along = rest[:, 0] + moved[:, 0]
-        across, high = {
-            View.SIDE: (along, up),
-            View.PLAN: (along, aside),
-            View.ALONG: (-aside, up),
-        }[self.view]
-        return np.column_stack([across, np.full(len(rest), layer), high])
+        if self.view is View.PLAN:
+            return np.column_stack([along, aside])
+        if self.view is View.ALONG:
+            near = EYE / np.maximum(along - eye, _NEAREST)
+            horizon = self.scale.size * self.horizon
+            return np.column_stack([-aside * near, horizon + (up - horizon) * near])
+        if self.view is View.OBLIQUE:
+            along, up = along + _DEPTH[0] * aside, up + _DEPTH[1] * aside
+        return np.column_stack([along, up])
 
 
 class Colours(NamedTuple):
     """What colours of wires show: the motion along an ``axis`` (1 to the left, 2 upward), what it
-    is called, and the end of its scale [m]."""
+    is called, and the ends of its scale [m]."""
 
     axis: int
     title: str
-    largest: float
+    low: float
+    high: float
 
 
 @dataclass(frozen=True)
@@ -94,37 +106,43 @@ class Picture:
     low: float
     high: float
 
-    def scale(
-        self, data: FilmData, snapshots: Snapshots, numbers: np.ndarray, motion: float | None
-    ) -> Scale:
+    @classmethod
+    def of(cls, view: View, data: FilmData, roof: float, width: float, aspect: float) -> Picture:
+        """That of a run, from the train's roof to above the wires; from above, from side to side.
+
+        From behind lengths are not seen: one metre of height is one metre of the picture.
+        """
+        low, high = roof - 1.0, float(data.points[:, 2].max()) + 0.6
+        if view is View.PLAN:
+            high = max(_LEAST, float(np.abs(data.points[:, 1]).max()) + _BEYOND)
+            low = -high
+        elif view is View.OBLIQUE:
+            high += _DEPTH[1] * BESIDE
+        elif view is View.ALONG:
+            width = aspect * (high - low)
+        return cls(view, width, aspect, low, high)
+
+    def scale(self, data: FilmData, extremes: np.ndarray, motion: float | None) -> Scale:
         """The scale that fills it.
 
         Parameters
         ----------
-        numbers : of the snapshots
+        extremes : (2, 3) of the motion [m], see `Snapshots.extremes`
         motion : the factor of motions if it is given
         """
-        axes = {View.SIDE: (2,), View.PLAN: (1,), View.ALONG: (1, 2)}[self.view]
-        largest = max(snapshots.largest(numbers, axis) for axis in axes)
-        if self.view is View.PLAN:
-            between, room = _BESIDE, 2.0 * self.half_width(data)
-        else:
-            between, room = room_between(data), self.high - self.low
-        return scale_for(self.width, room, self.aspect, between, largest, motion)
+        plan = self.view is View.PLAN
+        axes = {View.SIDE: [2], View.PLAN: [1]}.get(self.view, [1, 2])
+        largest = float(np.abs(extremes[:, axes]).max())
+        between = _BESIDE if plan else room_between(data)
+        return scale_for(self.width, self.high - self.low, self.aspect, between, largest, motion)
 
-    def colours(self, snapshots: Snapshots, numbers: np.ndarray) -> Colours:
-        """What colours show in some snapshots: uplift, from above the motion sideways if there is
-        one."""
-        if self.view is View.PLAN:
-            aside = snapshots.largest(numbers, 1)
-            if aside >= _SMALLEST:
-                return Colours(1, "sideways", _round_up(aside))
-        return Colours(2, "uplift", _round_up(max(snapshots.largest(numbers, 2), _SMALLEST)))
-
-    @staticmethod
-    def half_width(data: FilmData) -> float:
-        """How far a picture from above reaches to either side [m]."""
-        return max(_LEAST, float(np.abs(data.points[:, 1]).max()) + _BEYOND)
+    def colours(self, extremes: np.ndarray) -> Colours:
+        """What colours show: uplift, from above the motion sideways if there is one."""
+        axis, title = 2, "uplift"
+        if self.view is View.PLAN and np.abs(extremes[:, 1]).max() >= _SMALLEST:
+            axis, title = 1, "to the left"
+        low, high = extremes[:, axis]
+        return Colours(axis, title, -_round_up(-low), _round_up(max(high, _SMALLEST)))
 
 
 def room_between(data: FilmData) -> float:
@@ -161,11 +179,13 @@ def scale_for(
     if motion is None:
         wanted = _SHARE * between_m * size / max(largest_m, _SMALLEST)
         motion = max(round_down(wanted), size) if largest_m >= _SMALLEST else size
-    return Scale(size, motion)
+    return Scale(size, motion, max(1.0, round_down(np.sqrt(size))))
 
 
 def _round_up(value: float) -> float:
-    """Two digits that are not below the value."""
+    """Two digits that are not below the value, zero of what is smaller than can be seen."""
+    if value < _SMALLEST:
+        return 0.0
     digit = 10.0 ** (np.floor(np.log10(value)) - 1.0)
     return float(f"{np.ceil(value / digit - 1e-9) * digit:.2g}")
 

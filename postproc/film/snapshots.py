@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import h5py
 import numpy as np
@@ -11,13 +13,17 @@ import numpy as np
 from catenary.base.errors import InputError
 from catenary.postproc.files.hdf5.self_contained import open_own
 from catenary.postproc.read.guard import survives
-from catenary.postproc.record.snapshots.blocks import ARMS, OTHER_PARTS
+from catenary.postproc.record.snapshots.blocks import OTHER_PARTS
 from catenary.postproc.record.snapshots.field_layout import PLACES, BlockTables
 from catenary.postproc.record.snapshots.fields_schema import FieldsFault, read_fields
 
 FIELDS_FILE = "fields.h5"
-# Snapshots that are looked through for the largest uplift.
-_SAMPLED = 400
+# Snapshots that are looked through for the largest motion.
+_SAMPLED = 200
+# Share of them that the ends of a scale hold.
+_ALMOST_ALL = 0.98
+# Snapshots that are kept for the next picture.
+_KEPT = 6
 # Times that are no further apart are the same [s].
 _SAME_TIME = 1e-9
 _UP = 2
@@ -67,6 +73,17 @@ class _Wire:
         return values if self.has_vectors else values[:, None] * [0.0, 0.0, 1.0]
 
 
+class Frame(NamedTuple):
+    """A line and its pantographs at a time.
+
+    ``moved`` (n_nodes, 3) is the displacement of the nodes [m], NaN where it is not known;
+    ``places`` are the base, and the masses or bodies, of each pantograph, see `mbs.interface`.
+    """
+
+    moved: np.ndarray
+    places: list[tuple[float, np.ndarray]]
+
+
 class Snapshots:
     """Motion of the nodes at the times of the snapshots. A context manager; not collective.
 
@@ -101,6 +118,7 @@ class Snapshots:
         if not survives(path):
             raise InputError(f"{path} is damaged: HDF5 does not read it")
         self._path, self._n_nodes, self._until = path, n_nodes, until
+        self._kept: dict[int, Frame] = {}
         # Without a lock: a run may be writing it, or be continued while this is open.
         self._file = open_own(path, locking=False)
         try:
@@ -148,14 +166,11 @@ class Snapshots:
     def __exit__(self, kind: object, error: object, trace: object) -> None:
         self._file.close()
 
-    def arms(self) -> tuple[np.ndarray, np.ndarray]:
-        """Hinges of the steady arms that are shown, (k, 3) [m], and nodes that they hold, (k,)."""
-        if ARMS not in self.parts:
-            return np.zeros((0, 3)), np.zeros(0, dtype=int)
+    def block(self, name: str) -> BlockTables:
+        """Points of a part of the line that is no wire, and the nodes that they move with."""
         if not self._of_this_line:
             raise InputError(f"{self._path} does not belong to the run.h5 beside it")
-        block = self._blocks[ARMS]
-        return block.points[0::2], block.nodes[1::2]
+        return self._blocks[name]
 
     def shown(self, number: int) -> tuple[float, float]:
         """From and to of the wires whose motion a snapshot tells, as far as each reaches [m]."""
@@ -188,14 +203,48 @@ class Snapshots:
                 "the scene again without output.field_window_m, field_spans and field_parts"
             )
 
-    def largest(self, numbers: np.ndarray, axis: int) -> float:
-        """Largest motion along an axis (0, 1, 2 of x, y, z) in some snapshots, of many in so many
-        of them that it is not far from that [m]; zero where nothing moves along it."""
-        if axis != _UP and not self.has_vectors:
-            return 0.0
+    def extremes(self, numbers: np.ndarray) -> np.ndarray:
+        """Smallest and largest motion along x, y, z in some snapshots, (2, 3) [m], zero included.
+
+        Of many snapshots some are looked through, and the rare ones that exceed almost all others
+        are left out.
+        """
         some = numbers[:: max(1, numbers.size // _SAMPLED)].tolist()
-        moved = (np.abs(self.displacement(one)[:, axis]) for one in some)
-        return max(0.0, *(float(np.nanmax(one)) for one in moved))
+        moved = [self.displacement(one) for one in some]
+        low = np.quantile([np.nanmin(one, axis=0) for one in moved], 1.0 - _ALMOST_ALL, axis=0)
+        high = np.quantile([np.nanmax(one, axis=0) for one in moved], _ALMOST_ALL, axis=0)
+        return np.array([np.minimum(low, 0.0), np.maximum(high, 0.0)])
+
+    def frame(self, time: float) -> Frame:
+        """The line and its pantographs at a time [s]: a snapshot, or a cubic of the four around.
+
+        Where a neighbour does not show a point, the nearest snapshot that does stands for it.
+        """
+        last = self.times.size - 1
+        after = int(np.clip(self.times.searchsorted(time - _SAME_TIME), 0, last))
+        if after == 0 or abs(self.times[after] - time) <= _SAME_TIME:
+            return self._frame(after)
+        numbers = np.clip(np.arange(after - 2, after + 2), 0, last).tolist()
+        begin, end = self.times[[after - 1, after]]
+        share = float((time - begin) / (end - begin))
+        nearest = after if share > 0.5 else after - 1
+        fallback = np.nan_to_num(self._frame(nearest).moved)
+        shown = [self._frame(number) for number in numbers]
+        moved = _between(share, [np.where(np.isnan(f.moved), fallback, f.moved) for f in shown])
+        places = [
+            (float(_between(share, [f.places[p][0] for f in shown])),
+             np.asarray(_between(share, [f.places[p][1] for f in shown])))
+            for p in range(self.n_pantographs)
+        ]  # fmt: skip
+        return Frame(np.asarray(moved), places)
+
+    def _frame(self, number: int) -> Frame:
+        """A snapshot; those around a time are kept."""
+        if number not in self._kept:
+            self._kept[number] = Frame(self.displacement(number), self.pantographs(number))
+            if len(self._kept) > _KEPT:
+                del self._kept[next(iter(self._kept))]
+        return self._kept[number]
 
     def uplift(self, number: int) -> np.ndarray:
         """Uplift of the nodes in a snapshot, (n_nodes,) [m], as ``displacement``."""
@@ -232,23 +281,11 @@ class Snapshots:
             )
         return moved
 
-    def aside_at(self, number: int, name: str, x: float) -> float:
-        """How far a wire has moved to the left at a place along the track in a snapshot, zero
-        where it is not shown [m]."""
-        return float(self._motion_at(number, name, x)[1]) if name in self._wires else 0.0
 
-    def uplift_at(self, number: int, name: str, x: float) -> float:
-        """How far a wire has risen at a place along the track in a snapshot, NaN where it is not
-        shown [m]."""
-        return float(self._motion_at(number, name, x)[_UP]) if name in self._wires else np.nan
-
-    def _motion_at(self, number: int, name: str, x: float) -> np.ndarray:
-        """Motion of a wire between two of its points, (3,) [m]."""
-        wire = self._wires[name]
-        first, count = wire.shown(number)
-        last = first + count - 2
-        if wire.rests and not wire.x[first] <= x <= wire.x[last + 1]:
-            return np.zeros(3)
-        at = int(np.clip(wire.x.searchsorted(x) - 1, first, max(first, last)))
-        values = wire.motion(number, at, 2)
-        return np.array([np.interp(x, wire.x[at : at + 2], column) for column in values.T])
+def _between(share: float, four: Sequence[Any]) -> Any:
+    """A cubic between the second and the third of four values, with the slopes of their neighbours
+    (Catmull and Rom, 1974)."""
+    before, begin, end, after = four
+    bend = 2.0 * before - 5.0 * begin + 4.0 * end - after
+    steep = 3.0 * (begin - end) + after - before
+    return begin + 0.5 * share * (end - before + share * (bend + share * steep))

@@ -1,21 +1,25 @@
-"""Writes pictures into an MP4 and a GIF, which have their names when they are whole."""
+"""Writes pictures into an MP4 and a GIF as they come; both have their names when they are whole."""
 
 from __future__ import annotations
 
+import contextlib
 import os
+import subprocess
+import tempfile
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import imageio_ffmpeg
 import numpy as np
+from matplotlib.colors import to_rgb
 from PIL import Image
 
 from catenary.base.errors import InputError
 
 # A GIF has pictures of this width [px], and so many a second at most.
-_GIF_WIDTH, _GIF_RATE = 640, 12.5
-# Height of what adds a colour to the palette [px].
-_BAND = 8
+_GIF_WIDTH, _GIF_RATE = 800, 12.5
+# Pixels that a colour has among those of the first picture from which colours are chosen.
+_SHARE = 20_000
 
 
 def write(
@@ -24,17 +28,19 @@ def write(
     rate: float,
     mp4: Path,
     gif: Path,
-    later: Sequence[str] = (),
+    colours: Sequence[str] = (),
 ) -> int:
     """Write both films; returns how many pictures they were made of. Not collective.
 
+    One process of ffmpeg takes each picture and forgets it: memory does not grow with the film.
+
     Parameters
     ----------
-    pictures : (height, width, 3) uint8 each
+    pictures : (height, width, 4) uint8 each
     size : width and height [px], both even
     rate : pictures a second of the MP4
     mp4, gif : files, replaced when the new ones are whole
-    later : colours that the first picture may lack and others have
+    colours : that pictures have; the GIF takes its 256 from these and from the first picture
 
     Raises
     ------
@@ -45,11 +51,7 @@ def write(
     try:
         for part in parts:  # a link that was put there would be written through
             part.unlink(missing_ok=True)
-        count, small = _write_mp4(pictures, size, rate, parts[0], later)
-        small[0].save(
-            parts[1], save_all=True, append_images=small[1:], loop=0, disposal=1,
-            duration=round(1000.0 * _skipped(rate) / rate),
-        )  # fmt: skip
+        count = _encode(pictures, size, rate, parts, colours)
         for part, path in zip(parts, (mp4, gif), strict=True):
             os.replace(part, path)
     except OSError as error:
@@ -60,48 +62,63 @@ def write(
     return count
 
 
-def _skipped(rate: float) -> int:
-    """Of how many pictures a GIF shows one."""
-    return max(1, round(rate / _GIF_RATE))
-
-
-def _write_mp4(
+def _encode(
     pictures: Iterable[np.ndarray],
     size: tuple[int, int],
     rate: float,
-    path: Path,
-    later: Sequence[str],
-) -> tuple[int, list[Image.Image]]:
-    """Number of pictures written, and those of the GIF."""
-    writer = imageio_ffmpeg.write_frames(
-        str(path), size, fps=rate, codec="libx264", quality=7, macro_block_size=2,
-        ffmpeg_log_level="error",
-    )  # fmt: skip
-    writer.send(None)
-    small: list[Image.Image] = []
-    count, palette = 0, None
-    height = round(_GIF_WIDTH * size[1] / size[0])
-    try:
-        for picture in pictures:
-            writer.send(np.ascontiguousarray(picture))
-            if count % _skipped(rate) == 0:
-                image = Image.fromarray(picture).resize((_GIF_WIDTH, height))
-                # One palette for all: pictures differ little, and flicker would show.
-                if palette is None:
-                    palette = _with_colours(image, later).quantize(128)
-                small.append(image.quantize(palette=palette, dither=Image.Dither.NONE))
-            count += 1
-    finally:
-        writer.close()
-    return count, small
+    parts: Sequence[Path],
+    colours: Sequence[str],
+) -> int:
+    """Number of pictures that ffmpeg has written into both files."""
+    count, pipe, whole = 0, None, False
+    with tempfile.TemporaryDirectory() as place, tempfile.TemporaryFile() as said:
+        palette = Path(place) / "palette.png"
+        try:
+            for picture in pictures:
+                if pipe is None:
+                    _palette(picture, colours).save(palette)
+                    command = _command(size, rate, palette, parts)
+                    pipe = subprocess.Popen(command, stdin=subprocess.PIPE, stderr=said)
+                pipe.stdin.write(np.ascontiguousarray(picture).data)  # type: ignore[union-attr]
+                count += 1
+            whole = True
+        except BrokenPipeError:
+            pass  # ffmpeg has ended, and says why
+        finally:
+            if pipe is not None:
+                with contextlib.suppress(BrokenPipeError):
+                    pipe.stdin.close()  # type: ignore[union-attr]
+                if not whole:
+                    pipe.kill()
+                pipe.wait()
+        if pipe is None or pipe.returncode:
+            said.seek(0)
+            lines = said.read().decode(errors="replace").split("\n")
+            raise OSError(next((line for line in lines if line.strip()), "ffmpeg ended"))
+    return count
 
 
-def _with_colours(image: Image.Image, colours: Sequence[str]) -> Image.Image:
-    """A picture with bands of further colours below it."""
-    width, height = image.size
-    wider = Image.new("RGB", (width, height + _BAND * len(colours)))
-    wider.paste(image, (0, 0))
-    for number, colour in enumerate(colours):
-        low = height + _BAND * number
-        wider.paste(colour, (0, low, width, low + _BAND))
-    return wider
+def _command(size: tuple[int, int], rate: float, palette: Path, parts: Sequence[Path]) -> list[str]:
+    """How ffmpeg is called: pictures come from standard input, and go both ways."""
+    small = f"fps={min(rate, _GIF_RATE):g},scale={_GIF_WIDTH}:-1:flags=area"
+    ways = f"[0:v]split[a][b];[b]{small}[s];[s][1:v]paletteuse=dither=none[g]"
+    return [
+        imageio_ffmpeg.get_ffmpeg_exe(), "-y", "-loglevel", "error",
+        "-f", "rawvideo", "-pix_fmt", "rgb0", "-s", f"{size[0]}x{size[1]}", "-r", f"{rate:g}",
+        "-i", "-", "-i", str(palette), "-filter_complex", ways,
+        "-map", "[a]", "-c:v", "libx264", "-preset", "veryfast", "-crf", "20",
+        "-pix_fmt", "yuv420p", "-movflags", "+faststart", str(parts[0]),
+        "-map", "[g]", "-loop", "0", str(parts[1]),
+    ]  # fmt: skip
+
+
+def _palette(picture: np.ndarray, colours: Sequence[str]) -> Image.Image:
+    """256 colours as a picture of 16 by 16 pixels."""
+    seen = np.asarray(picture)[..., :3].reshape(-1, 3)
+    more = np.array([to_rgb(colour) for colour in colours]).reshape(-1, 3)
+    wanted = np.repeat(np.round(255.0 * more).astype(np.uint8), _SHARE, axis=0)
+    image = Image.fromarray(np.concatenate([seen, wanted])[None])
+    chosen = image.quantize(256).getpalette() or []
+    table = np.zeros((256, 3), dtype=np.uint8)
+    table.reshape(-1)[: len(chosen)] = chosen
+    return Image.fromarray(table.reshape(16, 16, 3))

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 STATE = "view.pvsm"
-_PROGRAM, _SCREEN = "pvpython", "xvfb-run"
+PROGRAM, _SCREEN = "pvpython", "xvfb-run"
 # Longest that ParaView may take [s].
 _PATIENCE = 300.0
 # Without -noreset a screen starts anew whenever nobody is connected to it, and refuses whoever
@@ -50,9 +50,9 @@ def write_state(script: Path) -> tuple[Path | None, str]:
         lines = [line for line in done.stderr.splitlines() if line.strip()]
         # The program that makes the screen complains last, about what it cannot clean up.
         own = [line for line in lines if not line.startswith(_SCREEN)]
-        why = f"{_PROGRAM} failed: {(own or lines or ['it wrote nothing'])[-1]}"
+        why = f"{PROGRAM} failed: {(own or lines or ['it wrote nothing'])[-1]}"
     except (OSError, subprocess.TimeoutExpired) as error:
-        why = f"{_PROGRAM} failed: {error}"
+        why = f"{PROGRAM} failed: {error}"
     finally:
         part.unlink(missing_ok=True)
     return None, f"no state is written, the script does the same ({why})"
@@ -60,15 +60,15 @@ def write_state(script: Path) -> tuple[Path | None, str]:
 
 def _command() -> tuple[Sequence[str], str]:
     """How ParaView's Python is started here, or why it cannot be."""
-    if shutil.which(_PROGRAM) is None:
-        return (), f"no state is written: {_PROGRAM} is not on this machine"
+    if shutil.which(PROGRAM) is None:
+        return (), f"no state is written: {PROGRAM} is not on this machine"
     if not sys.platform.startswith("linux"):
-        return (_PROGRAM,), ""
+        return (PROGRAM,), ""
     # Debian's draws on a screen only. One of its own is there whatever DISPLAY says.
     if shutil.which(_SCREEN) is not None:
         # Two that begin at one time look for a free number from different ones on.
         number = str(100 + os.getpid() % 5000)
-        return (_SCREEN, "-a", "-n", number, "-s", SCREEN_OF_ITS_OWN, _PROGRAM), ""
+        return (_SCREEN, "-a", "-n", number, "-s", SCREEN_OF_ITS_OWN, PROGRAM), ""
     if os.environ.get("DISPLAY"):
-        return (_PROGRAM,), ""
-    return (), f"no state is written: {_PROGRAM} needs a screen, or {_SCREEN}"
+        return (PROGRAM,), ""
+    return (), f"no state is written: {PROGRAM} needs a screen, or {_SCREEN}"

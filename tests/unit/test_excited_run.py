@@ -8,7 +8,7 @@ from typing import Annotated
 
 import numpy as np
 import pytest
-import pyvista
+from matplotlib.figure import Figure
 from measuring import check
 from mpi4py import MPI
 from pydantic import TypeAdapter, ValidationError
@@ -23,10 +23,11 @@ from catenary.cases.studies.waves.excited import Asked, Watch, excitation_of, wi
 from catenary.cases.studies.waves.seen import WavesSeen, WireMotion, course_of, waves_seen
 from catenary.postproc.files.run_schema import RunAttributes
 from catenary.postproc.film import animate
+from catenary.postproc.film.chart import RingingChart
 from catenary.postproc.film.film_data import film_data
-from catenary.postproc.film.force_curve import RingingCurve
-from catenary.postproc.film.pantograph_shape import MovingPantographs
+from catenary.postproc.film.scenery import Scenery
 from catenary.postproc.film.snapshots import Snapshots
+from catenary.postproc.film.wish import Wish
 from catenary.postproc.paraview import open_in_paraview
 from catenary.postproc.read.results import Results
 from catenary.postproc.report.report import write_report
@@ -110,19 +111,17 @@ def test_a_film_shows_how_the_wire_rings_where_it_was_struck(
         data = film_data(results)
         assert isinstance(data.excitation, Blow)
         with Snapshots(folder, len(data.points)) as snapshots:
-            curve = RingingCurve(
-                pyvista.Plotter(off_screen=True), data, data.excitation, snapshots,
-                np.arange(snapshots.times.size),
-            )  # fmt: skip
+            axes, numbers = Figure().add_subplot(), np.arange(snapshots.times.size)
+            chart = RingingChart(axes, data, data.excitation, snapshots, numbers)
     until = seen.time[seen.time.size // 2]
-    curve.update(data.row_at(until), 0.0, 1.0)
+    chart.update(data.row_at(until), 0.0, 1.0)
     shown = seen.time <= until + 1e-9
-    np.testing.assert_allclose(curve.shown.x, seen.time[shown])
+    np.testing.assert_allclose(chart.curve.get_xdata(), seen.time[shown])
     expected = np.array([np.interp(AT, seen.x, row) for row in seen.uplift[shown]])
     # Of a line between the points of the wire; snapshots are in single precision.
     largest = np.abs(expected).max()
-    check("uplift [mm]", curve.shown.y, 1e3 * expected, within=1e3 * 1e-6 * largest)
-    assert curve.chart.y_range[1] > 1e3 * largest > 1.0
+    check("uplift [mm]", chart.curve.get_ydata(), 1e3 * expected, within=1e3 * 1e-6 * largest)
+    assert axes.get_ylim()[1] > 1e3 * largest > 1.0
 
 
 @pytest.mark.study
@@ -134,10 +133,8 @@ def test_report_and_film_of_a_blow_have_no_train(struck: tuple[Path, WavesSeen])
     with Results(folder) as results:
         data = film_data(results)
         with Snapshots(folder, len(data.points)) as snapshots:
-            shapes = MovingPantographs(data, snapshots, None)
-            numbers = np.array([1, 2])
-            made = animate._pictures(data, results, snapshots, numbers, animate.Wish(), shapes)
-            first, second = list(made)
+            made = animate.Pictures(results, Scenery(data, snapshots), snapshots, Wish(end=0.05))
+            first, second = (np.array(one) for one, _ in zip(made, range(2), strict=False))
     assert (first != second).any()
 
 

@@ -192,7 +192,7 @@ def test_the_doctor_finds_that_runs_are_possible_here(
 def test_what_is_broken_is_told_with_a_remedy(monkeypatch: pytest.MonkeyPatch) -> None:
     found = [
         Finding("PETSc", BROKEN, "ended by signal 11", "install another", needed=True),
-        Finding("films", MISSING, "no pyvista", "pip install it"),
+        Finding("films", MISSING, "no imageio_ffmpeg", "pip install it"),
     ]
     monkeypatch.setattr(installation, "examined", lambda folder: iter(found))
     done = invoke("doctor")

@@ -8,32 +8,56 @@ from paper_pantograph import data as seven_bodies
 
 from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.mechanism.pantograph_data import stand
-from catenary.mbs.shape import BELOW_HEAD, BODY, HEAD, SPRING, shape_of
+from catenary.mbs.shape import (
+    BELOW_HEAD,
+    BODY,
+    HEAD,
+    LOWER_ARM,
+    SPRING,
+    UPPER_ARM,
+    schematic,
+    shape_of,
+)  # fmt: skip
 
 THREE = LumpedData((6.0, 9.0, 5.8), (160.0, 15500.0, 7000.0), (100.0, 0.0, 70.0))
 
 
-def test_lumped_masses_move_as_they_do() -> None:
+def test_lumped_masses_are_head_apex_and_knee_of_arms() -> None:
     shape = shape_of(THREE)
     pose = shape.pose(np.array([5.1, 5.06, 5.02]), 0.0, 5.1, 5.0)
     lifted = pose.now - pose.rest
     np.testing.assert_array_equal(lifted[:, :2], 0.0)
     points = {kind: np.unique(shape.cells[shape.kinds == kind]) for kind in (HEAD, BODY, SPRING)}
     np.testing.assert_allclose(pose.now[points[HEAD], 2], 5.1)
-    # Two boxes of four corners below the head.
-    np.testing.assert_allclose(lifted[points[BODY], 2], np.repeat([0.06, 0.02], 4), atol=1e-12)
+    # Apex with its two ends, knee, foot, and four corners of the base on the roof.
+    np.testing.assert_allclose(lifted[points[BODY], 2], [0.06] * 3 + [0.02] + [0.0] * 5, atol=1e-12)
     springs = lifted[points[SPRING], 2]
-    assert springs.max() == pytest.approx(0.1) and springs.min() == pytest.approx(0.0)
-    assert pose.rest[:, 2].min() == pytest.approx(5.0 - BELOW_HEAD + 0.06)
+    assert springs.max() == pytest.approx(0.1) and springs.min() == pytest.approx(0.06)
+    assert pose.now[:, 2].min() == pytest.approx(5.0 - BELOW_HEAD)
     moved = shape.pose(np.array([5.1, 5.06, 5.02]), 0.01, 5.1, 5.0)
     assert (moved.now - pose.now)[:, 2].max() == pytest.approx(0.01), "a vehicle lifts the roof"
+    assert shape.schematic
 
 
-def test_a_single_mass_stands_on_its_spring() -> None:
-    shape = shape_of(LumpedData((10.0,), (100.0,), (50.0,)))
-    assert set(shape.kinds) == {HEAD, SPRING}
-    pose = shape.pose(np.array([5.2]), 0.0, 5.2, 5.0)
-    assert pose.now[:, 2].max() == pytest.approx(5.2)
+@pytest.mark.parametrize("masses", [1, 2, 3, 4])
+def test_arms_of_lumped_masses_hang_together(masses: int) -> None:
+    data = LumpedData((5.0,) * masses, (100.0,) * masses, (10.0,) * masses)
+    shape = shape_of(data)
+    pose = shape.pose(np.full(masses, 5.2), 0.2, 5.2, 5.0)
+    np.testing.assert_allclose(pose.now - pose.rest, np.tile([0, 0, 0.2], (len(pose.now), 1)))
+    apex, knee, foot = pose.rest[np.unique(shape.cells[shape.kinds == BODY])[[1, 3, 4]]]
+    assert np.linalg.norm(apex - knee) == pytest.approx(UPPER_ARM)
+    assert np.linalg.norm(knee - foot) == pytest.approx(LOWER_ARM)
+    # The spring joins apex and head, also as both stand on each other where they are one mass.
+    spring = pose.rest[np.unique(shape.cells[shape.kinds == SPRING])]
+    np.testing.assert_allclose(spring[-1], apex)
+    np.testing.assert_allclose(spring[0], [0.0, 0.0, 5.0])
+
+
+def test_of_an_unknown_pantograph_only_the_head_moves_by_itself() -> None:
+    pose = schematic().pose(np.zeros(0), 0.0, 5.1, 5.0)
+    lifted = (pose.now - pose.rest)[:, 2]
+    assert set(np.round(lifted, 9)) == {0.0, 0.05, 0.1}
 
 
 def test_bodies_of_a_reduced_mechanism_keep_their_lengths() -> None:

@@ -1,31 +1,35 @@
-"""Films: what is drawn where, and what is refused. Pictures are drawn by VTK without a screen."""
+"""Films: what is drawn where, in which colour, and what is refused; mostly by the data drawn."""
 
 from __future__ import annotations
 
 import fcntl
+import functools
 import json
+import resource
+import shutil
+import weakref
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import h5py
 import numpy as np
 import pytest
-import pyvista
-from PIL import Image
+from PIL import Image, ImageSequence
 
 from catenary.base.errors import InputError
 from catenary.mbs.lumped_data import LumpedData
-from catenary.mbs.shape import BODY, HEAD, shape_of
+from catenary.mbs.shape import HEAD, shape_of
 from catenary.postproc.files.hdf5.array_writes import set_attribute
 from catenary.postproc.files.hdf5.checked import seal_attributes
-from catenary.postproc.film import animate, beside_line, pantograph_shape, projection, video
-from catenary.postproc.film.animate import SIZE, Wish
-from catenary.postproc.film.film_data import FilmData, film_data
-from catenary.postproc.film.line_view import LineView
-from catenary.postproc.film.pantograph_shape import LOWER_ARM, UPPER_ARM, MovingPantographs
+from catenary.postproc.film import animate, drawing, projection, scenery, video
+from catenary.postproc.film.animate import Pictures
+from catenary.postproc.film.film_data import film_data
 from catenary.postproc.film.projection import Projection
+from catenary.postproc.film.scenery import FORCES, PANTOGRAPHS, TRAIN, Scenery
 from catenary.postproc.film.snapshots import Snapshots
-from catenary.postproc.film.view import View
+from catenary.postproc.film.wish import View, Wish
 from catenary.postproc.read.guard import survives
 from catenary.postproc.read.results import Results
 from catenary.postproc.record.snapshots.field_layout import Course, FieldRecord
@@ -35,14 +39,44 @@ from catenary.postproc.record.snapshots.fields import FieldRecorder
 pytestmark = pytest.mark.process
 
 
+@pytest.fixture(scope="module")
+def made_once(
+    tmp_path_factory: pytest.TempPathFactory, make_march: Any, record_run: Any
+) -> Callable[..., Path]:
+    @functools.cache
+    def made(every: int, *separations: float) -> Path:
+        place = tmp_path_factory.mktemp("film")
+        march = make_march(n_steps=1000, separations=separations or (0.0,))
+        fields = FieldRecorder(march.comm, place / "fields.xdmf", march.recorded, every=every)
+        march.drive(fields)
+        record_run(place / "run.h5", march)
+        return place
+
+    return made
+
+
 @pytest.fixture
-def folder(tmp_path: Path, make_march: Any, record_run: Any) -> Path:
-    """A run of a second with a snapshot every 50 ms."""
-    march = make_march(n_steps=1000, separations=(0.0,))
-    fields = FieldRecorder(march.comm, tmp_path / "fields.xdmf", march.recorded, every=50)
-    march.drive(fields)
-    record_run(tmp_path / "run.h5", march)
-    return tmp_path
+def recorded(tmp_path: Path, made_once: Callable[..., Path]) -> Callable[..., Path]:
+    """Makes runs of a second at 300 km/h with snapshots so many milliseconds apart."""
+
+    def made(every: int, *separations: float) -> Path:
+        return shutil.copytree(made_once(every, *separations), tmp_path, dirs_exist_ok=True)
+
+    return made
+
+
+@pytest.fixture
+def folder(recorded: Callable[..., Path]) -> Path:
+    """A run of a second with a snapshot every 50 ms, 4.2 m apart."""
+    return recorded(50)
+
+
+@contextmanager
+def pictures_of(folder: Path, wish: Wish, shapes: Any = None) -> Iterator[Pictures]:
+    with Results(folder) as results:
+        data = film_data(results)
+        with Snapshots(folder, len(data.points)) as snapshots:
+            yield Pictures(results, Scenery(data, snapshots, shapes), snapshots, wish)
 
 
 @pytest.mark.parametrize(
@@ -62,22 +96,6 @@ def test_the_largest_uplift_stays_between_the_wires() -> None:
     assert 0.2 * 1.2 * found.size < found.motion * 0.1 < 0.5 * 1.2 * found.size
 
 
-@pytest.mark.parametrize("head", [4.2, 5.0, 5.6, 6.4])
-def test_arms_keep_their_lengths_and_reach_the_head(head: float) -> None:
-    (foot, knee, hinge), ends = pantograph_shape.shape(head, 3.6)
-    assert np.hypot(*(knee - foot)) == pytest.approx(LOWER_ARM)
-    assert np.hypot(*(hinge - knee)) == pytest.approx(UPPER_ARM)
-    np.testing.assert_allclose(hinge, ends.mean(axis=0), atol=1e-12)
-    assert hinge[1] == pytest.approx(head) and foot[1] == 3.6
-
-
-def test_arms_that_would_not_reach_are_stretched() -> None:
-    (foot, knee, hinge), _ = pantograph_shape.shape(9.0, 3.6)
-    lower, upper = np.hypot(*(knee - foot)), np.hypot(*(hinge - knee))
-    assert lower / upper == pytest.approx(LOWER_ARM / UPPER_ARM)
-    assert lower > LOWER_ARM and hinge[1] == pytest.approx(9.0)
-
-
 def test_snapshots_are_those_of_the_fields(folder: Path, make_march: Any) -> None:
     march = make_march(n_steps=1000, separations=(0.0,))
     points = march.mesh.points
@@ -94,12 +112,15 @@ def test_what_does_not_move_is_not_drawn_larger() -> None:
 
 def test_each_view_shows_its_two_directions() -> None:
     rest, moved = np.array([[7.0, 0.2, 5.0]]), np.array([[0.5, -0.01, 0.02]])
-    drawing = projection.Scale(10.0, 50.0)
-    seen = {view: Projection(view, drawing).seen(rest, moved, 3.0)[0] for view in View}
-    np.testing.assert_allclose(seen[View.SIDE], [7.5, 3.0, 51.0])
-    # To the left is up from above, and left from behind the train.
-    np.testing.assert_allclose(seen[View.PLAN], [7.5, 3.0, 1.5])
-    np.testing.assert_allclose(seen[View.ALONG], [-1.5, 3.0, 51.0])
+    scale = projection.Scale(10.0, 50.0)
+    seen = {view: Projection(view, scale, 4.0).seen(rest, moved, -10.0)[0] for view in View}
+    np.testing.assert_allclose(seen[View.SIDE], [7.5, 51.0])
+    # To the left is up from above, and farther away from the right and above.
+    np.testing.assert_allclose(seen[View.PLAN], [7.5, 1.5])
+    np.testing.assert_allclose(seen[View.OBLIQUE], [7.5 + 0.25 * 1.5, 51.0 + 0.35 * 1.5])
+    # From behind it is left, and what is 17.5 m from the eye is smaller than at 12 m.
+    near = 12.0 / 17.5
+    np.testing.assert_allclose(seen[View.ALONG], [-1.5 * near, 40.0 + 11.0 * near])
 
 
 def _blown(folder: Path, aside: float) -> None:
@@ -116,24 +137,54 @@ def test_motions_sideways_are_read_and_seen_from_above(folder: Path) -> None:
         with Snapshots(folder, len(data.points)) as snapshots:
             moved = snapshots.displacement(7)
             np.testing.assert_array_equal(moved[nodes, 1], 0.125)
+            np.testing.assert_array_equal(moved[data.wires["messenger_wire"], 1], 0.0)
             np.testing.assert_allclose(moved[:, 2], snapshots.uplift(7))
-            assert snapshots.aside_at(7, "contact_wire", 61.3) == 0.125
-            assert snapshots.aside_at(7, "messenger_wire", 61.3) == 0.0
-            assert snapshots.largest(np.arange(3), 1) == 0.125
-            assert snapshots.largest(np.arange(3), 0) == 0.0
-            schematic = MovingPantographs(data, snapshots, None)
-            numbers = np.array([10, 11])
-            reach = {}
-            for view in (View.PLAN, View.ALONG):
-                wish = Wish(width=60.0, view=view)
-                films = animate._pictures(data, results, snapshots, numbers, wish, schematic)
-                line = list(films)[0][:440]
-                if view is View.PLAN:
-                    line = np.swapaxes(line, 0, 1)
-                reach[view] = np.ptp(columns_of(line, (0xB2, 0x18, 0x2B), slice(None)))
-    # The head is seen across its length of 1.6 m, of 2.6 m from above and some 6 m of height.
-    assert 200 < reach[View.PLAN] < 300
-    assert 90 < reach[View.ALONG] < 160
+            extremes = snapshots.extremes(np.arange(3))
+            np.testing.assert_array_equal(extremes[:, :2], [[0.0, 0.0], [0.0, 0.125]])
+            places = Scenery(data, snapshots).beside(0.35, snapshots.frame(0.35))
+    np.testing.assert_allclose(places[FORCES].moved[:, 1], 0.125)
+    with pictures_of(folder, Wish(view=View.PLAN, motion=5.0)) as made:
+        made.show(0.35)
+        lines = np.array(made.drawing.wires.get_segments())
+        shown = np.asarray(made.drawing.wires.get_array())
+    aside = 5.0 * 0.125
+    assert set(np.unique(np.round(lines[..., 1], 9))) == {0.0, aside}
+    np.testing.assert_allclose(shown[lines[:, 0, 1] > 0.1], 125.0)
+
+
+def test_between_snapshots_the_line_moves_on(
+    recorded: Callable[..., Path], make_march: Any
+) -> None:
+    """Of a hump of 60 mm, exp(-(x / 9 m)^2), that moves by h = 1.67 m between two snapshots, four
+    points leave an error of some (h / 9 m)^3 / 12 of its height, below 0.1 %.
+    """
+    march = make_march(n_steps=1000, separations=(0.0,))
+    points = march.mesh.points
+    with Snapshots(recorded(20), len(points)) as snapshots:
+        np.testing.assert_array_equal(snapshots.frame(0.34).moved, snapshots.displacement(17))
+        frame = snapshots.frame(0.353)
+    ahead = points[:, 0] - march.position(0.353)[0]
+    error = np.abs(frame.moved[:, 2] - march.wave(0.353, points[:, 0]))
+    # Four points around the bend of the wire at the head see it up to two distances away.
+    assert error[np.abs(ahead) > 2.0 * 1.67].max() < 0.06e-3
+    # There its slope jumps by 0.02 times 0.35 / m, which a curve rounds off over a distance.
+    assert 0.1e-3 < error.max() < 0.02 * 0.35 * 1.67 / 4.0
+    ((base, places),) = frame.places
+    assert base == 0.0
+    np.testing.assert_allclose(places, march.places(0.353)[1:], atol=1e-4)
+
+
+def test_a_point_that_one_snapshot_lacks_is_taken_from_the_nearest(folder: Path) -> None:
+    with Snapshots(folder, 10) as snapshots:
+        snapshots._n_nodes = snapshots._wires["contact_wire"].x.size * 2
+        snapshots._of_this_line = True
+        whole = snapshots.frame(0.36).moved
+        snapshots._kept.clear()
+        lacking = snapshots._frame(9)
+        lacking.moved[3] = np.nan
+        found = snapshots.frame(0.36).moved
+    np.testing.assert_allclose(np.delete(found, 3, axis=0), np.delete(whole, 3, axis=0))
+    assert np.isfinite(found).all()
 
 
 def _cut_times(file: h5py.File) -> None:
@@ -197,21 +248,42 @@ def test_what_cannot_be_shown_is_refused(folder: Path) -> None:
 
 
 def test_masses_are_where_the_snapshots_have_them(folder: Path, make_march: Any) -> None:
+    """But for the head, which is at the wire that it presses on, and its arms in proportion."""
     march = make_march(n_steps=1000, separations=(0.0,))
     shape = shape_of(LumpedData((7.2, 15.0), (4200.0, 50.0), (10.0, 90.0)))
     with Results(folder) as results:
         data = film_data(results)
         with Snapshots(folder, len(data.points)) as snapshots:
-            moving = MovingPantographs(data, snapshots, [shape])
-            (pose,) = moving.poses(7)
+            found = Scenery(data, snapshots, [shape])
+            frame = snapshots.frame(0.35)
+            places = found.beside(0.35, frame)
+    rest, moved = places[PANTOGRAPHS]
     row = data.row_at(0.35)
-    boxes = np.unique(shape.cells[shape.kinds == BODY])
-    frame = march.places(0.35)[2]
-    wire = data.rest_height(data.position[row])[0]
-    np.testing.assert_allclose((pose.now - pose.rest)[boxes, 2], frame - wire)
+    x, wire = data.position[row, 0], data.rest_height(data.position[row])[0]
     head = np.unique(shape.cells[shape.kinds == HEAD])
-    np.testing.assert_allclose(pose.now[head, 2], data.head_height[row, 0])
-    assert pose.now[head, 0].mean() == pytest.approx(data.position[row, 0])
+    nodes = data.wires["contact_wire"]
+    lifted = np.interp(x, data.points[nodes, 0], frame.moved[nodes, 2])
+    np.testing.assert_allclose((rest + moved)[head, 2], wire + lifted)
+    assert rest[head, 0].mean() == pytest.approx(x)
+    apex = 1 + int(head.max()) + 1
+    # The base stands on the roof, whatever the height of the wire above.
+    assert rest[:, 2].min() == pytest.approx(found.roof)
+    assert wire - rest[apex, 2] == pytest.approx(0.25 / shape.below * (wire - found.roof))
+    more = wire + lifted - data.head_height[row, 0]
+    expected = march.places(0.35)[2] - wire + (1.0 - 0.25 / shape.below) * more
+    assert moved[apex, 2] == pytest.approx(expected)
+    np.testing.assert_allclose(places[FORCES].moved[0], [0.0, 0.0, lifted])
+
+
+def test_a_head_that_touches_nothing_is_where_it_is(folder: Path) -> None:
+    with h5py.File(folder / "run.h5", "r+") as file:
+        file["channels/contact_force"][...] = 0.0
+    with Results(folder) as results:
+        data = film_data(results)
+        with Snapshots(folder, len(data.points)) as snapshots:
+            rest, moved = Scenery(data, snapshots).beside(0.35, snapshots.frame(0.35))[FORCES]
+    row = data.row_at(0.35)
+    assert rest[0, 2] + moved[0, 2] == pytest.approx(data.head_height[row, 0])
 
 
 def test_a_picture_wider_than_the_snapshots_is_refused(
@@ -231,12 +303,61 @@ def test_a_picture_wider_than_the_snapshots_is_refused(
 
 def test_coaches_carry_all_pantographs() -> None:
     for position in (np.array([100.0]), np.array([100.0, 0.0]), np.array([400.0, 200.0, 31.0])):
-        spans = beside_line.coaches(position)
+        spans = scenery.coaches(position)
         for x in position:
-            on = (spans[:, 0] - beside_line.GAP < x) & (x < spans[:, 1])
+            on = (spans[:, 0] - scenery.GAP < x) & (x < spans[:, 1])
             assert on.any()
-        np.testing.assert_allclose(spans[:, 1] - spans[:, 0], beside_line.COACH)
-        assert beside_line.boxes(position, 3.6).shape == (8 * len(spans), 3)
+        np.testing.assert_allclose(spans[:, 1] - spans[:, 0], scenery.COACH)
+
+
+def test_pantographs_stand_on_the_roof_and_reach_the_wire(recorded: Callable[..., Path]) -> None:
+    with pictures_of(recorded(50, 0.0, 40.0), Wish()) as made:
+        found = made._scenery
+        made.show(0.35)
+        bodies = np.array(made.drawing.bodies.get_segments())
+        train = made.drawing._train.get_paths()
+        wires = np.array(made.drawing.wires.get_segments())
+        size = made.drawing._projection.scale.size
+    number = found.parts[PANTOGRAPHS].fields["number"]
+    position = found.data.position[found.data.row_at(0.35)]
+    roof = max(path.vertices[:, 1].max() for path in train)
+    assert roof == pytest.approx(size * found.roof)
+    assert len(found.parts[TRAIN].cells) == 6 * len(train) // 6
+    for p, x in enumerate(position):
+        own = bodies[number == p]
+        assert own[..., 1].min() == pytest.approx(roof)
+        near = np.unique(wires[np.abs(wires[:, 0, 0] - x) < 3.0].reshape(-1, 2), axis=0)
+        contact = near[near[:, 1] < size * 5.9]
+        # The sag of the chord over a node's distance is all that a head is off a wire.
+        above = np.interp(x, contact[:, 0], contact[:, 1])
+        assert own[..., 1].max() == pytest.approx(above, abs=1e-6)
+
+
+def test_views_are_chosen_by_what_lies_beside_each_other(folder: Path) -> None:
+    with Results(folder) as results:
+        data = film_data(results)
+        with Snapshots(folder, len(data.points)) as snapshots:
+            assert Scenery(data, snapshots).best_view is View.SIDE
+            data.points[3, 1] = 0.2
+            assert Scenery(data, snapshots).best_view is View.OBLIQUE
+
+
+def test_the_camera_goes_with_either_pantograph(recorded: Callable[..., Path]) -> None:
+    place = recorded(50, 0.0, 40.0)
+    seen = {}
+    for camera in (None, "leading", "2"):
+        with pictures_of(place, Wish(camera=camera)) as made:
+            made.show(0.5)
+            position = made._scenery.data.position[made._scenery.data.row_at(0.5)]
+            low, high = made.drawing.chart.get_xlim()
+        seen[camera] = low + 0.55 * (high - low), high - low
+    assert seen[None][0] == pytest.approx(position.mean())
+    assert seen["leading"][0] == pytest.approx(position[0])
+    assert seen["2"][0] == pytest.approx(position[1])
+    assert seen[None][1] == pytest.approx(seen["2"][1] + 1.1 * 40.0)
+    for wrong in ("3", "0", "middle"):
+        with pytest.raises(InputError, match="'leading', 'trailing', or a number from 1 to 2"):
+            animate.followed(made._scenery.data, wrong)
 
 
 def test_snapshots_are_chosen_by_time() -> None:
@@ -249,112 +370,194 @@ def test_snapshots_are_chosen_by_time() -> None:
         animate.chosen(times, Wish(2.0, 3.0))
 
 
-def columns_of(picture: np.ndarray, colour: tuple[int, int, int], rows: slice) -> np.ndarray:
-    """Columns of a picture with pixels of a colour in some rows."""
-    near = (np.abs(picture[rows].astype(int) - colour) < 25).all(axis=2)
-    return np.flatnonzero(near.any(axis=0))
+def test_pictures_are_equally_far_apart_along_the_track() -> None:
+    shown = 0.04 * np.arange(26)
+    times = animate.times_of_pictures(shown, 80.0, 1.0)
+    np.testing.assert_allclose(80.0 * np.diff(times), 1.0)
+    assert times[0] == 0.0 and times[-1] == pytest.approx(1.0)
+    # Too far apart to be interpolated, and nothing that travels.
+    for speed in (120.0, 0.0):
+        np.testing.assert_array_equal(animate.times_of_pictures(shown, speed, 1.0), shown)
 
 
-def test_the_pantograph_stands_above_its_force_and_the_masts_where_they_are(folder: Path) -> None:
-    """In a picture of 100 m a column is 0.087 m wide; lines are seven columns wide at most."""
-    with Results(folder) as results:
-        data = film_data(results)
-        with Snapshots(folder, len(data.points)) as snapshots:
-            numbers = animate.chosen(snapshots.times, Wish(0.5, 0.6))
-            wish, schematic = Wish(width=100.0), MovingPantographs(data, snapshots, None)
-            pictures = list(animate._pictures(data, results, snapshots, numbers, wish, schematic))
-    assert [picture.shape for picture in pictures] == [(SIZE[1], SIZE[0], 3)] * 3
-    picture = pictures[1]
-    red = (0xB2, 0x18, 0x2B)
-    lower = slice(int(0.68 * SIZE[1]), int(0.93 * SIZE[1]))
-    head = columns_of(picture, red, slice(0, int(0.3 * SIZE[1])))
-    assert head.size, "there is a head in the picture"
-    curve = columns_of(picture, red, lower)
-    # The curve ends below the middle of the head; the legend's sample of its colour is right of it.
-    ends = curve[np.append(np.diff(curve) > 40, True)]
-    assert np.abs(ends - head.mean()).min() <= 8
-    # Below the wires only masts are of their colour; they pass by as far as the train runs.
-    first, second = (masts_of(picture) for picture in pictures[:2])
-    passed = np.subtract.outer(first, second)
-    travelled = float(data.position[data.row_at(0.55), 0] - data.position[data.row_at(0.5), 0])
-    a_pixel = travelled / float(passed[(passed > 20) & (passed < 120)].mean())
-    np.testing.assert_allclose(np.diff(second) * a_pixel, 50.0, atol=1.0)
+def test_the_drawing_has_forces_places_and_colours_of_the_run(
+    recorded: Callable[..., Path],
+) -> None:
+    with pictures_of(recorded(50, 0.0, 40.0), Wish(width=100.0)) as made:
+        made.show(0.5)
+        found, data = made.drawing, made._scenery.data
+        row = data.row_at(0.5)
+        texts = [text.get_text() for text in found.values]
+        words = found.words.get_text()
+        written = [text.get_text() for text in found.figure.texts]
+        ends = [curve[0].get_xydata()[-1] for curve in made.chart.curves]
+        first = [curve[0].get_xydata()[0, 0] for curve in made.chart.curves]
+        limits = made.drawing.chart.get_xlim()
+        uplift, lines = np.asarray(found.wires.get_array()), np.array(found.wires.get_segments())
+        norm = found.wires.norm
+        made.show(0.55)
+        later = found.chart.get_xlim()
+    assert texts == [f"{force:.0f} N" for force in data.force[row]]
+    assert words == "t = 0.50 s   300 km/h"
+    assert written[0] == data.title
+    assert any("heights × " in own and "motion × " in own and "schematic" in own for own in written)
+    np.testing.assert_allclose(ends, np.column_stack([data.position[row], data.force[row]]))
+    # Nothing is drawn from before the film or far behind the picture.
+    assert min(first) >= min(data.position[0].min(), limits[0]) - 0.1
+    assert limits[1] - limits[0] == pytest.approx(100.0)
+    assert later[0] - limits[0] == pytest.approx(0.05 * 300.0 / 3.6)
+    # Colours are those of the uplift of the nodes, and use their scale.
+    node = np.abs(data.points[:, 0] - lines[10, 0, 0]).argmin()
+    assert uplift.max() == pytest.approx(60.0, abs=25.0)
+    assert norm.vmin <= uplift.min() and 0.75 * norm.vmax < uplift.max() <= 1.05 * norm.vmax
+    assert norm.vmin > -0.7 * norm.vmax and node >= 0
 
 
-def masts_of(picture: np.ndarray) -> np.ndarray:
-    """Middles of the masts in a picture [columns]."""
-    columns = columns_of(picture, (0xB8, 0xBC, 0xC2), slice(240, 290))
-    groups = np.split(columns, np.flatnonzero(np.diff(columns) > 20) + 1)
-    return np.array([group.mean() for group in groups])
+def test_slack_droppers_are_dashed_and_others_have_the_colour_of_their_force(folder: Path) -> None:
+    with pictures_of(folder, Wish()) as made:
+        made.show(0.5)
+        shown, slack = made.drawing.droppers, made.drawing.slack
+        taut, loose = (np.array(one.get_segments())[:, 0, 0] for one in (shown, slack))
+        forces, (_, dashes) = np.asarray(shown.get_array()), slack.get_linestyles()[0]
+        expected, data = made._dropper_forces(0.5), made._scenery.data
+        colours = shown.cmap(shown.norm([0.0, shown.norm.vmax]))
+    x = data.points[data.droppers[:, 0], 0]
+    assert loose.size and dashes is not None
+    np.testing.assert_allclose(np.interp(taut, x, expected), forces)
+    assert (forces > 0.0).all() and (np.interp(loose, x, expected) <= 0.0).all()
+    # Light to dark, which is seen without colours too.
+    assert colours[0, :3].sum() > 2.0 > 0.6 > colours[1, :3].sum()
+
+
+def test_scales_of_colours_grow_lighter_or_darker_all_the_way() -> None:
+    weights = np.array([0.2126, 0.7152, 0.0722])
+    for stops in (scenery.MOTIONS, scenery.DROPPER_FORCES):
+        light = drawing.ramp(stops)(np.linspace(0.0, 1.0, 64))[:, :3] @ weights
+        assert (np.diff(light) > 0.0).all() or (np.diff(light) < 0.0).all()
+
+
+def test_titles_of_any_length_end_before_the_scales(folder: Path) -> None:
+    with h5py.File(folder / "run.h5", "r+") as file:
+        set_attribute(file, "title", "A line with $ and _ " * 10)
+        seal_attributes(file, ["title"])
+    with pictures_of(folder, Wish()) as made:
+        made.show(0.5)
+        made.drawing.pixels()
+        figure = made.drawing.figure
+        renderer = figure.canvas.get_renderer()
+        title = figure.texts[0].get_window_extent(renderer)
+        scales = [axes.get_tightbbox(renderer) for axes in figure.axes[2:]]
+    assert title.x1 < min(one.x0 for one in scales)
+    # Nothing else is where the scales are: the line begins below.
+    assert min(one.y0 for one in scales) > made.drawing._axes.get_window_extent(renderer).y1
+
+
+def test_pixels_are_those_of_what_is_drawn(folder: Path) -> None:
+    """The first picture again after others is the same, and its dot has the pantograph's colour."""
+    with pictures_of(folder, Wish(0.2, 0.4)) as made:
+        shown = iter(made)
+        first, second = np.array(next(shown)), np.array(next(shown))
+        made.show(float(made.times[0]))
+        again = np.array(made.drawing.pixels())
+        (raw, _), axes = made.chart.curves[0], made.drawing.chart
+        column, height = axes.transData.transform(raw.get_xydata()[-1])
+    assert first.shape == (drawing.SIZE[1], drawing.SIZE[0], 4)
+    np.testing.assert_array_equal(first, again)
+    assert (first != second).any(axis=2).mean() > 1e-3
+    dot = again[drawing.SIZE[1] - int(height) - 1, int(column), :3].astype(int)
+    assert np.abs(dot - (0xB2, 0x18, 0x2B)).max() < 12
+
+
+def test_every_view_draws_the_line(folder: Path) -> None:
+    _blown(folder, 0.05)
+    for view in View:
+        with pictures_of(folder, Wish(view=view)) as made:
+            made.show(0.5)
+            low, high = made.drawing._axes.get_xlim()
+            lines = np.array(made.drawing.wires.get_segments())
+            inside = (lines[..., 0] > low) & (lines[..., 0] < high)
+            assert inside.sum() > 50, view
+            head = np.array(made.drawing.bodies.get_segments())
+            assert ((head[..., 0] > low) & (head[..., 0] < high)).all(), view
 
 
 def test_a_film_is_whole_or_not_there(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from catenary.postproc.film import video
-
     (folder / "film.mp4").write_bytes(b"an earlier film")
 
     def broken(*_: Any, **__: Any) -> None:
         raise OSError(28, "No space left on device")
 
     with monkeypatch.context() as patch:
-        patch.setattr(video, "_write_mp4", broken)
+        patch.setattr(video, "_encode", broken)
         with pytest.raises(InputError, match="No space left"):
             animate.animate(folder, Wish(), None, progress=False)
     assert (folder / "film.mp4").read_bytes() == b"an earlier film"
     assert not list(folder.glob(".film*"))
 
 
-def test_films_have_a_picture_for_each_snapshot(folder: Path) -> None:
+def test_films_have_a_picture_for_each_snapshot_that_is_far_from_others(folder: Path) -> None:
     import imageio_ffmpeg
-    from PIL import Image, ImageSequence
 
-    film = animate.animate(folder, Wish(start=0.2, rate=10.0), None, progress=False)
-    assert film.n_pictures == 17
+    film = animate.animate(folder, Wish(start=0.6, rate=10.0), None, progress=False)
+    assert film.n_pictures == 9 and not film.smooth
     # Snapshots 0.05 s apart, shown 0.1 s each.
     assert film.slowed == pytest.approx(2.0)
     count, seconds = imageio_ffmpeg.count_frames_and_secs(str(film.files[0]))
-    assert count == 17 and seconds == pytest.approx(1.7, abs=0.11)
+    assert count == 9 and seconds == pytest.approx(0.9, abs=0.11)
     with Image.open(film.files[1]) as gif:
-        assert gif.n_frames == 17 and gif.info["duration"] == 100
+        assert gif.n_frames == 9 and gif.info["duration"] == 100
         pictures = [np.asarray(picture.convert("RGB")) for picture in ImageSequence.Iterator(gif)]
     changed = [(a != b).mean() for a, b in zip(pictures, pictures[1:], strict=False)]
     assert min(changed) > 1e-3
+    # A GIF has the colours of the pantograph's curve and of slack droppers, within its palette.
+    for colour in ((0xB2, 0x18, 0x2B), (0xD6, 0x00, 0x6C)):
+        off = np.abs(pictures[4].astype(int) - colour).max(axis=2)
+        assert (off < 30).sum() > 20
 
 
-def test_without_its_libraries_a_film_says_what_is_missing(
+def test_a_film_is_smooth_where_snapshots_are_near(recorded: Callable[..., Path]) -> None:
+    wish = Wish(0.3, 0.4, every=1.0)
+    film = animate.animate(recorded(20), wish, None, progress=False)
+    assert film.smooth and film.n_pictures == 9
+    # A metre a picture, 25 pictures a second: 25 m/s of 83.3 m/s.
+    assert film.slowed == pytest.approx(83.333 / 25.0, rel=1e-3)
+
+
+def test_without_its_library_a_film_says_what_is_missing(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(animate, "_EGL", "libEGL_that_is_not_there.so.1")
-    monkeypatch.setattr(animate.sys, "platform", "linux")
-    with pytest.raises(InputError, match="apt-get install libegl1"):
+    monkeypatch.setitem(animate.sys.modules, "imageio_ffmpeg", None)
+    monkeypatch.delitem(animate.sys.modules, "catenary.postproc.film.video", raising=False)
+    monkeypatch.delattr("catenary.postproc.film.video", raising=False)
+    with pytest.raises(InputError, match=r"imageio_ffmpeg.*pip install 'catenary\[film\]'"):
         animate.animate(folder, Wish(), None, progress=False)
     assert not (folder / "film.mp4").exists()
 
 
-def _drawn_droppers(folder: Path, look: View) -> tuple[FilmData, int, np.ndarray]:
-    """The run, the record of its fourth snapshot, and which ends of droppers are drawn there."""
-    with Results(folder) as results:
-        data = film_data(results)
-        with Snapshots(folder, len(data.points)) as snapshots:
-            schematic = MovingPantographs(data, snapshots, None)
-            plotter = pyvista.Plotter(off_screen=True)
-            view = LineView(
-                plotter, data, Projection(look, projection.Scale(1.0, 1.0)),
-                projection.Colours(2, "uplift", 0.01), schematic, snapshots,
-            )  # fmt: skip
-            row = data.row_at(float(snapshots.times[3]))
-            view.update(row, snapshots.displacement(3), None, schematic.poses(3))
-            plotter.close()
-    return data, row, np.abs(view._droppers.points).max(axis=1).reshape(-1, 2) < 1e3
+def _drawn_droppers(folder: Path, view: View) -> tuple[Any, int, np.ndarray]:
+    """The run, the record of its fourth snapshot, and which droppers are drawn there, by their
+    forces, which are set to their numbers."""
+    with pictures_of(folder, Wish(view=view, width=400.0)) as made:
+        data, frame = made._scenery.data, made._snapshots.frame(0.15)
+        row = data.row_at(0.15)
+        beside = made._scenery.beside(0.15, frame)
+        numbers = 1.0 + np.arange(len(data.droppers))
+        middle = float(data.position[row, 0])
+        made.drawing.update(row, frame.moved, beside, numbers, (middle - 220.0, middle + 180.0))
+        found = np.asarray(made.drawing.droppers.get_array()) - 1.0
+        lines = np.array(made.drawing.droppers.get_segments())
+    assert len(lines) == found.size
+    drawn = np.zeros(len(data.droppers), dtype=bool)
+    drawn[found.astype(int)] = True
+    return data, row, drawn
 
 
 def test_from_behind_droppers_beyond_what_is_seen_are_not_drawn(folder: Path) -> None:
     data, row, drawn = _drawn_droppers(folder, View.ALONG)
     x, first = data.points[data.droppers[:, 1], 0], float(data.position[row].max())
-    seen = (x >= first - 2.0) & (x <= first + 65.0)
+    seen = (x >= first - 10.0) & (x <= first + 65.0)
     assert 0 < seen.sum() < seen.size
-    # Both ends, or none: a line to nowhere crosses the picture.
-    np.testing.assert_array_equal(drawn, np.column_stack([seen, seen]))
+    np.testing.assert_array_equal(drawn, seen)
 
 
 def test_droppers_that_are_missing_or_broke_are_not_drawn(folder: Path) -> None:
@@ -372,18 +575,49 @@ def test_droppers_that_are_missing_or_broke_are_not_drawn(folder: Path) -> None:
         seal_attributes(file, ["defects", "incidents"])
     data, _, drawn = _drawn_droppers(folder, View.SIDE)
     x = data.points[data.droppers[:, 1], 0]
-    np.testing.assert_allclose(x[~drawn[:, 0]], [60.0, 115.0])
-    np.testing.assert_array_equal(drawn[:, 0], drawn[:, 1])
+    np.testing.assert_allclose(x[~drawn & (x < 200.0)], [60.0, 115.0])
 
 
 def test_a_gif_has_colours_that_come_later(tmp_path: Path) -> None:
     rng = np.random.default_rng(1)
-    first = rng.integers(0, 100, (90, 160, 3), dtype=np.uint8)
+    first = rng.integers(0, 100, (90, 160, 4), dtype=np.uint8)
     second = first.copy()
-    second[20:60, 40:100] = (0xE0, 0x82, 0x14)
+    second[20:60, 40:100, :3] = (0xD6, 0x00, 0x6C)
     files = tmp_path / "film.mp4", tmp_path / "film.gif"
-    assert video.write([first, second], (160, 90), 10.0, *files, later=["#e08214"]) == 2
+    assert video.write([first, second], (160, 90), 10.0, *files, [scenery.SLACK]) == 2
     with Image.open(files[1]) as film:
         film.seek(1)
-        shown = np.asarray(film.convert("RGB"))[200, 280].astype(int)
-    assert np.abs(shown - (0xE0, 0x82, 0x14)).max() < 12
+        shown = np.asarray(film.convert("RGB"))[200, 350].astype(int)
+    assert np.abs(shown - (0xD6, 0x00, 0x6C)).max() < 12
+
+
+def test_what_ffmpeg_says_is_told(tmp_path: Path) -> None:
+    picture = np.zeros((90, 160, 4), dtype=np.uint8)
+    files = tmp_path / "nowhere" / "film.mp4", tmp_path / "nowhere" / "film.gif"
+    with pytest.raises(InputError, match="nowhere: .*No such file or directory"):
+        video.write([picture] * 3, (160, 90), 10.0, *files)
+
+
+def test_memory_does_not_grow_with_a_film(tmp_path: Path) -> None:
+    """300 pictures are 69 MB, and those of the GIF, 800 pixels wide, 108 MB."""
+    ground = np.zeros((180, 320, 4), dtype=np.uint8)
+    ground[:, :160, 0] = np.arange(160)
+    files = tmp_path / "film.mp4", tmp_path / "film.gif"
+    known: list[weakref.ref[Any]] = []
+
+    class Watched(np.ndarray):
+        pass
+
+    def pictures(n: int) -> Iterator[np.ndarray]:
+        for k in range(n):
+            picture = np.roll(ground, k, axis=1).view(Watched)
+            known.append(weakref.ref(picture))
+            assert sum(one() is not None for one in known) <= 3
+            yield picture
+
+    largest = []
+    for n in (20, 300):
+        assert video.write(pictures(n), (320, 180), 12.5, *files) == n
+        # Of all processes that have ended, ffmpeg is the largest [kB].
+        largest.append(1024 * resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss)
+    assert largest[1] < largest[0] + 25e6

@@ -3,17 +3,24 @@
 from __future__ import annotations
 
 import json
+import runpy
+import sys
+import types
 from pathlib import Path
 from typing import Any
+from unittest.mock import MagicMock
 
 import h5py
 import numpy as np
 import pytest
 import pyvista
+from matplotlib.colors import to_rgb
 
 from catenary.base.errors import InputError
 from catenary.postproc.film.film_data import film_data
-from catenary.postproc.film.view import View
+from catenary.postproc.film.scenery import MOTIONS
+from catenary.postproc.film.snapshots import Snapshots
+from catenary.postproc.film.wish import View
 from catenary.postproc.paraview import open_in_paraview
 from catenary.postproc.read.results import Results
 from catenary.postproc.record.snapshots.fields import FieldRecorder
@@ -39,20 +46,29 @@ def test_heads_arms_and_forces_are_where_the_record_has_them(folder: Path) -> No
     assert script == folder / "paraview" / "view.py"
     with Results(folder) as results:
         data = film_data(results)
+    nodes = data.wires["contact_wire"]
     arms, forces = (pyvista.get_reader(path) for path in files[:2])
     np.testing.assert_allclose(arms.time_values, 0.05 * np.arange(11))
-    for time in arms.time_values[::5]:
+    for number, time in list(enumerate(arms.time_values))[::5]:
         row = data.row_at(time)
         arms.set_active_time_value(time)
         grid = arms.read()
         moved = grid.point_data["displacement"]
-        height = grid.points[:, 2] + moved[:, 2]
-        # Foot, knee, hinge and ends of the head along and across the track, of each; the hinge is
-        # where the head is.
-        np.testing.assert_allclose(height[2::7], data.head_height[row], atol=1e-7)
-        np.testing.assert_allclose(grid.points[2::7, 0], data.position[row])
-        np.testing.assert_array_equal(grid.cell_data["number"], np.repeat([0, 1], 4))
-        np.testing.assert_array_equal(moved[0::7], 0.0)
+        height = (grid.points[:, 2] + moved[:, 2]).reshape(2, -1)
+        # The highest points are those of the head, on the wire that it presses on.
+        with Snapshots(folder, len(data.points)) as snapshots:
+            lifted = snapshots.uplift(number)[nodes]
+        wire = np.interp(data.position[row], data.points[nodes, 0], lifted + data.points[nodes, 2])
+        np.testing.assert_allclose(height.max(axis=1), wire, atol=1e-6)
+        heads = grid.points.reshape(2, -1, 3)[height == height.max(axis=1, keepdims=True)]
+        apart = np.abs(heads[:, :1] - data.position[row])
+        assert (apart.min(axis=1) < 0.5).all() and (apart.min(axis=0) < 1e-3).all()
+        n_cells = grid.n_cells // 2
+        np.testing.assert_array_equal(grid.cell_data["number"], np.repeat([0, 1], n_cells))
+        assert set(grid.cell_data["kind"]) == {0, 1, 2}
+        # Base and foot stand on the roof.
+        foot = moved.reshape(2, -1, 3)[height == height.min(axis=1, keepdims=True)]
+        np.testing.assert_array_equal(foot, 0.0)
         forces.set_active_time_value(time)
         found = forces.read()
         vectors = found.point_data["force"]
@@ -84,7 +100,8 @@ def test_the_script_is_python_and_keeps_strangers_words_as_text(
     [
         (View.SIDE, 0.0, "", "uplift [m]"),
         (View.PLAN, 0.0, "", "uplift [m]"),
-        (View.PLAN, 0.0123, "Y", "sideways [m]"),
+        (View.PLAN, 0.0123, "Y", "to the left [m]"),
+        (View.OBLIQUE, 0.0, "", "uplift [m]"),
         (View.ALONG, 0.0123, "", "uplift [m]"),
     ],
 )
@@ -103,7 +120,44 @@ def test_each_view_is_coloured_by_what_it_shows(
     assert (settings["motion"] == settings["size"]) == alike
     if component:
         # Ends of a scale have two digits, and are not below what is shown.
-        assert settings["largest_m"] == 0.013
+        assert settings["ends_m"] == [0.0, 0.013]
+    # Colours are those of films, from end to end of their scale.
+    assert settings["ramp"][0::4] == pytest.approx(np.linspace(*settings["ends_m"], len(MOTIONS)))
+    assert settings["ramp"][-3:] == pytest.approx(to_rgb(MOTIONS[-1]))
+    assert settings["looks"]["masts"] == [2.0, pytest.approx(to_rgb("#b8bcc2"))]
+
+
+class _AnyParaView(types.ModuleType):
+    """Stands for ParaView's module: takes every call, and keeps what cameras were given."""
+
+    def __getattr__(self, name: str) -> Any:
+        made = MagicMock(name=name)
+        setattr(self, name, made)
+        return made
+
+
+@pytest.mark.parametrize("view", list(View))
+def test_the_script_runs_from_end_to_end(
+    folder: Path, view: View, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Against a stand-in; `tests/paraview` has the program. The camera looks at the train."""
+    script = open_in_paraview.write_script(folder, None, look=view)[0]
+    package, simple = _AnyParaView("paraview"), _AnyParaView("paraview.simple")
+    package.simple = simple
+    window = simple.GetActiveViewOrCreate.return_value
+    window.ViewSize = [1280, 640]
+    for name, module in (("paraview", package), ("paraview.simple", simple)):
+        monkeypatch.setitem(sys.modules, name, module)
+    monkeypatch.setattr(sys, "argv", [str(script), "--picture", "x.png", "--time", "0.25"])
+    made = runpy.run_path(str(script))
+    (x, _, _), at = window.CameraPosition, window.CameraFocalPoint
+    with Results(folder) as results:
+        data = film_data(results)
+    middle = data.position[data.row_at(0.25)].mean()
+    ahead = {View.ALONG: 0.1 * made["WIDTH"]}.get(view, 0.0)
+    assert at[0] == pytest.approx(middle + ahead)
+    assert (x < at[0] - 1.0) == (view in (View.OBLIQUE, View.ALONG))
+    assert simple.SaveScreenshot.call_args.args[0] == "x.png"
 
 
 def test_a_folder_that_cannot_be_written_is_named(folder: Path) -> None:

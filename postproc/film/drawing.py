@@ -1,0 +1,341 @@
+"""The pictures of a film: lines and texts that stay and change their places, over still ground."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator
+
+import matplotlib
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.cm import ScalarMappable
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.colors import LinearSegmentedColormap, Normalize
+from matplotlib.figure import Figure
+
+from catenary.meshgen.mesh import DROPPERS
+from catenary.postproc.film.projection import EYE, Colours, Picture, Projection, room_above
+from catenary.postproc.film.scenery import (
+    COLOURS,
+    CONTACT,
+    DROPPER_FORCES,
+    FORCES,
+    LOOKS,
+    MOTIONS,
+    PANTOGRAPHS,
+    SLACK,
+    THICK,
+    TRACK,
+    TRAIN,
+    UNKNOWN,
+    WIRE,
+    Places,
+    Scenery,
+)
+from catenary.postproc.film.wish import View
+from catenary.postproc.record.snapshots.blocks import ARMS, CLAMPS, MASTS
+
+SIZE = (1920, 1080)
+_DPI = 100
+# Line and chart in the picture: left, bottom, width, height.
+_LINE, _CHART = (0.05, 0.345, 0.935, 0.545), (0.05, 0.07, 0.935, 0.235)
+ASPECT = _LINE[2] * SIZE[0] / (_LINE[3] * SIZE[1])
+# Letters of a title at most; usual width of a line [points].
+_MOST_LETTERS = 90
+_USUAL = 4.0
+# Length of the arrow of a force: share of the drawn room above the contact wire per N.
+_ARROW = 0.0035
+# Length of line that is seen from behind the train, from behind the first pantograph on [m].
+_SEEN_BEHIND, _SEEN_AHEAD = 10.0, 65.0
+# What is that near to the picture is drawn [m]; half the length of lines across the track [m].
+_NEAR, _ACROSS = 12.0, 50.0
+# Faces of a box from dark to light: left, floor, rear, front, roof, right.
+_FACES = ("#c3c8ce", "#c3c8ce", "#ccd1d7", "#ccd1d7", "#eceef1", "#dde1e6")
+_STYLE = {"font.size": 15, "axes.spines.top": False, "axes.spines.right": False, "axes.grid": True,
+          "grid.color": "#e3e5e8", "axes.axisbelow": True, "text.parse_math": False}  # fmt: skip
+
+
+@contextlib.contextmanager
+def _styled() -> Iterator[None]:
+    """Matplotlib's own style, whatever a user's files say."""
+    with matplotlib.rc_context():
+        matplotlib.rcdefaults()
+        matplotlib.rcParams.update(_STYLE)
+        yield
+
+
+class Drawing:
+    """Pictures of one size, of a line above and a chart below. Not collective.
+
+    Attributes
+    ----------
+    chart : axes of the chart, filled by whoever adds its curves to ``moving``
+    moving : what is drawn anew in each picture, from behind to the front
+    wires, droppers, slack, bodies : lines of the picture
+    values : texts of the forces, and ``words``, those of the time
+
+    Parameters
+    ----------
+    scenery : of the run
+    picture : what the drawing holds
+    projection : of the drawing
+    colours : what colours of wires show
+    strongest : largest force of a dropper [N], None if it is not known
+    """
+
+    def __init__(
+        self,
+        scenery: Scenery,
+        picture: Picture,
+        projection: Projection,
+        colours: Colours,
+        strongest: float | None,
+    ) -> None:
+        self._scenery, self._picture, self._projection = scenery, picture, projection
+        self._colours, self._ground = colours, None
+        self._parts = _seen_parts(scenery, picture.view)
+        with _styled():
+            self.figure = Figure(figsize=(SIZE[0] / _DPI, SIZE[1] / _DPI), dpi=_DPI)
+            self._canvas = FigureCanvasAgg(self.figure)
+            self._axes = self.figure.add_axes(_LINE)
+            self.chart = self.figure.add_axes(_CHART)
+            self._frame_line()
+            self._write_head(strongest)
+            self._add_lines(strongest)
+
+    def _frame_line(self) -> None:
+        """Leave the line without axes, a metre of height as long as one of length."""
+        self._axes.set_axis_off()
+        size = self._projection.scale.size
+        middle = 0.5 * size * (self._picture.low + self._picture.high)
+        half = 0.5 * self._picture.width / ASPECT
+        self._axes.set_ylim(middle - half, middle + half)
+        if self._picture.view is View.ALONG:
+            self._axes.set_xlim(-ASPECT * half, ASPECT * half)
+
+    def _write_head(self, strongest: float | None) -> None:
+        """Title, what is drawn larger, and the scales of colours, above everything else."""
+        scale, write = self._projection.scale, self.figure.text
+        title = self._scenery.data.title[:_MOST_LETTERS]
+        size = 21.0 * min(1.0, 46.0 / max(len(title), 1))
+        write(_LINE[0], 0.955, title, fontsize=size, fontweight="bold")
+        view = self._picture.view
+        parts = [f"{'widths' if view is View.PLAN else 'heights'} × {scale.size:g}"]
+        if view is View.OBLIQUE:
+            parts = [f"heights and widths × {scale.size:g}"]
+        if scale.along > 1.0 and view is not View.ALONG and TRAIN in self._scenery.parts:
+            parts.append(f"pantographs along the track × {scale.along:g}")
+        parts.append(f"motion × {scale.motion:g}")
+        if any(shape.schematic for shape in self._scenery.shapes):
+            parts.append("arms are schematic")
+        write(_LINE[0], 0.896, ",  ".join(parts), fontsize=14, color="#50555c")
+        self.words = self._text(_LINE[0], 0.925, 17)
+        _, title, low, high = self._colours
+        bars = [(0.56, MOTIONS, 1e3 * low, 1e3 * high, f"{title} [mm]")]
+        if strongest is not None and DROPPERS in self._scenery.line:
+            bars.append((0.79, DROPPER_FORCES, 0.0, strongest, "dropper force [N]"))
+        for left, stops, bottom, top, label in bars:
+            axes = self.figure.add_axes((left, 0.935, 0.195, 0.016))
+            shown = ScalarMappable(Normalize(bottom, top), ramp(stops))
+            bar = self.figure.colorbar(shown, cax=axes, orientation="horizontal")
+            bar.outline.set_visible(False)  # type: ignore[operator]
+            bar.set_ticks(np.unique([bottom, 0.0, top]).tolist())
+            axes.tick_params(labelsize=13, length=4)
+            write(left, 0.965, label, fontsize=14)
+        if len(bars) > 1:
+            write(0.985, 0.965, "- - -  slack", fontsize=14, color=SLACK, ha="right")
+
+    def _text(self, x: float, y: float, size: float) -> Artist:
+        return self.figure.text(x, y, "", fontsize=size, animated=True)
+
+    def _add_lines(self, strongest: float | None) -> None:
+        """All that moves, empty, from behind to the front."""
+        axes = self._axes
+
+        def lines(**how: object) -> LineCollection:
+            made = LineCollection([], animated=True, capstyle="round", **how)
+            axes.add_collection(made, autolim=False)
+            return made
+
+        train = PolyCollection([], animated=True, linewidths=0.8, edgecolors="#b6bcc4")
+        axes.add_collection(train, autolim=False)
+        self._train = train
+        self._still = {
+            kind: lines(linewidths=_USUAL * LOOKS[kind].thick, colors=LOOKS[kind].colour)
+            for kind in (TRACK, MASTS, ARMS, CLAMPS)
+        }
+        if self._picture.view is View.PLAN:
+            self._still[MASTS].set_linewidths(_USUAL * LOOKS[CLAMPS].thick)
+        width = _USUAL * LOOKS[DROPPERS].thick
+        self.droppers = lines(
+            linewidths=width, cmap=ramp(DROPPER_FORCES), norm=Normalize(0.0, strongest or 1.0)
+        )
+        self.droppers.get_cmap().set_bad(UNKNOWN)
+        self.slack = lines(linewidths=1.3 * width, colors=SLACK, linestyles=(0, (2.5, 2.0)))
+        self.slack.set_capstyle("butt")
+        limits = Normalize(1e3 * self._colours.low, 1e3 * self._colours.high)
+        self.wires = lines(cmap=ramp(MOTIONS), norm=limits)
+        about = self._scenery.parts[PANTOGRAPHS].fields
+        self.bodies = lines(
+            linewidths=[_USUAL * THICK[kind] for kind in about["kind"].tolist()],
+            colors=[COLOURS[p % len(COLOURS)] for p in about["number"].tolist()],
+        )
+        self._arrows = lines(linewidths=2.0, colors="black")
+        self.values = [
+            axes.text(
+                0.0, 0.0, "", color=COLOURS[p % len(COLOURS)], fontsize=17, fontweight="bold",
+                ha="left", va="center", clip_on=True, animated=True,
+                bbox={"facecolor": "white", "alpha": 0.75, "edgecolor": "none", "pad": 2.0},
+            )
+            for p in range(self._scenery.data.n_pantographs)
+        ]  # fmt: skip
+        still = [self._still[kind] for kind in (TRACK, MASTS, ARMS, CLAMPS)]
+        self.moving: list[Artist] = [
+            *still[:2], train, *still[2:], self.droppers, self.slack,
+            self.bodies, self.wires, self._arrows, *self.values, self.words,
+        ]  # fmt: skip
+        if self._picture.view is View.PLAN:
+            self.moving[:3] = [train, *still[:2]]
+
+    def update(
+        self,
+        row: int,
+        moved: np.ndarray,
+        beside: dict[str, Places],
+        forces: np.ndarray | None,
+        span: tuple[float, float],
+    ) -> None:
+        """Show a time.
+
+        Parameters
+        ----------
+        row : record at that time
+        moved : (n_nodes, 3) how far the line's nodes have moved, NaN where it is not known [m]
+        beside : the parts beside the line, see `Scenery.beside`
+        forces : (n_droppers,) of droppers [N], zero of those that are slack; None if not recorded
+        span : line in the picture, from and to [m]
+        """
+        # What is not known is beyond the picture, or at rest.
+        moved = np.nan_to_num(moved)
+        data, view = self._scenery.data, self._picture.view
+        low, high = span[0] - _NEAR, span[1] + _NEAR
+        eye = 0.0
+        if view is View.ALONG:
+            eye = data.position[row].max() - EYE
+            low, high = eye + EYE - _SEEN_BEHIND, eye + EYE + _SEEN_AHEAD
+        else:
+            self._axes.set_xlim(*span)
+        wires: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
+        for kind, cells, rest, of in self._parts:
+            by = of.moved(moved)
+            x = rest[cells, 0]
+            chosen = (x.max(axis=1) >= low) & (x.min(axis=1) <= high)
+            if kind == DROPPERS:
+                chosen &= data.gone > data.time[row]
+            ends = cells[chosen]
+            lines = self._projection.seen(rest[ends].reshape(-1, 3), by[ends].reshape(-1, 3), eye)
+            lines = lines.reshape(-1, 2, 2)
+            if kind in (CONTACT, WIRE):
+                colour = 1e3 * by[ends, self._colours.axis].mean(axis=1)
+                wires.append((lines, colour, np.full(len(lines), _USUAL * LOOKS[kind].thick)))
+            elif kind == DROPPERS:
+                self._show_droppers(lines, None if forces is None else forces[chosen])
+            else:
+                self._still[kind].set_segments(lines)
+        if wires:
+            lines, colour, thick = (np.concatenate(own) for own in zip(*wires, strict=True))
+            self.wires.set_segments(lines)
+            self.wires.set_array(colour)
+            self.wires.set_linewidths(thick)
+        self._show_beside(row, beside, eye)
+
+    def _show_droppers(self, lines: np.ndarray, forces: np.ndarray | None) -> None:
+        slack = np.zeros(len(lines), dtype=bool) if forces is None else forces <= 0.0
+        self.droppers.set_segments(lines[~slack])
+        self.droppers.set_array(np.full(len(lines), np.nan) if forces is None else forces[~slack])
+        self.slack.set_segments(lines[slack])
+
+    def _show_beside(self, row: int, beside: dict[str, Places], eye: float) -> None:
+        """Show train, track, pantographs and forces."""
+        seen, data, parts = self._projection.seen, self._scenery.data, self._scenery.parts
+        rest, moved = beside[TRACK]
+        if self._picture.view is View.ALONG:
+            rest = np.column_stack([np.clip(rest[:, 0], eye, eye + EYE + _SEEN_AHEAD), rest[:, 1:]])
+        self._still[TRACK].set_segments(seen(rest, moved, eye)[parts[TRACK].cells])
+        if TRAIN in parts:
+            corners = seen(*beside[TRAIN], eye)[parts[TRAIN].cells]
+            shades = parts[TRAIN].fields["face"]
+            self._train.set_verts(corners)
+            self._train.set_facecolor([_FACES[face] for face in shades.tolist()])
+        rest, moved = (np.array(points) for points in beside[PANTOGRAPHS])
+        if self._picture.view is not View.ALONG:
+            middle = data.position[row][self._scenery.number]
+            along = self._projection.scale.along
+            rest[:, 0] = middle + along * (rest[:, 0] - middle)
+            moved[:, 0] *= along
+        self.bodies.set_segments(seen(rest, moved, eye)[parts[PANTOGRAPHS].cells])
+        arrows = []
+        tops = seen(*beside[FORCES], eye)
+        for force, at, text in zip(data.force[row].tolist(), tops, self.values, strict=True):
+            arrow = self._arrow(max(force, 0.0)) + at
+            arrows.append(arrow)
+            text.set_text(f"{force:.0f} N")
+            beyond = 0.012 * np.ptp(self._axes.get_xlim())
+            text.set_position((at[0] + beyond, arrow[..., 1].max()))
+        self._arrows.set_segments(np.concatenate(arrows))
+
+    def _arrow(self, force: float) -> np.ndarray:
+        """Stem and tip of the arrow of a force, (3, 2, 2); from above a cross."""
+        if self._picture.view is View.PLAN:
+            half = 0.6 * float(force > 0.0)
+            return half * np.array([[[-1, -1], [1, 1]], [[-1, 1], [1, -1]], [[0, 0], [0, 0]]])
+        size = self._projection.scale.size
+        length = _ARROW * size * room_above(self._scenery.data) * force
+        back, beside = 0.25 * length, 0.12 * length
+        tip = [0.0, length]
+        return np.array(
+            [[[0.0, 0.0], tip], [[-beside, length - back], tip], [[beside, length - back], tip]]
+        )
+
+    def pixels(self) -> np.ndarray:
+        """The picture as it stands, (height, width, 4) uint8, valid until the next one."""
+        with _styled():
+            if self._ground is None:
+                _add_legend(self.chart)
+                self._canvas.draw()
+                self._ground = self._canvas.copy_from_bbox(self.figure.bbox)
+            self._canvas.restore_region(self._ground)
+            renderer = self._canvas.get_renderer()
+            for artist in self.moving:
+                artist.draw(renderer)
+        return np.asarray(self._canvas.buffer_rgba())
+
+
+def ramp(stops: tuple[str, ...]) -> LinearSegmentedColormap:
+    """A scale of colours through some."""
+    return LinearSegmentedColormap.from_list("ramp", stops)
+
+
+def _add_legend(axes: Axes) -> None:
+    axes.legend(
+        loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=4, frameon=False, borderaxespad=0.1
+    )
+
+
+def _seen_parts(scenery: Scenery, view: View) -> list[tuple]:
+    """Kind, cells, points and motion of the parts of the line that a view shows.
+
+    From the side an arm is a dot before its mast; from above a mast is a line across the track.
+    """
+    found = []
+    for part in scenery.line.values():
+        cells, rest, nodes = part.cells, part.rest, part
+        if part.kind == ARMS and view is View.SIDE:
+            continue
+        if part.kind == MASTS and view is View.PLAN:
+            rest = rest.copy()
+            rest[0::2, 1], rest[1::2, 1] = -_ACROSS, _ACROSS
+        found.append((part.kind, cells, rest, nodes))
+    return found

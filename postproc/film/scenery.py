@@ -1,0 +1,282 @@
+"""What films and ParaView draw of a run, and how it looks: the one description that feeds both.
+
+The line comes from the snapshots part by part. Beside it stand the pantographs, the forces at their
+heads, the train and the track. Points are places at rest, with how far they have moved from there,
+so that either can draw motions larger than heights.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from catenary.mbs.shape import BELOW_HEAD, BODY, HEAD, SPRING, Pose, Shape, schematic
+from catenary.meshgen.mesh import DROPPERS
+from catenary.postproc.film.film_data import FilmData
+from catenary.postproc.film.snapshots import Frame, Snapshots
+from catenary.postproc.film.wish import View
+from catenary.postproc.record.snapshots.blocks import ARMS, CLAMPS, FIXED, MASTS
+
+CONTACT, WIRE = "contact", "wire"
+PANTOGRAPHS, FORCES, TRAIN, TRACK = "pantographs", "forces", "train", "track"
+# Half the distance of the rails [m].
+_HALF_GAUGE = 0.75
+# Length of a coach and of the gap to the next one, how far the first one reaches ahead of the
+# first pantograph; half its width, and the height of its floor [m].
+COACH, GAP, AHEAD = 25.0, 0.6, 8.0
+_HALF_WIDTH, _FLOOR = 1.45, 1.0
+# Corners of the faces of a box, those in front behind the others from the right, above and ahead.
+_FACES = np.array(
+    [[2, 3, 7, 6], [0, 1, 3, 2], [0, 2, 6, 4], [1, 3, 7, 5], [4, 5, 7, 6], [0, 1, 5, 4]]
+)
+# Length of what is drawn of a force that is no pantograph's, and half its width [m].
+_STEM, _HALF_STROKE = 0.5, 0.25
+# A view from the right and above shows wires that lie so far apart sideways [m].
+_APART = 0.05
+
+
+class Look(NamedTuple):
+    """Thickness of lines, of the usual one, and colour; None where a motion or a force gives it."""
+
+    thick: float
+    colour: str | None
+
+
+LOOKS = {
+    CONTACT: Look(1.2, None),
+    WIRE: Look(0.8, None),
+    DROPPERS: Look(0.6, None),
+    CLAMPS: Look(0.6, "#6b7078"),
+    ARMS: Look(0.8, "#8c9198"),
+    MASTS: Look(2.0, "#b8bcc2"),
+    TRACK: Look(0.8, "#6b7078"),
+    TRAIN: Look(0.2, "#d9dde2"),
+}
+# Thickness of the lines of a pantograph by their kind, and its colour by its order.
+THICK = {SPRING: 0.5, BODY: 1.0, HEAD: 1.7}
+COLOURS = ("#b2182b", "#2166ac", "#1b7837", "#762a83")
+# From the smallest to the largest motion, and from no force of a dropper to the largest one: both
+# grow darker or lighter all the way, also to eyes that see no red or no green.
+MOTIONS = ("#440154", "#472d7b", "#3b528b", "#2c728e", "#21918c", "#28ae80", "#5ec962", "#a8d327")
+DROPPER_FORCES = ("#d9c29a", "#c08f4f", "#8c5a23", "#4a2c0f")
+SLACK, UNKNOWN = "#d6006c", "#8c9198"
+
+
+class Stroke:
+    """What is drawn where an excitation acts: a stem up to the wire, with a plate on it."""
+
+    cells = np.array([[0, 1], [2, 3], [4, 5]])
+    kinds = np.array([BODY, HEAD, HEAD])
+    below = BELOW_HEAD
+    schematic = False
+
+    def pose(self, places: np.ndarray, base: float, head: float, wire: float) -> Pose:
+        """Where the points are: under the wire at rest, as what strikes is not simulated."""
+        points = np.zeros((6, 3))
+        points[0, 2] = -_STEM
+        points[[2, 3], 0] = points[[4, 5], 1] = -_HALF_STROKE, _HALF_STROKE
+        points[:, 2] += wire
+        return Pose(points, points.copy())
+
+
+@dataclass(frozen=True)
+class LinePart:
+    """A part of the line.
+
+    Attributes
+    ----------
+    kind : key of ``LOOKS``
+    cells : (m, 2) points of its lines
+    rest : (n, 3) its points [m]
+    nodes : (n,) nodes of the line that they move with, ``FIXED`` for one that stays
+    """
+
+    kind: str
+    cells: np.ndarray
+    rest: np.ndarray
+    nodes: np.ndarray
+
+    def moved(self, nodes: np.ndarray) -> np.ndarray:
+        """How far its points have moved, from how far the line's nodes have, (n, 3) [m]."""
+        return np.where((self.nodes == FIXED)[:, None], 0.0, nodes[self.nodes])
+
+
+@dataclass(frozen=True)
+class Part:
+    """A part beside the line.
+
+    Attributes
+    ----------
+    cells : (m, k) points of its dots, lines or faces, k = 1, 2, 4
+    fields : of its cells by name, (m,) each
+    moves : whether it is elsewhere at each time
+    """
+
+    cells: np.ndarray
+    fields: dict[str, np.ndarray] = field(default_factory=dict)
+    moves: bool = True
+
+
+class Places(NamedTuple):
+    """Points of a part at a time, (n, 3) [m]: at rest, and how far they have moved from there."""
+
+    rest: np.ndarray
+    moved: np.ndarray
+
+
+class Scenery:
+    """A run as parts that can be drawn. Not collective.
+
+    Attributes
+    ----------
+    data : of the run
+    line : parts of the line by name
+    parts : what stands beside it, by name; no train where an excitation stands for it
+    shapes : of the pantographs
+    roof : height of the roofs that they stand on [m]
+    number : pantograph of each point of ``parts["pantographs"]``
+
+    Parameters
+    ----------
+    snapshots : of the line
+    shapes : of the pantographs, None for schematics
+    """
+
+    def __init__(
+        self, data: FilmData, snapshots: Snapshots, shapes: Sequence[Shape] | None = None
+    ) -> None:
+        self.data = data
+        self.line = {name: _line_part(name, data, snapshots) for name in snapshots.parts}
+        contact = float(np.median(data.points[data.wires[data.contact], 2]))
+        known = snapshots.n_pantographs == data.n_pantographs
+        if data.excitation is not None:
+            shapes = [Stroke()]
+        elif shapes is None or len(shapes) != data.n_pantographs or not known:
+            shapes = [schematic()] * data.n_pantographs
+        self._known = known and data.excitation is None
+        self.shapes = list(shapes)
+        self.roof = contact - max(one.below for one in self.shapes)
+        sizes = [1 + int(shape.cells.max()) for shape in self.shapes]
+        self.number = np.repeat(np.arange(len(sizes)), sizes)
+        starts = np.cumsum([0, *sizes])
+        cells = [one.cells + begin for one, begin in zip(self.shapes, starts, strict=False)]
+        fields = {
+            "number": np.repeat(np.arange(len(sizes)), [len(one.cells) for one in self.shapes]),
+            "kind": np.concatenate([one.kinds for one in self.shapes]),
+        }
+        self.parts = {
+            PANTOGRAPHS: Part(np.concatenate(cells), fields),
+            FORCES: Part(np.arange(data.n_pantographs)[:, None]),
+            TRACK: Part(np.array([[0, 1], [2, 3]]), moves=False),
+        }
+        if data.excitation is None:
+            n = len(coaches(data.position[0]))
+            faces = np.concatenate([8 * k + _FACES for k in range(n)])
+            self.parts[TRAIN] = Part(faces, {"face": np.tile(np.arange(len(_FACES)), n)})
+
+    @property
+    def track(self) -> np.ndarray:
+        """Points (4, 3) of the rails, from end to end of the line [m]."""
+        ends = self.data.points[:, 0].min(), self.data.points[:, 0].max()
+        return np.array([[x, side, 0.0] for side in (-_HALF_GAUGE, _HALF_GAUGE) for x in ends])
+
+    @property
+    def best_view(self) -> View:
+        """From the right and above where wires lie beside each other, from the side otherwise."""
+        if len(self.data.contacts) > 1 or float(np.ptp(self.data.points[:, 1])) > _APART:
+            return View.OBLIQUE
+        return View.SIDE
+
+    def beside(self, time: float, frame: Frame) -> dict[str, Places]:
+        """Where the parts beside the line are at a time [s].
+
+        A head that presses on a wire is drawn where the wire is, which is drawn between its nodes;
+        the arms below it give way in proportion.
+
+        Parameters
+        ----------
+        frame : the line at that time
+        """
+        data, row = self.data, self.data.row_at(time)
+        position, height = data.position[row], data.rest_height(data.position[row])
+        touched = self._contacts(row, np.nan_to_num(frame.moved))
+        poses = []
+        for p, one in enumerate(self.shapes):
+            base, places = frame.places[p] if self._known else (0.0, np.zeros(0))
+            head, wire = float(data.head_height[row, p]), float(height[p])
+            pose = one.pose(places, base, head, wire)
+            more = float(touched.rest[p, 2] + touched.moved[p, 2]) - head
+            share = np.clip(1.0 + (pose.rest[:, 2] - wire) / one.below, 0.0, 1.0)
+            pose.now[:, 2] += share * more
+            if one.schematic:  # it counts from the wire, and stands on the roof wherever that is
+                for points in pose:
+                    points[:, 2] += (1.0 - share) * (self.roof + one.below - wire)
+            poses.append(Pose(*(points + [position[p], 0.0, 0.0] for points in pose)))
+        rest, now = (np.concatenate(own) for own in zip(*poses, strict=True))
+        found = {
+            PANTOGRAPHS: Places(rest, now - rest),
+            FORCES: touched,
+            TRACK: Places(self.track, np.zeros((4, 3))),
+        }
+        if TRAIN in self.parts:
+            corners = _boxes(position, self.roof)
+            found[TRAIN] = Places(corners, np.zeros_like(corners))
+        return found
+
+    def _contacts(self, row: int, moved: np.ndarray) -> Places:
+        """Where the lowest wires above the heads rest, and how far they have moved, or how high the
+        heads are that touch none."""
+        data = self.data
+        rest, by = np.zeros((2, data.n_pantographs, 3))
+        for p, x in enumerate(data.position[row].tolist()):
+            above = []
+            for name in data.contacts_at(x):
+                nodes = data.wires[name]
+                own = data.points[nodes]
+                there = [np.interp(x, own[:, 0], column) for column in (*own.T, *moved[nodes].T)]
+                above.append((there[2] + there[5], there))
+            there = min(above)[1]
+            rest[p], by[p] = (x, *there[1:3]), (0.0, *there[4:6])
+            if not data.force[row, p] > 0.0:
+                by[p, 2] = data.head_height[row, p] - rest[p, 2]
+        return Places(rest, by)
+
+
+def _line_part(name: str, data: FilmData, snapshots: Snapshots) -> LinePart:
+    if name in data.wires:
+        kind = CONTACT if name in data.contacts else WIRE
+        return LinePart(kind, data.elements[name], data.points, np.arange(len(data.points)))
+    if name == DROPPERS:
+        nodes = data.droppers.ravel()
+        return LinePart(name, np.arange(nodes.size).reshape(-1, 2), data.points[nodes], nodes)
+    block = snapshots.block(name)
+    cells = np.arange(len(block.points)).reshape(-1, 2)
+    return LinePart(name, cells, block.points, block.nodes)
+
+
+def coaches(position: np.ndarray) -> np.ndarray:
+    """From and to of the coaches along the track, (n, 2) [m], as many as carry the pantographs.
+
+    Parameters
+    ----------
+    position : of the pantographs [m]
+    """
+    front = float(position.max()) + AHEAD
+    n = 1 + int((front - float(position.min())) // (COACH + GAP))
+    begin = front - (COACH + GAP) * np.arange(n)
+    return np.column_stack([begin - COACH, begin])
+
+
+def _boxes(position: np.ndarray, roof: float) -> np.ndarray:
+    """Corners of the coaches under a roof (8 n, 3) [m]."""
+    corners = [
+        [x, side * _HALF_WIDTH, z]
+        for begin, end in coaches(position)
+        for z in (_FLOOR, roof)
+        for side in (-1.0, 1.0)
+        for x in (begin, end)
+    ]
+    return np.array(corners)
