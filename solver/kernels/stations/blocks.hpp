@@ -3,6 +3,14 @@
 #include "stations/known_layouts.hpp"
 #include "stations/lanes.hpp"
 
+// A pragma that names AVX does not define its macro: C++ is read whole before pragmas take effect.
+#undef CATENARY_HAS_AVX
+#if defined(CATENARY_TARGET_HAS_AVX) || defined(__AVX__)
+#define CATENARY_HAS_AVX 1
+#else
+#define CATENARY_HAS_AVX 0
+#endif
+
 namespace catenary::CATENARY_TARGET {
 
 /// Masks of rows and factors and the numbers of their blocks, of one of the shipped lines.
@@ -130,7 +138,7 @@ struct Blocks : Masks {
     }
     CATENARY_INLINE static V crossed(V x) {
         V y = x;
-#if defined(__AVX__)
+#if CATENARY_HAS_AVX
         // GCC takes vpermpd, which takes AMD's processors twice as long: a chain waits for it.
         if constexpr (kVector == 4) asm("vperm2f128 $1, %1, %1, %0" : "=x"(y) : "x"(x));
 #else
@@ -139,7 +147,7 @@ struct Blocks : Masks {
         return y;
     }
     CATENARY_INLINE static V twice(const double* two) {
-#if defined(__AVX__)
+#if CATENARY_HAS_AVX
         return __builtin_ia32_vbroadcastf128_pd256(reinterpret_cast<const Vector<2>*>(two));
 #else
         const auto found = read<2, 2>(two);
