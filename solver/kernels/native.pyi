@@ -169,10 +169,16 @@ class Layout:
     """How the unknowns of a station stand in vectors, and which products blocks of such rows or
     factors need: those of a kernel that was compiled for them, if there is one of few more."""
 
-    def __init__(self, own: np.ndarray, beside: np.ndarray, damped: bool, sparse: bool) -> None: ...
+    def __init__(
+        self, own: np.ndarray, beside: np.ndarray, damped: bool, factors: bool
+    ) -> None: ...
     def places(self, which: str) -> np.ndarray:
         """Row and column of each number of a packed block (2, n), -1 where it is zero: of the
         station's ``own``, of those ``beside`` it, or of ``half`` of a symmetric own."""
+
+    @property
+    def is_sparse(self) -> bool:
+        """Whether factors keep S^-1 alone, and not -B^T S^-1 beside it."""
 
     @property
     def n_products(self) -> int:

@@ -19,7 +19,7 @@ namespace {
 
 using Joined = py::array_t<bool, py::array::c_style | py::array::forcecast>;
 
-Layout layout_of(const Joined& own, const Joined& beside, bool damped, bool sparse) {
+Layout layout_of(const Joined& own, const Joined& beside, bool damped, bool factors) {
     const py::ssize_t n = own.ndim() == 2 ? own.shape(0) : 0;
     for (const Joined& joined : {own, beside})
         if (joined.ndim() != 2 || joined.shape(0) != n || joined.shape(1) != n)
@@ -30,7 +30,7 @@ Layout layout_of(const Joined& own, const Joined& beside, bool damped, bool spar
     auto mask = [&pieces](const Joined& joined) {
         return mask_of(pieces, [&joined](int i, int j) { return joined.at(i, j); });
     };
-    return fitting({pieces.unknowns, mask(own), mask(beside), damped, sparse});
+    return fitting({pieces.unknowns, mask(own), mask(beside), damped, factors});
 }
 
 /// Row and column of each number of a packed block, (2, n), -1 where it is of none.
@@ -186,7 +186,7 @@ py::tuple eliminated(std::span<const int32_t> kinds, const StationBlocks& blocks
     Eliminated found = eliminate(kinds, blocks, from_end);
     const auto m = static_cast<py::ssize_t>(found.kinds.size()), b = blocks.own.rows;
     const auto n = static_cast<py::ssize_t>(found.numbers.size());
-    return py::make_tuple(given_away(std::move(found.factors), {m, 3, b, b}),
+    return py::make_tuple(given_away(std::move(found.factors), {m, 2, b, b}),
                           given_away(std::move(found.kinds), {m}),
                           given_away(std::move(found.numbers), {n}));
 }
@@ -205,8 +205,9 @@ void offer_stations(py::module_& m) {
     m.def("are_compiled", &are_compiled, py::arg("rows"), py::arg("factors"));
     py::class_<Layout>(m, "Layout")
         .def(py::init(&layout_of), py::arg("own"), py::arg("beside"), py::arg("damped"),
-             py::arg("sparse"))
+             py::arg("factors"))
         .def("places", &places, py::arg("which"))
+        .def_property_readonly("is_sparse", &Layout::is_sparse)
         .def_property_readonly("n_products", [](const Layout& layout) { return layout.of_row(); })
         .def_property_readonly("n_vectors",
                                [](const Layout& layout) { return layout.pieces().n(); })

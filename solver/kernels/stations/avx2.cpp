@@ -3,5 +3,6 @@
 #ifdef CATENARY_AVX2
 #pragma GCC target("arch=x86-64-v3")
 #define CATENARY_TARGET avx2
+#define CATENARY_TARGET_HAS_AVX
 #include "stations/target.hpp"
 #endif

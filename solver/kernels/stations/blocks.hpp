@@ -3,6 +3,14 @@
 #include "stations/known_layouts.hpp"
 #include "stations/lanes.hpp"
 
+// A pragma that names AVX does not define its macro: C++ is read whole before pragmas take effect.
+#undef CATENARY_HAS_AVX
+#if defined(CATENARY_TARGET_HAS_AVX) || defined(__AVX__)
+#define CATENARY_HAS_AVX 1
+#else
+#define CATENARY_HAS_AVX 0
+#endif
+
 namespace catenary::CATENARY_TARGET {
 
 /// Masks of rows and factors and the numbers of their blocks, of one of the shipped lines.
@@ -11,10 +19,10 @@ struct KnownMasks {
     static constexpr bool is_known = true;
     static constexpr Layout r = kShipped[K].rows, f = kShipped[K].factors;
     static constexpr int pitch = r.unknowns;
-    static constexpr bool is_damped = r.is_damped, is_sparse = f.is_sparse;
+    static constexpr bool is_damped = r.is_damped, is_sparse = f.is_sparse();
     static constexpr Mask row_own = r.own, row_beside = r.beside, whole = f.own, beside = f.beside;
     static constexpr int own_size = r.size_of(row_own), row_beside_size = r.size_of(row_beside),
-                         whole_size = f.size_of(whole), beside_size = f.size_of(beside);
+                         half_size = f.size_of(upper(whole)), beside_size = f.size_of(beside);
 
     KnownMasks(const Layout&, const Layout&) {}
 };
@@ -26,19 +34,19 @@ struct GivenMasks {
     int pitch;
     bool is_damped, is_sparse;
     Mask row_own, row_beside, whole, beside;
-    int own_size, row_beside_size, whole_size, beside_size;
+    int own_size, row_beside_size, half_size, beside_size;
 
     GivenMasks(const Layout& r, const Layout& f)
         : pitch(r.unknowns),
           is_damped(r.is_damped),
-          is_sparse(f.is_sparse),
+          is_sparse(f.is_sparse()),
           row_own(r.own),
           row_beside(r.beside),
           whole(f.own),
           beside(f.beside),
           own_size(r.size_of(row_own)),
           row_beside_size(r.size_of(row_beside)),
-          whole_size(f.size_of(whole)),
+          half_size(f.size_of(upper(whole))),
           beside_size(f.size_of(beside)) {}
 };
 
@@ -57,6 +65,8 @@ struct Blocks : Masks {
     static constexpr int kN = kPieces.n(), kVector = kPieces.vector();
     static constexpr int kInLast = W - (kN - 1) * kVector;
     static constexpr bool kHalf = kInLast < kVector;
+    /// Whether a chain waits for its products, and not the processor for their numbers.
+    static constexpr bool kNarrow = kN == 1;
     using V = Vector<kVector>;
     using X = Lanes<kN, kVector>;
 
@@ -114,12 +124,25 @@ struct Blocks : Masks {
     CATENARY_INLINE void add_whole(Sums<X>& sums, const double* numbers, const X& x) const {
         add(sums, numbers, this->whole, x);
     }
-    /// S^-1 times x: of this symmetric block one half is stored if factors are sparse.
+    /// The transpose of a block that joins all of a plane, times x. Of one vector only.
+    CATENARY_INLINE void add_transposed(Sums<X>& sums, const double* numbers, const X& x) const {
+        const V here = x.piece[0];
+        V &one = sums.one.piece[0], &other = sums.other.piece[0];
+        with_kinds<0, 0>(this->whole[0][0], [&](int there) CATENARY_HOT {
+            if (there & 1) one += next(numbers) * here;
+            if (there & 2) other += turned(next(numbers)) * here;
+            if constexpr (has_crossed(0, 0)) {
+                if (there & 4) one += crossed(next(numbers)) * crossed(here);
+                if (there & 8) other += turned(crossed(next(numbers))) * crossed(here);
+            }
+        });
+    }
+    /// S^-1 times x: of this symmetric block each square above the diagonal counts for two.
     CATENARY_INLINE void add_inverse(Sums<X>& sums, const double* numbers, const X& x) const {
-        if (this->is_sparse)
-            add_symmetric(sums, numbers, x);
+        if constexpr (Masks::is_known || kN <= kInPlace)
+            add_symmetric_here(sums, numbers, this->whole, x);
         else
-            add_whole(sums, numbers, x);
+            add_symmetric_apart(sums, numbers, this->whole, x);
     }
 
   private:
@@ -130,7 +153,7 @@ struct Blocks : Masks {
     }
     CATENARY_INLINE static V crossed(V x) {
         V y = x;
-#if defined(__AVX__)
+#if CATENARY_HAS_AVX
         // GCC takes vpermpd, which takes AMD's processors twice as long: a chain waits for it.
         if constexpr (kVector == 4) asm("vperm2f128 $1, %1, %1, %0" : "=x"(y) : "x"(x));
 #else
@@ -139,7 +162,7 @@ struct Blocks : Masks {
         return y;
     }
     CATENARY_INLINE static V twice(const double* two) {
-#if defined(__AVX__)
+#if CATENARY_HAS_AVX
         return __builtin_ia32_vbroadcastf128_pd256(reinterpret_cast<const Vector<2>*>(two));
 #else
         const auto found = read<2, 2>(two);
@@ -195,13 +218,6 @@ struct Blocks : Masks {
             if (!kinds) return;
         }
         function(kinds);
-    }
-    /// Add a symmetric block times x: each square above the diagonal counts for two.
-    CATENARY_INLINE void add_symmetric(Sums<X>& sums, const double* numbers, const X& x) const {
-        if constexpr (Masks::is_known || kN <= kInPlace)
-            add_symmetric_here(sums, numbers, this->whole, x);
-        else
-            add_symmetric_apart(sums, numbers, this->whole, x);
     }
     __attribute__((noinline)) static void add_symmetric_apart(Sums<X>& sums, const double* numbers,
                                                               const Mask& mask, const X& x) {

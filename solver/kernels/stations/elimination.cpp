@@ -18,8 +18,8 @@ namespace catenary {
 
 namespace {
 
-/// Parts of a factor: S^-1, -S^-1 B, and the transpose of the second of the station before.
-enum Part { kInverse, kCarried, kTurned, kParts };
+/// Parts of a factor: S^-1 and -S^-1 B.
+enum Part { kInverse, kCarried, kParts };
 
 /// Factors that there is room for at first.
 constexpr int64_t kRoom = 1024;
@@ -35,10 +35,10 @@ void copy(Given from, Matrix to) {
     std::copy(from.all().begin(), from.all().end(), to.all().begin());
 }
 
-/// Add to `pivot` what elimination of a station beside it leaves there, the product of the `block`
-/// that joins both and of what the other has `carried`, and keep that `turned`.
+/// Add to `pivot` what elimination of a station beside it leaves there: the product of the `block`
+/// that joins both and of what the other has `carried`.
 CATENARY_FOR_TARGETS
-void condense(Given block, Given carried, Matrix pivot, Matrix turned, std::span<double> row) {
+void condense(Given block, Given carried, Matrix pivot, std::span<double> row) {
     const int64_t n = pivot.rows;
     double* const total = row.data();
     for (int64_t i = 0; i < n; ++i) {
@@ -50,7 +50,6 @@ void condense(Given block, Given carried, Matrix pivot, Matrix turned, std::span
         }
         double* const into = pivot.data + i * n;
         for (int64_t j = 0; j < n; ++j) into[j] += total[j];
-        for (int64_t j = 0; j < n; ++j) turned.data[i * n + j] = carried.data[j * n + i];
     }
 }
 
@@ -116,11 +115,10 @@ class Known {
         numbers_.resize(std::max(numbers_.size(), (count + 1) * each()));
         const Matrix pivot = part(count, kInverse);
         copy(blocks.own[kind], pivot);
-        if (last >= 0)
-            condense(before[kind], read(part(last, kCarried)), pivot, part(count, kTurned), row_);
+        if (last >= 0) condense(before[kind], read(part(last, kCarried)), pivot, row_);
         invert_pivot(pivot);
         carry(read(pivot), onward[kind], part(count, kCarried));
-        const size_t compared = (last >= 0 ? kParts : kTurned) * width_ * width_;
+        const size_t compared = kParts * width_ * width_;
         const double* const own = pivot.data;
         for (int32_t other = latest_[kind]; other >= 0; other = alike_[other])
             if (std::equal(own, own + compared, part(other, kInverse).data)) return other;
@@ -166,11 +164,9 @@ void join(std::span<const Meeting> meetings, const StationBlocks& blocks,
         const Matrix pivot = factor[kInverse];
         copy(blocks.own[meeting.kind], pivot);
         if (meeting.before >= 0)
-            condense(blocks.before[meeting.kind], before[meeting.before][kCarried], pivot,
-                     factor[kTurned], row);
+            condense(blocks.before[meeting.kind], before[meeting.before][kCarried], pivot, row);
         if (meeting.after >= 0)
-            condense(blocks.after[meeting.kind], after[meeting.after][kCarried], pivot,
-                     factor[kCarried], row);
+            condense(blocks.after[meeting.kind], after[meeting.after][kCarried], pivot, row);
         invert_pivot(pivot);
     }
 }

@@ -16,7 +16,7 @@ struct StationBlocks {
 
 /// Stations after elimination from one end.
 struct Eliminated {
-    std::vector<double> factors;   ///< (m, 3, b, b), see elimination.py
+    std::vector<double> factors;   ///< (m, 2, b, b), see elimination.py
     std::vector<int32_t> kinds;    ///< (m,) kind of station that each factor is of
     std::vector<int32_t> numbers;  ///< (n,) the factor of each station
 };
@@ -30,7 +30,8 @@ struct Meeting {
     int64_t kind, before, after;
 };
 
-/// Fill in factors (m, 3, b, b) of meetings, whose neighbours have those `before` and `after`.
+/// Fill in S^-1 of the factors (m, 2, b, b) of meetings, whose neighbours have those `before` and
+/// `after`.
 void join(std::span<const Meeting> meetings, const StationBlocks& blocks,
           Array4<const double> before, Array4<const double> after, Array4<double> factors);
 

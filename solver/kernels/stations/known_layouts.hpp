@@ -26,7 +26,7 @@ struct Shipped {
 /// Rows that join within a station unknowns whose places differ by one of these numbers, in the
 /// sense of exclusive or: 1 a beam's deflection and slope, 2 the deflections of two wires. Unknowns
 /// of one wire are joined from station to station. Factors join all of a plane of so many unknowns.
-constexpr Shipped shipped(int unknowns, std::initializer_list<int> differences, bool is_sparse,
+constexpr Shipped shipped(int unknowns, std::initializer_list<int> differences,
                           int plane = kMostUnknowns, bool is_damped = false,
                           const Wires& wires = kPairs) {
     const Pieces pieces{unknowns};
@@ -39,7 +39,7 @@ constexpr Shipped shipped(int unknowns, std::initializer_list<int> differences, 
     });
     const Mask whole = mask_of(pieces, [&](int i, int j) { return i / plane == j / plane; });
     return {{unknowns, own, beside, is_damped, false},
-            {unknowns, whole, is_sparse ? beside : Mask{}, false, is_sparse},
+            {unknowns, whole, beside, false, true},
             false,
             !is_damped};
 }
@@ -49,66 +49,54 @@ constexpr Shipped mixed(Shipped of) {
 }
 /// The same stations by M, which joins a wire's own deflections and slopes only.
 constexpr Shipped by_mass(Shipped of) {
-    of.rows = shipped(of.rows.unknowns, {0, 1}, true).rows;
+    of.rows = shipped(of.rows.unknowns, {0, 1}).rows;
     return of;
 }
 constexpr Shipped kTensioned = [] {
-    Shipped of = shipped(10, {}, true, kMostUnknowns, true, kStretching);
+    Shipped of = shipped(10, {}, kMostUnknowns, true, kStretching);
     of.rows.own = of.factors.own;
     return of;
 }();
 
 /// Stations of which everything joins everything, plane by plane.
-constexpr Shipped dense(int unknowns, bool is_sparse, int plane = kMostUnknowns) {
+constexpr Shipped dense(int unknowns, int plane = kMostUnknowns) {
     Wires planes{};
     for (int u = 0; u < kMostUnknowns; ++u) planes[u] = static_cast<int8_t>(u / plane);
-    Shipped of = shipped(unknowns, {}, is_sparse, plane, false, planes);
+    Shipped of = shipped(unknowns, {}, plane, false, planes);
     of.rows.own = of.factors.own;
     of.is_for_scenes = false;
     return of;
 }
 
 constexpr Shipped kShipped[] = {
-    shipped(2, {0, 1}, false),                   // one wire
-    shipped(4, {0, 1}, false, 2),                // in two planes
-    mixed(shipped(4, {0, 1, 2}, false)),         // two wires with droppers
-    shipped(4, {0, 1, 2}, true),                 // the same where no two spans are alike
-    mixed(shipped(8, {0, 1, 2}, false, 4)),      // two such lines side by side, in an overlap
-    shipped(8, {0, 1, 2}, true, 4),              // two wires in two planes
-    shipped(6, {0, 1, 2, 6}, false),             // compound
-    shipped(6, {0, 1, 2, 6}, true),              //
-    shipped(6, {0, 1, 4, 6}, false),             // twin, with relative motion
-    mixed(shipped(4, {0, 1}, false)),            // stitched, by M: two wires
-    mixed(shipped(4, {0, 1}, true)),             //
-    mixed(shipped(6, {0, 1}, false)),            // and three
-    mixed(shipped(6, {0, 1}, true)),             //
-    mixed(shipped(8, {0, 1}, true)),             // two wires in planes that arms join, by M
-    shipped(8, {0, 1, 2, 4, 6}, true, 8, true),  // in wind
-    shipped(12, {0, 1}, true),                   // three wires in planes that arms join, by M
-    shipped(16, {0, 1}, true),                   // an overlap of such lines of two wires
+    shipped(2, {0, 1}),                    // one wire
+    shipped(4, {0, 1}, 2),                 // in two planes
+    mixed(shipped(4, {0, 1, 2})),          // two wires with droppers
+    mixed(shipped(8, {0, 1, 2}, 4)),       // two such lines side by side, or in two planes
+    shipped(6, {0, 1, 2, 6}),              // compound
+    shipped(6, {0, 1, 4, 6}),              // twin, with relative motion
+    mixed(shipped(4, {0, 1})),             // stitched, by M: two wires
+    mixed(shipped(6, {0, 1})),             // and three
+    mixed(shipped(8, {0, 1})),             // two wires in planes that arms join, by M
+    shipped(8, {0, 1, 2, 4, 6}, 8, true),  // in wind
+    shipped(12, {0, 1}),                   // three wires in planes that arms join, by M
+    shipped(16, {0, 1}),                   // an overlap of such lines of two wires
     // Lines whose wires and droppers are damped each in its own way.
-    shipped(2, {0, 1}, false, 2, true),
-    shipped(4, {0, 1, 2}, false, 4, true),
-    shipped(4, {0, 1, 2, 3}, false, 4, true),  // and that go on behind an end
-    shipped(4, {0, 1, 2}, true, 4, true),
-    shipped(6, {0, 1, 2, 6}, false, 6, true),
+    shipped(2, {0, 1}, 2, true),
+    shipped(4, {0, 1, 2}, 4, true),
+    shipped(4, {0, 1, 2, 3}, 4, true),  // and that go on behind an end
+    shipped(6, {0, 1, 2, 6}, 6, true),
     // Two wires that stretch, in their plane and in three.
-    by_mass(shipped(6, {}, true, 6, false, kStretching)),
+    by_mass(shipped(6, {}, 6, false, kStretching)),
     by_mass(kTensioned),
     kTensioned,
     // Any lines of these widths.
-    dense(4, false),
-    dense(4, true),
-    dense(8, false, 4),
-    dense(8, true, 4),
-    dense(6, false),
-    dense(6, true),
-    dense(8, false),
-    dense(8, true),
-    dense(10, false),
-    dense(10, true),
-    dense(12, false),
-    dense(12, true),
+    dense(4),
+    dense(8, 4),
+    dense(6),
+    dense(8),
+    dense(10),
+    dense(12),
 };
 
 /// The layout of the least products among those that kernels were compiled for which has all of a

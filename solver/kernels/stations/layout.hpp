@@ -105,19 +105,24 @@ constexpr bool holds(const Mask& mask, const Mask& other) {
 /// Which unknowns of a station the blocks of rows, or of factors, join. See `station_layout.py`.
 struct Layout {
     int unknowns = 0;
-    Mask own{};     ///< of a row's diagonal block; of factors S^-1, and S^-1 B unless sparse
-    Mask beside{};  ///< of the matrix's blocks between stations
-    bool is_damped = false;  ///< whether rows hold -C as well as K
-    bool is_sparse = false;  ///< whether factors keep the matrix's own blocks, and half of S^-1
+    Mask own{};               ///< of a row's diagonal block; of factors S^-1 and -B^T S^-1
+    Mask beside{};            ///< of the matrix's blocks between stations
+    bool is_damped = false;   ///< whether rows hold -C as well as K
+    bool is_factors = false;  ///< whether of factors, which keep half of S^-1
 
     constexpr bool operator==(const Layout&) const = default;
 
     constexpr Pieces pieces() const { return {unknowns}; }
+    /// Whether the pass forth reads less if it multiplies with S^-1 and the matrix's own B than
+    /// with -B^T S^-1, which is kept then.
+    constexpr bool is_sparse() const {
+        return is_factors && n_products(upper(own)) + n_products(beside) <= n_products(own);
+    }
     /// Numbers of a packed block.
     constexpr int size_of(const Mask& mask) const { return n_products(mask) * pieces().vector(); }
     constexpr bool holds(const Layout& other) const {
         return unknowns == other.unknowns && is_damped == other.is_damped &&
-               is_sparse == other.is_sparse && catenary::holds(own, other.own) &&
+               is_factors == other.is_factors && catenary::holds(own, other.own) &&
                catenary::holds(beside, other.beside);
     }
     /// Products that a row of such blocks makes.

@@ -116,33 +116,39 @@ struct Chained {
     CATENARY_INLINE void add_behind(Sums<X>& sums, int64_t i, int step, const X& behind) const {
         blocks.add_beside(sums, kept(joined.at(i)) + (step > 0 ? 0 : blocks.beside_size), behind);
     }
-    /// Leave in `answer` what the right-hand side is after the stations outwards are eliminated;
-    /// what the one inwards takes of it.
-    CATENARY_INLINE X eliminate(int64_t i, int step, Sums<X> sums, const X& outward) const {
-        double* at = answer + i * blocks.pitch;
-        if (blocks.is_sparse)
+    /// Leave in `answer` what is left of a right-hand side after the stations outwards are
+    /// eliminated. What is given on to the station inwards is S^-1 times that at the end of a chain
+    /// and where factors are sparse, else what is left itself.
+    CATENARY_INLINE X eliminate(int64_t i, int step, Sums<X> sums, const X& outward,
+                                bool is_first) const {
+        if (blocks.is_sparse || is_first)
             add_behind(sums, i, step, outward);
         else
-            blocks.add_whole(sums, kept(inverse.at(i)) + 2 * blocks.whole_size, outward);
+            blocks.add_whole(sums, kept(inverse.at(i - step)) + blocks.half_size, outward);
         const X left = blocks.total_of(sums);
-        blocks.store(at, left);
+        blocks.store(answer + i * blocks.pitch, left);
         return blocks.is_sparse ? divided(i, left) : left;
+    }
+    CATENARY_INLINE X at_end(const Chain& chain, int step, const X& given_on) const {
+        if (blocks.is_sparse || chain.n == 0) return given_on;
+        return divided(chain.first + step * (chain.n - 1), given_on);
     }
     /// Unknowns from those of the station inwards, from which the chain comes.
     template <class T>
     CATENARY_INLINE X solved(int64_t i, int step, const X& inward, T then) const {
         double* at = answer + i * blocks.pitch;
         X own;
-        if (blocks.is_sparse) {
+        if (Blocks::kNarrow && !blocks.is_sparse) {
+            const double* numbers = kept(inverse.at(i));
+            Sums<X> sums = no_sums<X>();
+            blocks.add_inverse(sums, numbers, blocks.load(at));
+            if constexpr (Blocks::kNarrow)
+                blocks.add_transposed(sums, numbers + blocks.half_size, inward);
+            own = blocks.total_of(sums);
+        } else {
             Sums<X> sums = sums_from(blocks.load_once(at));
             add_behind(sums, i, step, inward);
             own = divided(i, blocks.total_of(sums));
-        } else {
-            const double* numbers = kept(inverse.at(i));
-            Sums<X> sums = no_sums<X>();
-            blocks.add_whole(sums, numbers, blocks.load(at));
-            blocks.add_whole(sums, numbers + blocks.whole_size, inward);
-            own = blocks.total_of(sums);
         }
         if (then == Then::kStore)
             blocks.store(at, own);
@@ -150,15 +156,12 @@ struct Chained {
             go_on(i, own, then);
         return own;
     }
-    /// Unknowns of the station where both chains meet, from what is left of it and of the one
-    /// after.
+    /// Unknowns of the station where both chains meet, from what is left of it and what the chain
+    /// from the end gives on.
     CATENARY_INLINE X met(int64_t middle, const X& after) const {
         double* at = answer + middle * blocks.pitch;
         Sums<X> sums = sums_from(blocks.load_once(at));
-        if (blocks.is_sparse)
-            blocks.add_beside(sums, joined.at(middle) + blocks.beside_size, after);
-        else
-            blocks.add_whole(sums, inverse.at(middle) + blocks.whole_size, after);
+        blocks.add_beside(sums, joined.at(middle) + blocks.beside_size, after);
         const X own = divided(middle, blocks.total_of(sums));
         blocks.store(at, own);
         return own;
@@ -202,18 +205,18 @@ void go_forth(const Blocks& blocks, const Work& work, Chain& chain, int step, Gi
     int64_t i = chain.first;
     if (is_given) {
         for (int64_t k = 0; k < chain.n; ++k, i += step)
-            x = one.eliminate(i, step, one.right(i), x);
+            x = one.eliminate(i, step, one.right(i), x, k == 0);
     } else {
         auto before = one.outwards(chain, step), here = one.state(one.place(i));
         const auto last = one.inwards(chain, step);
         for (int64_t k = 1; k <= chain.n; ++k, i += step) {
             const auto after = one.state(k == chain.n ? last : one.place(i + step));
-            x = one.eliminate(i, step, one.row(i, step, before, here, after), x);
+            x = one.eliminate(i, step, one.row(i, step, before, here, after), x, k == 1);
             before = here;
             here = after;
         }
     }
-    blocks.store(chain.beside->unknowns, x);
+    blocks.store(chain.beside->unknowns, one.at_end(chain, step, x));
 }
 
 /// The same through two chains of equal length, side by side.
@@ -227,8 +230,8 @@ void go_forth(const Blocks& blocks, const Work& work, Chain& from_start, Chain& 
     const int64_t n = from_start.n;
     if (is_given) {
         for (int64_t k = 0; k < n; ++k, ++i, --j) {
-            x = one.eliminate(i, 1, one.right(i), x);
-            y = other.eliminate(j, -1, other.right(j), y);
+            x = one.eliminate(i, 1, one.right(i), x, k == 0);
+            y = other.eliminate(j, -1, other.right(j), y, k == 0);
         }
     } else {
         auto before = one.outwards(from_start, 1), here = one.state(one.place(i));
@@ -237,13 +240,13 @@ void go_forth(const Blocks& blocks, const Work& work, Chain& from_start, Chain& 
         for (int64_t k = 1; k <= n; ++k, ++i, --j) {
             const auto after = one.state(k == n ? last : one.place(i + 1));
             const auto ahead = other.state(k == n ? first : other.place(j - 1));
-            x = one.eliminate(i, 1, one.row(i, 1, before, here, after), x);
-            y = other.eliminate(j, -1, other.row(j, -1, beyond, there, ahead), y);
+            x = one.eliminate(i, 1, one.row(i, 1, before, here, after), x, k == 1);
+            y = other.eliminate(j, -1, other.row(j, -1, beyond, there, ahead), y, k == 1);
             before = here, here = after, beyond = there, there = ahead;
         }
     }
-    blocks.store(from_start.beside->unknowns, x);
-    blocks.store(from_end.beside->unknowns, y);
+    blocks.store(from_start.beside->unknowns, one.at_end(from_start, 1, x));
+    blocks.store(from_end.beside->unknowns, other.at_end(from_end, -1, y));
 }
 
 /// The pass back through one chain.

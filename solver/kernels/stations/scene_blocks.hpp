@@ -42,6 +42,7 @@ template <int K, int L>
 struct SceneBlocks : KnownMasks<K> {
     using Of = KnownMasks<K>;
     static constexpr int W = Of::r.unknowns, pitch = W * L;
+    static constexpr bool kNarrow = false;
     using V = Vector<L>;
     using X = Lanes<W, L>;
 
@@ -71,10 +72,7 @@ struct SceneBlocks : KnownMasks<K> {
         add<kWhole>(sums, numbers, x);
     }
     CATENARY_INLINE static void add_inverse(Sums<X>& sums, const double* numbers, const X& x) {
-        if constexpr (Of::is_sparse)
-            add<kHalf, true>(sums, numbers, x);
-        else
-            add<kWhole>(sums, numbers, x);
+        add<kHalf, true>(sums, numbers, x);
     }
 
   private:
@@ -86,9 +84,9 @@ struct SceneBlocks : KnownMasks<K> {
     static constexpr Mask kHalfMask = upper(Of::whole);
     static constexpr auto kOwn = of<Of::own_size>(Of::row_own);
     static constexpr auto kRowBeside = of<Of::row_beside_size>(Of::row_beside);
-    static constexpr auto kWhole = of<Of::whole_size>(Of::whole);
+    static constexpr auto kWhole = of<Of::f.size_of(Of::whole)>(Of::whole);
     static constexpr auto kBeside = of<Of::beside_size>(Of::beside);
-    static constexpr auto kHalf = of<Of::f.size_of(kHalfMask)>(kHalfMask);
+    static constexpr auto kHalf = of<Of::half_size>(kHalfMask);
 
     template <const auto& List, bool IsSymmetric = false>
     CATENARY_INLINE static void add(Sums<X>& sums, const double* numbers, const X& x) {

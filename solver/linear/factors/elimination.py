@@ -28,8 +28,8 @@ class Eliminated(NamedTuple):
 
     Attributes
     ----------
-    factors : (m, 3, b, b) S^-1, -S^-1 B and the transpose of the second of the station before, of
-        each factor; S is the diagonal block after elimination, B joins it to the next station
+    factors : (m, 2, b, b) S^-1 and -S^-1 B of each factor; S is the diagonal block after
+        elimination, B joins it to the next station
     kinds : (m,) kind of station that each factor is of
     numbers : (n,) int32, the factor of each station
     """

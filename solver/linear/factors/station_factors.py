@@ -28,14 +28,6 @@ from catenary.solver.linear.stations.station_layout import Layout
 from catenary.solver.linear.stations.station_products import kinds_by_make_up, of_pairs
 from catenary.solver.linear.stations.station_rows import StationRows, rows_of
 
-# Bytes of factors from which on they keep the matrix's own blocks and half of what is symmetric:
-# more would leave no room for the state in a cache next to a processor, of 1 to 2 MB.
-LARGE = 2**19
-# Unknowns of a plane up to which stations are narrow.
-NARROW = 4
-# Where factors do not keep the matrix's own blocks.
-NO_BESIDES = np.zeros(0, dtype=np.int32), np.zeros(0)
-
 
 class FactorArrays(NamedTuple):
     """What kernels read of ``StationFactors``."""
@@ -57,12 +49,10 @@ class StationFactors:
     layout : Layout
     starts : (n + 1,) first unknown of each station, and how many unknowns there are
     kinds : (n,) of the stations, see ``kinds_by_make_up``
-    blocks : of each kind S^-1, -S^-1 B with its block B towards the middle, and the transpose of
-        the second of the station before it in elimination, which that multiplies with; packed by
-        the layout. S is a diagonal block after elimination. In the middle the second is for
-        elimination from the other end. Half of S^-1 alone if the layout is sparse
-    beside_kinds, besides : then the kinds of the matrix's own blocks between stations, and of each
-        kind those to the stations before and after it, negative; else empty
+    blocks : of each kind half of S^-1, with S the diagonal block after elimination, and, unless the
+        layout is sparse, -B^T S^-1, with B the block towards the middle; packed by the layout
+    beside_kinds, besides : kinds of the matrix's own blocks between stations, and of each kind
+        those to the stations before and after it, negative
     low : first station of a rank's own
     ends : (5,) int, read at each step: first station that a step solves for and the one after the
         last, first own one that it takes on and the one after the last, and where elimination ends
@@ -140,12 +130,14 @@ def station_factors(
     n = rows.kinds.size
     high = n if high is None else high
     stations = Sections.alike(n, layout.pitch) if stations is None else stations
-    rows, lacks = completed(rows, stations)
-    found = FoundFactors.of(rows, None if turns else (low + high) // 2)
-    packed = _packed(layout, stations, rows, lacks, found)
-    if packed is None:
+    rows = completed(rows, stations)
+    layout = layout_of_factors(layout, rows.blocks)
+    besides = besides_of(layout, stations, rows)
+    if besides is None:
         return None
-    layout, kinds, numbers, n_kinds, besides = packed
+    found = FoundFactors.of(rows, None if turns else (low + high) // 2)
+    make_up = stations.make_up[rows.chosen][found.kinds]
+    kinds, numbers, n_kinds = packed_factors(layout, make_up, found)
     of_station = kinds[found.numbers]
     if not turns:
         return StationFactors(layout, stations, of_station, numbers, low, high, n_kinds, besides)
@@ -158,97 +150,48 @@ def station_factors(
     )
 
 
-def layout_of_factors(
-    layout: Layout, stations: Sections, rows: StationRows, share: float
-) -> Layout | None:
-    """The layout that suits factors of a matrix by rows, for any middle.
+def layout_of_factors(layout: Layout, blocks: np.ndarray) -> Layout:
+    """The layout of factors of a matrix of these ``blocks``, see ``neighbours``, of a line of that
+    layout.
 
-    ``share`` is how much of them is read in a step. None as for ``station_factors``.
+    S^-1 joins all of a plane, whatever matrices join: the same kernels serve them all.
     """
-    rows, lacks = completed(rows, stations)
-    packed = _packed(layout, stations, rows, lacks, FoundFactors.of(rows, None), share)
-    return None if packed is None else packed[0]
+    joined = (blocks[0] != 0).any(axis=0) | (blocks[2] != 0).any(axis=0)
+    joined |= of_pairs(layout.pitch)
+    return Layout(layout.widths, beside=joined, make_ups=layout.make_ups, factors=True)
 
 
-def completed(rows: StationRows, stations: Sections) -> tuple[StationRows, np.ndarray]:
-    """Rows with a unit diagonal for what ``stations`` lack, and what those of each kind do."""
-    lacks, blocks = stations.missing()[rows.chosen], rows.blocks
-    if lacks.any():
-        number, lacking = np.nonzero(lacks)
-        blocks = blocks.copy()
-        blocks[1, number, lacking, lacking] = 1.0
-        rows = rows._replace(blocks=blocks)
-    return rows, lacks
-
-
-def _packed(
-    layout: Layout,
-    stations: Sections,
-    rows: StationRows,
-    lacks: np.ndarray,
-    found: FoundFactors,
-    share: float = 1.0,
-) -> tuple[Layout, np.ndarray, np.ndarray, int, tuple[np.ndarray, np.ndarray]] | None:
-    """Layout, kinds of factors, their numbers, how many there are, and ``besides``, as
-    ``StationFactors`` keeps them; ``share`` of them is read in a step."""
-    # Factors join all of a plane, whatever matrices join: the same kernels serve them all.
-    layout = Layout(layout.widths, beside=layout.beside & False, make_ups=layout.make_ups)
-    make_up = stations.make_up[rows.chosen][found.kinds]
-    kinds, numbers, n_kinds, unfit = packed_factors(layout, make_up, lacks, found)
-    besides: tuple[np.ndarray, np.ndarray] | None = NO_BESIDES
-    # Narrow stations of several make-ups are quicker with blocks that join all of a plane.
-    few = layout.varies and max(layout.widths) <= NARROW
-    if unfit or (share * numbers.nbytes > LARGE and not few):
-        layout = _sparse(layout, rows.blocks)
-        kinds, numbers, n_kinds, unfit = packed_factors(layout, make_up, lacks, found)
-        besides = besides_of(layout, stations, rows)
-    if unfit or besides is None:
-        return None
-    return layout, kinds, numbers, n_kinds, besides
+def completed(rows: StationRows, stations: Sections) -> StationRows:
+    """Rows with a unit diagonal for what ``stations`` lack."""
+    lacks = stations.missing()[rows.chosen]
+    if not lacks.any():
+        return rows
+    number, lacking = np.nonzero(lacks)
+    blocks = rows.blocks.copy()
+    blocks[1, number, lacking, lacking] = 1.0
+    return rows._replace(blocks=blocks)
 
 
 def packed_blocks(layout: Layout, factors: np.ndarray) -> np.ndarray:
-    """Numbers (m, k) of ``factors`` (m, 3, b, b) as ``StationFactors`` keeps them."""
-    if layout.sparse:
-        return layout.packed(factors[:, 0], "half")
-    packed = layout.packed(factors, "own")
-    return packed.reshape(packed.shape[0], 3 * packed.shape[2])  # of no factor, too
+    """Numbers (m, k) of ``factors`` (m, 2, b, b) as ``StationFactors`` keeps them."""
+    inverse = layout.packed(factors[:, 0], "half")
+    if layout.native.is_sparse:
+        return inverse
+    return np.hstack([inverse, layout.packed(factors[:, 1].swapaxes(1, 2), "own")])
 
 
 def packed_factors(
-    layout: Layout, make_up: np.ndarray, lacks: np.ndarray, found: FoundFactors
-) -> tuple[np.ndarray, np.ndarray, int, bool]:
-    """Kinds of factors, their numbers and how many there are; see ``kinds_by_make_up``. The last
-    is whether elimination joins what a station lacks: ``lacks`` (k, b) says what each kind of
-    station does, ``make_up`` (m,) which make-up each factor is of."""
+    layout: Layout, make_up: np.ndarray, found: FoundFactors
+) -> tuple[np.ndarray, np.ndarray, int]:
+    """Kinds of factors, their numbers and how many there are; see ``kinds_by_make_up``.
+
+    ``make_up`` (m,) is that of each factor.
+    """
 
     def pack(part: Layout, rows: slice | np.ndarray) -> np.ndarray:
         return packed_blocks(part, found.factors[rows])
 
-    kinds, numbers, n_kinds, count = kinds_by_make_up(layout, make_up, pack)
-    if not layout.varies:
-        return kinds, numbers, n_kinds, False
-    n_blocks = 1 if layout.sparse else 3
-    if layout.sparse:
-        # Halves hold some numbers twice, others of each make-up.
-        count = sum(
-            np.count_nonzero(part.packed(found.factors[make_up == number, 0], "own"))
-            for number, part in enumerate(layout.parts)
-        )
-    all_of_them = np.count_nonzero(found.factors[:, :n_blocks])
-    return kinds, numbers, n_kinds, count != all_of_them - lacks[found.kinds].sum()
-
-
-def _sparse(layout: Layout, blocks: np.ndarray) -> Layout:
-    """Layout of factors that keep S^-1 and a matrix's own ``blocks``, see ``neighbours``.
-
-    A product that joins all of a plane has one product less in a row than one with S^-1 and one
-    with a sparse block. Numbers that a cache does not hold are waited for longer than that: sparse
-    blocks take a share of them, and are alike where S is not.
-    """
-    joined = (blocks[0] != 0).any(axis=0) | (blocks[2] != 0).any(axis=0)
-    joined |= of_pairs(layout.pitch)
-    return Layout(layout.widths, beside=joined, make_ups=layout.make_ups, sparse=True)
+    return kinds_by_make_up(layout, make_up, pack)[:3]
 
 
 def besides_of(
@@ -267,7 +210,7 @@ def besides_of(
 
 
 class FoundFactors(NamedTuple):
-    """Factors (m, 3, b, b), the kind of station (m,) of each, and ``numbers`` of those that the
+    """Factors (m, 2, b, b), the kind of station (m,) of each, and ``numbers`` of those that the
     stations have: (n,) in order for a given middle; for any middle (n,) before it, (n,) behind it,
     and of those where it may be. Factors stand in the order of these numbers."""
 

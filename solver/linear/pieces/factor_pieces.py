@@ -7,7 +7,6 @@ import numpy as np
 from catenary.base.errors import RunBroken
 from catenary.solver.linear.factors.meeting_station import MIDDLES, Turning, softened
 from catenary.solver.linear.factors.station_factors import (
-    NO_BESIDES,
     FoundFactors,
     StationFactors,
     besides_of,
@@ -46,17 +45,14 @@ class FactorPieces:
     def __init__(self, layout: Layout, stations: Sections, pieces: Pieces) -> None:
         n, size = stations.size, pieces.size
         self._layout, self._stations = layout, stations
-        none = np.zeros((1, 3, stations.width, stations.width))
+        none = np.zeros((1, 2, stations.width, stations.width))
         widths = tuple(packed_blocks(part, none).shape[1] for part in layout.parts)
         room = 2 * size + size // MIDDLES
         self._blocks = Slots(pieces.n_slots, room, widths)
-        besides = NO_BESIDES
-        self._besides: Slots | None = None
-        if layout.sparse:
-            kept = [part.packed(none[:, 0], "beside") for part in layout.parts]
-            widths = tuple(2 * numbers.shape[1] for numbers in kept)
-            self._besides = Slots(pieces.n_slots, size, widths)
-            besides = np.zeros(n, dtype=np.int32), self._besides.numbers
+        kept = [part.packed(none[:, 0], "beside") for part in layout.parts]
+        widths = tuple(2 * numbers.shape[1] for numbers in kept)
+        self._besides = Slots(pieces.n_slots, size, widths)
+        besides = np.zeros(n, dtype=np.int32), self._besides.numbers
         kinds = np.zeros(n, dtype=np.int32)
         here = np.zeros(-(-n // MIDDLES), dtype=np.int32)
         edges = np.zeros((2, n + 1), dtype=np.int64)
@@ -77,7 +73,7 @@ class FactorPieces:
             If they are not finite, or join what the layout does not.
         """
         stations, n = self._stations.part(piece.low, piece.high), rows.kinds.size
-        whole, lacks = completed(rows, stations)
+        whole = completed(rows, stations)
         found, own = FoundFactors.of(whole, None), piece.own
         middles = found.numbers[2 * n :][-(-own.start // MIDDLES) : -(-own.stop // MIDDLES)]
         numbers = found.numbers[:n][own], found.numbers[n : 2 * n][own], middles
@@ -86,9 +82,7 @@ class FactorPieces:
         if not np.isfinite(found.factors).all():
             raise RunBroken("the step operator cannot be factored: it is singular or not finite")
         make_up = stations.make_up[whole.chosen][found.kinds]
-        kinds, packed, _, unfit = packed_factors(self._layout, make_up, lacks, found)
-        if unfit:
-            raise RunBroken(JOINED_OTHERWISE)
+        kinds, packed, _ = packed_factors(self._layout, make_up, found)
         kinds, size = kinds[place] + self._blocks.put(piece.slot, packed), piece.end - piece.begin
         begin, end, turning = piece.begin, piece.end, self._turning
         turning.to_end[begin:end], turning.to_start[begin:end] = kinds[: 2 * size].reshape(2, -1)
@@ -97,12 +91,11 @@ class FactorPieces:
         soft = softened(whole.blocks[1][found.kinds], found.factors[:, 0])[place]
         self.can_begin[begin:end] |= soft[:size]
         self.can_end[begin + 1 : end + 1] |= soft[size : 2 * size]
-        if self._besides is not None:
-            part = besides_of(self._layout, stations.part(own.start, own.stop), rows.part(own))
-            if part is None:
-                raise RunBroken(JOINED_OTHERWISE)
-            first = self._besides.put(piece.slot, part[1])
-            self.factors.beside_kinds[begin:end] = part[0] + first
+        besides = besides_of(self._layout, stations.part(own.start, own.stop), rows.part(own))
+        if besides is None:
+            raise RunBroken(JOINED_OTHERWISE)
+        first = self._besides.put(piece.slot, besides[1])
+        self.factors.beside_kinds[begin:end] = besides[0] + first
 
     def _turn(self, piece: Piece) -> None:
         """Give the stations of a piece the factors for where elimination ends now."""

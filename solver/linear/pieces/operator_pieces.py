@@ -14,7 +14,7 @@ from catenary.solver.linear.factors.station_factors import (
 )
 from catenary.solver.linear.petsc_solvers import DIRECT, wants_own_solver
 from catenary.solver.linear.pieces.factor_pieces import JOINED_OTHERWISE, FactorPieces
-from catenary.solver.linear.pieces.pieces import Piece, Pieces, Slots, most_within
+from catenary.solver.linear.pieces.pieces import Piece, Pieces, Slots
 from catenary.solver.linear.stations.like_stations import LikeStations
 from catenary.solver.linear.stations.sections import Sections, places_of
 from catenary.solver.linear.stations.station_layout import Layout
@@ -57,7 +57,7 @@ class WantedPieces(NamedTuple):
         pieces = Pieces(numbering, reach, around + self.ahead, self.around)
         if pieces.are_few:
             return None
-        layouts = layouts_of(model, coefficients, pieces, most_within(numbering, around))
+        layouts = layouts_of(model, coefficients, pieces)
         return None if layouts is None else OperatorPieces(model, coefficients, pieces, *layouts)
 
 
@@ -160,10 +160,10 @@ class Stretch:
 
 
 def layouts_of(
-    model: Model, coefficients: Coefficients, pieces: Pieces, n_needed: int
+    model: Model, coefficients: Coefficients, pieces: Pieces
 ) -> tuple[Layout, Layout] | None:
     """Layouts of products and of factors, the latter by the first piece of the line; None if there
-    are none. ``n_needed`` stations are read in a step."""
+    are none."""
     stations = Sections.of(model.numbering, 0, model.numbering.size)
     joined = joined_by(model, coefficients, (0.0, 1.0, 0.0), (1.0, 0.0, 0.0))
     if joined is None:
@@ -177,10 +177,9 @@ def layouts_of(
     piece = pieces.first()
     rows = Stretch(model, piece).operator(coefficients)
     part = stations.part(piece.low, piece.high)
-    of_factors = layout_of_factors(layout, part, rows, n_needed / (2 * part.size))
-    if of_factors is None or not _residual(rows, layout, part) <= DIRECT:
+    if not _residual(rows, layout, part) <= DIRECT:
         return None
-    return layout, of_factors
+    return layout, layout_of_factors(layout, rows.blocks)
 
 
 def _residual(rows: StationRows, layout: Layout, stations: Sections) -> float:

@@ -16,7 +16,7 @@ from catenary.solver.kernels import native
 # Unknowns of a station that kernels take.
 MOST_UNKNOWNS = native.MOST_UNKNOWNS
 # Parameters of a layout.
-_SETTINGS = ("widths", "own", "beside", "damped", "make_ups", "sparse")
+_SETTINGS = ("widths", "own", "beside", "damped", "make_ups", "factors")
 
 
 class Layout:
@@ -30,8 +30,7 @@ class Layout:
     own, beside : (b, b) bool, what is joined within a station, and between a station and those
         beside it; all of each plane by default. Of factors the former is what elimination joins
     damped : whether a product with K is one with C as well
-    sparse : whether factors keep the matrix's own blocks between stations in place of products with
-        these, which join all of a plane, and of S^-1 one half
+    factors : whether of factors
     make_ups : places in a cross-section that stations of each make-up have; none if all have all
 
     Attributes
@@ -52,7 +51,7 @@ class Layout:
         beside: np.ndarray | None = None,
         damped: bool = False,
         make_ups: tuple[tuple[int, ...], ...] = (),
-        sparse: bool = False,
+        factors: bool = False,
     ) -> None:
         self.widths = tuple(widths)
         plane = np.repeat(np.arange(len(widths)), widths)
@@ -60,7 +59,7 @@ class Layout:
         together = plane[:, None] == plane
         self.own = together if own is None else own & together
         self.beside = together if beside is None else beside & together
-        self.damped, self.make_ups, self.sparse = bool(damped), make_ups, bool(sparse)
+        self.damped, self.make_ups, self.factors = bool(damped), make_ups, bool(factors)
         self.pitch = plane.size
 
     def __eq__(self, other: object) -> bool:
@@ -73,7 +72,7 @@ class Layout:
     def key(self) -> tuple[object, ...]:
         """All that makes a layout."""
         own = self.widths, self.own.tobytes(), self.beside.tobytes()
-        more = self.damped, self.make_ups, self.sparse, self.number
+        more = self.damped, self.make_ups, self.factors, self.number
         return (*own, *more, None if self.whole is None else self.whole.key)
 
     def changed(self, **settings: Any) -> Layout:
@@ -94,14 +93,14 @@ class Layout:
         places = self.make_ups[number]
         widths = tuple(int(width) for width in np.bincount(self._plane[list(places)]) if width)
         own, beside = (joined[np.ix_(places, places)] for joined in (self.own, self.beside))
-        part = Layout(widths, own, beside, self.damped, sparse=self.sparse)
+        part = Layout(widths, own, beside, self.damped, factors=self.factors)
         part.whole, part.places, part.number = self, places, number
         return part
 
     @cached_property
     def native(self) -> native.Layout:
         """The layout as kernels take it, which may join more: one that some were compiled for."""
-        return native.Layout(self.own, self.beside, self.damped, self.sparse)
+        return native.Layout(self.own, self.beside, self.damped, self.factors)
 
     def packed(self, blocks: np.ndarray, which: Literal["own", "beside", "half"]) -> np.ndarray:
         """Blocks (..., pitch, pitch) as kernels read those of a station itself, those beside it, or

@@ -46,30 +46,30 @@ def columns_of(model: Model) -> tuple[ShortColumns, np.ndarray]:
     return responses.columns(dofs[:, :, None], free[dofs][:, :, None], model.mesh.x(nodes)), dofs
 
 
-def rows_of_stations(model: Model) -> list[bytes]:
-    """All that stands in the rows of a station: M, K and C from the station before to the next."""
+def rows_of_stations(model: Model) -> list[np.ndarray]:
+    """All that stands in the rows of a station: M, K and C from the station before to the next,
+    each in terms of its largest number."""
     starts, width = model.numbering.starts, model.numbering.width
     parts = [matrix_of(model, *np.eye(3)[k]).tocsr() for k in range(3)]
     found = []
     for i, (first, last) in enumerate(zip(starts[:-1], starts[1:], strict=True)):
         low, high = max(0, first - width), min(starts[-1], last + width)
-        rows = [part[first:last, low:high].toarray() + 0.0 for part in parts]
-        found.append(bytes([i == 0, i == starts.size - 2]) + b"".join(r.tobytes() for r in rows))
+        rows = [part[first:last, low:high].toarray() for part in parts]
+        rows = [own / np.abs(own).max() for own in rows]
+        found.append(np.concatenate([[i == 0, i == starts.size - 2], *map(np.ravel, rows)]))
     return found
 
 
 def test_stations_of_one_mark_have_the_same_rows(long_line: Model) -> None:
-    """Terms of a row are added in one order, so that the same rows are the same bit for bit."""
     marks, rows = LikeStations(long_line).marks, rows_of_stations(long_line)
-    of_mark: dict[int, set[bytes]] = {}
-    of_row = set(rows)
+    of_mark: dict[int, np.ndarray] = {}
     for mark, row in zip(marks.tolist(), rows, strict=True):
-        of_mark.setdefault(mark, set()).add(row)
+        # Numbers of elements that are alike differ by less than 2^-37; some ten add up.
+        np.testing.assert_allclose(row, of_mark.setdefault(mark, row), rtol=0.0, atol=1e-10)
+    of_row = {(row + 0.0).tobytes() for row in rows}
     print(f"{marks.size} stations, {len(of_mark)} marks, {len(of_row)} kinds of rows")
-    assert all(len(found) == 1 for found in of_mark.values())
-    assert len(of_mark) < 0.7 * marks.size
-    # Terms that differ in their last digit may add up to the same.
-    assert len(of_row) > 0.8 * len(of_mark)
+    # Twelve spans that are alike but for where they are, and the line's ends.
+    assert len(of_mark) < min(len(of_row), marks.size / 10)
 
 
 def test_one_spring_that_differs_parts_what_is_within_its_stretch(long_line: Model) -> None:
@@ -79,7 +79,7 @@ def test_one_spring_that_differs_parts_what_is_within_its_stretch(long_line: Mod
     stiffness = blocks[number].stiffness
     assert stiffness is not None
     changed = stiffness.copy()
-    changed[40] *= 1.0 + 1e-15
+    changed[40] *= 1.0 + 1e-9
     blocks[number] = replace(blocks[number], stiffness=changed)
     other = LikeStations(replace(long_line, blocks=blocks))
     unknown = blocks[number].dofs[blocks[number].kind == 40]

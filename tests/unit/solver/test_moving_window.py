@@ -16,7 +16,7 @@ from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.problem import problem_of as scene_problem
 from catenary.meshgen.mesh import LineMesh
 from catenary.solver.kernels import native
-from catenary.solver.linear.factors import meeting_station, station_factors
+from catenary.solver.linear.factors import meeting_station
 from catenary.solver.problem.ends import Fixed, Periodic
 from catenary.solver.problem.incidents import DropperBreak
 from catenary.solver.problem.problem import Damping, Problem
@@ -58,12 +58,7 @@ def steps(problem: Problem, mesh: LineMesh, window: WindowChoice) -> tuple[Histo
 
 
 @pytest.mark.parametrize("behind", [(0.0,), (0.0, 100.0)])
-@pytest.mark.parametrize("sparse", [False, True])
-def test_an_exact_window_gives_the_forces_of_the_whole_line(
-    behind: tuple[float, ...], sparse: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    if sparse:
-        monkeypatch.setattr(station_factors, "LARGE", 0)
+def test_an_exact_window_gives_the_forces_of_the_whole_line(behind: tuple[float, ...]) -> None:
     problem, mesh = scene(2.0)
     train = replace(
         problem.train,

@@ -10,7 +10,6 @@ from repeating_line import layout, line, widths_of
 from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
-from catenary.solver.linear.factors import station_factors as module
 from catenary.solver.linear.factors.station_factors import station_factors
 from catenary.solver.linear.stations.sections import neighbours
 from catenary.solver.linear.stations.station_layout import MOST_UNKNOWNS, Layout
@@ -63,18 +62,18 @@ def test_factors_and_products_of_any_width(widths: tuple[int, ...], joined: bool
     compare_product(matrix, 0, lanes)
 
 
-@pytest.mark.parametrize("widths", widths_of((2,), (3,), (4,), (4, 4), (6,), (10,), (6, 4)))
-@pytest.mark.parametrize("n_stations", [1, 2, 3, 40])
+@pytest.mark.parametrize("widths", widths_of((2,), (3,), (4,), (4, 4), (6,), (8,), (10,), (6, 4)))
+@pytest.mark.parametrize("n_stations", [2, 3, 40])
 @pytest.mark.parametrize("joined", [False, True])
-def test_large_factors_keep_the_blocks_of_the_matrix(
-    widths: tuple[int, ...], n_stations: int, joined: bool, monkeypatch: pytest.MonkeyPatch
+def test_factors_keep_what_is_read_soonest(
+    widths: tuple[int, ...], n_stations: int, joined: bool
 ) -> None:
     matrix = line(n_stations, widths=widths, joined=joined)
-    apart = station_factors(matrix, layout(matrix))
-    monkeypatch.setattr(module, "LARGE", 0)
     found = station_factors(matrix, layout(matrix))
-    assert apart is not None and not apart.layout.sparse
-    assert found is not None and found.layout.sparse and 2 * found.blocks.size <= apart.blocks.size
+    assert found is not None
+    # Eight unknowns, joined wire by wire between stations, are multiplied with the matrix's own
+    # blocks: 12 and 4 products in place of 16.
+    assert found.layout.native.is_sparse == (widths == (8,) and not joined)
     # Blocks between stations repeat with the line, those after elimination more slowly.
     assert np.unique(found.beside_kinds).size <= min(n_stations, 10)
     assert found.kinds.size == n_stations
@@ -82,10 +81,9 @@ def test_large_factors_keep_the_blocks_of_the_matrix(
 
 
 @pytest.mark.parametrize("widths", widths_of((6,), (10,)))
-def test_large_factors_of_wires_that_only_stations_join_keep_blocks_by_wires(
-    widths: tuple[int, ...], monkeypatch: pytest.MonkeyPatch
+def test_factors_of_wires_that_only_stations_join_keep_blocks_by_wires(
+    widths: tuple[int, ...],
 ) -> None:
-    monkeypatch.setattr(module, "LARGE", 0)
     # As unknowns stand in a cross-section: heights and slopes of both wires, then those along the
     # track, then those across.
     wire = np.array([0, 0, 1, 1, 0, 1, 0, 0, 1, 1])[: widths[0]]
@@ -111,7 +109,7 @@ def test_packed_blocks_hold_each_number_once(widths: tuple[int, ...]) -> None:
 
 @pytest.mark.parametrize("widths", PLANES)
 def test_half_of_a_symmetric_block_holds_all_of_it(widths: tuple[int, ...]) -> None:
-    lanes, block = Layout(widths, sparse=True), block_of(widths)
+    lanes, block = Layout(widths, factors=True), block_of(widths)
     block += block.T
     half = unpacked(lanes, block, "half")
     assert np.array_equal(np.where(half != 0, half, half.T), block)

@@ -9,7 +9,6 @@ from repeating_line import layout, line, widths_of
 from catenary.solver.integrators.line_state import LineState, PredictedLineState, Steps
 from catenary.solver.integrators.two_pass_step import StationPasses
 from catenary.solver.kernels import native
-from catenary.solver.linear.factors import station_factors as module
 from catenary.solver.linear.factors.station_factors import station_factors
 from catenary.solver.linear.stations.station_products import station_product
 from catenary.solver.linear.step_operators import ByStations
@@ -35,14 +34,6 @@ def test_passes_take_the_steps_of_their_parts(n_own: int, before: int, after: in
 @pytest.mark.parametrize("widths", widths_of((2,), (6,), (8,), (10,), (12,), (16,), (4, 4), (6, 4)))
 def test_passes_over_stations_of_any_width(widths: tuple[int, ...], loaded: bool) -> None:
     compare(90, 4, 7, widths, loaded)
-
-
-@pytest.mark.parametrize("widths", widths_of((4,), (8,)))
-def test_passes_with_factors_that_keep_the_blocks_of_the_matrix(
-    widths: tuple[int, ...], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(module, "LARGE", 0)
-    compare(91, 4, 7, widths)
 
 
 def compare(

@@ -13,7 +13,6 @@ from stitched_line import stitched_line
 
 from catenary.base.errors import RunBroken
 from catenary.solver.linear import unit_responses
-from catenary.solver.linear.factors import station_factors
 from catenary.solver.linear.pieces import factor_pieces, pieces
 from catenary.solver.problem.problem import Damping, Problem
 from catenary.solver.problem.window import BOUNDED, WindowChoice
@@ -147,16 +146,8 @@ def test_columns_that_reach_further_than_those_tried_are_borne_or_told(
 
 
 @pytest.mark.usefixtures("small")
-def test_factors_of_pieces_may_be_sparse_and_must_be_finite(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    problem, mesh = scene(1.0)
-    apart, _, _ = histories(problem, mesh)
-    monkeypatch.setattr(station_factors, "LARGE", 0)
-    sparse, operators, _ = histories(problem, mesh)
-    assert operators.factors.factors.layout.sparse
-    expected = apart["contact_force"]
-    check("force", sparse["contact_force"], expected, within=ROUND_OFF * expected.max())
+def test_factors_of_pieces_must_be_finite() -> None:
+    _, operators, _ = histories(*scene(1.0))
     factors, made = operators.factors, operators.pieces.first()
     rows = operators.rows_of(made)
     broken = rows._replace(blocks=np.full_like(rows.blocks, np.nan))
