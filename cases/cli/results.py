@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from catenary.base.errors import InputError
+from catenary.base.errors import CatenaryError, InputError
 from catenary.cases.cli.app import Force, RunFolder, app, folder_option
 from catenary.cases.terminal import console
 from catenary.postproc.film.wish import View
@@ -60,8 +60,7 @@ def report(
     """Serial."""
     records = _records(folder)
     console.alone()  # starts MPI as one process, before anything imports it
-    from catenary.cases.studies.full_report.measured_errors import measured_errors
-    from catenary.cases.studies.full_report.scene_of_run import SceneOfRun
+    from catenary.cases.studies.full_report.scene_of_run import SceneOfRun, measured_errors
     from catenary.cases.studies.full_report.sections import full_sections
     from catenary.postproc.read.results import Results
     from catenary.postproc.report.report import write_report
@@ -70,7 +69,7 @@ def report(
     with Results(folder, records) as results:
         try:
             scene = SceneOfRun(results)
-        except InputError as error:
+        except CatenaryError as error:
             if accuracy is not None:
                 raise
             console.warn(f"the report has no data sheets: {error}")

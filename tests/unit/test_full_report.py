@@ -21,8 +21,7 @@ from catenary.cases.scene.problem import resolved
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.accuracy.analysis import Row
 from catenary.cases.studies.accuracy.output import table_of
-from catenary.cases.studies.full_report.measured_errors import measured_errors
-from catenary.cases.studies.full_report.scene_of_run import SceneOfRun
+from catenary.cases.studies.full_report.scene_of_run import SceneOfRun, measured_errors
 from catenary.postproc.read.results import Results
 from catenary.postproc.report.pictures import interactive
 

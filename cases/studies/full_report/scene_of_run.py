@@ -1,8 +1,10 @@
-"""The scene that a run recorded, as its full report needs it."""
+"""The scene that a run recorded, and the errors that a study of its case measured."""
 
 from __future__ import annotations
 
+import json
 from functools import cached_property
+from pathlib import Path
 
 import tomli_w
 
@@ -11,19 +13,30 @@ from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.input.faults import Origin
 from catenary.cases.scene.load import scene_from
 from catenary.cases.scene.problem import problem_of, resolved
+from catenary.cases.scene.scene import Scene
+from catenary.cases.studies.accuracy.output import RECORD
 from catenary.postproc.read.results import Results
 from catenary.postproc.report.sections.run_facts import INPUT
 from catenary.solver.effects.all_effects import registry
 from catenary.solver.problem.problem import Problem
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest
 
+# Columns of the study's table by the quantities that rule books judge.
+_COLUMNS = {
+    "mean_force": "error_mean_N",
+    "force_std": "error_std_N",
+    "force_max": "error_max_N",
+    "force_min": "error_min_N",
+    "arm_uplift": "error_uplift_mm",
+}
+
 
 class SceneOfRun:
-    """The scene that a run recorded, and its line at rest, computed when it is asked for.
+    """The scene that a run recorded, and its line at rest, which is computed.
 
     Attributes
     ----------
-    scene, problem : of the run
+    scene, problem, at_rest : of the run
     has_train : whether a train excites the line
 
     Parameters
@@ -32,14 +45,15 @@ class SceneOfRun:
 
     Raises
     ------
-    InputError
-        If the recorded scene is not one of this version.
+    CatenaryError
+        If the recorded scene is not one of this version, or its line has no rest.
     """
 
     def __init__(self, results: Results) -> None:
         origin = Origin(str(results.path), recorded=True)
         self.scene = scene_from(results.attributes["config"], origin)
         self.problem: Problem = problem_of(self.scene)
+        self.at_rest: LineAtRest = line_at_rest(self.problem, mesh_of(self.scene))
         # A line that a force or a blow excites has no train, though its scene has.
         self.has_train = not results.attributes.get("excitation")
 
@@ -65,7 +79,40 @@ class SceneOfRun:
             return None
         return tomli_w.dumps(plain)
 
-    @cached_property
-    def at_rest(self) -> LineAtRest:
-        """Its line at rest."""
-        return line_at_rest(self.problem, mesh_of(self.scene))
+
+def measured_errors(scene: Scene, folder: Path) -> dict[str, float]:
+    """Errors of quantities at the step and mesh of a scene, in their units. Not collective.
+
+    Parameters
+    ----------
+    folder : of the study, which varied step and mesh together (axis ``grid``)
+
+    Raises
+    ------
+    InputError
+        If there is no such study, if it is of another case, or lacks the scene's step and mesh.
+    """
+    path = folder / RECORD
+    try:
+        record = json.loads(path.read_text(encoding="utf-8"))
+        rows, case = record["rows"], record["case"]
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise InputError(f"{path} is no record of `catenary accuracy`: {error}") from error
+    if case != scene.case.name:
+        raise InputError(f"{path} is a study of {case}, the run is one of {scene.case.name}")
+    dt, elements = scene.numerics.dt_s, scene.mesh.elements_per_gap
+    own = [
+        row
+        for row in rows
+        if row["outcome"] == "done"
+        and row["elements_per_gap"] == elements
+        and row["dt_s"] is not None
+        and abs(row["dt_s"] / dt - 1.0) < 1e-9
+    ]
+    if not own:
+        raise InputError(
+            f"{path} has no run with a step of {1e3 * dt:g} ms and {elements} elements per gap, "
+            "as this one has: vary both with --axes grid, without --quick"
+        )
+    known = {quantity: own[0][column] for quantity, column in _COLUMNS.items()}
+    return {quantity: abs(error) for quantity, error in known.items() if error is not None}
