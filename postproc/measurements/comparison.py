@@ -250,7 +250,7 @@ class _Comparing:
         heights = self._heights(own, valid, within, at, dt)
         self._force_figures(name, at, force, run)
         if heights is not None:
-            self._height_figures(name, *heights, own.height_bias)
+            self._height_figures(name, *heights, own, dt)
         measured_height, run_height = heights or (None, None)
         self.overlays.append(
             Overlay(name, at, force, modelled, measured_height, run_height, aligned)
@@ -362,11 +362,15 @@ class _Comparing:
             f"above {max(_DRIFTED, told * found.drift.deviation * length):.2g} m, a gain above "
             f"{100 * max(_FORCE_SHARE, told * found.gain.deviation):.2g} %"
         )
-        if stated and found.residual > _MORE_THAN_NOISE * stated:
-            more = np.sqrt(found.residual**2 - stated**2)
+        self._beyond_noise(name, "noise floor", "N", found.residual, stated)
+
+    def _beyond_noise(self, name: str, what: str, unit: str, floor: float, stated: float) -> None:
+        """Tell how much of a floor is more than the stated noise, zero if none is stated."""
+        if stated and floor > _MORE_THAN_NOISE * stated:
+            more = np.sqrt(floor**2 - stated**2)
             self.remarks.append(
-                f"{name}: the stated noise is {stated:.2f} N below the cut-off: {more:.2f} N of "
-                "the floor are not of it, and the run differs from the measurement by so much"
+                f"{name}: of the {what} the stated noise is {stated:.2f} {unit}: {more:.2f} {unit} "
+                "are not of it, and the run differs from the measurement by so much"
             )
 
     # ---- figures --------------------------------------------------------------------------------
@@ -407,17 +411,19 @@ class _Comparing:
         )
 
     def _height_figures(
-        self, name: str, measured: np.ndarray, run: np.ndarray, bias: float
+        self, name: str, measured: np.ndarray, run: np.ndarray, own: MeasuredForce, dt: float
     ) -> None:
-        """The range of heights, and an error of their zero beyond the stated ``bias`` [m]."""
+        """The range of heights, and an error of their zero beyond the stated bias."""
         difference = measured - run
         offset, rest = float(difference.mean()), float(difference.std())
         # As for forces: what remains is noise, with its correlation.
         n = difference.size / correlation_time(difference)
-        if abs(offset) > max(_HEIGHT, np.sqrt(CERTAIN / n) * rest, _BIASES * bias):
+        if abs(offset) > max(_HEIGHT, np.sqrt(CERTAIN / n) * rest, _BIASES * own.height_bias):
             text = f"{name}: head heights are {1e3 * offset:+.1f} mm off the run's throughout"
             self._find("height", name, text, offset)
         self.remarks.append(f"{name}: noise floor of heights {1e3 * rest:.2f} mm")
+        stated = 1e3 * self._passage.noise_in_band(own.height_noise, dt)
+        self._beyond_noise(name, "noise floor of heights", "mm", 1e3 * rest, stated)
         values = 1e3 * float(np.ptp(run)), 1e3 * float(np.ptp(measured))
         key = "contact_height_range"
         self._figure("range of head height", name, "mm", key, values, 20.0, _WIDENED * 1e3 * rest)

@@ -24,7 +24,8 @@ class MeasuredForce:
     place : (n,) as the file says [m]
     force : (n,) >= 0 in compression, NaN where the file has none [N]
     head_height : (n,) above top of rail [m], None if not measured
-    noise : standard deviation of the noise of a sample of the force [N], zero if not stated
+    noise, height_noise : standard deviations of the noise of a sample of force [N] and height [m],
+        zero if not stated
     bias, height_bias : standard deviations of an unknown constant in force [N] and height [m]
     """
 
@@ -33,6 +34,7 @@ class MeasuredForce:
     force: np.ndarray
     head_height: np.ndarray | None = None
     noise: float = 0.0
+    height_noise: float = 0.0
     bias: float = 0.0
     height_bias: float = 0.0
 

@@ -119,8 +119,19 @@ def test_noise_that_was_stated_is_beside_what_remains(run: Path, table: pd.DataF
     assert not any("stated noise" in text for text in told[2.0])
     (text,) = (text for text in told[0.5] if "stated noise" in text)
     # The root of 2^2 - 0.5^2, of noise with 3 % of its own.
-    assert "0.50 N below the cut-off" in text
+    assert "the stated noise is 0.50 N" in text
     assert float(text.split(": ")[2].split(" N")[0]) == pytest.approx(1.94, rel=0.1)
+
+
+def test_noise_of_heights_is_beside_what_remains(run: Path, table: pd.DataFrame) -> None:
+    noise = 4e-3 * np.random.default_rng(7).normal(size=len(table))
+    table = table.assign(head_height_m=table.head_height_m + noise)
+    column = {"column": "head_height_m", "noise": 1e-3}
+    remarks = found_in(run, table, measured={**PLACES, "head_height": column}).remarks
+    (text,) = (text for text in remarks if "stated noise" in text)
+    # The root of 4^2 - 1^2, of noise with 3 % of its own.
+    assert "the stated noise is 1.00 mm" in text
+    assert float(text.split(": ")[2].split(" mm")[0]) == pytest.approx(3.87, rel=0.1)
 
 
 def test_forces_of_another_world_are_not_aligned(run: Path, table: pd.DataFrame) -> None:

@@ -245,6 +245,7 @@ def test_a_model_that_is_not_exact_has_no_errors_of_the_measurement(
 
 
 @pytest.mark.study
+@pytest.mark.timeout(3600)
 @pytest.mark.parametrize("errors", [True, False])
 def test_a_hundred_line_tests_of_each_run(errors: bool, run_folder: Path, tmp_path: Path) -> None:
     wrong = share(run_folder, tmp_path, 100, errors)

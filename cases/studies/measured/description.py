@@ -109,6 +109,13 @@ class OtherPantograph(Table):
     force: Force
 
 
+class Largest(_Column):
+    """The column of largest uplifts; ``noise`` in its unit."""
+
+    unit: Literal["m", "cm", "mm"] = "m"
+    noise: POSITIVE | None = None
+
+
 class Uplift(Table):
     """A CSV file of largest uplifts at supports, beside the description.
 
@@ -121,7 +128,7 @@ class Uplift(Table):
 
     file: NAME
     place: Place
-    largest: Height
+    largest: Largest
 
 
 class Tolerances(Table):

@@ -76,13 +76,18 @@ def passage_of(
         start = _start(results, number - 1) if own.time is not None else 0.0
         places = places_of(table, str(path), own, results.fact("speed"), start)
         values = column_of(table, str(path), force.column, may_lack=True) * force.factor
-        height, height_bias = None, 0.0
+        height, height_noise, height_bias = None, 0.0, 0.0
         if own.head_height is not None and number == own.pantograph:
             signal = own.head_height
             height = column_of(table, str(path), signal.column, may_lack=True) * signal.factor
+            height_noise = (signal.noise or 0.0) * signal.factor
             height_bias = signal.bias * signal.factor
         noise, bias = (force.noise or 0.0) * force.factor, force.bias * force.factor
-        forces.append(MeasuredForce(number - 1, places, values, height, noise, bias, height_bias))
+        forces.append(
+            MeasuredForce(
+                number - 1, places, values, height, noise, height_noise, bias, height_bias
+            )
+        )
     begin, end = results.evaluation
     return Passage(
         path.name,
