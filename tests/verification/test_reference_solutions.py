@@ -66,9 +66,6 @@ DC_SIMPLE = replace(
 )
 STUDIES = {
     "ac_simple_320_one": AC_SIMPLE,
-    "ac_simple_275_two": replace(
-        AC_SIMPLE, static_force=145.60, speed=275.0 / 3.6, starts=(310.0, 110.0)
-    ),
     "dc_simple_200_one": DC_SIMPLE,
 }
 
