@@ -2,13 +2,12 @@
 #include "stations/elimination.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 #include "base/inverse.hpp"
 #include "base/targets.hpp"
 
-// How many factors there are is to depend little on whether a processor adds products without
-// rounding.
+// Factors are the same if they are so bit for bit. How many there are is not to depend on whether a
+// processor adds products without rounding.
 #if defined(__clang__)
 #pragma clang fp contract(off)
 #elif defined(__GNUC__)
@@ -22,8 +21,6 @@ namespace {
 /// Parts of a factor: S^-1 and -S^-1 B.
 enum Part { kInverse, kCarried, kParts };
 
-/// What rounding changes a factor by at most, in terms of itself.
-constexpr double kRounding = 0x1p-46;
 /// Factors that there is room for at first.
 constexpr int64_t kRoom = 1024;
 
@@ -76,18 +73,6 @@ void invert_pivot(Matrix pivot) {
     invert(pivot);
 }
 
-/// Whether two inverses differ by rounding only, each number in terms of those on the diagonal.
-bool are_alike(Matrix one, Matrix other) {
-    const int64_t n = one.rows;
-    auto square = [](double x) { return x * x; };
-    for (int64_t i = 0; i < n; ++i)
-        for (int64_t j = 0; j < n; ++j)
-            if (!(square(one(i, j) - other(i, j)) <=
-                  square(kRounding) * std::abs(one(i, i) * one(j, j))))
-                return false;
-    return true;
-}
-
 /// Factors by number, found again by what they were made from.
 class Known {
   public:
@@ -133,8 +118,10 @@ class Known {
         if (last >= 0) condense(before[kind], read(part(last, kCarried)), pivot, row_);
         invert_pivot(pivot);
         carry(read(pivot), onward[kind], part(count, kCarried));
+        const size_t compared = kParts * width_ * width_;
+        const double* const own = pivot.data;
         for (int32_t other = latest_[kind]; other >= 0; other = alike_[other])
-            if (are_alike(pivot, part(other, kInverse))) return other;
+            if (std::equal(own, own + compared, part(other, kInverse).data)) return other;
         kinds_.push_back(kind);
         alike_.push_back(latest_[kind]);
         latest_[kind] = count;
