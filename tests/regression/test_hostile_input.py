@@ -26,7 +26,7 @@ from catenary.cases.scene.load import load_scene, scene_from
 from catenary.cases.scene.problem import problem_of, resolved
 from catenary.cases.studies.sweep.variants import read_named
 from catenary.meshgen.mesh import CONTACT_WIRE
-from catenary.meshgen.topologies.named import second
+from catenary.meshgen.topologies.all_topologies import second
 from catenary.solver.effects.all_effects import move_together
 
 SOUND = Path(__file__).parent / "broken_scenes" / "sound.toml"

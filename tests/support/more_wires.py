@@ -10,8 +10,8 @@ from small_lines import en50318_line
 
 from catenary.meshgen.hardware import DropperKind
 from catenary.meshgen.line import Line
+from catenary.meshgen.topologies.all_topologies import AUXILIARY_WIRE, STITCH_WIRE, simple_catenary
 from catenary.meshgen.topologies.line_data import AuxiliaryWire, ClampedWire, LineData
-from catenary.meshgen.topologies.named import AUXILIARY_WIRE, STITCH_WIRE, simple_catenary
 from catenary.meshgen.topologies.registry import register, unregister
 from catenary.meshgen.wires import Conductor, Piece, Role, Wire
 

@@ -14,9 +14,8 @@ from catenary.meshgen.build import make_mesh
 from catenary.meshgen.hardware import SteadyArm
 from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE, LineMesh
-from catenary.meshgen.topologies.all_topologies import make_line
+from catenary.meshgen.topologies.all_topologies import BRIDLE_WIRE, make_line, second
 from catenary.meshgen.topologies.line_data import ClampedWire, LineData, Overlaps, Twin
-from catenary.meshgen.topologies.named import BRIDLE_WIRE, second
 from catenary.meshgen.topologies.overlaps import of_next
 from catenary.meshgen.wires import Conductor, Role
 from catenary.solver.model.elements import beam

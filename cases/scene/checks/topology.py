@@ -13,9 +13,8 @@ from catenary.cases.scene.line.line_data import numbered
 from catenary.cases.scene.run.incidents import TensionLossTable
 from catenary.cases.scene.scene import Scene
 from catenary.meshgen.geometry import find_cuts
-from catenary.meshgen.topologies.all_topologies import make_line, registered
+from catenary.meshgen.topologies.all_topologies import FREE, make_line, registered
 from catenary.meshgen.topologies.line_data import SHORTEST_GAP, FreeDroppers, LineData
-from catenary.meshgen.topologies.named import FREE
 
 # Keys of ``line`` that come with a part of a topology.
 _WITH = {"messenger_wire": ("encumbrance_m",)}

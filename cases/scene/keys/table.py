@@ -75,6 +75,8 @@ def ascending(values: Sequence[float], what: str) -> None:
 
 # A list for which a person may write one number.
 OneOrMore = BeforeValidator(_as_list)
+# Name of a wire, of which a line may have any.
+WireName = Annotated[str, Field(min_length=1, max_length=100)]
 PAIR = Annotated[list[Annotated[float, Field(ge=-1e6, le=1e6)]], Field(min_length=2, max_length=2)]
 
 

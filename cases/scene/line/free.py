@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
-from catenary.cases.scene.keys.table import OneOrMore, Table, ascending, either
+from catenary.cases.scene.keys.table import OneOrMore, Table, WireName, ascending, either
 from catenary.cases.scene.line.droppers import DropperTable
 from catenary.cases.scene.line.hardware import SteadyArmTable, SupportTable
 from catenary.cases.scene.line.wires import WireTable
@@ -78,16 +78,12 @@ class FreeWireTable(WireTable):
         description="in place of height_m and stagger_m, points [along, to the left, height] that "
         "it passes, along the line or, with from_supports_m, from each support",
     )
-    start: str | None = Field(
+    start: WireName | None = Field(
         None,
-        min_length=1,
-        max_length=100,
         description="where it starts: tensioner, fixed, or the name of the wire that it is clamped "
         "to; if absent as line.ends says, and fixed inside the line",
     )
-    end: str | None = Field(
-        None, min_length=1, max_length=100, description="the same of where it ends"
-    )
+    end: WireName | None = Field(None, description="the same of where it ends")
     clamp_kg: float = Field(0.0, ge=0, le=100, description="mass of each clamp at its ends")
     clamp_stiffness_N_per_m: float = Field(
         1e7, gt=0, le=1e10, description="stiffness of each such clamp, in tension and compression"
@@ -114,8 +110,8 @@ class FreeDroppersTable(DropperTable):
 
     type: Literal["droppers"] = Field(description="kind of link")
     name: PartName = Field(description="name of the group")
-    upper: str = Field(min_length=1, max_length=100, description="name of the wire above")
-    lower: str = Field(min_length=1, max_length=100, description="name of the wire below")
+    upper: WireName = Field(description="name of the wire above")
+    lower: WireName = Field(description="name of the wire below")
     spans: list[SpanNumber] | None = Field(
         None,
         min_length=1,
@@ -148,8 +144,8 @@ class FreeClampsTable(Table):
 
     type: Literal["clamps"] = Field(description="kind of link")
     name: PartName = Field(description="name of the group")
-    upper: str = Field(min_length=1, max_length=100, description="name of the wire that carries")
-    lower: str = Field(min_length=1, max_length=100, description="name of the wire that hangs")
+    upper: WireName = Field(description="name of the wire that carries")
+    lower: WireName = Field(description="name of the wire that hangs")
     at_m: list[Place] = Field(min_length=1, max_length=100_000, description="places along the line")
     clamp_kg: float = Field(0.0, ge=0, le=100, description="mass of each")
     stiffness_N_per_m: float = Field(
@@ -166,7 +162,7 @@ class _AtSupports(Table):
     """Keys of supports and of steady arms of one wire."""
 
     name: PartName = Field(description="name of the group")
-    wire: str = Field(min_length=1, max_length=100, description="name of the wire")
+    wire: WireName = Field(description="name of the wire")
     supports: list[SupportNumber] | None = Field(
         None,
         min_length=1,
@@ -190,10 +186,8 @@ class FreeSupportsTable(_AtSupports, SupportTable):
     """What carries a wire at masts."""
 
     type: Literal["supports"] = Field(description="kind of link")
-    holds: str | None = Field(
+    holds: WireName | None = Field(
         None,
-        min_length=1,
-        max_length=100,
         description="name of a wire that is to have its height there at rest; each support is as "
         "high as that takes. If absent, the support is relaxed at the height of its own wire",
     )

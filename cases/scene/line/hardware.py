@@ -7,7 +7,7 @@ from typing import Literal
 
 from pydantic import Field, model_validator
 
-from catenary.cases.scene.keys.table import Table, either
+from catenary.cases.scene.keys.table import Table, WireName, either
 from catenary.cases.scene.keys.units import angle_from_deg
 from catenary.meshgen.hardware import Fittings, SteadyArm
 
@@ -89,10 +89,8 @@ class FittingTable(Table):
     kind: Literal["section_insulator", "neutral_section", "splice", "mid_point_anchor"] = Field(
         description="what it is, for reports"
     )
-    wire: str = Field(
+    wire: WireName = Field(
         "contact_wire",
-        min_length=1,
-        max_length=100,
         description="name of a wire of the line, such as contact_wire, messenger_wire",
     )
     at_m: float = Field(ge=0, le=1e7, description="its place, or its begin, along the line")

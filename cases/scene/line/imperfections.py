@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
-from catenary.cases.scene.keys.table import PAIR, TAKE_AWAY, Table, band, within
+from catenary.cases.scene.keys.table import PAIR, TAKE_AWAY, Table, WireName, band, within
 from catenary.cases.scene.keys.units import angle_from_deg, length_from_mm
 from catenary.meshgen.line import Line
 from catenary.solver.problem import defects as solver
@@ -136,7 +136,6 @@ class IrregularitiesTable(Table):
 
 
 Place = Annotated[float, Field(ge=0, le=1e7)]
-WireName = Annotated[str, Field(min_length=1, max_length=100)]
 _WIRE = "name of a wire of the line, such as contact_wire, messenger_wire"
 
 

@@ -124,6 +124,12 @@ _RECORDED = line_channels()
 _FIELDS = FIELDS
 
 
+_Spans = Annotated[list[Annotated[int, Field(ge=1, le=10**6)]], Field(min_length=2, max_length=2)]
+_AroundTrain = Annotated[
+    list[Annotated[float, Field(ge=0, le=1e6)]], Field(min_length=2, max_length=2)
+]
+
+
 class OutputTable(Table):
     """What is written, and how much of it."""
 
@@ -151,17 +157,13 @@ class OutputTable(Table):
         description="parts of the line that snapshots show: names of wires, and "
         f"{', '.join(OTHER_PARTS)}; all if absent",
     )
-    field_spans: list[Annotated[int, Field(ge=1, le=10**6)]] | None = Field(
+    field_spans: _Spans | None = Field(
         None,
-        min_length=2,
-        max_length=2,
         description="first and last span that snapshots show, counted from 1; if absent all, or "
         "with a window.mode other than off what moves",
     )
-    field_window_m: list[Annotated[float, Field(ge=0, le=1e6)]] | None = Field(
+    field_window_m: _AroundTrain | None = Field(
         None,
-        min_length=2,
-        max_length=2,
         description="how far behind the last and ahead of the first pantograph snapshots show the "
         "line; if absent the whole line, or with a window.mode other than off what moves",
     )
@@ -192,17 +194,13 @@ class OutputTable(Table):
     line_channels_every_m: float | None = Field(
         None, ge=0, le=1e4, description="the same as a distance that the train travels"
     )
-    line_channels_window_m: list[Annotated[float, Field(ge=0, le=1e6)]] | None = Field(
+    line_channels_window_m: _AroundTrain | None = Field(
         None,
-        min_length=2,
-        max_length=2,
         description="how far behind the last and ahead of the first pantograph the line's channels "
         "are recorded; the whole line if absent",
     )
-    line_channels_spans: list[Annotated[int, Field(ge=1, le=10**6)]] | None = Field(
+    line_channels_spans: _Spans | None = Field(
         None,
-        min_length=2,
-        max_length=2,
         description="first and last span whose channels are recorded, counted from 1; all if "
         "absent",
     )

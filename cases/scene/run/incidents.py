@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field
 
-from catenary.cases.scene.keys.table import Table
+from catenary.cases.scene.keys.table import Table, WireName
 from catenary.meshgen.line import Line
 from catenary.solver.problem.incidents import DropperBreak, LineIncident, TensionLoss
 
@@ -40,10 +40,8 @@ class TensionLossTable(IncidentTable):
     """A wire that has only a share of its tension from then on."""
 
     type: Literal["tension_loss"] = Field(description="kind of incident")
-    wire: str = Field(
-        min_length=1,
-        max_length=100,
-        description="name of a wire of the line, such as contact_wire, messenger_wire",
+    wire: WireName = Field(
+        description="name of a wire of the line, such as contact_wire, messenger_wire"
     )
     share: float = Field(
         ge=LEAST_SHARE,
