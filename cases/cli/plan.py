@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from catenary.base.errors import InputError
-from catenary.cases.cli.app import Force, Jobs, SceneWords, app, folder_option
+from catenary.cases.cli.app import Force, Jobs, SceneWords, app, folder_option, tell
 from catenary.cases.terminal import console
 
 if TYPE_CHECKING:
@@ -147,10 +147,9 @@ def _cost(wish: Wish, out: Path | None, as_json: bool, n_jobs: int, force: bool)
 
 def _print(found: Costs, files: list[Path], as_json: bool) -> None:
     from catenary.cases.studies.effect_cost import output
+    from catenary.postproc.report.study_table import json_text
 
     if as_json:
-        console.say(output.as_json(found).rstrip())
-        return
-    console.say("\n" + output.as_text(found))
-    if files:
-        console.say("\n" + "\n".join(map(str, files)))
+        console.say(json_text(output.record_of(found)).rstrip())
+    else:
+        tell(output.as_text(found), files)

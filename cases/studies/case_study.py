@@ -28,11 +28,11 @@ from catenary.cases.studies.sweep.jobs import (
     AS_USUAL,
     Ended,
     Job,
+    Part,
     RunOptions,
     interrupted,
     make_jobs,
 )
-from catenary.cases.studies.sweep.part import Part
 from catenary.cases.studies.sweep.variants import Variant, slug
 
 if TYPE_CHECKING:
@@ -170,8 +170,8 @@ def _conclude(
     plan: Plan, module: ModuleType, out_dir: Path, ended: Sequence[Ended], begin: float
 ) -> str:
     from catenary.cases.studies.sweep import output as sweep_output
-    from catenary.postproc.files.disk import write_all
     from catenary.postproc.report.study_report import verdict_text, write_study
+    from catenary.postproc.report.study_table import write_files
 
     runs = {
         one.variant.name: StudyRun(one, job.scene, out_dir / RUNS / one.variant.name)
@@ -187,7 +187,7 @@ def _conclude(
         f"{sum(one.skipped for one in ended)} of the runs had been done before",
     }
     files = write_study(study, out_dir, table.records(), facts)
-    files += write_all(out_dir, {"study.csv": table.csv()})
+    files += write_files(out_dir, {"study.csv": table})
     told = [f"{name}: {value}" for name, value in facts.items()]
     listed = [str(path) for path in files if path.stem == "study"]
     remarks = sweep_output.remarks_of(ended)

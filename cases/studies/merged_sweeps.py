@@ -17,8 +17,7 @@ from catenary.cases.studies.uncertainty.run_table import (
     read_sampling_beside,
     run_table,
 )
-from catenary.postproc.files.disk import write_all
-from catenary.postproc.report.study_table import Column, StudyTable
+from catenary.postproc.report.study_table import Column, StudyTable, write_files
 
 _DONE = "done"
 # What differs between two runs of the same variant.
@@ -86,7 +85,7 @@ def write(
     """Write the table of merged sweeps, of samples with their evaluation. Not collective."""
     rows = record["rows"]
     table = StudyTable([Column(name) for name in rows[0]], rows)
-    files = write_all(out, table_files(record, table))
+    files = write_files(out, table_files(record, table))
     if sampling is None:
         return files, None
     runs = run_table(rows, sampling)

@@ -20,16 +20,15 @@ from catenary.mbs.build import PantographData
 from catenary.mbs.mechanism.pantograph_data import MultibodyData, stand
 from catenary.mbs.response.frequency_response import HeadResponse, head_response, peaks
 from catenary.mbs.response.lumped_fit import ChainFit, fit_chain
-from catenary.postproc.files.disk import write_all
 from catenary.postproc.report.pictures.figures import (
     COLOURS,
     LIGHT,
     legend_above,
     new_figure,
     own_style,
-    painted,
     tidy,
 )
+from catenary.postproc.report.study_table import write_files
 
 # Frequencies for the search of peaks and for the fit.
 N_SEARCHED, N_FITTED = 400, 200
@@ -235,10 +234,8 @@ def new_files(folder: Path, force: bool) -> None:
 def write_study(found: PantographStudy, folder: Path) -> list[Path]:
     """Write all files and return their paths. Raises ``RunBroken`` if the disk refuses."""
     table, drawn, lumped = FILES
-    content: dict[str, bytes | str] = {table: csv_text(found)}
-    content |= painted(drawn, lambda: picture(found))
-    content[lumped] = lumped_toml(found)
-    return write_all(folder, content)
+    content = {table: csv_text(found), drawn: lambda: picture(found), lumped: lumped_toml(found)}
+    return write_files(folder, content)
 
 
 def csv_text(found: PantographStudy) -> str:

@@ -171,15 +171,15 @@ def write_files(folder: Path, content: Mapping[str, Content]) -> list[Path]:
     ----------
     folder : made if it is not there
     content : by names of files. A table, or rows with the same keys, become CSV, a mapping JSON,
-        and what a function draws a picture, which is left out if it draws none or fails; texts and
-        bytes are written as they are
+        and what a function draws a picture; no rows, and a picture that there is none of or that
+        fails, are left out; texts and bytes are written as they are
 
     Raises
     ------
     RunBroken
         If the disk refuses.
     """
-    from catenary.postproc.files.disk import plain, write_all
+    from catenary.postproc.files.disk import write_all
 
     files: dict[str, bytes | str] = {}
     for name, own in content.items():
@@ -188,14 +188,21 @@ def write_files(folder: Path, content: Mapping[str, Content]) -> list[Path]:
         elif isinstance(own, StudyTable):
             files[name] = own.csv()
         elif isinstance(own, Mapping):
-            files[name] = json.dumps(plain(own), indent=1, ensure_ascii=False) + "\n"
+            files[name] = json_text(own)
         elif callable(own):
             from catenary.postproc.report.pictures import figures
 
             files |= figures.painted(name, own)
-        else:
+        elif own:
             files[name] = rows_csv(own)
     return write_all(folder, files)
+
+
+def json_text(record: Mapping[str, Any]) -> str:
+    """A record as the text of a JSON file."""
+    from catenary.postproc.files.disk import plain
+
+    return json.dumps(plain(record), indent=1, ensure_ascii=False) + "\n"
 
 
 def remark_lines(runs: Iterable[tuple[str, Sequence[str]]]) -> list[str]:

@@ -12,9 +12,8 @@ from catenary.base.errors import InputError
 from catenary.cases.cli.main import app
 from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.problem import resolved
-from catenary.cases.studies.accuracy import models
-from catenary.cases.studies.accuracy.axes import AXES, parse_axes
-from catenary.cases.studies.accuracy.axis import DISCRETISATION
+from catenary.cases.studies.accuracy import axes as models
+from catenary.cases.studies.accuracy.axes import AXES, DISCRETISATION, parse_axes
 from catenary.cases.studies.accuracy.plan import Plan, make_plan
 
 CASE = "en50318_2002"

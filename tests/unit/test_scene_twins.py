@@ -13,7 +13,7 @@ from catenary.cases.scene.checks.twins import needs_relative_motion
 from catenary.cases.scene.input.faults import SceneError
 from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.problem import problem_of
-from catenary.cases.studies.accuracy.models import planes
+from catenary.cases.studies.accuracy.axes import planes
 from catenary.cases.studies.effect_cost.study import switchable_effects
 from catenary.cases.studies.waves.excited import Asked, excitation_of
 from catenary.solver.effects import all_effects as effects

@@ -5,8 +5,7 @@ from __future__ import annotations
 import csv
 
 from catenary.cases.studies.hard.cases import hard_cases
-from catenary.cases.studies.hard.checks import Criterion
-from catenary.cases.studies.hard.output import criteria, page
+from catenary.cases.studies.hard.checks import Criterion, criteria, page
 from catenary.postproc.report.study_table import remark_lines
 
 

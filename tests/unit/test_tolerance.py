@@ -22,10 +22,15 @@ from catenary.cases.studies.scene_sets import evaluation
 from catenary.cases.studies.scene_sets.evaluation import BROKE
 from catenary.cases.studies.scene_sets.scene_set import BoundTable
 from catenary.cases.studies.task_files import read_task
-from catenary.cases.studies.tolerance.criteria import least, margins_of
 from catenary.cases.studies.tolerance.errors import Group, groups_of
 from catenary.cases.studies.tolerance.output import as_text, installer_table
-from catenary.cases.studies.tolerance.study import ALL, find_tolerances, make_plan
+from catenary.cases.studies.tolerance.study import (
+    ALL,
+    find_tolerances,
+    least,
+    make_plan,
+    margins_of,
+)
 from catenary.cases.studies.tolerance.task import ToleranceTask
 
 # Six spans with one element a gap.

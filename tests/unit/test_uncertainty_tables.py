@@ -16,13 +16,12 @@ from catenary.cases.studies.sampling.tables import sampling_of
 from catenary.cases.studies.sweep.jobs import Ended
 from catenary.cases.studies.sweep.output import table_of, write
 from catenary.cases.studies.sweep.variants import Variant
-from catenary.cases.studies.uncertainty import output, pictures
+from catenary.cases.studies.uncertainty import output
 from catenary.cases.studies.uncertainty.evaluation import evaluate, failing
 from catenary.cases.studies.uncertainty.run_table import (
     SAMPLING,
     read_run_table,
     run_table,
-    sampling_text,
 )
 
 SPEED = "train.speed_km_h"
@@ -60,7 +59,9 @@ def some(numbers: range) -> list[Ended]:
 def folder(path: Path, runs: list[Ended], sample: dict[str, Any] | None = None) -> Path:
     write(path, "a_case", runs, None)
     if sample is not None:
-        (path / SAMPLING).write_text(sampling_text(sampling_of(sample, "s.toml")))
+        (path / SAMPLING).write_text(
+            json.dumps(sampling_of(sample, "s.toml").model_dump(exclude_none=True))
+        )
     return path
 
 
@@ -121,20 +122,20 @@ def test_a_table_without_any_run_that_ended_is_evaluated_too() -> None:
 def test_pictures_show_their_runs(sample: dict[str, Any] | None) -> None:
     sampling = None if sample is None else sampling_of(sample, "s.toml")
     table = run_table(table_of(some(range(1, 31))).records(), sampling)
-    scatter = pictures.scatter(table)
+    scatter = output.scatter(table)
     assert scatter is not None
     std = next(axes for axes in scatter.axes if "standard" in axes.get_ylabel())
     assert [len(line.get_xdata()) for line in std.lines] == [30, 30]
     assert std.lines[0].get_xdata() == pytest.approx(table.of("std_N")["first"][SPEED])
-    parallel = pictures.parallel_coordinates(table, ["std_N"])
+    parallel = output.parallel_coordinates(table, ["std_N"])
     assert parallel is not None
     (lines,) = parallel.axes[0].collections
     assert len(lines.get_segments()) == 30
-    convergence = pictures.convergence(table, ["std_N"])
+    convergence = output.convergence(table, ["std_N"])
     assert convergence is not None
     mean = convergence.axes[0].lines[0]
     assert mean.get_ydata()[-1] == pytest.approx(table.of("std_N")["first"]["std_N"].mean())
-    histogram = pictures.histograms(table, ["std_N"])
+    histogram = output.histograms(table, ["std_N"])
     assert histogram is not None
     assert sum(bar.get_height() for bar in histogram.axes[0].patches) == 60
 

@@ -55,11 +55,9 @@ def hard(
     from catenary.base.parallel import on_root
     from catenary.cases.process.petsc_options import start_petsc
     from catenary.cases.process.workers import at_once
-    from catenary.cases.studies.hard import output
-    from catenary.cases.studies.hard.checks import check_cases
+    from catenary.cases.studies.hard import checks
     from catenary.cases.studies.records import KeptRows
-    from catenary.postproc.files.disk import write_all
-    from catenary.postproc.report.study_table import remark_lines
+    from catenary.postproc.report.study_table import remark_lines, write_files
 
     if comm.size > 1 and n_jobs != 1:
         raise InputError(f"-j is {n_jobs} on {comm.size} ranks, of which each case is to take all")
@@ -67,11 +65,11 @@ def hard(
     found: list[Criterion] = []
     told: dict[str, dict[str, list[str]]] = {}
     petsc = partial(start_petsc, arguments)
-    checked = check_cases(cases, comm, shortened, kept, at_once(n_jobs, comm), petsc)
+    checked = checks.check_cases(cases, comm, shortened, kept, at_once(n_jobs, comm), petsc)
     for number, case in enumerate(cases, start=1):
         console.say(f"[{number}/{len(cases)}] {case.name}: {case.what}")
         rows, remarks = next(checked)
-        console.say("\n".join(output.line(row) for row in rows))
+        console.say("\n".join(checks.line(row) for row in rows))
         found += rows
         told[case.name] = remarks
     failed = [row for row in found if not row.passed]
@@ -80,11 +78,10 @@ def hard(
         console.say("\n" + "\n".join(lines) + "\n")
     if out is not None:
         folder = out
-        tables = output.criteria(found, told).csv(), output.page(cases, found, told)
-        texts: dict[str, bytes | str] = dict(zip(TABLES, tables, strict=True))
-        on_root(comm, lambda: write_all(folder, texts))
+        tables = checks.criteria(found, told), checks.page(cases, found, told)
+        files = on_root(comm, lambda: write_files(folder, dict(zip(TABLES, tables, strict=True))))
         kept.forget()
-        console.say("\n".join(str(folder / name) for name in TABLES))
+        console.say("\n".join(map(str, files)))
     console.say(
         f"{len(cases)} hard cases on {comm.size} rank{'s' if comm.size > 1 else ''}: "
         f"{len(found) - len(failed)} of {len(found)} limits kept"

@@ -58,11 +58,10 @@ def sensitivity(
         refuse_table(out / TABLE, force)
     from catenary.cases.studies.sensitivity.output import as_text, table_of
     from catenary.cases.studies.sensitivity.study import sensitivity_of
-    from catenary.postproc.files.disk import write_all
+    from catenary.postproc.report.study_table import write_files
 
     found = sensitivity_of(scene, keys or [], console.alone(), droppers=droppers)
     console.say(as_text(found))
     if out is not None:
-        for path in write_all(out, {TABLE: table_of(found).csv()}):
-            console.say(f"\n{path}")
+        console.say(f"\n{write_files(out, {TABLE: table_of(found)})[0]}")
     return console.DONE

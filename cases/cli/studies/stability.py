@@ -34,18 +34,14 @@ def stability_map(
     from catenary.cases.studies.records import KeptRows
     from catenary.cases.studies.stability import map as study
     from catenary.cases.studies.stability.map import draw
-    from catenary.postproc.files.disk import write_all
-    from catenary.postproc.report.pictures import figures
-    from catenary.postproc.report.study_table import rows_csv
+    from catenary.postproc.report.study_table import write_files
 
     refuse_table(out / TABLE, force)
     grid = study.QUICK if quick else study.Grid()
     kept, scene = KeptRows(out, force), (words.case, words.changes, words.shortened)
     comm = console.alone()
     found = study.make_map(*scene, comm, grid, console.say, kept, at_once(n_jobs, comm))
-    content: dict[str, bytes | str] = {TABLE: rows_csv(study.as_rows(found))}
-    content |= figures.painted(PICTURE, lambda: draw(found))
-    files = write_all(out, content)
+    files = write_files(out, {TABLE: study.as_rows(found), PICTURE: lambda: draw(found)})
     kept.forget()
     console.say("\n" + study.as_text(found) + "\n" + "\n".join(map(str, files)))
     return console.DONE if all(one.agrees for one in found.limits) else console.NOT_ACCEPTED

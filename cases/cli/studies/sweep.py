@@ -80,8 +80,7 @@ def sweep(
     verbose: Verbose = False,
 ) -> int:
     """Collective."""
-    from catenary.cases.studies.sweep.jobs import RunOptions, check_statistics
-    from catenary.cases.studies.sweep.part import parse_part
+    from catenary.cases.studies.sweep.jobs import RunOptions, check_statistics, parse_part
     from catenary.cases.studies.sweep.sweep import run_part, run_sweep, sweep_of
 
     own = None if part is None else parse_part(part)
@@ -203,7 +202,7 @@ def run_study(
 ) -> int:
     """What ``catenary run CASE --study`` does; returns the exit code. Collective."""
     from catenary.cases.studies.case_study import Plan, find_study, make_plan
-    from catenary.cases.studies.sweep.part import parse_part
+    from catenary.cases.studies.sweep.jobs import parse_part
 
     own = None if part is None else parse_part(part)
 

@@ -8,15 +8,239 @@ is, and no difference is an error.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from catenary.base.errors import InputError
 from catenary.cases.scene.input.faults import shown
-from catenary.cases.studies.accuracy import models
-from catenary.cases.studies.accuracy.axis import DISCRETISATION, MODEL, Axis, Level, Reference
 
 if TYPE_CHECKING:
     from catenary.cases.scene.scene import Scene
+
+
+DISCRETISATION, MODEL = "discretisation", "model"
+
+
+@dataclass(frozen=True)
+class Level:
+    """One setting of an axis.
+
+    Attributes
+    ----------
+    name : short, unique within its axis
+    assignments : ``key=value`` each, on top of the scene
+    sizes : what is refined, by name: ``dt`` [s], ``h`` as a share of a gap; empty if nothing is
+    quick : whether the level also belongs to the short form of the axis
+    """
+
+    name: str
+    assignments: tuple[str, ...]
+    sizes: tuple[tuple[str, float], ...] = ()
+    quick: bool = False
+
+    def size(self, name: str) -> float | None:
+        """The value of one of ``sizes``, None if it has none."""
+        return dict(self.sizes).get(name)
+
+
+@dataclass(frozen=True)
+class Reference:
+    """What the levels of a discretisation axis are compared with, and what it is measured by.
+
+    Attributes
+    ----------
+    level : finer than every level of the axis in all that it refines
+    chains : for each size three levels, of which each has half the fineness of the one before it;
+        the first is the reference, or has its fineness in that size
+    """
+
+    level: Level
+    chains: tuple[tuple[Level, Level, Level], ...]
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One thing that is varied.
+
+    Attributes
+    ----------
+    name, title : for the option ``--axes`` and for headings
+    kind : ``DISCRETISATION`` or ``MODEL``
+    levels : the levels for a scene, quick ones only on request; none where it has nothing to vary
+    reference : for a scene, the reference of a discretisation axis; None for models, which are
+        compared with the scene as it is
+    refined : which of the levels' sizes an observed order belongs to, "" if none
+    step_alone : for a level of step and mesh, the one with its mesh and the reference's step: what
+        the two differ by is the error of the step, what is left that of the mesh; None if the axis
+        does not refine both
+    """
+
+    name: str
+    title: str
+    kind: str
+    levels: Callable[[Scene], Sequence[Level]]
+    reference: Callable[[bool], Reference] | None = None
+    refined: str = ""
+    step_alone: Callable[[Level], Level] | None = None
+
+    def chosen(self, scene: Scene, quick: bool) -> list[Level]:
+        """The levels of the axis for a scene, in the long or the short form."""
+        return [level for level in self.levels(scene) if level.quick or not quick]
+
+
+_SMALLEST_FIT = 0.5  # [Hz], as the verb ``pantograph`` does
+# Effects that let wires move sideways and along the track.
+_ACROSS, _ALONG = "lateral_motion", "axial_motion"
+# Wires and fittings that a line may do without, by key of ``line``, and the topology that is left.
+_PARTS = {
+    "stitch_wire": "simple",
+    "auxiliary_wire": "simple",
+    "twin": "simple",
+    "bridle": "single",
+    "overlap": None,
+}
+_NEWMARK = ("numerics.integrator=newmark", "numerics.spectral_radius=")
+_NO_LAW = ("contact.restitution=", "contact.hertz_stiffness_N_per_m1_5=",
+           "contact.damping_N_s_per_m=", "contact.least_impact_speed_m_per_s=")  # fmt: skip
+_ELASTIC = (*_NO_LAW, "effects.contact_damping=false")
+
+
+def contacts(scene: Scene) -> list[Level]:
+    """Laws of the contact, and stiffnesses of the linear one."""
+    levels = [
+        Level(
+            f"linear_{k:g}",
+            (*_ELASTIC, "contact.law=linear", f"contact.stiffness_N_per_m={k:g}"),
+            quick=k in (5e4, 2e5),
+        )
+        for k in (2e4, 5e4, 1e5, 2e5, 1e6)
+    ]
+    levels.append(Level("hertz", (*_ELASTIC, "contact.law=hertz")))
+    levels += [
+        Level(
+            f"{law}_0.6",
+            (
+                *_NO_LAW,
+                f"contact.law={law}",
+                "contact.restitution=0.6",
+                "effects.contact_damping=true",
+            ),  # fmt: skip
+        )
+        for law in ("lankarani_nikravesh", "hunt_crossley", "flores", "gonthier")
+    ]
+    # Without numerical damping the force of a contact that does not give way alternates.
+    damped = (*_NEWMARK, "numerics.newmark_gamma=0.55", "numerics.newmark_beta=0.28")
+    rigid = (*_ELASTIC, "contact.stiffness_N_per_m=", "contact.law=kinematic", *damped)
+    return [*levels, Level("kinematic_newmark_0.55", rigid)]
+
+
+def droppers(scene: Scene) -> list[Level]:
+    """Laws of slack droppers."""
+    slack, kept = "effects.dropper_slackening", "effects.residual_dropper_stiffness"
+    slackens, damper = (f"{kept}=false", f"{slack}=true"), "line.dropper.slack_damping"
+    return [
+        Level("linear", (f"{kept}=false", f"{slack}=false"), quick=True),
+        Level("slackening", (*slackens, f"{damper}=released"), quick=True),
+        Level("slackening_damped", (*slackens, f"{damper}=kept")),
+        Level(
+            "residual_0.01",
+            (
+                f"{slack}=true",
+                f"{kept}=true",
+                "line.dropper.residual_stiffness_ratio=0.01",
+                f"{damper}=released",
+            ),
+        ),
+    ]
+
+
+def pantographs(scene: Scene) -> list[Level]:
+    """Lumped chains fitted to the scene's leading kind; a mechanism also with all its bodies.
+
+    A chain is not fitted with more masses than it has: the data say nothing of the others.
+    """
+    kind = scene.train.pantographs[0].name
+    table = scene.pantographs[kind]
+    most = len(table.masses_kg) if table.type == "lumped" else 3
+    levels = [_fitted(scene, kind, n) for n in range(1, min(most, 3) + 1)]
+    if table.type == "multibody":
+        motion = f"pantographs.{kind}.motion"
+        levels.append(Level("reduced", (f"{motion}=reduced",), quick=True))
+        levels.append(Level("all_bodies", (f"{motion}=all_bodies",)))
+    return levels
+
+
+def _fitted(scene: Scene, kind: str, n_masses: int) -> Level:
+    """All pantographs of the train as chains fitted to a kind, as the verb ``pantograph`` does."""
+    from catenary.cases.studies.pantograph_response import Range, inline_table, study
+
+    found = study(scene, kind, n_masses, Range(0.1, 25.0, 2, _SMALLEST_FIT))
+    name = f"fitted_{n_masses}"
+    assignments = [f"pantographs.{name}={inline_table(found)}"]
+    for place in range(len(scene.train.pantographs)):
+        assignments += [
+            f"train.pantographs.{place}.name={name}",
+            f"train.pantographs.{place}.reversed=",
+        ]
+    return Level(f"fitted_{n_masses}_mass", tuple(assignments), quick=n_masses == 2)
+
+
+def planes(scene: Scene) -> list[Level]:
+    """Planes in which wires move: sideways, and along the track if they have what that needs."""
+    from catenary.cases.scene.checks.twins import RELATIVE_MOTION, needs_relative_motion
+    from catenary.cases.scene.problem import problem_of
+    from catenary.solver.effects import all_effects
+
+    problem = problem_of(scene)
+    with_data = all_effects.registry()[_ALONG].applies(problem)
+    # Twin wires that move as one do so in the vertical plane only.
+    apart = (f"effects.{RELATIVE_MOTION}=true",) if needs_relative_motion(problem, _ACROSS) else ()
+    levels = {"vertical": (False, False), "lateral": (True, False)}
+    if with_data:
+        levels |= {"axial": (False, True), "three_planes": (True, True)}
+    return [
+        Level(
+            name,
+            (
+                f"effects.{_ACROSS}={str(across).lower()}",
+                f"effects.{_ALONG}={str(along).lower()}",
+                *(apart if across or along else ()),
+            ),
+            quick=name in ("vertical", "lateral"),
+        )
+        for name, (across, along) in levels.items()
+    ]
+
+
+# Damping of a wire itself, of whole lines as it was measured on their vertical motion (ratios of
+# 0.01 and 0.05 at 1.4 Hz), and so much that no wave comes back from a mast [1/s]; see the README of
+# ac_simple_3d. None was measured on lateral motion.
+_ACROSS_DAMPINGS = (0.003, 0.2, 0.9, 3.0, 10.0)
+
+
+def lateral_dampings(scene: Scene) -> list[Level]:
+    """Dampings of the wires' lateral motion, on their mass alone; none without that motion."""
+    if not scene.switches()[_ACROSS]:
+        return []
+    return [
+        Level(
+            f"{beta:g}_per_s",
+            (f"line.damping.lateral={{alpha_s=0.0, beta_per_s={beta:g}}}",),
+            quick=beta in (0.003, 0.9),
+        )
+        for beta in _ACROSS_DAMPINGS
+    ]
+
+
+def parts_of_the_line(scene: Scene) -> list[Level]:
+    """The line without each wire or fitting that it can do without; none of a simple line."""
+    levels = []
+    for part, left in _PARTS.items():
+        if getattr(scene.line, part) is not None:
+            topology = [] if left is None else [f"line.topology={left}"]
+            levels.append(Level(f"without_{part}", (f"line.{part}=", *topology), quick=True))
+    return levels
 
 
 def parse_axes(text: str | None) -> list[Axis]:
@@ -120,7 +344,6 @@ def _grid(scene: Scene) -> list[Level]:
 
 # ---- scheme and coupling ------------------------------------------------------------------------
 
-_NEWMARK = ("numerics.integrator=newmark", "numerics.spectral_radius=")
 _ONE_SOLVE = ("numerics.iterations=", "numerics.scheme=one_solve")
 # The paper's correction, so many times in every step, whatever they reach; or until changes are
 # below tolerances, of which the loosest end every step after the first.
@@ -238,11 +461,11 @@ _ALL = (
     Axis("scheme", "scheme, at the case's step", DISCRETISATION, _schemes, _fine_step),
     Axis("coupling", "coupling, at the case's step", DISCRETISATION, _couplings, _fine_step),
     Axis("adaptive", "steps halved where a force is wrong", DISCRETISATION, _adaptive, _fine_step),
-    Axis("contact", "contact law and stiffness", MODEL, models.contacts),
-    Axis("dropper", "dropper model", MODEL, models.droppers),
-    Axis("pantograph", "pantograph model", MODEL, models.pantographs),
-    Axis("planes", "planes in which wires move", MODEL, models.planes),
-    Axis("lateral_damping", "damping of lateral motion", MODEL, models.lateral_dampings),
-    Axis("parts", "the line without one of its parts", MODEL, models.parts_of_the_line),
+    Axis("contact", "contact law and stiffness", MODEL, contacts),
+    Axis("dropper", "dropper model", MODEL, droppers),
+    Axis("pantograph", "pantograph model", MODEL, pantographs),
+    Axis("planes", "planes in which wires move", MODEL, planes),
+    Axis("lateral_damping", "damping of lateral motion", MODEL, lateral_dampings),
+    Axis("parts", "the line without one of its parts", MODEL, parts_of_the_line),
 )  # fmt: skip
 AXES = {axis.name: axis for axis in _ALL}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import re
 import shlex
@@ -22,14 +21,17 @@ from catenary.cases.studies.accuracy.analysis import (
     observed_orders,
     pareto,
 )
-from catenary.cases.studies.accuracy.axes import AXES
-from catenary.cases.studies.accuracy.axis import DISCRETISATION, Axis
-from catenary.cases.studies.accuracy.plan import PlannedAxis
-from catenary.cases.studies.accuracy.runs import Measured
+from catenary.cases.studies.accuracy.axes import AXES, DISCRETISATION, Axis
+from catenary.cases.studies.accuracy.runs import Measured, PlannedAxis
 from catenary.postproc.evaluate.wording import counted
-from catenary.postproc.files.disk import plain, write_all
 from catenary.postproc.report.pictures import figures
-from catenary.postproc.report.study_table import Column, StudyTable, remark_lines
+from catenary.postproc.report.study_table import (
+    Column,
+    Content,
+    StudyTable,
+    remark_lines,
+    write_files,
+)
 
 TABLE, RECORD, PAGE = "accuracy.csv", "accuracy.json", "accuracy.md"
 PICTURE = "work_precision.png"
@@ -46,14 +48,12 @@ def write(found: Measured, out_dir: Path, target: float) -> list[Path]:
 
     The diagram is left out if no axis of discretisation was varied.
     """
-    content: dict[str, bytes | str] = {
-        TABLE: table_of(found.rows).csv(),
-        RECORD: json.dumps(plain(_record(found, target)), indent=1, ensure_ascii=False) + "\n",
-    }
-    if any(row.done for axis in _precise(found) for row in found.rows_of(axis.name)):
-        content |= figures.painted(PICTURE, lambda: draw(found))
-    content[PAGE] = page(found, advices(found, target), PICTURE if PICTURE in content else "")
-    return write_all(out_dir, content)
+    content: dict[str, Content] = {TABLE: table_of(found.rows), RECORD: _record(found, target)}
+    drawn = any(row.done for axis in _precise(found) for row in found.rows_of(axis.name))
+    if drawn:
+        content[PICTURE] = lambda: draw(found)
+    content[PAGE] = page(found, advices(found, target), PICTURE if drawn else "")
+    return write_files(out_dir, content)
 
 
 def table_of(rows: Sequence[Row], axis: Axis | None = None) -> StudyTable:

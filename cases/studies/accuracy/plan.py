@@ -11,7 +11,7 @@ from catenary.cases.scene.input.case_files import find_case
 from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.problem import resolved
 from catenary.cases.scene.scene import Scene
-from catenary.cases.studies.accuracy.axis import MODEL, Axis, Level, Reference
+from catenary.cases.studies.accuracy.axes import MODEL, Axis, Level, Reference
 from catenary.cases.studies.sweep.jobs import Job
 from catenary.cases.studies.sweep.variants import Variant, slug
 from catenary.postproc.files.disk import plain

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Sequence
 from dataclasses import replace
@@ -11,8 +10,7 @@ from typing import Any, NamedTuple
 
 from catenary.cases.studies.effect_cost.study import FIGURES, UPLIFT, Costs, Measured, Size
 from catenary.postproc.evaluate.wording import counted, fixed
-from catenary.postproc.files.disk import plain, write_all
-from catenary.postproc.report.study_table import Column, StudyTable, remark_lines
+from catenary.postproc.report.study_table import Column, StudyTable, remark_lines, write_files
 
 TABLE, RECORD, TEXT = "cost.csv", "cost.json", "cost.txt"
 # Figures of a table for people.
@@ -234,9 +232,9 @@ def sentence(found: Costs, row: Measured) -> str:
     return f"{text} Switched with it, since one requires the other: {others}."
 
 
-def as_json(found: Costs) -> str:
-    """Everything as JSON text."""
-    record = {
+def record_of(found: Costs) -> dict[str, Any]:
+    """Everything for JSON."""
+    return {
         "case": found.wish.case,
         "assignments": list(found.wish.overrides),
         "evaluation_m": list(found.stretch),
@@ -246,10 +244,9 @@ def as_json(found: Costs) -> str:
         "lacking_data": found.effects.lacking,
         "rows": table_of(found).records(),
     }
-    return json.dumps(plain(record), indent=1, ensure_ascii=False) + "\n"
 
 
 def write(found: Costs, folder: Path) -> list[Path]:
     """Write table, record and text into a folder; returns the files. Not collective."""
-    content = {TABLE: table_of(found).csv(), RECORD: as_json(found), TEXT: as_text(found) + "\n"}
-    return write_all(folder, content)
+    text = as_text(found) + "\n"
+    return write_files(folder, {TABLE: table_of(found), RECORD: record_of(found), TEXT: text})

@@ -8,7 +8,7 @@ Limits that are no answer of a single case's are derived here:
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -19,11 +19,69 @@ from catenary.cases.process.workers import WorkerLost
 from catenary.cases.scene.problem import resolved
 from catenary.cases.studies.hard import runs as hard_runs
 from catenary.cases.studies.hard.cases import HardCase
-from catenary.cases.studies.hard.energy import energy_that_left
 from catenary.cases.studies.hard.runs import Watched, cut_of, node_places, rest_height
 from catenary.cases.studies.records import KeptRows
-from catenary.solver.problem.incidents import in_steps
+from catenary.postproc.report.study_table import Column, StudyTable, remark_lines
+from catenary.solver.model.elements.beam import shape_slopes
+from catenary.solver.problem.incidents import DropperBreak, LineIncident, in_steps
 from catenary.solver.statics.line_at_rest import LineAtRest
+
+# Gauss's rule of three points is exact for the square of a cubic's slope.
+_POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(3)
+
+
+class Left(NamedTuple):
+    """Energy that left in a step [J]: as the balance of the run says, and as theory says."""
+
+    step: int
+    observed: float
+    expected: float
+
+
+def energy_that_left(rest: LineAtRest, run: Watched) -> list[Left]:
+    """What left at each incident of a run that was watched for it. Not collective.
+
+    A dropper takes along the T^2 / 2k that its tension T at that time has stored. A wire whose
+    tension falls from T to T' gives (T - T') / 2 times the integral of z'^2 to its tensioner, z'
+    being its slope then, pre-sag and motion included.
+    """
+    found: list[Left] = []
+    shares: dict[str, float] = {}
+    seen: Sequence[LineIncident] = ()
+    balance = run.energy - run.work
+    for happened in in_steps(rest.problem.incidents, rest.problem.numerics.dt):
+        force, displacement = run.kept[happened.step]
+        new = happened.incidents[len(seen) :]
+        expected = sum(_leaves(rest, incident, shares, force, displacement) for incident in new)
+        observed = float(balance[happened.step] - balance[happened.step + 1])
+        found.append(Left(happened.step, observed, expected))
+        seen = happened.incidents
+    return found
+
+
+def _leaves(
+    rest: LineAtRest,
+    incident: LineIncident,
+    shares: dict[str, float],
+    force: np.ndarray,
+    displacement: np.ndarray,
+) -> float:
+    mesh, line = rest.model.mesh, rest.problem.line
+    if isinstance(incident, DropperBreak):
+        number = int(np.argmin(np.abs(mesh.x(mesh.droppers[:, 1]) - incident.x)))
+        return float(rest.model.dropper_slopes.energy_under(force)[number])
+    before = shares.get(incident.wire, 1.0)
+    shares[incident.wire] = incident.share
+    dofs, length = rest.model.wire_elements(incident.wire)
+    form, pairs = rest.form, mesh.elements(incident.wire)
+    at = np.stack([form.height[pairs], form.slope[pairs]], axis=2)
+    shape = at.reshape(-1, 4) + displacement[dofs]
+    total = 0.0
+    for values, h in zip(shape, length, strict=True):
+        slopes = [shape_slopes(0.5 * (1.0 + point), h) @ values for point in _POINTS]
+        total += 0.5 * h * float(_WEIGHTS @ np.square(slopes))
+    return 0.5 * (before - incident.share) * line.wire(incident.wire).tension * total
+
 
 FALLS = 0.6
 # Energy that rises by less [-] is round-off of some thousand steps: of its largest value.
@@ -313,3 +371,75 @@ def _reaches(case: HardCase, name: str, value: float, limit: float) -> Criterion
 
 def _holds(case: HardCase, name: str, holds: bool, note: str = "") -> Criterion:
     return Criterion(case.name, name, float(holds), 1.0, holds, "" if note == "done" else note)
+
+
+# By case and run of it, sentences about what decides the run's results.
+Told = Mapping[str, Mapping[str, Sequence[str]]]
+# Criteria that nearly all cases have, and the heads of their columns.
+_COLUMNS = {
+    "largest contact force [N]": "force [N]",
+    "largest lift [m]": "lift [m]",
+    "energy from nothing": "energy made",
+    "the same at half the step": "at half the step",
+    "difference after halving the step twice to once": "refinement",
+    "fixed-point correction, head height [m]": "schemes [m]",
+}
+# Criteria without a figure.
+_PLAIN = ("runs to its end", "everything is finite", "the fixed-point correction breaks")
+
+
+def criteria(found: Sequence[Criterion], told: Told) -> StudyTable:
+    """All that was measured, a row each, and a row with the remarks on each case that has any."""
+    names = ("case", "criterion", "value", "limit", "kept", "note")
+    rows: list[tuple[str, ...]] = [
+        (row.case, row.name, f"{row.value:.3g}", f"{row.limit:.3g}", "yes" if row.passed else "no",
+         row.note)
+        for row in found
+    ]  # fmt: skip
+    for case, remarks in told.items():
+        texts = [f"{run}: {text}" for run, own in remarks.items() for text in own]
+        if texts:
+            rows.append((case, "remarks", str(len(texts)), "", "", "; ".join(texts)))
+    return StudyTable(
+        [Column(name) for name in names], [dict(zip(names, row, strict=True)) for row in rows]
+    )
+
+
+def page(cases: Sequence[HardCase], found: Sequence[Criterion], told: Told) -> str:
+    """A table of Markdown with a line for each case, and below it the remarks."""
+    columns = [
+        Column("case", "case"),
+        Column("words", "what is hard; *a right answer*"),
+        *(Column(name, head, ".2g") for name, head in _COLUMNS.items()),
+        *(Column(name, name) for name in ("others", "remarks", "kept")),
+    ]
+    rows = []
+    for case in cases:
+        own = {row.name: row for row in found if row.case == case.name}
+        others = "; ".join(
+            f"{row.name} {row.value:.3g}"
+            for name, row in own.items()
+            if name not in _COLUMNS and (name not in _PLAIN or not row.passed)
+        )
+        rows.append(
+            {name: row.value for name, row in own.items() if name in _COLUMNS}
+            | {
+                "case": f"`{case.name}`",
+                "words": f"{case.what}; *{case.right}*",
+                "others": others,
+                "remarks": sum(map(len, told.get(case.name, {}).values())) or None,
+                "kept": "yes" if all(row.passed for row in own.values()) else "**no**",
+            }
+        )
+    lines = [StudyTable(columns, rows).markdown()]
+    below = remark_lines(run for remarks in told.values() for run in remarks.items())
+    if below:
+        lines += ["", *(f"- {line.split(maxsplit=1)[1]}" for line in below)]
+    return "\n".join(lines) + "\n"
+
+
+def line(row: Criterion) -> str:
+    """A criterion for a terminal."""
+    mark = "kept  " if row.passed else "BROKEN"
+    note = f"  ({row.note})" if row.note else ""
+    return f"    {mark}  {row.name:48} {row.value:10.3g}  limit {row.limit:9.3g}{note}"

@@ -17,7 +17,7 @@ from catenary.cases.studies.scene_sets.scene_set import Member, SceneSet
 from catenary.cases.studies.sweep.jobs import OF_PANTOGRAPH
 
 if TYPE_CHECKING:
-    from catenary.cases.studies.ensemble.scenes_on_lines import Marches
+    from catenary.cases.studies.ensemble import Marches
 
 BROKE = "broke"
 # Tables of a scene that its figures do not depend on.
@@ -84,7 +84,7 @@ def _summaries(scenes: Sequence[Scene], comm: Any = None) -> list[dict[str, Any]
     from catenary.cases.process.petsc_options import options_of
 
     alone()  # starts MPI as one process, before anything imports it
-    from catenary.cases.studies.ensemble.scenes_on_lines import Marches
+    from catenary.cases.studies.ensemble import Marches
     from catenary.postproc.files.run_schema import DONE
 
     global _marches

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -17,9 +17,15 @@ from catenary.cases.studies.sweep.jobs import OF_LINE, OF_PANTOGRAPH, STATISTICS
 from catenary.cases.studies.sweep.variants import NAMES
 from catenary.cases.terminal.key_list import Key, keys_of_a_scene
 from catenary.cases.terminal.terminal_text import labelled
-from catenary.postproc.files.disk import plain, write_all
 from catenary.postproc.report.pictures import figures
-from catenary.postproc.report.study_table import Column, StudyTable, cell, remark_lines
+from catenary.postproc.report.study_table import (
+    Column,
+    Content,
+    StudyTable,
+    cell,
+    remark_lines,
+    write_files,
+)
 
 TABLE, RECORD, PICTURE = "sweep.csv", "sweep.json", "sweep.png"
 PARQUET = "sweep.parquet"
@@ -45,7 +51,8 @@ def table_of(ended: Sequence[Ended]) -> StudyTable:
         head |= {"passed": one.summary.get("passed"), "failed": failed, "remarks": one.remarks}
         head |= {"judged": judged_criteria(one.summary)}
         head |= {"not_judged": unjudged_criteria(one.summary)}
-        head |= {"rules": list(dict.fromkeys(row["book"] for row in _judged_rows(one.summary)))}
+        rules = [*one.summary.get("acceptance", []), *one.summary.get("not_judged", [])]
+        head["rules"] = list(dict.fromkeys(row["book"] for row in rules if row.get("book")))
         head |= {"wall_s": one.wall, "accepted": _verdict(one.summary.get("passed"), failed)}
         for pantograph in one.summary.get("pantographs", [{}]):
             row: dict[str, Any] = {**head, "pantograph": pantograph.get("name", "")}
@@ -76,29 +83,24 @@ def _typed(key: str, text: str | None) -> Any:
 
 def failed_criteria(summary: Mapping[str, Any]) -> list[str]:
     """Names of the acceptance criteria that a run failed, each once."""
+    return _criteria(summary, (False,))
+
+
+def judged_criteria(summary: Mapping[str, Any]) -> list[str]:
+    """Names of the acceptance criteria that were judged in a run, each once."""
+    return _criteria(summary, (False, True))
+
+
+def _criteria(summary: Mapping[str, Any], verdicts: Sequence[bool]) -> list[str]:
     rows = summary.get("acceptance", [])
     several = len({row.get("book") for row in rows}) > 1
-    failed = (labelled(row, several) for row in rows if row["passed"] is False)
-    return list(dict.fromkeys(failed))
+    return list(dict.fromkeys(labelled(row, several) for row in rows if row["passed"] in verdicts))
 
 
 def unjudged_criteria(summary: Mapping[str, Any]) -> list[str]:
     """Names of the criteria for which a run has no data, each once."""
     rows = summary.get("not_judged", [])
     return list(dict.fromkeys(labelled(row, several=True) for row in rows))
-
-
-def _judged_rows(summary: Mapping[str, Any]) -> list[Mapping[str, Any]]:
-    rows = [*summary.get("acceptance", []), *summary.get("not_judged", [])]
-    return [row for row in rows if row.get("book")]
-
-
-def judged_criteria(summary: Mapping[str, Any]) -> list[str]:
-    """Names of the acceptance criteria that were judged in a run, each once."""
-    rows = summary.get("acceptance", [])
-    several = len({row.get("book") for row in rows}) > 1
-    judged = (labelled(row, several) for row in rows if row["passed"] is not None)
-    return list(dict.fromkeys(judged))
 
 
 def _verdict(passed: bool | None, failed: Sequence[str]) -> str:
@@ -150,17 +152,13 @@ def write(
     }
     content = table_files(record, table)
     if plotted is not None and sum(one.done for one in ended) > 1:
-        keys = varied_keys(ended)
-        content |= figures.painted(PICTURE, lambda: draw(table.rows, keys, plotted))
-    return write_all(out_dir, content)
+        content[PICTURE] = partial(draw, table.rows, varied_keys(ended), plotted)
+    return write_files(out_dir, content)
 
 
-def table_files(record: Mapping[str, Any], table: StudyTable) -> dict[str, bytes | str]:
+def table_files(record: Mapping[str, Any], table: StudyTable) -> dict[str, Content]:
     """The table of a sweep as CSV, as JSON within its record, and as Parquet with pyarrow."""
-    files: dict[str, bytes | str] = {
-        TABLE: table.csv(),
-        RECORD: json.dumps(plain(dict(record)), indent=1, ensure_ascii=False) + "\n",
-    }
+    files: dict[str, Content] = {TABLE: table, RECORD: record}
     columns = table.parquet()
     return files if columns is None else files | {PARQUET: columns}
 

@@ -15,7 +15,7 @@ from catenary.cases.studies.sweep.variants import Variant
 
 if TYPE_CHECKING:
     from catenary.cases.scene.scene import Scene
-    from catenary.cases.studies.sweep.part import Part
+    from catenary.cases.studies.sweep.jobs import Part
     from catenary.cases.studies.sweep.together import Ensemble
 
 

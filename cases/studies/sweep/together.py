@@ -19,8 +19,7 @@ from catenary.cases.scene.input.faults import UnfitScene
 from catenary.cases.scene.load import Draft, read_draft
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.records import KeptRows
-from catenary.cases.studies.sweep.jobs import Ended, RunOptions, interrupted, scene_of
-from catenary.cases.studies.sweep.part import Part
+from catenary.cases.studies.sweep.jobs import Ended, Part, RunOptions, interrupted, scene_of
 from catenary.cases.studies.sweep.variants import Variant
 from catenary.postproc.files.run_schema import DONE, INTERRUPTED
 
@@ -172,7 +171,7 @@ class _March:
 
     def __call__(self, piece: Sequence[Variant], comm: Any) -> list[list[Any]]:
         """Outcome and what is kept of the summary of each. Not collective."""
-        from catenary.cases.studies.ensemble.scenes_on_lines import Marches
+        from catenary.cases.studies.ensemble import Marches
 
         rows: list[list[Any]] = [[] for _ in piece]
         scenes, numbers = [], []

@@ -2,30 +2,189 @@
 
 from __future__ import annotations
 
-import functools
-import json
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter
+
 from catenary.cases.studies.sweep.jobs import STATISTICS
-from catenary.cases.studies.uncertainty import pictures
-from catenary.cases.studies.uncertainty.evaluation import Row, Uncertainty
+from catenary.cases.studies.sweep.output import PLOTTED, key_in_words
+from catenary.cases.studies.uncertainty.estimates import quantile, student
+from catenary.cases.studies.uncertainty.evaluation import Row, Uncertainty, independent_runs
 from catenary.cases.studies.uncertainty.run_table import (
     SAMPLING,
     RunTable,
-    sampling_text,
 )
-from catenary.postproc.files.disk import plain, write_all
+from catenary.cases.studies.uncertainty.sensitivity import ranked_inputs
 from catenary.postproc.report.pictures import figures
-from catenary.postproc.report.study_table import Column, StudyTable
+from catenary.postproc.report.study_table import Column, Content, StudyTable, write_files
+
+# Panels, points and lines that a picture has room for; of more, evenly chosen ones are drawn.
+_MOST_KEYS, _MOST_STATISTICS, _MOST_POINTS, _MOST_LINES = 6, 5, 5000, 1000
+_UPPER = 0.95  # quantile that is drawn
+_MANY = 300  # points that are drawn small
+_STEPS = 25  # points of a curve of convergence
+
+
+def drawn_statistics(table: RunTable, wanted: Sequence[str] = ()) -> list[str]:
+    """The statistics that are drawn: the wanted ones, else the usual ones, else the first."""
+    usual = [name for name in wanted or PLOTTED if name in table.statistics]
+    return usual or table.statistics[:_MOST_STATISTICS]
+
+
+@figures.own_style()
+def scatter(table: RunTable, wanted: Sequence[str] = ()) -> Figure | None:
+    """Statistics over each input, a row of panels for each statistic; None without inputs."""
+    keys, statistics = ranked_inputs(table)[:_MOST_KEYS], drawn_statistics(table, wanted)
+    if not keys or not statistics:
+        return None
+    figure = figures.new_figure(0.6 + 1.9 * len(statistics))
+    panels = figure.subplots(len(statistics), len(keys), sharex="col", sharey="row", squeeze=False)
+    for row, name in zip(panels, statistics, strict=True):
+        for axes, key in zip(row, keys, strict=True):
+            for number, (pantograph, rows) in enumerate(table.of(name).items()):
+                some = rows.iloc[:: -(-len(rows) // _MOST_POINTS)]
+                figures.curve(
+                    axes, some[key], some[name], number, pantograph or None, "o",
+                    ms=4.0 if len(some) < _MANY else 1.5, alpha=0.6, mew=0.0,
+                )  # fmt: skip
+            _panel(axes, "", _meaning(name) if key == keys[0] else "")
+    for axes, key in zip(panels[-1], keys, strict=True):
+        axes.set_xlabel(key_in_words(key), fontsize="small")
+    if len(table.of(statistics[0])) > 1:
+        figures.legend_above(panels[0][-1])
+    return figure
+
+
+@figures.own_style()
+def parallel_coordinates(table: RunTable, wanted: Sequence[str] = ()) -> Figure | None:
+    """A line for each run through its inputs and a statistic, by which it is coloured.
+
+    Each axis runs from the least to the greatest value. None with fewer than two axes.
+    """
+    keys, statistics = ranked_inputs(table), drawn_statistics(table, wanted)
+    if not keys or not statistics:
+        return None
+    name = "std_N" if "std_N" in statistics else statistics[0]
+    pantograph, rows = next(iter(table.of(name).items()))
+    axes_names = [*keys[:_MOST_KEYS], name]
+    numbers = rows[axes_names].dropna().to_numpy(float)
+    numbers = numbers[:: max(1, -(-len(numbers) // _MOST_LINES))]
+    if len(numbers) < 2:
+        return None
+    low, high = numbers.min(axis=0), numbers.max(axis=0)
+    scaled = (numbers - low) / np.where(high > low, high - low, 1.0)
+    figure = figures.new_figure(3.6)
+    axes = figure.subplots()
+    x = np.arange(len(axes_names))
+    order = np.argsort(scaled[:, -1])
+    lines = LineCollection(
+        [np.column_stack([x, own]) for own in scaled[order]],
+        array=numbers[order, -1], cmap="viridis", linewidths=0.7, alpha=0.7,
+    )  # fmt: skip
+    axes.add_collection(lines)
+    figure.colorbar(lines, ax=axes, label=_meaning(name), pad=0.02)
+    axes.set_xlim(-0.2, len(x) - 0.8)
+    axes.set_ylim(-0.02, 1.02)
+    axes.set_yticks([])
+    labels = [
+        f"{_meaning(one) if one == name else key_in_words(one)}\n{a:.5g} to {b:.5g}"
+        for one, a, b in zip(axes_names, low, high, strict=True)
+    ]
+    axes.set_xticks(x, labels, fontsize="small")
+    for place in x:
+        axes.axvline(place, color=figures.GREY, linewidth=0.8)
+    for side in ("top", "right", "left"):
+        axes.spines[side].set_visible(False)
+    if pantograph and len(table.of(name)) > 1:
+        axes.set_title(pantograph, loc="left", fontsize="medium")
+    return figure
+
+
+@figures.own_style()
+def convergence(table: RunTable, wanted: Sequence[str] = ()) -> Figure | None:
+    """Mean and 95 % quantile with their bounds over the number of samples; None of fewer than 10.
+
+    Samples are taken in their order, independent ones only.
+    """
+    table = independent_runs(table)
+    statistics = drawn_statistics(table, wanted)
+    if not statistics or len(table.done) < 10:
+        return None
+    figure = figures.new_figure(0.6 + 2.0 * len(statistics))
+    panels = figure.subplots(len(statistics), 1, sharex=True, squeeze=False)[:, 0]
+    for axes, name in zip(panels, statistics, strict=True):
+        pantograph, rows = next(iter(table.of(name).items()))
+        x = rows[name].dropna().to_numpy(float)
+        if len(x) < 10:
+            continue
+        counts = np.unique(np.geomspace(10, len(x), _STEPS).round().astype(int))
+        means = np.array([student(x[:n]) for n in counts])
+        uppers = np.array([quantile(x[:n], _UPPER) for n in counts])
+        for number, (label, found) in enumerate(
+            (("mean", means), (f"{100 * _UPPER:g} % quantile", uppers))
+        ):
+            figures.curve(axes, counts, found[:, 0], number, label, ".-")
+            for bound in (found[:, 1], found[:, 2]):
+                figures.curve(axes, counts, bound, number, None, "--", 0.7)
+        _panel(axes, "", _meaning(name), pantograph)
+    panels[-1].set_xlabel("number of samples; dashed: 95 % confidence", fontsize="small")
+    panels[-1].set_xscale("log")
+    panels[-1].xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    panels[-1].xaxis.set_major_formatter("{x:g}")
+    panels[-1].xaxis.set_minor_formatter(NullFormatter())
+    figures.legend_above(panels[0])
+    return figure
+
+
+@figures.own_style()
+def histograms(table: RunTable, wanted: Sequence[str] = ()) -> Figure | None:
+    """Histogram of each statistic with its median and 95 % quantile; None without any."""
+    table = independent_runs(table)
+    statistics = drawn_statistics(table, wanted)
+    if not statistics:
+        return None
+    figure = figures.new_figure(0.6 + 1.8 * len(statistics))
+    panels = figure.subplots(len(statistics), 1, squeeze=False)[:, 0]
+    for axes, name in zip(panels, statistics, strict=True):
+        for number, (pantograph, rows) in enumerate(table.of(name).items()):
+            x = rows[name].dropna().to_numpy(float)
+            # The bins of Freedman and Diaconis, but no more than are seen.
+            bins = min(60, len(np.histogram_bin_edges(x, "fd")))
+            colour = figures.colour(number)
+            axes.hist(x, bins=bins, color=colour, alpha=0.5, label=pantograph or None)
+            for probability, look in ((0.5, "-"), (_UPPER, "--")):
+                axes.axvline(float(np.quantile(x, probability)), color=colour, ls=look, lw=1.2)
+        _panel(axes, _meaning(name), "runs")
+    if len(table.of(statistics[0])) > 1:
+        figures.legend_above(panels[0])
+    panels[0].set_title("solid: median, dashed: 95 % quantile", loc="left", fontsize="medium")
+    return figure
+
+
+def _panel(axes: Axes, x: str, y: str, title: str = "") -> None:
+    figures.tidy(axes, x, y, title)
+    axes.yaxis.label.set_fontsize("small")
+    axes.xaxis.label.set_fontsize("small")
+
+
+def _meaning(name: str) -> str:
+    known = STATISTICS.get(name)
+    return known.meaning if known is not None and known.meaning else name
+
 
 RECORD = "uncertainty.json"
 PICTURES = {
-    "uncertainty_scatter.png": pictures.scatter,
-    "uncertainty_parallel.png": pictures.parallel_coordinates,
-    "uncertainty_convergence.png": pictures.convergence,
-    "uncertainty_histogram.png": pictures.histograms,
+    "uncertainty_scatter.png": scatter,
+    "uncertainty_parallel.png": parallel_coordinates,
+    "uncertainty_convergence.png": convergence,
+    "uncertainty_histogram.png": histograms,
 }
 _LOW, _HIGH = 0.05, 0.95
 _MOST_REMARKS = 5  # on a terminal; all are in the file
@@ -43,14 +202,12 @@ def write(
     found : their evaluation
     plotted : statistics that are drawn; the usual ones if there are none
     """
-    content: dict[str, bytes | str] = {
-        RECORD: json.dumps(plain(found.as_table()), indent=1, ensure_ascii=False) + "\n"
-    }
+    content: dict[str, Content] = {RECORD: found.as_table()}
     if table.sampling is not None:
-        content[SAMPLING] = sampling_text(table.sampling)
+        content[SAMPLING] = table.sampling.model_dump(exclude_none=True)
     for name, draw in PICTURES.items():
-        content |= figures.painted(name, functools.partial(draw, table, plotted))
-    return write_all(out, content)
+        content[name] = partial(draw, table, plotted)
+    return write_files(out, content)
 
 
 def as_text(found: Uncertainty) -> str:

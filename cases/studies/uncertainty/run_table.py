@@ -13,7 +13,6 @@ from catenary.base.errors import InputError
 from catenary.cases.studies.sampling.tables import SamplingTable, sampling_of
 from catenary.cases.studies.sweep.jobs import OF_LINE
 from catenary.cases.studies.sweep.output import PARQUET, TABLE
-from catenary.postproc.files.disk import plain
 
 SAMPLING = "sampling.json"
 DONE = "done"
@@ -149,12 +148,6 @@ def read_sampling_beside(folder: Path) -> SamplingTable | None:
     except (OSError, ValueError, RecursionError) as error:
         raise InputError(f"{path} is damaged; the sweep's command writes it again") from error
     return sampling_of(raw, str(path))
-
-
-def sampling_text(sampling: SamplingTable) -> str:
-    """A sampling as the text of its file in a sweep's folder."""
-    table = plain(sampling.model_dump(exclude_none=True))
-    return json.dumps(table, indent=1, ensure_ascii=False) + "\n"
 
 
 def _file_of(path: Path) -> Path:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from matplotlib.figure import Figure
 from mpi4py import MPI
 
 from catenary.base.errors import RunBroken
@@ -33,13 +32,11 @@ from catenary.cases.studies.waves.seen import (
 from catenary.cases.studies.waves.theory import WaveTheory, wave_theory
 from catenary.postproc.evaluate.error_indicators import indicate
 from catenary.postproc.evaluate.remarks import all_remarks
-from catenary.postproc.files.disk import write_all
 from catenary.postproc.film.film_data import FilmData, film_data
 from catenary.postproc.film.snapshots import Snapshots
 from catenary.postproc.read.guard import examined
 from catenary.postproc.read.results import Results
-from catenary.postproc.report.pictures import figures
-from catenary.postproc.report.study_table import rows_csv
+from catenary.postproc.report.study_table import Content, write_files
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest
 from catenary.solver.time_loop.views.observers import Observer
 from catenary.solver.waves.excitation import MovingForce
@@ -144,13 +141,18 @@ def study_obstacles(scene: Scene, folder: Path, force: bool) -> tuple[str, list[
     problem = problem_of(scene)
     rest = line_at_rest(problem, mesh_of(scene))
     results = [obstacles.result_of(one, problem) for one in obstacles.obstacles_of(rest)]
-    content: dict[str, bytes | str] = {OBSTACLES: rows_csv(obstacles.as_rows(results))}
-    content |= figures.painted("obstacles.png", lambda: obstacles.picture(results))
     lines = [
         f"{one.name.replace('_', ' ')}: measured within {100.0 * one.error.max():.2g} % of theory"
         for one in results
     ]
-    return "\n".join(lines), write_all(folder, content)
+    files = write_files(
+        folder,
+        {
+            OBSTACLES: obstacles.as_rows(results),
+            "obstacles.png": lambda: obstacles.picture(results),
+        },
+    )
+    return "\n".join(lines), files
 
 
 def _numbers_in(data: FilmData, rest: LineAtRest) -> np.ndarray:
@@ -177,31 +179,26 @@ def _write(
     measured = [
         *measured_rows(theory, seen), *ends.reflection_rows(reflections, theory.speed)
     ]  # fmt: skip
-    content: dict[str, bytes | str] = {
-        "energy.csv": rows_csv(energy_rows(energy, seen)),
-        TABLE: rows_csv([*as_rows(theory), *measured]),
-        "pass_bands.csv": rows_csv(band_rows(theory)),
-    }
-    drawings: dict[str, Callable[[], Figure]] = {
+    content: dict[str, Content] = {
+        "energy.csv": energy_rows(energy, seen),
+        TABLE: [*as_rows(theory), *measured],
+        "pass_bands.csv": band_rows(theory),
         "space_time.png": lambda: pictures.space_time(seen, theory, supports, moving),
         "wavenumbers.png": lambda: pictures.wavenumbers(seen, theory, what),
         "energy.png": lambda: pictures.energy_parts(energy, seen, origin),
     }
     if reflections:
-        drawings["end_reflection.png"] = lambda: ends.picture(
-            reflections, rest.problem.ends, theory.speed
-        )
-        content["end_reflection.csv"] = rows_csv(ends.curve_rows(reflections))
+        both = rest.problem.ends
+        content["end_reflection.png"] = lambda: ends.picture(reflections, both, theory.speed)
+        content["end_reflection.csv"] = ends.curve_rows(reflections)
     spectra = transmitted(theory, seen)
     if spectra is not None:
-        drawings["transmission.png"] = lambda: pictures.transmission(spectra)
+        content["transmission.png"] = lambda: pictures.transmission(spectra)
     if seen.position.shape[1]:
-        drawings["train_frame.png"] = lambda: pictures.train_frame(
+        content["train_frame.png"] = lambda: pictures.train_frame(
             seen, theory, _BEHIND, _AHEAD, origin
         )
-    for name, draw in drawings.items():
-        content |= figures.painted(name, draw)
-    return Studied(theory, measured, write_all(folder, content), remarks)
+    return Studied(theory, measured, write_files(folder, content), remarks)
 
 
 def energy_rows(energy: EnergySeen, seen: WavesSeen) -> list[Row]:

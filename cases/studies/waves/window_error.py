@@ -21,10 +21,9 @@ from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.problem import problem_of
 from catenary.cases.scene.scene import Scene
 from catenary.postproc.evaluate.filters import low_pass
-from catenary.postproc.files.disk import write_all
 from catenary.postproc.record.run_watch import RunWatch, watch_cadence, watched
 from catenary.postproc.report.pictures import figures
-from catenary.postproc.report.study_table import Column, StudyTable, remark_lines
+from catenary.postproc.report.study_table import Column, StudyTable, remark_lines, write_files
 from catenary.solver.problem.window import WindowChoice
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest
 from catenary.solver.time_loop.march import March
@@ -172,9 +171,7 @@ def table_of(curves: Sequence[Curve]) -> StudyTable:
 
 def write(folder: Path, curves: Sequence[Curve]) -> list[Path]:
     """Write table and picture; returns the files. Not collective."""
-    content: dict[str, bytes | str] = {TABLE: table_of(curves).csv()}
-    content |= figures.painted(PICTURE, lambda: draw(curves))
-    return write_all(folder, content)
+    return write_files(folder, {TABLE: table_of(curves), PICTURE: lambda: draw(curves)})
 
 
 @figures.own_style()

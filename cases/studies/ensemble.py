@@ -25,7 +25,6 @@ from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.problem import problem_of, resolved
 from catenary.cases.scene.run.case import rule_entries
 from catenary.cases.scene.scene import Scene
-from catenary.cases.studies.ensemble.keeper import Keeper
 from catenary.postproc.channels.facts import facts_of
 from catenary.postproc.channels.header import Header, static_datasets
 from catenary.postproc.evaluate import statistics as stats
@@ -43,6 +42,51 @@ from catenary.solver.statics.form_finding.equilibrium import sound_form
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest
 from catenary.solver.statics.stability_of_rest import refuse_lost_wire
 from catenary.solver.time_loop.march import March
+from catenary.solver.time_loop.views import channels
+from catenary.solver.time_loop.views.observers import NEVER, Observer, Stage, StepView
+
+_OF_LINE = ("arm_uplift", "dropper_force")
+
+
+class Keeper(Observer):
+    """Keeps histories of the train, and extremes of arms and droppers, in memory. One rank only."""
+
+    def start(self, stage: Stage) -> None:
+        """Forget everything."""
+        self._times: list[np.ndarray] = []
+        self._rows: dict[str, list[np.ndarray]] = {}
+        self._extremes: dict[str, np.ndarray] = {}
+
+    def next_state(self, step: int) -> int:
+        """Rows will do."""
+        return NEVER
+
+    def observe(self, view: StepView) -> None:
+        """Keep the steps of a view."""
+        self._times.append(view.times.copy())
+        for name in view.columns:
+            values = view.each(name)
+            if name in _OF_LINE:
+                low, high = values.min(axis=0), values.max(axis=0)
+                kept = self._extremes.setdefault(name, np.stack([low, high]))
+                np.minimum(kept[0], low, out=kept[0])
+                np.maximum(kept[1], high, out=kept[1])
+            elif (
+                values.shape[1]
+                and name in channels.CHANNELS
+                and not channels.CHANNELS[name].of_line
+            ):
+                self._rows.setdefault(f"channels/{name}", []).append(values.copy())
+
+    def tables(self) -> dict[str, np.ndarray]:
+        """Histories by their paths in a result file, ``time`` among them."""
+        joined = {path: np.concatenate(parts) for path, parts in self._rows.items()}
+        return {"time": np.concatenate(self._times), **joined}
+
+    def extremes(self) -> dict[str, np.ndarray]:
+        """Smallest and largest value of each column of a channel of the line, (2, columns)."""
+        return self._extremes
+
 
 # Tables of a scene that its line, and how that is stepped, do not depend on.
 _OF_THE_TRAIN = ("case", "train", "pantographs", "contact", "evaluation", "output", "test")
