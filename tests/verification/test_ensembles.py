@@ -16,7 +16,8 @@ from catenary.base.errors import InputError
 from catenary.cases.scene.input.toml_input import REMOVED
 from catenary.cases.scene.load import read_draft
 from catenary.cases.scene.scene import Scene
-from catenary.cases.studies.ensemble import Marched, Marches, scenes_on_lines
+from catenary.cases.studies import ensemble as scenes_on_lines
+from catenary.cases.studies.ensemble import Marched, Marches
 from catenary.postproc.files.disk import plain
 from catenary.solver.ensemble import marches
 from catenary.solver.ensemble.shared_line import N_LANES

@@ -133,7 +133,7 @@ def check_cases(
     outcomes = kept.each(_Check(short), cases, depends_on, n_at_once, comm, initialise)
     for case, outcome in zip(cases, outcomes, strict=True):
         if isinstance(outcome.error, WorkerLost):
-            yield Checked([_holds(case, "runs to its end", False, str(outcome.error))], {})
+            yield Checked([holds_or_not(case, "runs to its end", False, str(outcome.error))], {})
         else:
             found, remarks = outcome.get()
             yield Checked([Criterion(*row) for row in found], remarks)
@@ -149,85 +149,156 @@ class _Check:
         """Collective."""
         from mpi4py import MPI
 
-        return _checked(case, comm, MPI.COMM_SELF, self.short)
+        one = _OneCase(case, MPI.COMM_SELF, self.short)
+        checked: Checked = on_root(comm, one.checked, takes_long=True)
+        if comm.size > 1:
+            checked.found.append(one.by_ranks(comm))
+        return checked
 
 
-def _checked(case: HardCase, world: Any, alone: Any, short: bool) -> Checked:
-    checked: Checked = on_root(world, lambda: _check_alone(case, alone, short), takes_long=True)
-    if world.size > 1:
-        checked.found.append(_ranks(case, world, alone, short))
-    return checked
+class _OneCase:
+    """A hard case: its runs in all forms, criteria on them, and what they told, by their names."""
 
+    def __init__(self, case: HardCase, alone: Any, short: bool) -> None:
+        self.case, self.alone, self.short = case, alone, short
+        self.remarks: dict[str, list[str]] = {}
 
-def _check_alone(case: HardCase, comm: Any, short: bool) -> Checked:
-    runs: dict[str, Watched] = {}
-    found = _measured(case, comm, short, runs)
-    return Checked(found, {name: run.remarks for name, run in runs.items()})
+    def checked(self) -> Checked:
+        """All criteria but agreement of ranks. Not collective."""
+        return Checked(list(self._criteria()), self.remarks)
 
+    def _rest(self, halvings: int = 0, fixed_point: bool = False) -> LineAtRest:
+        scene = self.case.scene(self.short, halvings, fixed_point)
+        return hard_runs.at_rest(scene, self.alone)
 
-def _measured(case: HardCase, comm: Any, short: bool, runs: dict[str, Watched]) -> list[Criterion]:
-    """What is measured of a case; puts its marches into ``runs``, by name."""
-
-    def marched(form: str, rest: LineAtRest, with_work: bool = False) -> Watched:
-        made = hard_runs.run(rest, comm, with_work, self_watched=True)
-        runs[f"{case.name} {form}".strip()] = made
+    def _marched(self, form: str, rest: LineAtRest, with_work: bool = False) -> Watched:
+        made = hard_runs.run(rest, self.alone, with_work, self_watched=True)
+        self.remarks[f"{self.case.name} {form}".strip()] = made.remarks
         return made
 
-    rest = hard_runs.at_rest(case.scene(short), comm)
-    if case.kind == "free":
-        freed = hard_runs.run_free(rest, comm, case.short_steps if short else case.steps)
-        drift = float(np.abs(freed.energy / freed.energy[0] - 1.0).max())
-        return [_below(case, "relative change of energy", drift, case.energy_gain)]
-    base = marched("", rest, with_work=True)
-    found = [_holds(case, "runs to its end", base.outcome == "done", base.outcome)]
-    if base.outcome != "done":
-        return found
-    found.append(_holds(case, "everything is finite", base.all_finite))
-    found += _bounded(case, rest, base)
-    halved = marched("at half the step", _rest(case, comm, short, 1), with_work=True)
-    found += _energy(case, base, halved)
-    if case.refined and not short:
-        quartered = marched("at a quarter of the step", _rest(case, comm, short, 2))
-        found.append(_refined(case, base, halved, quartered))
-    if case.fixed_point != "left out":
-        corrected = hard_runs.at_rest(case.scene(short, fixed_point=True), comm)
-        found.append(_correction(case, base, marched("by fixed-point correction", corrected)))
-    return [*found, *_needs(case, rest, base)]
+    def _below(self, name: str, value: float, limit: float, note: str = "") -> Criterion:
+        return Criterion(self.case.name, name, value, limit, bool(value <= limit), note)
+
+    def _reaches(self, name: str, value: float, limit: float) -> Criterion:
+        value = float(value)
+        return Criterion(self.case.name, name, value, limit, value >= limit, "at least")
+
+    def _holds(self, name: str, holds: bool, note: str = "") -> Criterion:
+        return holds_or_not(self.case, name, holds, note)
+
+    def _criteria(self) -> Iterator[Criterion]:
+        case, rest = self.case, self._rest()
+        if case.kind == "free":
+            n_steps = case.short_steps if self.short else case.steps
+            freed = hard_runs.run_free(rest, self.alone, n_steps)
+            drift = float(np.abs(freed.energy / freed.energy[0] - 1.0).max())
+            yield self._below("relative change of energy", drift, case.energy_gain)
+            return
+        base = self._marched("", rest, with_work=True)
+        yield self._holds("runs to its end", base.outcome == "done", base.outcome)
+        if base.outcome != "done":
+            return
+        yield self._holds("everything is finite", base.all_finite)
+        lifted = np.abs(base.wire - rest_height(rest, base.position)).max()
+        largest = float(base.force.max())
+        yield self._below("largest contact force [N]", largest, case.force_below_N)
+        yield self._below("largest lift [m]", float(lifted), case.uplift_below_m)
+        halved = self._marched("at half the step", self._rest(1), with_work=True)
+        yield from self._energy(base, halved)
+        if case.refined and not self.short:
+            quartered = self._marched("at a quarter of the step", self._rest(2))
+            first, second = _apart(base, halved), _apart(halved, quartered)
+            ratio = second / first if second > case.same else 0.0
+            note = f"differences {first:.1e}, {second:.1e} of the deviation"
+            name = "difference after halving the step twice to once"
+            yield self._below(name, ratio, FALLS, note)
+        if case.fixed_point != "left out":
+            corrected = self._rest(fixed_point=True)
+            yield self._correction(base, self._marched("by fixed-point correction", corrected))
+        yield from self._needs(rest, base)
+
+    def _energy(self, base: Watched, halved: Watched) -> Iterator[Criterion]:
+        """Energy is not made, or, where switches of droppers make some, less with smaller steps.
+
+        Contact makes none, however it switches. Of droppers the gains and losses may cancel in one
+        run and not in the other: what one of them may make in one switch is allowed where the case
+        allows energy at all.
+        """
+        gain, allowed = base.energy_gain(), self.case.energy_gain
+        one_switch = min(halved.one_switch / halved.energy_scale(), allowed)
+        limit = max(FALLS * gain, one_switch, ROUND_OFF)
+        yield self._below("energy from nothing", gain, allowed)
+        yield self._below("the same at half the step", halved.energy_gain(), limit)
+
+    def _correction(self, base: Watched, other: Watched) -> Criterion:
+        """The paper's correction agrees, or breaks where the table says so."""
+        if self.case.fixed_point == "breaks":
+            name = "the fixed-point correction breaks"
+            return self._holds(name, other.outcome != "done", other.outcome)
+        if other.outcome != "done":
+            return self._holds("the fixed-point correction ends", False, other.outcome)
+        apart = float(np.abs(other.height - base.height).max())
+        return self._below("fixed-point correction, head height [m]", apart, self.case.schemes_m)
+
+    def _needs(self, rest: LineAtRest, base: Watched) -> Iterator[Criterion]:
+        """Whether the run was the hard one that the case is named after."""
+        needs = self.case.needs
+        for key, (name, measure) in _REACHED.items():
+            if limit := getattr(needs, key):
+                yield self._reaches(name, measure(rest, base), float(limit))
+        if needs.lost_share_below is not None:
+            share = float((base.force[base.time.size // 2 :] == 0.0).mean())
+            yield self._below("share without contact", share, needs.lost_share_below)
+        if needs.breaks_at_cut:
+            far = float(np.abs(broken(rest, base) - cut_of(rest)).min(initial=np.inf))
+            longest = float(np.diff(node_places(rest)).max())
+            yield self._below("broken dropper to the boundary [m]", far, longest)
+        if needs.energy_leaves is not None:
+            left = energy_that_left(rest, base)
+            off = max(abs(one.observed / one.expected - 1.0) for one in left)
+            note = ", ".join(f"{one.expected:.3g} J at step {one.step}" for one in left)
+            yield self._below("energy that leaves, relative", off, needs.energy_leaves, note)
+        if needs.no_force_after_s is not None:
+            late = base.force[base.time > needs.no_force_after_s]
+            name = f"force after {needs.no_force_after_s:g} s [N]"
+            yield self._below(name, float(late.max()), 0.0)
+        if needs.ends_at_m is not None:
+            last = float(base.position[-1, 0])
+            yield self._reaches("end of the run [m]", last, needs.ends_at_m - 0.2)
+
+    def by_ranks(self, world: Any) -> Criterion:
+        """One rank against all of ``world``. Collective."""
+        case, name = self.case, f"1 and {world.size} ranks, relative"
+        rest = hard_runs.at_rest(case.scene(self.short), world)
+
+        def run(comm: Any) -> Watched:
+            if case.kind == "free":
+                return hard_runs.run_free(rest, comm, case.short_steps)
+            return hard_runs.run(rest, comm)
+
+        together = run(world)
+
+        def compare() -> Criterion:
+            one = run(self.alone)
+            if case.kind == "free":
+                apart = float(np.abs(together.energy / one.energy - 1.0).max())
+                return self._below(name, apart, case.ranks)
+            if one.force.shape != together.force.shape:
+                return self._holds(name, False, together.outcome)
+            if case.ranks_m is not None:
+                apart = float(np.abs(together.height - one.height).max())
+                heights = f"1 and {world.size} ranks, head height [m]"
+                return self._below(heights, apart, case.ranks_m)
+            apart = float(np.abs(together.force - one.force).max() / np.abs(one.force).max())
+            return self._below(name, apart, case.ranks)
+
+        result: Criterion = on_root(world, compare, takes_long=True)
+        return result
 
 
-def _rest(case: HardCase, comm: Any, short: bool, halvings: int) -> LineAtRest:
-    return hard_runs.at_rest(case.scene(short, halvings), comm)
-
-
-def _bounded(case: HardCase, rest: LineAtRest, base: Watched) -> list[Criterion]:
-    lifted = base.wire - rest_height(rest, base.position)
-    return [
-        _below(case, "largest contact force [N]", float(base.force.max()), case.force_below_N),
-        _below(case, "largest lift [m]", float(np.abs(lifted).max()), case.uplift_below_m),
-    ]
-
-
-def _energy(case: HardCase, base: Watched, halved: Watched) -> list[Criterion]:
-    """Energy is not made, or, where switches of droppers make some, less with smaller steps.
-
-    Contact makes none, however it switches. Of droppers the gains and losses may cancel in one run
-    and not in the other: what one of them may make in one switch is allowed where the case allows
-    energy at all.
-    """
-    gain, less = base.energy_gain(), halved.energy_gain()
-    one_switch = min(halved.one_switch / halved.energy_scale(), case.energy_gain)
-    limit = max(FALLS * gain, one_switch, ROUND_OFF)
-    return [
-        _below(case, "energy from nothing", gain, case.energy_gain),
-        _below(case, "the same at half the step", less, limit),
-    ]
-
-
-def _refined(case: HardCase, base: Watched, halved: Watched, quartered: Watched) -> Criterion:
-    first, second = _apart(base, halved), _apart(halved, quartered)
-    ratio = second / first if second > case.same else 0.0
-    note = f"differences {first:.1e}, {second:.1e} of the deviation"
-    return _below(case, "difference after halving the step twice to once", ratio, FALLS, note)
+def holds_or_not(case: HardCase, name: str, holds: bool, note: str = "") -> Criterion:
+    """A criterion without a figure."""
+    return Criterion(case.name, name, float(holds), 1.0, holds, "" if note == "done" else note)
 
 
 def _apart(coarse: Watched, fine: Watched) -> float:
@@ -235,17 +306,6 @@ def _apart(coarse: Watched, fine: Watched) -> float:
     n = min(coarse.time.size, (fine.time.size + 1) // 2)
     difference = coarse.height[:n] - fine.height[::2][:n]
     return float(np.sqrt((difference**2).mean()) / fine.height.std())
-
-
-def _correction(case: HardCase, base: Watched, other: Watched) -> Criterion:
-    """The paper's correction agrees, or breaks where the table says so."""
-    if case.fixed_point == "breaks":
-        name = "the fixed-point correction breaks"
-        return _holds(case, name, other.outcome != "done", other.outcome)
-    if other.outcome != "done":
-        return _holds(case, "the fixed-point correction ends", False, other.outcome)
-    apart = float(np.abs(other.height - base.height).max())
-    return _below(case, "fixed-point correction, head height [m]", apart, case.schemes_m)
 
 
 def _crossing(rest: LineAtRest, base: Watched) -> float:
@@ -274,37 +334,6 @@ _REACHED: dict[str, tuple[str, Callable[[LineAtRest, Watched], float]]] = {
 }
 
 
-def _needs(case: HardCase, rest: LineAtRest, base: Watched) -> list[Criterion]:
-    """Whether the run was the hard one that the case is named after."""
-    needs = case.needs
-    found = [
-        _reaches(case, name, measure(rest, base), float(limit))
-        for key, (name, measure) in _REACHED.items()
-        if (limit := getattr(needs, key))
-    ]
-    if needs.lost_share_below is not None:
-        share = float((base.force[base.time.size // 2 :] == 0.0).mean())
-        found.append(_below(case, "share without contact", share, needs.lost_share_below))
-    if needs.breaks_at_cut:
-        far = float(np.abs(broken(rest, base) - cut_of(rest)).min(initial=np.inf))
-        longest = float(np.diff(node_places(rest)).max())
-        found.append(_below(case, "broken dropper to the boundary [m]", far, longest))
-    if needs.energy_leaves is not None:
-        left = energy_that_left(rest, base)
-        off = max(abs(one.observed / one.expected - 1.0) for one in left)
-        note = ", ".join(f"{one.expected:.3g} J at step {one.step}" for one in left)
-        name = "energy that leaves, relative"
-        found.append(_below(case, name, off, needs.energy_leaves, note))
-    if needs.no_force_after_s is not None:
-        late = base.force[base.time > needs.no_force_after_s]
-        name = f"force after {needs.no_force_after_s:g} s [N]"
-        found.append(_below(case, name, float(late.max()), 0.0))
-    if needs.ends_at_m is not None:
-        last = float(base.position[-1, 0])
-        found.append(_reaches(case, "end of the run [m]", last, needs.ends_at_m - 0.2))
-    return found
-
-
 def passes(run: Watched) -> int:
     """How often the contact wire with the greatest force of a pantograph changes, summed.
 
@@ -330,47 +359,6 @@ def lost_way(run: Watched) -> float:
     """Longest way between two contacts of the leading pantograph [m]."""
     touched = run.position[run.force[:, 0] > 0.0, 0]
     return float(np.diff(touched).max(initial=0.0))
-
-
-def _ranks(case: HardCase, world: Any, alone: Any, short: bool) -> Criterion:
-    """One rank against all of ``world``. Collective."""
-    scene = case.scene(short)
-    rest = hard_runs.at_rest(scene, world)
-    name = f"1 and {world.size} ranks, relative"
-    if case.kind == "free":
-        n_steps = case.short_steps
-        together = hard_runs.run_free(rest, world, n_steps)
-        one: Watched = on_root(
-            world, lambda: hard_runs.run_free(rest, alone, n_steps), takes_long=True
-        )
-        apart = float(np.abs(together.energy / one.energy - 1.0).max())
-        return _below(case, name, apart, case.ranks)
-    together = hard_runs.run(rest, world)
-
-    def compare() -> Criterion:
-        one = hard_runs.run(rest, alone)
-        if one.force.shape != together.force.shape:
-            return _holds(case, name, False, together.outcome)
-        if case.ranks_m is not None:
-            apart = float(np.abs(together.height - one.height).max())
-            return _below(case, f"1 and {world.size} ranks, head height [m]", apart, case.ranks_m)
-        apart = float(np.abs(together.force - one.force).max() / np.abs(one.force).max())
-        return _below(case, name, apart, case.ranks)
-
-    result: Criterion = on_root(world, compare, takes_long=True)
-    return result
-
-
-def _below(case: HardCase, name: str, value: float, limit: float, note: str = "") -> Criterion:
-    return Criterion(case.name, name, value, limit, bool(value <= limit), note)
-
-
-def _reaches(case: HardCase, name: str, value: float, limit: float) -> Criterion:
-    return Criterion(case.name, name, float(value), limit, bool(value >= limit), "at least")
-
-
-def _holds(case: HardCase, name: str, holds: bool, note: str = "") -> Criterion:
-    return Criterion(case.name, name, float(holds), 1.0, holds, "" if note == "done" else note)
 
 
 # By case and run of it, sentences about what decides the run's results.

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import warnings
+from functools import cache
+from typing import Any
 
 import numpy as np
 
@@ -37,21 +39,49 @@ def _by_gradient(problem: Problem, table: SearchTable) -> None:
     """
     from scipy.optimize import minimize
 
-    model = _Scaled(problem)
-    n, worst = problem.variables.low.size, problem.is_worst
-    start = model.start()
+    low = problem.variables.low
+    width, n, worst = problem.variables.high - low, low.size, problem.is_worst
+
+    @cache
+    def at(key: bytes) -> Point:
+        (point,) = problem.points([low + np.frombuffer(key) * width])
+        return point
+
+    @cache
+    def slopes_at(key: bytes) -> tuple[np.ndarray, np.ndarray]:
+        return problem.slopes(at(key))
+
+    # Functions of z: changes from 0 at the lower to 1 at the upper bound, then t.
+    def point(z: np.ndarray) -> Point:
+        return at(np.clip(z[:n], 0.0, 1.0).tobytes())
+
+    def slopes(z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return slopes_at(np.clip(z[:n], 0.0, 1.0).tobytes())
+
+    def margin_slopes(z: np.ndarray) -> np.ndarray:
+        found = slopes(z)[1]
+        return np.column_stack([found, np.zeros((found.shape[0], z.size - n))])
+
+    def below_slopes(z: np.ndarray) -> np.ndarray:
+        found = slopes(z)[0]
+        return np.column_stack([-found, np.ones(found.shape[0])])
+
+    start = -low / width
+    constraints: list[dict[str, Any]] = []
+    if point(start).margins.size:
+        margins = {"fun": lambda z: point(z).margins, "jac": margin_slopes}
+        constraints.append({"type": "ineq"} | margins)
+    bounds: list[tuple[float | None, float | None]] = [(0.0, 1.0)] * n
+    objective = {"fun": lambda z: point(z).objective.mean(), "jac": lambda z: slopes(z)[0].mean(0)}
     if worst:
-        start = np.append(start, model.point(start).objective.max())
-    constraints = []
-    if model.margins(start).size:
-        constraints.append({"type": "ineq", "fun": model.margins, "jac": model.margin_slopes})
-    if worst:
-        constraints.append({"type": "ineq", "fun": model.below, "jac": model.below_slopes})
-    bounds = [(0.0, 1.0)] * n + ([(None, None)] if worst else [])
+        below = {"fun": lambda z: z[n] - point(z).objective, "jac": below_slopes}
+        constraints.append({"type": "ineq"} | below)
+        bounds.append((None, None))
+        start = np.append(start, point(start).objective.max())
+        objective = {"fun": lambda z: z[n], "jac": lambda z: np.append(np.zeros(n), 1.0)}
     minimize(
-        (lambda z: z[n]) if worst else model.mean,
-        start,
-        jac=(lambda z: np.append(np.zeros(n), 1.0)) if worst else model.mean_slopes,
+        **objective,
+        x0=start,
         bounds=bounds,
         constraints=constraints,
         callback=_Stalled(problem, table.precision),
@@ -78,56 +108,6 @@ class _Stalled:
             before = self._values[-1 - _FRUITLESS]
             if before - self._values[-1] < self._precision * abs(before):
                 raise Spent
-
-
-class _Scaled:
-    """A problem as functions of z: changes from 0 at the lower to 1 at the upper bound, then t."""
-
-    def __init__(self, problem: Problem) -> None:
-        self._problem = problem
-        self._low = problem.variables.low
-        self._width = problem.variables.high - self._low
-        self._points: dict[bytes, Point] = {}
-        self._slopes: dict[bytes, tuple[np.ndarray, np.ndarray]] = {}
-
-    def start(self) -> np.ndarray:
-        """The case as shipped."""
-        return np.asarray(-self._low / self._width)
-
-    def point(self, z: np.ndarray) -> Point:
-        own = np.clip(z[: self._low.size], 0.0, 1.0)
-        key = own.tobytes()
-        if key not in self._points:
-            (self._points[key],) = self._problem.points([self._low + own * self._width])
-        return self._points[key]
-
-    def slopes(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        point = self.point(z)
-        key = point.change.tobytes()
-        if key not in self._slopes:
-            self._slopes[key] = self._problem.slopes(point)
-        return self._slopes[key]
-
-    def mean(self, z: np.ndarray) -> float:
-        return float(self.point(z).objective.mean())
-
-    def mean_slopes(self, z: np.ndarray) -> np.ndarray:
-        return np.asarray(self.slopes(z)[0].mean(axis=0))
-
-    def below(self, z: np.ndarray) -> np.ndarray:
-        return np.asarray(z[-1] - self.point(z).objective)
-
-    def below_slopes(self, z: np.ndarray) -> np.ndarray:
-        slopes = self.slopes(z)[0]
-        return np.column_stack([-slopes, np.ones(slopes.shape[0])])
-
-    def margins(self, z: np.ndarray) -> np.ndarray:
-        return self.point(z).margins
-
-    def margin_slopes(self, z: np.ndarray) -> np.ndarray:
-        slopes = self.slopes(z)[1]
-        more = z.size - slopes.shape[1]
-        return np.column_stack([slopes, np.zeros((slopes.shape[0], more))])
 
 
 def _by_evolution(problem: Problem, table: SearchTable) -> None:
