@@ -234,8 +234,8 @@ def new_files(folder: Path, force: bool) -> None:
 def write_study(found: PantographStudy, folder: Path) -> list[Path]:
     """Write all files and return their paths. Raises ``RunBroken`` if the disk refuses."""
     table, drawn, lumped = FILES
-    content = {table: csv_text(found), drawn: lambda: picture(found), lumped: lumped_toml(found)}
-    return write_files(folder, content)
+    texts = {table: csv_text(found), lumped: lumped_toml(found)}
+    return write_files(folder, {**texts, drawn: lambda: picture(found)})
 
 
 def csv_text(found: PantographStudy) -> str:

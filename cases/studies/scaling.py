@@ -18,7 +18,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from mpi4py import MPI
 
-from catenary.base.errors import InputError
 from catenary.base.parallel import wait_for_all
 from catenary.cases.run.planning.needs import needs_with_mesh
 from catenary.cases.run.scene_mesh import mesh_of
@@ -178,30 +177,6 @@ class Predicted(NamedTuple):
     def messages(self) -> float:
         """What of it are messages [s]."""
         return self.neighbours + self.tree
-
-
-def parse_ranks(text: str) -> list[int]:
-    """Numbers of ranks ``a,b,...``, ascending.
-
-    Raises
-    ------
-    InputError
-        If it has another form, or names one twice.
-    """
-    try:
-        values = [int(part) for part in text.split(",")]
-    except ValueError:
-        values = []
-    if not values or not 1 <= min(values) <= max(values) <= MOST_RANKS or _twice(values):
-        raise InputError(
-            f"--ranks {text} must be whole numbers from 1 to {MOST_RANKS}, each once, as a,b,..., "
-            "e.g. 64,512,4096"
-        )
-    return sorted(values)
-
-
-def _twice(values: Sequence[int]) -> bool:
-    return len(set(values)) < len(values)
 
 
 def work_of(scene: Scene) -> Work:

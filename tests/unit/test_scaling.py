@@ -9,7 +9,6 @@ from mpi4py import MPI
 from program import MPIRUN, catenary
 from typer.testing import CliRunner
 
-from catenary.base.errors import InputError
 from catenary.cases.cli.main import app
 from catenary.cases.scene.load import load_scene
 from catenary.cases.studies import scaling
@@ -61,19 +60,12 @@ def test_one_rank_exchanges_nothing_and_times_nothing() -> None:
         (["--latency-us", "0", "--bandwidth-GB-per-s", "10"], "must be above 0"),
         (["--ranks", "0,4"], "--ranks 0,4 must be whole numbers"),
         (["--ranks", "4,4"], "each once"),
-        (["--ranks", "many"], "e.g. 64,512,4096"),
+        (["--ranks", "64,"], "e.g. 64,512,4096"),
     ],
 )
 def test_what_cannot_be_is_refused_in_a_sentence(words: list[str], says: str) -> None:
     done = CliRunner().invoke(app, ["scaling", "ambrosio2012", *words])
     assert done.exit_code == 2 and says in done.stderr and done.stderr.count("\n") == 1
-
-
-@pytest.mark.parametrize("text", ["64", "1,4096"])
-def test_ranks_are_whole_numbers(text: str) -> None:
-    assert scaling.parse_ranks(text) == [int(part) for part in text.split(",")]
-    with pytest.raises(InputError):
-        scaling.parse_ranks(text + ",")
 
 
 @pytest.mark.process

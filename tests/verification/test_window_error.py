@@ -8,6 +8,7 @@ import pytest
 
 from catenary.base.errors import InputError
 from catenary.cases.scene.load import load_scene
+from catenary.cases.studies.sweep.variants import whole_numbers
 from catenary.cases.studies.waves import window_error
 
 # The paper's line with average damping, on which waves fade within a few spans.
@@ -50,10 +51,11 @@ def test_what_marches_tell_of_themselves_is_told_of_the_windows() -> None:
 
 
 def test_sizes_that_cannot_be_are_refused() -> None:
+    bounds = window_error.LEAST, window_error.MOST
     for text in ("", "8,x", "1,2", "8,8", "4.5"):
-        with pytest.raises(InputError, match="--window-error .* must be whole numbers of spans"):
-            window_error.parse_sizes(text)
-    assert window_error.parse_sizes("16,8") == [8, 16]
+        with pytest.raises(InputError, match="--window-error .* must be whole numbers from 2"):
+            whole_numbers(text, window_error.OPTION, *bounds, "8,16")
+    assert whole_numbers("16,8", window_error.OPTION, *bounds, "8,16") == [8, 16]
     with pytest.raises(InputError, match="window of 14 spans, but the line has 14"):
         window_error.curve_of("", load_scene("ambrosio2012", SHORT), [4, 14])
 

@@ -37,6 +37,7 @@ def scaling(
     """Collective."""
     from catenary.base.parallel import launched_by_mpirun, on_root
     from catenary.cases.studies import scaling as study
+    from catenary.cases.studies.sweep.variants import whole_numbers
 
     if (latency is None) != (bandwidth is None):
         raise InputError("--latency-us and --bandwidth-GB-per-s belong together; give both")
@@ -48,7 +49,7 @@ def scaling(
                 f"{bandwidth:g} between 1e-6 and 1e6"
             )
         given = study.Wire(1e-6 * latency, 1e-9 / bandwidth)
-    numbers = study.parse_ranks(ranks)
+    numbers = whole_numbers(ranks, "--ranks", 1, study.MOST_RANKS, "64,512,4096")
     comm = console.world() if launched_by_mpirun() else None
     several = comm is not None and comm.size > 1
     if not several and given is None:

@@ -157,11 +157,17 @@ def waves(
 def _window_error(words: WaveWords, out: Path, text: str, vary: list[str], force: bool) -> int:
     """What --window-error does; returns the exit code."""
     from catenary.cases.process.petsc_options import start_petsc
-    from catenary.cases.studies.sweep.variants import check_keys, parse_vary, product
+    from catenary.cases.studies.sweep.variants import (
+        check_keys,
+        parse_vary,
+        product,
+        whole_numbers,
+    )
     from catenary.cases.studies.waves import window_error
 
     refuse_table(out / window_error.TABLE, force)
-    sizes = window_error.parse_sizes(text)
+    bounds = window_error.LEAST, window_error.MOST
+    sizes = whole_numbers(text, window_error.OPTION, *bounds, "8,16,24,40,54")
     variants = product([parse_vary(one) for one in vary], {}) if vary else []
     check_keys(variants, "on the command line (--vary)")
     scenes = [(one.name, words.load(*one.assignments)) for one in variants]

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from catenary.cases.studies.effect_cost.study import FIGURES, UPLIFT, Costs, Measured, Size
+from catenary.cases.studies.effect_cost.study import FIGURES, UPLIFT, Costs, Measured, Size, Switch
 from catenary.postproc.evaluate.wording import counted, fixed
 from catenary.postproc.report.study_table import Column, StudyTable, remark_lines, write_files
 
@@ -169,57 +168,53 @@ def table_of(found: Costs) -> StudyTable:
         *(Column(f"shown_{name}", _HEADS[name], ">") for name in names),
     ]
     columns = [*map(Column, files), *(one._replace(in_files=False) for one in people)]
-    rows = _rows(found, found.size, found.figures, found.step) + [
-        row
-        for one in found.rows
-        for row in _rows(found, one.size, one.figures, found.step * one.ratio, one)
-    ]
+    as_it_is = Measured(
+        Switch("", "", True, {}, ()), "done", found.size, 1.0, found.figures, found.remarks
+    )
+    rows = [row for one in (as_it_is, *found.rows) for row in _rows(found, one)]
     return StudyTable(columns, rows)
 
 
-def _rows(
-    found: Costs,
-    size: Size | None,
-    figures: Sequence[dict[str, float | None]],
-    step: float,
-    switched: Measured | None = None,
-) -> list[dict[str, Any]]:
+def _rows(found: Costs, one: Measured) -> list[dict[str, Any]]:
     """The rows of a switch, or of the scene as it is, one of each pantograph."""
-    run, remarks = ("as it is", found.remarks) if switched is None else _told(switched)
+    switch, size, step = one.switch, one.size, found.step * one.ratio
+    run, remarks = _told(one)
+    simulated = "as it is"
+    if switch.name:
+        simulated = "left out" if switch.on else "switched on"
     head: dict[str, Any] = {
         "run": run,
-        "effect": "" if switched is None else switched.switch.name,
-        "simulated": "as it is",
-        "together": [] if switched is None else list(switched.switch.together),
-        "outcome": "done" if switched is None else switched.outcome,
+        "effect": "" if not switch.name else switch.name,
+        "simulated": simulated,
+        "together": [] if not switch.name else list(switch.together),
+        "outcome": one.outcome,
         "n_unknowns": None if size is None else size.n_unknowns,
         "unknowns_of_a_station": "" if size is None else width_text(size),
         "us_per_step": None if math.isnan(step) else step,
-        "cost": None if switched is None or not switched.done else switched.cost,
+        "cost": None if not (switch.name and one.done) else one.cost,
         "from_m": found.stretch[0],
         "to_m": found.stretch[1],
-        "advice": "" if switched is None else sentence(found, switched),
+        "advice": "" if not switch.name else sentence(found, one),
         "remarks": remarks,
     }
-    if switched is not None:
-        head["simulated"] = "left out" if switched.switch.on else "switched on"
     rows = []
-    for number, own in enumerate(figures or [{}]):
-        row = {**head, "pantograph": found.names[number] if figures else ""}
+    for number, own in enumerate(one.figures or [{}]):
+        row = {**head, "pantograph": found.names[number] if one.figures else ""}
         for name in (*FIGURES, UPLIFT):
             value, first = own.get(name), found.figures[number][name]
             change = None if value is None or first is None else value - first
-            row |= {name: value, f"change_of_{name}": change, f"shown_{name}": None}
-            if switched is None and value is not None:
-                row[f"shown_{name}"] = fixed(value, 2)
-            elif change is not None:
-                row[f"shown_{name}"] = f"{change:+.2f}"
+            shown = None if change is None else f"{change:+.2f}"
+            if not switch.name and value is not None:
+                shown = fixed(value, 2)
+            row |= {name: value, f"change_of_{name}": change, f"shown_{name}": shown}
         rows.append(row)
     return rows
 
 
 def _told(row: Measured) -> tuple[str, list[str]]:
     """A run's name as in the table, and its remarks."""
+    if not row.switch.name:
+        return "as it is", row.remarks
     return f"{'without' if row.switch.on else 'with'} {row.switch.name}", row.remarks
 
 

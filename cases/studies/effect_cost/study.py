@@ -6,10 +6,10 @@ Figures are those of whole runs over a stretch, costs those of steps in turns on
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from mpi4py import MPI
 
@@ -26,13 +26,8 @@ from catenary.cases.studies.sweep.jobs import Job, RunOptions, interrupted
 from catenary.cases.studies.sweep.run_jobs import run_jobs
 from catenary.cases.studies.sweep.variants import Variant
 from catenary.solver.effects import all_effects as effects
-from catenary.solver.effects.effect import Effect
 from catenary.solver.problem.problem import Problem, steps_of
 from catenary.solver.statics.line_at_rest import line_at_rest
-
-if TYPE_CHECKING:
-    from catenary.cases.scene.scene import Scene
-
 
 # What an effect without data lacks, where it does not say so itself.
 _NO_DATA = "the scene has no data for it"
@@ -88,14 +83,17 @@ def switchable_effects(scene: Scene) -> SwitchableEffects:
         if effect.always:
             continue
         if name in active:
-            others = _with(name, {n: e for n, e in known.items() if is_on[n]}, _requiring)
+            on = {n: e for n, e in known.items() if is_on[n]}
+            others = _taken_along(name, on, lambda a, b: a in known[b].requires)
             ended = tuple(n for n in others if n in active)
-            switches.append(Switch(name, effect.title, True, _keys(name, others, False), ended))
+            keys = dict.fromkeys([name, *others], False)
+            switches.append(Switch(name, effect.title, True, keys, ended))
         elif effect.applies(problem):
-            others = _with(name, {n: e for n, e in known.items() if not is_on[n]}, _required)
+            off = {n: e for n, e in known.items() if not is_on[n]}
+            others = _taken_along(name, off, lambda a, b: b in known[a].requires)
             if needs_relative_motion(problem, name):
                 others.append(RELATIVE_MOTION)
-            keys = _keys(name, others, True)
+            keys = dict.fromkeys([name, *others], True)
             switches.append(Switch(name, effect.title, False, keys, tuple(others)))
         else:
             lacking[name] = effect.data or _NO_DATA
@@ -103,27 +101,15 @@ def switchable_effects(scene: Scene) -> SwitchableEffects:
     return SwitchableEffects(switches, [n for n, e in known.items() if e.always], lacking)
 
 
-def _keys(name: str, others: list[str], on: bool) -> dict[str, bool]:
-    return dict.fromkeys([name, *others], on)
-
-
-def _requiring(name: str, among: dict[str, Effect]) -> list[str]:
-    return [other for other, effect in among.items() if name in effect.requires]
-
-
-def _required(name: str, among: dict[str, Effect]) -> list[str]:
-    return [other for other in effects.registry()[name].requires if other in among]
-
-
-def _with(name: str, among: dict[str, Effect], of: object) -> list[str]:
+def _taken_along(name: str, among: Iterable[str], takes: Callable[[str, str], bool]) -> list[str]:
     """All that an effect takes along, directly and through others, in the registry's order."""
-    assert callable(of)
-    found, ahead = set(), [name]
+    found, ahead, left = set(), [name], [other for other in among if other != name]
     while ahead:
-        new = [other for other in of(ahead.pop(), among) if other not in found and other != name]
+        one = ahead.pop()
+        new = [other for other in left if takes(one, other) and other not in found]
         found.update(new)
         ahead += new
-    return [other for other in among if other in found]
+    return [other for other in left if other in found]
 
 
 # The scene as it is, among the names of runs: no effect has a hyphen in its name.

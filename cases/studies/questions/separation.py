@@ -203,8 +203,8 @@ def period_in(study: SeparationStudy, scene: Scene) -> Period:
     first, last = middle_span(problem.line)
     theory = wave_theory(problem, line_at_rest(problem, mesh_of(scene)))
     known = [row for row in study.done if row["std_trailing_N"] is not None]
-    columns = np.array([(row[DISTANCE], row["std_trailing_N"]) for row in known]).reshape(-1, 2)
-    return period_of(*columns.T, theory, last - first)
+    d, sigma = (np.array([row[name] for row in known]) for name in (DISTANCE, "std_trailing_N"))
+    return period_of(d, sigma, theory, last - first)
 
 
 def period_of(d: np.ndarray, sigma: np.ndarray, theory: WaveTheory, span: float) -> Period:

@@ -112,14 +112,12 @@ def differences(changes: Sequence[str], ended: Sequence[Ended], out: Path) -> Di
     with Results(folders[0]) as a, Results(folders[1]) as b:
         of_a, of_b = stats.evaluate(a), stats.evaluate(b)
         arms, droppers = (of_a.supports, of_b.supports), (of_a.droppers, of_b.droppers)
-        uplift = [1e3 * one.uplift for one in arms]
-        forces = [[one.highest for one in droppers], [one.lowest for one in droppers]]
-        of_droppers = (
-            (Column("max_N", "largest [N]", ".1f"), *forces[0]),
-            (Column("min_N", "least [N]", ".1f"), *forces[1]),
-            (Column("slack_s", "slack [s]", ".3f"), slack_times(a), slack_times(b)),
-        )
-        of_arms = [(Column("uplift_mm", "uplift [mm]", ".1f"), *uplift)]
+        of_arms = [(Column("uplift_mm", "uplift [mm]", ".1f"), [1e3 * one.uplift for one in arms])]
+        of_droppers = [
+            (Column("max_N", "largest [N]", ".1f"), [one.highest for one in droppers]),
+            (Column("min_N", "least [N]", ".1f"), [one.lowest for one in droppers]),
+            (Column("slack_s", "slack [s]", ".3f"), [slack_times(a), slack_times(b)]),
+        ]
         return Differences(
             str(a.attributes["case"]),
             tuple(changes),
@@ -171,23 +169,23 @@ def _statistics(a: RunStatistics, b: RunStatistics) -> StudyTable:
 
 
 def _by_place(
-    title: str, head: str, first: Any, second: Any, of_each: Sequence[tuple[Column, Any, Any]]
+    title: str, head: str, first: Any, second: Any, of_each: Sequence[tuple[Column, Any]]
 ) -> StudyTable:
     """Figures of arms or droppers that both runs have, by their places.
 
     Parameters
     ----------
     first, second : statistics of both runs, with places ``x`` (n,) and what is ``evaluated``
-    of_each : a column, and its values (n,) in both runs
+    of_each : a column, and its values (n,) in each run
     """
     rows = []
     for i, j in _pairs(first.x, second.x):
         row: dict[str, Any] = {"x_m": float(first.x[i]), "evaluated": bool(first.evaluated[i])}
-        for column, own, other in of_each:
+        for column, (own, other) in of_each:
             row |= _figures(column.name, own[i], other[j])
         rows.append(row)
     columns = [Column("x_m", f"{head} at [m]", ".1f")]
-    for column, _, _ in of_each:
+    for column, _ in of_each:
         columns += _columns(column.name, column.head, column.format)
     return StudyTable([*columns, Column("evaluated", "evaluated")], rows, title)
 

@@ -70,6 +70,27 @@ def parse_vary(text: str) -> VariedKey:
     return varied_key(key, values)
 
 
+def whole_numbers(text: str, option: str, least: int, most: int, example: str) -> list[int]:
+    """Whole numbers ``a,b,...`` within bounds, ascending.
+
+    Raises
+    ------
+    InputError
+        If it has another form, or names one that is out of bounds, or one twice.
+    """
+    try:
+        values = sorted(int(part) for part in text.split(","))
+    except ValueError:
+        values = []
+    within = bool(values) and least <= values[0] and values[-1] <= most
+    if not within or len(set(values)) < len(values):
+        raise InputError(
+            f"{option} {shown(text)[1:-1]} must be whole numbers from {least} to {most}, each "
+            f"once, as a,b,..., e.g. {example}"
+        )
+    return values
+
+
 def varied_key(key: str, values: tuple[str, ...], option: str = "--vary") -> VariedKey:
     """A key and the texts of its values, at least one; ``option`` names in an error what gave them.
 

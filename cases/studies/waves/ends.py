@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from catenary.base.errors import InputError
-from catenary.cases.studies.waves.theory import HIGHEST
+from catenary.cases.studies.waves.theory import HIGHEST, row_of
 from catenary.postproc.report.pictures import figures
 from catenary.solver.ends.line_beyond import SIDES
 from catenary.solver.problem.ends import AbsorbingLayer, EndCondition, Periodic
@@ -44,16 +44,15 @@ def reflection_rows(found: list[EndReflection], speed: float) -> list[dict[str, 
     rows = []
     for side, end in zip(SIDES, found, strict=False):
         of_what = f"the {side} of the line sends back of waves that outrun the train"
-        figures_of = (
-            ("largest_reflection", end.of_faster(speed)[0], "largest amplitude"),
-            ("rms_reflection", end.of_faster(speed)[1], "root mean square amplitude"),
-            ("largest_energy", end.energy_of_faster(speed)[0], "largest share of the energy"),
-            ("mean_energy", end.energy_of_faster(speed)[1], "mean share of the energy"),
-        )
+        amplitude, energy = end.of_faster(speed), end.energy_of_faster(speed)
         rows += [
-            {"name": f"{name}_{side}", "value": value, "unit": "-"}
-            | {"meaning": f"{what} that {of_what}"}
-            for name, value, what in figures_of
+            row_of(f"{name}_{side}", value, "-", f"{what} that {of_what}")
+            for name, value, what in (
+                ("largest_reflection", amplitude[0], "largest amplitude"),
+                ("rms_reflection", amplitude[1], "root mean square amplitude"),
+                ("largest_energy", energy[0], "largest share of the energy"),
+                ("mean_energy", energy[1], "mean share of the energy"),
+            )
         ]
     return rows
 

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from catenary.cases.studies.waves.seen import WavesSeen
-from catenary.cases.studies.waves.theory import HIGHEST, WaveTheory
+from catenary.cases.studies.waves.theory import HIGHEST, WaveTheory, row_of
 from catenary.solver.waves.bloch import BlochWaves
 
 # A band is so many widths to both sides, and lies within a branch [-]; its largest width [Hz].
@@ -79,27 +79,23 @@ def arrived(
     return Arrived(velocity, nu[inside], weight / weight.sum())
 
 
-def measured_rows(theory: WaveTheory, seen: WavesSeen) -> list[dict[str, Any]]:
+def measured_rows(
+    theory: WaveTheory, seen: WavesSeen, spectrum: Transmitted | None
+) -> list[dict[str, Any]]:
     """Group velocities of the waves of a blow beside those of the periodic line, as rows of
     ``waves.csv``; none without a blow, periodic line or room for two stations, nor where the start
     of the line sends waves back to these stations within the record."""
-    waves = theory.bloch
-    if waves is None or seen.position.shape[1]:
-        return []
-    columns = _stations(seen, waves.length)
-    if columns is None:
+    waves, columns = theory.bloch, _stations(theory, seen)
+    if waves is None or columns is None:
         return []
     first, second = (seen.velocity[:, column].astype(float) for column in columns)
     distance = float(seen.x[columns[1]] - seen.x[columns[0]])
     way_back = float(seen.struck + seen.x[columns[0]] - 2.0 * seen.x[0])
     rows = []
-    spectrum = transmitted(theory, seen)
     if spectrum is not None:
         meaning = "share of what has come so far that lies in the pass bands of the periodic line"
-        rows.append(
-            {"name": "energy_in_pass_bands", "value": spectrum.inside, "unit": "-"}
-            | {"meaning": f"{meaning}, {distance:.0f} m on"}
-        )
+        told = f"{meaning}, {distance:.0f} m on"
+        rows.append(row_of("energy_in_pass_bands", spectrum.inside, "-", told))
     for number, highest in enumerate(_UP_TO, start=1):
         frequency, velocity = branch_of_fastest(waves, highest)
         at, wide = 0.5 * (frequency[0] + frequency[-1]), frequency[-1] - frequency[0]
@@ -112,11 +108,11 @@ def measured_rows(theory: WaveTheory, seen: WavesSeen) -> list[dict[str, Any]]:
             continue
         found = arrived(seen.time, first, second, distance, float(at), width)
         what = f"of energy around {at:.1f} Hz over {distance:.0f} m"
+        name, theirs = f"group_velocity_{number}", found.expected(frequency, velocity)
         rows += [
-            _row(f"group_velocity_{number}", found.velocity, f"measured, {what}"),
-            _row(f"group_velocity_{number}_theory", found.expected(frequency, velocity),
-                 f"of the periodic line, {what}"),
-        ]  # fmt: skip
+            row_of(name, found.velocity, "m/s", f"measured, {what}"),
+            row_of(f"{name}_theory", theirs, "m/s", f"of the periodic line, {what}"),
+        ]
     return rows
 
 
@@ -143,8 +139,7 @@ class Transmitted(NamedTuple):
 
 def transmitted(theory: WaveTheory, seen: WavesSeen) -> Transmitted | None:
     """What passes from one station to another; None without a blow, periodic line or room."""
-    waves = theory.bloch
-    columns = None if waves is None or seen.position.shape[1] else _stations(seen, waves.length)
+    columns = _stations(theory, seen)
     if columns is None:
         return None
     n = seen.time.size
@@ -170,8 +165,12 @@ def transmitted(theory: WaveTheory, seen: WavesSeen) -> Transmitted | None:
     )
 
 
-def _stations(seen: WavesSeen, length: float) -> tuple[int, int] | None:
-    """Columns of two places whole spans of a ``length`` [m] beyond a blow; None without room."""
+def _stations(theory: WaveTheory, seen: WavesSeen) -> tuple[int, int] | None:
+    """Columns of two places whole spans of a periodic line beyond a blow; None without these, or
+    without room."""
+    if theory.bloch is None or seen.position.shape[1]:
+        return None
+    length = theory.bloch.length
     n = int(_SHARE * (seen.x[-1] - seen.struck) // length) - _FIRST
     if n < _APART:
         return None
@@ -190,7 +189,3 @@ def branch_of_fastest(waves: BlochWaves, highest: float) -> tuple[np.ndarray, np
     order = np.argsort(waves.frequency[:, branch])
     velocity = np.maximum(np.abs(waves.group_velocity[order, branch]), 1e-3)
     return waves.frequency[order, branch], velocity
-
-
-def _row(name: str, value: float, meaning: str) -> dict[str, Any]:
-    return {"name": name, "value": value, "unit": "m/s", "meaning": meaning}

@@ -141,23 +141,17 @@ def result_of(obstacle: Obstacle, problem: Problem, frequency: np.ndarray = FREQ
 
 def as_rows(results: list[Result]) -> list[dict[str, Any]]:
     """A row for each obstacle, pair of wires and frequency: sizes of the shares, and the error."""
+    names = ("back", "back_theory", "onward", "onward_theory")
     rows = []
     for result in results:
-        error = result.error
+        error = 100.0 * result.error.max(axis=0)
         for j, i in np.ndindex(*result.back.shape[2:]):
             for f, frequency in enumerate(result.frequency.tolist()):
-                shares = np.abs([*result.back[:, f, j, i], *result.onward[:, f, j, i]])
-                names = ("back", "back_theory", "onward", "onward_theory")
-                rows.append(
-                    {
-                        "obstacle": result.name,
-                        "wave_on": result.wires[i],
-                        "seen_on": result.wires[j],
-                        "frequency_Hz": frequency,
-                        **dict(zip(names, shares.tolist(), strict=True)),
-                        "error_percent": 100.0 * float(error[:, f, j, i].max()),
-                    }
-                )
+                shares = np.abs([*result.back[:, f, j, i], *result.onward[:, f, j, i]]).tolist()
+                wires = {"wave_on": result.wires[i], "seen_on": result.wires[j]}
+                row = {"obstacle": result.name, **wires, "frequency_Hz": frequency}
+                row |= dict(zip(names, shares, strict=True))
+                rows.append(row | {"error_percent": float(error[f, j, i])})
     return rows
 
 

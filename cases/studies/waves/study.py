@@ -29,7 +29,7 @@ from catenary.cases.studies.waves.seen import (
     places_of,
     waves_seen,
 )
-from catenary.cases.studies.waves.theory import WaveTheory, wave_theory
+from catenary.cases.studies.waves.theory import WaveTheory, row_of, wave_theory
 from catenary.postproc.evaluate.error_indicators import indicate
 from catenary.postproc.evaluate.remarks import all_remarks
 from catenary.postproc.film.film_data import FilmData, film_data
@@ -175,9 +175,9 @@ def _write(
 ) -> Studied:
     """Pictures and tables of what is seen and what theory says."""
     moving, origin = ("pantographs", "first pantograph") if what == "train" else (what, what)
-    reflections = ends.reflections_of(rest)
+    reflections, spectra = ends.reflections_of(rest), transmitted(theory, seen)
     measured = [
-        *measured_rows(theory, seen), *ends.reflection_rows(reflections, theory.speed)
+        *measured_rows(theory, seen, spectra), *ends.reflection_rows(reflections, theory.speed)
     ]  # fmt: skip
     content: dict[str, Content] = {
         "energy.csv": energy_rows(energy, seen),
@@ -191,7 +191,6 @@ def _write(
         both = rest.problem.ends
         content["end_reflection.png"] = lambda: ends.picture(reflections, both, theory.speed)
         content["end_reflection.csv"] = ends.curve_rows(reflections)
-    spectra = transmitted(theory, seen)
     if spectra is not None:
         content["transmission.png"] = lambda: pictures.transmission(spectra)
     if seen.position.shape[1]:
@@ -204,12 +203,9 @@ def _write(
 def energy_rows(energy: EnergySeen, seen: WavesSeen) -> list[Row]:
     """Energy over time: behind, between and ahead of what moves, or of the place of a blow [J]."""
     behind, between, ahead = energy.parts(places_of(seen, energy.time))
-    return [
-        {"time_s": t, "behind_J": b, "between_J": m, "ahead_J": a, "total_J": b + m + a}
-        for t, b, m, a in zip(
-            *(part.tolist() for part in (energy.time, behind, between, ahead)), strict=True
-        )
-    ]
+    columns = energy.time, behind, between, ahead, behind + between + ahead
+    names = ("time_s", "behind_J", "between_J", "ahead_J", "total_J")
+    return [dict(zip(names, row, strict=True)) for row in np.column_stack(columns).tolist()]
 
 
 def as_rows(theory: WaveTheory) -> list[Row]:
@@ -228,21 +224,15 @@ def as_rows(theory: WaveTheory) -> list[Row]:
             ("fastest_group_velocity", speed, "m/s", "of the periodic line up to 20 Hz"),
             ("frequency_of_the_fastest", at, "Hz", "of that wave"),
         ]
-    return [
-        {"name": name, "value": value, "unit": unit, "meaning": meaning}
-        for name, value, unit, meaning in rows
-        if np.isfinite(value)
-    ]
+    return [row_of(*row) for row in rows if np.isfinite(row[1])]
 
 
 def band_rows(theory: WaveTheory) -> list[Row]:
     """Pass bands of the periodic line, and ranges that outrun the train [Hz]."""
-    rows: list[tuple[str, np.ndarray]] = [
-        ("pass band", theory.bands()), ("outruns the train", theory.outrunning())
-    ]  # fmt: skip
+    found = {"pass band": theory.bands(), "outruns the train": theory.outrunning()}
     return [
         {"what": what, "from_Hz": float(low), "to_Hz": float(high)}
-        for what, bands in rows
+        for what, bands in found.items()
         for low, high in bands
     ]
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.sparse import linalg as sparse_linalg
@@ -81,6 +82,11 @@ class WaveTheory:
         gap = max(0.1, float(np.abs(np.diff(waves.frequency, axis=0)).max()))
         first = np.append(True, np.diff(found) > gap)
         return np.column_stack([found[first], found[np.append(first[1:], True)]])
+
+
+def row_of(name: str, value: float, unit: str, meaning: str) -> dict[str, Any]:
+    """A row of ``waves.csv``."""
+    return {"name": name, "value": value, "unit": unit, "meaning": meaning}
 
 
 def wave_theory(problem: Problem, rest: LineAtRest) -> WaveTheory:

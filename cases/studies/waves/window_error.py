@@ -20,6 +20,7 @@ from catenary.base.errors import InputError, RunBroken
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.problem import problem_of
 from catenary.cases.scene.scene import Scene
+from catenary.cases.studies.ensemble import Keeper
 from catenary.postproc.evaluate.filters import low_pass
 from catenary.postproc.record.run_watch import RunWatch, watch_cadence, watched
 from catenary.postproc.report.pictures import figures
@@ -27,13 +28,12 @@ from catenary.postproc.report.study_table import Column, StudyTable, remark_line
 from catenary.solver.problem.window import WindowChoice
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest
 from catenary.solver.time_loop.march import March
-from catenary.solver.time_loop.views.observers import NEVER, Observer, StepView
 from catenary.solver.window.choice import estimated_error, spans_of_window
 
 TABLE, PICTURE = "window_error.csv", "window_error.png"
 OPTION = "--window-error"
-# Sizes that a curve may have, and the least [spans].
-MOST, LEAST = 100, 2
+# The least size of a window, and the largest [spans].
+LEAST, MOST = 2, 100_000
 # Share of a window that is ahead of the train, as in the one that the program chooses.
 _AHEAD = 0.55
 
@@ -61,6 +61,7 @@ class Error(NamedTuple):
 
     @property
     def spans(self) -> float:
+        """Size of the window."""
         return self.ahead + self.behind
 
 
@@ -73,26 +74,6 @@ class Curve(NamedTuple):
     name: str
     errors: tuple[Error, ...]
     remarks: tuple[str, ...]
-
-
-def parse_sizes(text: str) -> list[int]:
-    """Sizes of windows, ``a,b,...`` [spans], ascending.
-
-    Raises
-    ------
-    InputError
-        If it has another form, or names one that is too small, or one twice.
-    """
-    try:
-        values = [int(part) for part in text.split(",")]
-    except ValueError:
-        values = []
-    if not 0 < len(values) <= MOST or min(values) < LEAST or len(set(values)) < len(values):
-        raise InputError(
-            f"{OPTION} {text} must be whole numbers of spans from {LEAST} on, each once, as "
-            "a,b,..., e.g. 8,16,24,40,54"
-        )
-    return sorted(values)
 
 
 def curve_of(name: str, scene: Scene, sizes: Sequence[int]) -> Curve:
@@ -127,17 +108,9 @@ def curve_of(name: str, scene: Scene, sizes: Sequence[int]) -> Curve:
     for ahead, behind in sorted(windows, key=sum):
         found, remarks = _forces(rest, spans_of_window(problem, ahead, behind))
         history, sigma = _worst(found, whole)
-        errors.append(
-            Error(
-                ahead,
-                behind,
-                history,
-                sigma,
-                estimated_error(problem, ahead, behind),
-                (ahead, behind) == (usual.spans_ahead, usual.spans_behind),
-                tuple(remarks),
-            )
-        )
+        estimated = estimated_error(problem, ahead, behind)
+        chosen = (ahead, behind) == (usual.spans_ahead, usual.spans_behind)
+        errors.append(Error(ahead, behind, history, sigma, estimated, chosen, tuple(remarks)))
     return Curve(name, tuple(errors), tuple(of_whole))
 
 
@@ -154,18 +127,14 @@ def table_of(curves: Sequence[Curve]) -> StudyTable:
         Column("chosen", " ", in_files=False),
         Column("remarks"),
     ]
-    rows = [
-        {
-            "with": curve.name, "spans_ahead": one.ahead, "spans_behind": one.behind,
-            "history_percent_of_std": one.history, "std_percent": one.sigma,
-            "estimated_percent": one.estimated,
-            "default": int(one.is_default),
-            "chosen": "chosen by the program" if one.is_default else "",
-            "remarks": [*(f"whole line: {text}" for text in curve.remarks), *one.remarks],
-        }
-        for curve in curves
-        for one in curve.errors
-    ]  # fmt: skip
+    rows = []
+    for curve in curves:
+        of_whole = [f"whole line: {text}" for text in curve.remarks]
+        for one in curve.errors:
+            chosen = "chosen by the program" if one.is_default else ""
+            cells = (*one[:5], int(one.is_default), chosen, [*of_whole, *one.remarks])
+            names = (column.name for column in columns)
+            rows.append(dict(zip(names, (curve.name, *cells), strict=True)))
     return StudyTable(columns, rows)
 
 
@@ -210,40 +179,19 @@ def as_text(curves: Sequence[Curve]) -> str:
     return "\n".join([table_of(curves).text(), *remark_lines(told)])
 
 
-class _Forces(Observer):
-    """Observer that keeps positions and contact forces of all pantographs at all steps."""
-
-    def __init__(self) -> None:
-        self._blocks: list[np.ndarray] = []
-
-    def next_state(self, step: int) -> int:
-        """No state is needed."""
-        return NEVER
-
-    def observe(self, view: StepView) -> None:
-        """Copy."""
-        channels = "contact_position", "contact_force"
-        self._blocks.append(np.hstack([view.each(name) for name in channels]))
-
-    def table(self) -> np.ndarray:
-        """(rows, 2, n_pantographs), positions [m] and forces [N]."""
-        rows = np.concatenate(self._blocks)
-        return rows.reshape(len(rows), 2, -1)
-
-
 def _forces(rest: LineAtRest, window: WindowChoice) -> tuple[list[np.ndarray], list[str]]:
     """Filtered force (n,) of each pantograph in the stretch [N], and what the march told."""
-    problem, seen = replace(rest.problem, window=window), _Forces()
+    problem, seen = replace(rest.problem, window=window), Keeper()
     at_rest = rest._replace(problem=problem)
     watch = RunWatch(MPI.COMM_SELF, watched(at_rest), watch_cadence(problem.numerics.dt))
     with March(MPI.COMM_SELF, *at_rest) as run:
         outcome = run.run([seen, watch])
     if outcome.outcome != "done":
         raise RunBroken(outcome.outcome)
-    position, force = seen.table().transpose(1, 2, 0)
+    tables = seen.tables()
     first, last = problem.evaluation
-    filtered = low_pass(force.T, problem.numerics.dt).T
-    both = zip(filtered, position, strict=True)
+    filtered = low_pass(tables["channels/contact_force"], problem.numerics.dt).T
+    both = zip(filtered, tables["channels/contact_position"].T, strict=True)
     return [own[(at >= first) & (at <= last)] for own, at in both], watch.remarks
 
 
