@@ -22,7 +22,7 @@ from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.problem import end_of, problem_of
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.effect_cost.step_timing import RepeatedMarch, beside, in_turns
-from catenary.cases.studies.sweep.jobs import Job, RunOptions, interrupted
+from catenary.cases.studies.sweep.jobs import Ended, Job, RunOptions, interrupted
 from catenary.cases.studies.sweep.run_jobs import run_jobs
 from catenary.cases.studies.sweep.variants import Variant
 from catenary.solver.effects import all_effects as effects
@@ -306,7 +306,9 @@ def measure(
     scene = jobs[0].scene
     problem = problem_of(scene)
     first, n_steps = _round_of(problem)
-    runs = {one.variant.name: (job, one) for job, one in zip(jobs[1:], others, strict=True)}
+    runs: dict[str, tuple[Job, Ended]] = {
+        one.variant.name: (job, one) for job, one in zip(jobs[1:], others, strict=True)
+    }
     rows = []
     with (
         Phase(comm, "steps were timed", "runs are kept where -o names a folder") as phase,
@@ -316,12 +318,10 @@ def measure(
         for number, switch in enumerate(effects.switches, start=1):
             phase.next(f"steps without or with {switch.name} were timed")
             say(f"[{number}/{len(effects.switches)}] steps: {switch.name}")
-            if switch.name in refused:
-                rows.append(Measured(switch, refused[switch.name]))
-                continue
-            job, one = runs[switch.name]
-            if not one.done:
-                rows.append(Measured(switch, one.outcome))
+            job, one = runs.get(switch.name, (None, None))
+            if job is None or one is None or not one.done:
+                outcome = refused[switch.name] if one is None else one.outcome
+                rows.append(Measured(switch, outcome))
                 continue
             with RepeatedMarch(comm, _at_rest(job.scene), first, n_steps) as march:
                 timed, own = beside(march, as_it_is, wish.rounds), size_of(march)
@@ -330,9 +330,7 @@ def measure(
             step = min(step, timed.least_of_other)
         size = size_of(as_it_is)
     names = [one["name"] for one in whole.summary["pantographs"]]
-    start, end = scene.evaluation.from_m, scene.evaluation.to_m
-    figures = figures_of(whole.summary)
-    stretch = start, end
+    stretch, figures = (scene.evaluation.from_m, scene.evaluation.to_m), figures_of(whole.summary)
     return Costs(wish, effects, stretch, n_steps, size, step, figures, names, rows, whole.remarks)
 
 

@@ -71,34 +71,24 @@ def conclude(study: PaperStudy, runs: Mapping[str, StudyRun], draw: Draw) -> Stu
     start = rows[first["name"]].only(study.trains[:1])
     ranked = rank(start, dict(study.rows_of_variations(runs)), study)
     named = judge(statements, rows[first["name"]].only(study.named_trains))
-    explained = [
-        _explained(
-            one, named[i], {r["title"]: found[r["name"]][i] for r in others}, statements[i], ranked
-        )
-        for i, one in enumerate(found[first["name"]])
-    ]
+    explained = []
+    for i, one in enumerate(found[first["name"]]):
+        elsewhere = {other["title"]: found[other["name"]][i] for other in others}
+        explained.append(_explained(one, named[i], elsewhere, statements[i], ranked))
     shown = [one for one in readings if one.get("figures")]
-    return Study(
-        table["title"],
-        table["lead"],
-        [
-            Reading(
-                one["name"],
-                one["title"],
-                changes_of(one),
-                explained if one is first else found[one["name"]],
-            )
-            for one in readings
-        ],  # fmt: skip
-        [
-            _side_by_side(shown, found),
-            search_table(study, statements, _searched(study, runs)),
-            *(_table_of(one, rows[one["name"]]) for one in readings),
-            separation_table(study, _bands(study, runs, readings, rows)),
-            ranking_table(study, ranked),
-        ],
-        _drawn(study, runs, shown, rows, draw),
-    )
+    told = [
+        Reading(one["name"], one["title"], changes_of(one), found[one["name"]]) for one in readings
+    ]
+    told[0] = replace(told[0], findings=explained)
+    tables = [
+        _side_by_side(shown, found),
+        search_table(study, statements, _searched(study, runs)),
+        *(_table_of(one, rows[one["name"]]) for one in readings),
+        separation_table(study, _bands(study, runs, readings, rows)),
+        ranking_table(study, ranked),
+    ]
+    pictures = _drawn(study, runs, shown, rows, draw)
+    return Study(table["title"], table["lead"], told, tables, pictures)
 
 
 def _drawn(
@@ -152,31 +142,23 @@ def _explained(
     return replace(finding, reason=" ".join([*parts, movers(statement, ranked)]).strip())
 
 
-def _table(
-    title: str, note: str, heads: Sequence[str], rows: Sequence[Sequence[Any]]
-) -> StudyTable:
-    return texts_table(heads, rows, (), title, note)
-
-
 def _side_by_side(
     readings: Sequence[Mapping[str, Any]], found: Mapping[str, Sequence[Finding]]
 ) -> StudyTable:
     """All statements under some readings, each with its figures."""
     columns = [found[one["name"]] for one in readings]
     met = [sum(one.verdict == REPRODUCED for one in column) for column in columns]
-    note = "; ".join(
+    told = [
         f"{reading['title']}: {n} of {len(column)} reproduced"
         for reading, n, column in zip(readings, met, columns, strict=True)
-    )
-    return _table(
-        "The statements beside each other",
-        f"{note}.",
-        ["no.", "statement", *(reading["title"] for reading in readings)],
-        [
-            [one[0].number, one[0].statement, *(f"{own.verdict}: {own.found}" for own in one)]
-            for one in zip(*columns, strict=True)
-        ],
-    )
+    ]
+    heads = ["no.", "statement", *(reading["title"] for reading in readings)]
+    rows = [
+        [one[0].number, one[0].statement, *(f"{own.verdict}: {own.found}" for own in one)]
+        for one in zip(*columns, strict=True)
+    ]
+    title = "The statements beside each other"
+    return texts_table(heads, rows, title=title, note=f"{'; '.join(told)}.")
 
 
 def _table_of(reading: Mapping[str, Any], rows: Rows) -> StudyTable:
@@ -217,15 +199,15 @@ def search_table(
     found.sort(key=lambda one: one[:2], reverse=True)
     counts = {n: sum(one[0] == n for one in found) for n in range(len(statements), -1, -1)}
     spread = ", ".join(f"{many} meet {n}" for n, many in counts.items() if many)
-    return _table(
-        "Search: which reading of the open inputs meets most statements",
-        "The reading searched around, and each option of an input in its place ([search] in "
-        + (f"study.toml): of {len(found)}, {spread}." if found else "study.toml): none was run."),
-        ["reading", "met", "statements", f"pantographs that meet {search['counts']}",
-         *(" ".join([*one.get("where", {}).values(), FIGURES[one["figure"]].head])
-           for one in search["shown"])],
-        [cells for *_, cells in found],
-    )  # fmt: skip
+    title = "Search: which reading of the open inputs meets most statements"
+    note = "The reading searched around, and each option of an input in its place ([search] in "
+    note += f"study.toml): of {len(found)}, {spread}." if found else "study.toml): none was run."
+    heads = ["reading", "met", "statements", f"pantographs that meet {search['counts']}"]
+    heads += [
+        " ".join([*one.get("where", {}).values(), FIGURES[one["figure"]].head])
+        for one in search["shown"]
+    ]
+    return texts_table(heads, [cells for *_, cells in found], title=title, note=note)
 
 
 def _range(rows: Rows, figure: str, where: Mapping[str, str] | None = None) -> str:
@@ -278,15 +260,14 @@ def ranking_table(study: PaperStudy, ranked: Sequence[Ranked]) -> StudyTable:
         ]
         changes = changes if one.title else ["" for _ in changes]
         rows.append([one.title or "the case", *(f"{v:.1f}" for v in own), *changes, *pairs])
-    return _table(
-        "What the open inputs decide",
+    note = (
         f"One input at a time, one pantograph, in the order of their effect on {head}; "
-        f"{' / '.join(dampings)} damping.",
-        ["input", *(f"{head} {damping}" for damping in dampings),
-         *(f"change {damping}" for damping in dampings),
-         *(FIGURES[name].head for name in ranking["shown"])],
-        rows,
-    )  # fmt: skip
+        f"{' / '.join(dampings)} damping."
+    )
+    heads = ["input", *(f"{head} {damping}" for damping in dampings)]
+    heads += [f"change {damping}" for damping in dampings]
+    heads += [FIGURES[name].head for name in ranking["shown"]]
+    return texts_table(heads, rows, title="What the open inputs decide", note=note)
 
 
 def movers(statement: Statement, ranked: Sequence[Ranked]) -> str:
@@ -370,14 +351,13 @@ def separation_table(
             periods = " to ".join(f"{delay * frequency:.2f}" for frequency in band)
             modes = " to ".join(f"{frequency:.2f}" for frequency in band)
             rows.append([title, modes, train["name"], f"{delay:.2f}", periods, *ratios])
-    return _table(
-        "Which separation is critical",
+    note = (
         "A span rings in the first modes after the leading pantograph has passed. The trailing one "
-        "comes after so many periods; its standard deviation is so many times the single one's.",
-        ["reading", "first modes [Hz]", "train", "delay [s]", "delay [periods]",
-         *(f"deviation / single, {damping}" for damping in study.dampings)],
-        rows,
-    )  # fmt: skip
+        "comes after so many periods; its standard deviation is so many times the single one's."
+    )
+    heads = ["reading", "first modes [Hz]", "train", "delay [s]", "delay [periods]"]
+    heads += [f"deviation / single, {damping}" for damping in study.dampings]
+    return texts_table(heads, rows, title="Which separation is critical", note=note)
 
 
 def _ratio(rows: Rows, train: str, damping: str) -> str:

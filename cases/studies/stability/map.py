@@ -1,7 +1,7 @@
 """The stability map: largest step of each coupling against contact stiffness and head mass.
 
-Each point of the map is found twice: from the matrices of a step (`stability_theory`) and by
-marching (`stability_march`).
+Each point of the map is found twice: from the matrices of a step (`from_matrices`) and by marching
+(`by_marching`).
 """
 
 from __future__ import annotations
@@ -204,15 +204,9 @@ def make_map(
         raise lost[0]
     linear = own.contact.law == "linear"
     own_point = (own.contact.stiffness_N_per_m if linear else None, bench.data.masses[0])
-    return StabilityMap(
-        own.case.name,
-        limits,
-        grid,
-        bench.x,
-        line.mass,
-        (*own_point, own.numerics.dt_s),
-        line.load.shape[1],
-    )
+    point = (*own_point, own.numerics.dt_s)
+    n_wires = line.load.shape[1]
+    return StabilityMap(own.case.name, limits, grid, bench.x, line.mass, point, n_wires)
 
 
 class _FindLimits:
@@ -294,10 +288,10 @@ def as_rows(found: StabilityMap) -> list[dict[str, Any]]:
             "stiffness_N_per_m": one.stiffness,
             "head_mass_kg": one.head_mass,
             "wire_mass_kg": found.wire_mass,
-            "theory_s": _finite(one.theory),
-            "omega_dt_2_s": _finite(one.closed_form),
+            "theory_s": one.theory if np.isfinite(one.theory) else None,
+            "omega_dt_2_s": one.closed_form if np.isfinite(one.closed_form) else None,
             "marched_stable_s": one.stable,
-            "marched_unstable_s": _finite(one.unstable),
+            "marched_unstable_s": one.unstable if np.isfinite(one.unstable) else None,
             "agrees": "yes" if one.agrees else "no",
         }
         for one in found.limits
@@ -331,10 +325,6 @@ def in_ms(dt: float) -> str:
     return f"{1e3 * dt:.3g}" if np.isfinite(dt) else "no limit below 25"
 
 
-def _finite(dt: float) -> float | None:
-    return dt if np.isfinite(dt) else None
-
-
 _MARKERS = {"explicit": "o", "iterated": "s", "fixed_point": "^"}
 _RAISED = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 _STABLE, _ONLY_IMPLICIT = "#eef3e6", "#fbeee6"
@@ -345,94 +335,70 @@ def draw(found: StabilityMap) -> Figure:
     """Largest step over contact stiffness and over head mass, both logarithmic."""
     figure = figures.new_figure(5.6)
     left, right = figure.subplots(1, 2, sharey=True)
-    by_mass = {
-        f"head {mass:g} kg": _series(found, "stiffness", head_mass=mass)
-        for mass in found.grid.few_masses
-    }
-    by_stiffness = {
-        f"contact {_power(k)} N/m": _series(found, "head_mass", stiffness=k)
-        for k in found.grid.few_stiffnesses
-    }
-    _panel(left, by_mass, "stiffness")
-    _panel(right, by_stiffness, "head_mass", named=True)
+    masses, stiffnesses = found.grid.few_masses, found.grid.few_stiffnesses
+    by_mass = [(f"head {mass:g} kg", {"head_mass": mass}) for mass in masses]
+    by_stiffness = [(f"contact {_power(k)} N/m", {"stiffness": k}) for k in stiffnesses]
+    _panel(left, found, by_mass, "stiffness")
+    _panel(right, found, by_stiffness, "head_mass", named=True)
     figures.tidy(left, "contact stiffness [N/m]", "largest stable step [ms]")
     figures.tidy(right, "head mass [kg]", "")
+    small: dict[str, Any] = {"fontsize": "small"}
     stiffness, mass, dt = found.own
     if stiffness is not None:
-        left.plot(stiffness, 1e3 * dt, "*", ms=11, color="black", zorder=5)
-        left.annotate(
-            f"the case: {mass:g} kg",
-            (stiffness, 1e3 * dt),
-            textcoords="offset points",
-            xytext=(0, -15),
-            ha="center",
-            fontsize="small",
-        )
+        at = stiffness, 1e3 * dt
+        left.plot(*at, "*", ms=11, color="black", zorder=5)
+        left.annotate(f"the case: {mass:g} kg", at, (0, -15), textcoords="offset points",
+                      ha="center", **small)  # fmt: skip
     implicit = found.of("implicit")
     everywhere = all(one.marched == np.inf and one.theory == np.inf for one in implicit)
     word = "implicit: stable everywhere on this map" if everywhere else "implicit: see the table"
-    right.text(0.97, 0.97, word, transform=right.transAxes, ha="right", va="top", fontsize="small")
-    left.legend(
-        handles=[
-            Line2D([], [], color=figures.colour(i), label=name) for i, name in enumerate(by_mass)
-        ],
-        loc="upper right",
-        fontsize="small",
-        frameon=False,
-    )
+    right.text(0.97, 0.97, word, transform=right.transAxes, ha="right", va="top", **small)
+    lines = [
+        Line2D([], [], color=figures.colour(i), label=name) for i, (name, _) in enumerate(by_mass)
+    ]
+    left.legend(handles=lines, loc="upper right", frameon=False, **small)
     word = "a coupling is stable below its line;\nabove both lines only the implicit one is"
-    left.text(0.03, 0.03, word, transform=left.transAxes, va="bottom", fontsize="small")
-    figure.suptitle(
+    left.text(0.03, 0.03, word, transform=left.transAxes, va="bottom", **small)
+    title = (
         f"{found.case}: stability of the couplings while contact lasts and droppers are taut (the "
-        f"linear system);\n{meets(found)} {found.wire_mass:.2g} kg",
-        x=0.01,
-        ha="left",
-        fontsize="medium",
+        f"linear system);\n{meets(found)} {found.wire_mass:.2g} kg"
     )
-    figure.legend(handles=_key(), loc="outside lower center", ncols=3, fontsize="small",
-                  frameon=False)  # fmt: skip
+    figure.suptitle(title, x=0.01, ha="left", fontsize="medium")
+    figure.legend(handles=_key(), loc="outside lower center", ncols=3, frameon=False, **small)
     return figure
 
 
-def _series(found: StabilityMap, along: str, **fixed: float) -> dict[str, list[Limit]]:
-    """Limits of each coupling that has any, in the order of what varies."""
-    return {
-        name: sorted(found.of(name, **fixed), key=lambda one: float(getattr(one, along)))
-        for name in _MARKERS
-    }
-
-
 def _panel(
-    axes: Axes, curves: dict[str, dict[str, list[Limit]]], along: str, named: bool = False
+    axes: Axes,
+    found: StabilityMap,
+    curves: Sequence[tuple[str, dict[str, float]]],
+    along: str,
+    named: bool = False,
 ) -> None:
-    """Curves of one panel and the regions below and above the lowest; ``named`` at their ends."""
+    """Curves of one panel, each of what is fixed, and the regions below and above the lowest;
+    ``named`` at their ends."""
     axes.set_xscale("log")
     axes.set_yscale("log")
     axes.yaxis.set_major_formatter("{x:g}")
     lowest: tuple[np.ndarray, np.ndarray] | None = None
-    for number, (label, series) in enumerate(curves.items()):
+    for number, (label, fixed) in enumerate(curves):
         colour = figures.colour(number)
-        for name, limits in series.items():
+        for name, marker in _MARKERS.items():
+            limits = sorted(found.of(name, **fixed), key=lambda one: float(getattr(one, along)))
             x = np.array([getattr(one, along) for one in limits])
             theory = 1e3 * np.array([one.theory for one in limits])
             marched = 1e3 * np.array([one.marched for one in limits])
             there = np.isfinite(marched)
-            axes.plot(x[there], marched[there], _MARKERS[name], color=colour, ms=5, mfc="none")
+            axes.plot(x[there], marched[there], marker, color=colour, ms=5, mfc="none")
             if name == "fixed_point":  # the line of iterated
                 continue
-            axes.plot(x, theory, "-" if name == "explicit" else "--", color=colour, linewidth=1.2)
-            if name == "explicit" and named:
-                end = int(np.argmax(x))
-                axes.annotate(
-                    label,
-                    (x[end], theory[end]),
-                    textcoords="offset points",
-                    xytext=(-4, -13),
-                    ha="right",
-                    fontsize="small",
-                    color=colour,
-                )
-            if name == "explicit" and (lowest is None or theory[0] < lowest[1][0]):
+            explicit = name == "explicit"
+            axes.plot(x, theory, "-" if explicit else "--", color=colour, linewidth=1.2)
+            if explicit and named:
+                end = x[-1], theory[-1]
+                axes.annotate(label, end, (-4, -13), textcoords="offset points", ha="right",
+                              fontsize="small", color=colour)  # fmt: skip
+            if explicit and (lowest is None or theory[0] < lowest[1][0]):
                 lowest = x, theory
     top = 1.25e3 * MAX_DT
     axes.set_ylim(None, top)
@@ -447,10 +413,10 @@ def _key() -> list[Line2D]:
     lines = (("-", "explicit, theory (ω dt = 2)"), ("--", "exchanges, theory"))
     grey = figures.GREY
     keys = [Line2D([], [], color=grey, lw=1.2, ls=style, label=name) for style, name in lines]
-    for name, marker in _MARKERS.items():
-        told = f"{name}, marched"
-        keys.append(Line2D([], [], color=grey, ls="", marker=marker, mfc="none", label=told))
-    return keys
+    return keys + [
+        Line2D([], [], color=grey, ls="", marker=marker, mfc="none", label=f"{name}, marched")
+        for name, marker in _MARKERS.items()
+    ]
 
 
 def _power(value: float) -> str:

@@ -89,20 +89,14 @@ def run_sweep(
     from catenary.base.parallel import on_root
     from catenary.cases.result_folder.folder_lock import held
     from catenary.cases.studies.sweep import output
-    from catenary.cases.studies.sweep.run_jobs import run_jobs
 
     name, show = sweep.first.case.name, plotted
     if show is not None:
         show = show or output.PLOTTED
     with held(out, comm, command):
-        if sweep.ensemble is None:
-            ended = run_jobs(sweep.jobs, out, comm, options)
-            ended = in_order(sweep.variants, ended, sweep.refused)
-        else:
-            from catenary.cases.studies.sweep.together import run_ensemble
-
+        if sweep.ensemble is not None:
             on_root(comm, lambda: refuse_earlier(out, options.force))
-            ended = run_ensemble(sweep.ensemble, out, comm, options)
+        ended = in_order(sweep.variants, _run(sweep, out, comm, options), sweep.refused)
         files = on_root(comm, lambda: output.write(out, name, ended, show), takes_long=True)
     return ended, files
 
@@ -116,17 +110,23 @@ def run_part(sweep: Sweep, part: Part, out: Path, comm: Any, options: RunOptions
     from catenary.base.parallel import on_root
     from catenary.cases.studies.sweep import output
 
-    if sweep.ensemble is None:
-        from catenary.cases.studies.sweep.run_jobs import run_jobs
-
-        ended = run_jobs(part.of(sweep.jobs), out, comm, options)
-    else:
-        from catenary.cases.studies.sweep.together import run_ensemble
-
-        ended = run_ensemble(sweep.ensemble, out, comm, options, part)
+    ended = _run(sweep, out, comm, options, part)
     name, folder = sweep.first.case.name, out / part.folder
     on_root(comm, lambda: output.write(folder, name, ended, None), takes_long=True)
     return ended
+
+
+def _run(
+    sweep: Sweep, out: Path, comm: Any, options: RunOptions, part: Part | None = None
+) -> list[Ended]:
+    """Run what is not done yet of a sweep or a part of it. Collective."""
+    if sweep.ensemble is None:
+        from catenary.cases.studies.sweep.run_jobs import run_jobs
+
+        return run_jobs(sweep.jobs if part is None else part.of(sweep.jobs), out, comm, options)
+    from catenary.cases.studies.sweep.together import run_ensemble
+
+    return run_ensemble(sweep.ensemble, out, comm, options, part)
 
 
 def refuse_other_sweep(out: Path, variants: Sequence[Variant], force: bool) -> None:
