@@ -106,52 +106,41 @@ _NO_LAW = ("contact.restitution=", "contact.hertz_stiffness_N_per_m1_5=",
 _ELASTIC = (*_NO_LAW, "effects.contact_damping=false")
 
 
+def _level(name: str, *assignments: str, quick: bool = False) -> Level:
+    return Level(name, assignments, quick=quick)
+
+
 def contacts(scene: Scene) -> list[Level]:
     """Laws of the contact, and stiffnesses of the linear one."""
-    levels = [
-        Level(
-            f"linear_{k:g}",
-            (*_ELASTIC, "contact.law=linear", f"contact.stiffness_N_per_m={k:g}"),
-            quick=k in (5e4, 2e5),
-        )
-        for k in (2e4, 5e4, 1e5, 2e5, 1e6)
-    ]
-    levels.append(Level("hertz", (*_ELASTIC, "contact.law=hertz")))
-    levels += [
-        Level(
-            f"{law}_0.6",
-            (
-                *_NO_LAW,
-                f"contact.law={law}",
-                "contact.restitution=0.6",
-                "effects.contact_damping=true",
-            ),  # fmt: skip
-        )
-        for law in ("lankarani_nikravesh", "hunt_crossley", "flores", "gonthier")
-    ]
+    law, stiffness = "contact.law=", "contact.stiffness_N_per_m="
+    lossy = ("contact.restitution=0.6", "effects.contact_damping=true")
     # Without numerical damping the force of a contact that does not give way alternates.
     damped = (*_NEWMARK, "numerics.newmark_gamma=0.55", "numerics.newmark_beta=0.28")
-    rigid = (*_ELASTIC, "contact.stiffness_N_per_m=", "contact.law=kinematic", *damped)
-    return [*levels, Level("kinematic_newmark_0.55", rigid)]
+    return [
+        *(
+            _level(f"linear_{k:g}", *_ELASTIC, f"{law}linear", f"{stiffness}{k:g}", quick=quick)
+            for k, quick in ((2e4, False), (5e4, True), (1e5, False), (2e5, True), (1e6, False))
+        ),
+        _level("hertz", *_ELASTIC, f"{law}hertz"),
+        *(
+            _level(f"{name}_0.6", *_NO_LAW, law + name, *lossy)
+            for name in ("lankarani_nikravesh", "hunt_crossley", "flores", "gonthier")
+        ),
+        _level("kinematic_newmark_0.55", *_ELASTIC, stiffness, f"{law}kinematic", *damped),
+    ]
 
 
 def droppers(scene: Scene) -> list[Level]:
     """Laws of slack droppers."""
-    slack, kept = "effects.dropper_slackening", "effects.residual_dropper_stiffness"
-    slackens, damper = (f"{kept}=false", f"{slack}=true"), "line.dropper.slack_damping"
+    slack, kept = "effects.dropper_slackening=", "effects.residual_dropper_stiffness="
+    damper, ratio = "line.dropper.slack_damping=", "line.dropper.residual_stiffness_ratio="
+    slackens = (f"{kept}false", f"{slack}true")
+    residual = (f"{slack}true", f"{kept}true", f"{ratio}0.01", f"{damper}released")
     return [
-        Level("linear", (f"{kept}=false", f"{slack}=false"), quick=True),
-        Level("slackening", (*slackens, f"{damper}=released"), quick=True),
-        Level("slackening_damped", (*slackens, f"{damper}=kept")),
-        Level(
-            "residual_0.01",
-            (
-                f"{slack}=true",
-                f"{kept}=true",
-                "line.dropper.residual_stiffness_ratio=0.01",
-                f"{damper}=released",
-            ),
-        ),
+        _level("linear", f"{kept}false", f"{slack}false", quick=True),
+        _level("slackening", *slackens, f"{damper}released", quick=True),
+        _level("slackening_damped", *slackens, f"{damper}kept"),
+        _level("residual_0.01", *residual),
     ]
 
 
@@ -166,8 +155,8 @@ def pantographs(scene: Scene) -> list[Level]:
     levels = [_fitted(scene, kind, n) for n in range(1, min(most, 3) + 1)]
     if table.type == "multibody":
         motion = f"pantographs.{kind}.motion"
-        levels.append(Level("reduced", (f"{motion}=reduced",), quick=True))
-        levels.append(Level("all_bodies", (f"{motion}=all_bodies",)))
+        levels.append(_level("reduced", f"{motion}=reduced", quick=True))
+        levels.append(_level("all_bodies", f"{motion}=all_bodies"))
     return levels
 
 
@@ -179,11 +168,9 @@ def _fitted(scene: Scene, kind: str, n_masses: int) -> Level:
     name = f"fitted_{n_masses}"
     assignments = [f"pantographs.{name}={inline_table(found)}"]
     for place in range(len(scene.train.pantographs)):
-        assignments += [
-            f"train.pantographs.{place}.name={name}",
-            f"train.pantographs.{place}.reversed=",
-        ]
-    return Level(f"fitted_{n_masses}_mass", tuple(assignments), quick=n_masses == 2)
+        own = f"train.pantographs.{place}"
+        assignments += [f"{own}.name={name}", f"{own}.reversed="]
+    return _level(f"fitted_{n_masses}_mass", *assignments, quick=n_masses == 2)
 
 
 def planes(scene: Scene) -> list[Level]:
@@ -196,21 +183,15 @@ def planes(scene: Scene) -> list[Level]:
     with_data = all_effects.registry()[_ALONG].applies(problem)
     # Twin wires that move as one do so in the vertical plane only.
     apart = (f"effects.{RELATIVE_MOTION}=true",) if needs_relative_motion(problem, _ACROSS) else ()
-    levels = {"vertical": (False, False), "lateral": (True, False)}
-    if with_data:
-        levels |= {"axial": (False, True), "three_planes": (True, True)}
-    return [
-        Level(
-            name,
-            (
-                f"effects.{_ACROSS}={str(across).lower()}",
-                f"effects.{_ALONG}={str(along).lower()}",
-                *(apart if across or along else ()),
-            ),
-            quick=name in ("vertical", "lateral"),
-        )
-        for name, (across, along) in levels.items()
+    across, along = f"effects.{_ACROSS}=", f"effects.{_ALONG}="
+    levels = [
+        _level("vertical", f"{across}false", f"{along}false", quick=True),
+        _level("lateral", f"{across}true", f"{along}false", *apart, quick=True),
     ]
+    if with_data:
+        levels.append(_level("axial", f"{across}false", f"{along}true", *apart))
+        levels.append(_level("three_planes", f"{across}true", f"{along}true", *apart))
+    return levels
 
 
 # Damping of a wire itself, of whole lines as it was measured on their vertical motion (ratios of
@@ -223,12 +204,9 @@ def lateral_dampings(scene: Scene) -> list[Level]:
     """Dampings of the wires' lateral motion, on their mass alone; none without that motion."""
     if not scene.switches()[_ACROSS]:
         return []
+    damping = "line.damping.lateral={{alpha_s=0.0, beta_per_s={:g}}}"
     return [
-        Level(
-            f"{beta:g}_per_s",
-            (f"line.damping.lateral={{alpha_s=0.0, beta_per_s={beta:g}}}",),
-            quick=beta in (0.003, 0.9),
-        )
+        _level(f"{beta:g}_per_s", damping.format(beta), quick=beta in (0.003, 0.9))
         for beta in _ACROSS_DAMPINGS
     ]
 
@@ -239,7 +217,7 @@ def parts_of_the_line(scene: Scene) -> list[Level]:
     for part, left in _PARTS.items():
         if getattr(scene.line, part) is not None:
             topology = [] if left is None else [f"line.topology={left}"]
-            levels.append(Level(f"without_{part}", (f"line.{part}=", *topology), quick=True))
+            levels.append(_level(f"without_{part}", f"line.{part}=", *topology, quick=True))
     return levels
 
 
@@ -368,65 +346,56 @@ def _one_solve(scene: Scene) -> tuple[str, ...]:
 
 def _newmark(scene: Scene, name: str, gamma: float, beta: float, quick: bool = False) -> Level:
     keys = (f"numerics.newmark_gamma={gamma}", f"numerics.newmark_beta={beta}")
-    return Level(name, (*_one_solve(scene), *_NEWMARK, *keys), quick=quick)
+    return _level(name, *_one_solve(scene), *_NEWMARK, *keys, quick=quick)
 
 
 def _dissipating(integrator: str, radius: float) -> tuple[str, ...]:
-    return (
-        f"numerics.integrator={integrator}",
-        f"numerics.spectral_radius={radius}",
-        "numerics.newmark_gamma=",
-        "numerics.newmark_beta=",
-    )
-
-
-def _alpha(scene: Scene, integrator: str, radius: float) -> Level:
-    keys = _dissipating(integrator, radius)
-    return Level(f"{integrator}_{radius:g}", (*_one_solve(scene), *keys))
-
-
-def _ts_alpha2(scene: Scene, radius: float) -> Level:
-    """PETSc's own stepper, which runs on one rank and takes plain scenes only."""
-    own = _dissipating("generalized_alpha", radius)
-    keys = ("numerics.coupling=", "numerics.iterations=", "numerics.scheme=ts_alpha2")
-    return Level(f"ts_alpha2_{radius:g}", (*keys, *_without_tolerances(scene), *own))
+    own = (f"numerics.integrator={integrator}", f"numerics.spectral_radius={radius}")
+    return (*own, "numerics.newmark_gamma=", "numerics.newmark_beta=")
 
 
 def _schemes(scene: Scene) -> list[Level]:
-    levels = [
+    alphas = [("generalized_alpha", radius) for radius in (0.9, 0.8, 0.5, 0.0)]
+    one, paper = _one_solve(scene), (*_PAPER, *_without_tolerances(scene, ("eps_force_N",)))
+    times = (*paper, "numerics.max_iterations=")
+    # PETSc's own stepper, which runs on one rank and takes plain scenes only.
+    petsc = ("numerics.coupling=", "numerics.iterations=", "numerics.scheme=ts_alpha2",
+             *_without_tolerances(scene))  # fmt: skip
+    return [
         _newmark(scene, "average_acceleration", 0.5, 0.25, True),
         _newmark(scene, "newmark_0.55", 0.55, 0.28, True),
         _newmark(scene, "newmark_0.6", 0.6, 0.3025),
-        *(_alpha(scene, "generalized_alpha", radius) for radius in (0.9, 0.8, 0.5, 0.0)),
-        *(_alpha(scene, "hht", radius) for radius in (0.9, 0.8)),
-        _ts_alpha2(scene, 0.8),
+        *(
+            _level(f"{name}_{radius:g}", *one, *_dissipating(name, radius))
+            for name, radius in (*alphas, ("hht", 0.9), ("hht", 0.8))
+        ),
+        _level("ts_alpha2_0.8", *petsc, *_dissipating("generalized_alpha", 0.8)),
+        *(
+            _level(f"corrected_{n}_times", *times, f"numerics.iterations={n}")
+            for n in (1, 2, 4, 6, 10, 20)
+        ),
+        *(
+            _level(
+                f"corrected_to_{d:g}_m",
+                *paper,
+                f"numerics.eps_d_m={d:g}",
+                f"numerics.eps_v_m_per_s={v:g}",
+            )  # fmt: skip
+            for d, v in _LOOSENESS
+        ),
     ]
-    paper = (*_PAPER, *_without_tolerances(scene, ("eps_force_N",)))
-    levels += [
-        Level(
-            f"corrected_{n}_times",
-            (*paper, "numerics.max_iterations=", f"numerics.iterations={n}"),
-        )
-        for n in (1, 2, 4, 6, 10, 20)
-    ]
-    levels += [
-        Level(
-            f"corrected_to_{eps_d:g}_m",
-            (*paper, f"numerics.eps_d_m={eps_d:g}", f"numerics.eps_v_m_per_s={eps_v:g}"),
-        )
-        for eps_d, eps_v in _LOOSENESS
-    ]
-    return levels
 
 
 def _couplings(scene: Scene) -> list[Level]:
     own = {"implicit": _TOLERANCES, "iterated": _TOLERANCES[:2], "explicit": _TOLERANCES}
     return [
-        Level(
+        _level(
             name,
-            (*_ONE_SOLVE, *_without_tolerances(scene, taken), f"numerics.coupling={name}"),
+            *_ONE_SOLVE,
+            *_without_tolerances(scene, taken),
+            f"numerics.coupling={name}",
             quick=name != "iterated",
-        )
+        )  # fmt: skip
         for name, taken in own.items()
     ]
 
@@ -438,11 +407,13 @@ _ADAPTED = ((1e-3, 1.0), (1e-3, 0.1), (4e-3, 10.0), (4e-3, 1.0), (4e-3, 0.1))
 def _adaptive(scene: Scene) -> list[Level]:
     one = _one_solve(scene)
     return [
-        Level(
+        _level(
             f"{1e3 * dt:g}_ms_{tolerance:g}_N",
-            (*one, f"numerics.dt_s={dt:g}", f"numerics.adaptive_tolerance_N={tolerance:g}"),
+            *one,
+            f"numerics.dt_s={dt:g}",
+            f"numerics.adaptive_tolerance_N={tolerance:g}",
             quick=tolerance == 10.0,
-        )
+        )  # fmt: skip
         for dt, tolerance in _ADAPTED
     ]
 

@@ -182,16 +182,12 @@ def runs_with_remarks(found: Measured) -> list[tuple[str, Sequence[str]]]:
     for planned in found.plan.axes:
         for level, name in planned.runs.items():
             words.setdefault(name, []).append(f"{planned.axis.name} {in_words(level)}")
+    own = {name: name.rpartition("__") for name in found.remarks}
+    whole = {name: f"{axis} {in_words(level)}".strip() for name, (axis, _, level) in own.items()}
     return [
-        (" or ".join(words.get(name, [_whole_in_words(name)])), remarks)
+        (" or ".join(words.get(name, [whole[name]])), remarks)
         for name, remarks in found.remarks.items()
     ]
-
-
-def _whole_in_words(name: str) -> str:
-    """The name of a run as axis and level in words."""
-    axis, _, level = name.rpartition("__")
-    return f"{axis} {in_words(level)}".strip()
 
 
 def uncertainty_text(planned: PlannedAxis, percent: Mapping[str, float]) -> str:
@@ -292,16 +288,14 @@ def _precise(found: Measured) -> list[Axis]:
 def _record(found: Measured, target: float) -> dict[str, Any]:
     axes = []
     for planned in found.plan.axes:
-        rows = found.rows_of(planned.axis.name)
-        size = planned.axis.refined
+        axis, rows = planned.axis, found.rows_of(planned.axis.name)
+        size = axis.refined
         axes.append(
-            {
-                "name": planned.axis.name,
-                "title": planned.axis.title,
-                "kind": planned.axis.kind,
+            {name: getattr(axis, name) for name in ("name", "title", "kind")}
+            | {
                 "reference": planned.reference,
                 "reference_chains": planned.chains,
-                "reference_uncertainty_percent": found.uncertainty.get(planned.axis.name),
+                "reference_uncertainty_percent": found.uncertainty.get(axis.name),
                 "orders": {q: observed_orders(rows, size, q) for q in _ADVISED} if size else {},
                 "pareto": [row.level for row in pareto(rows)],
             }

@@ -121,9 +121,7 @@ def _planned(axis: Axis, scene: Scene, jobs: _Jobs, quick: bool) -> Iterator[Pla
     if axis.reference is not None:
         pair: Reference = axis.reference(quick)
         reference = jobs.add(axis.name, pair.level)
-        chains = tuple(
-            tuple(jobs.add(axis.name, level) for level in chain) for chain in pair.chains
-        )
+        chains = tuple(tuple(jobs.add(axis.name, one) for one in chain) for chain in pair.chains)
     else:
         reference, chains = jobs.add(axis.name, AS_IT_IS), ()
     runs, refused, step_alone = {}, {}, {}

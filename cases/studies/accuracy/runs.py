@@ -12,6 +12,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from catenary.cases.studies.accuracy.analysis import Found, Row, compare, separate, uncertainties
+from catenary.cases.studies.accuracy.axes import Level
 from catenary.cases.studies.accuracy.plan import Plan, PlannedAxis, again
 from catenary.cases.studies.sweep.jobs import AS_USUAL, Ended, RunOptions, interrupted
 from catenary.cases.studies.sweep.run_jobs import run_jobs
@@ -96,7 +97,11 @@ def run(
         return None, ended
     every = list(ended)
     times = {one.variant.name: [_cost(one)] for one in ended if one.done}
-    work = {one.variant.name: _work(one) for one in ended if one.done}
+    work = {
+        one.variant.name: float(one.summary["n_steps"]) * float(one.summary["n_dofs"])
+        for one in ended
+        if one.done
+    }
     short = [job for job in plan.jobs if work.get(job.variant.name, _LONG) < _LONG]
     alone = options._replace(n_jobs=1)
     if options.n_jobs != 1 and plan.repeats > 1:  # several runs at a time disturb each other
@@ -123,7 +128,7 @@ def evaluate(
     rows: list[Row] = []
     uncertainty: dict[str, dict[str, float]] = {}
     for planned in plan.axes:
-        rows += [_row(planned, name, runs, times) for name in _names(planned)]
+        rows += [_row(planned, level, runs, times) for level in planned.levels]
         if planned.chains:
             chains = [[_found(runs[name]) for name in chain] for chain in planned.chains]
             uncertainty[planned.axis.name] = uncertainties(_found(runs[planned.reference]), chains)
@@ -131,18 +136,13 @@ def evaluate(
     return Measured(plan, rows, uncertainty, wall, remarks)
 
 
-def _names(planned: PlannedAxis) -> list[str]:
-    return [level.name for level in planned.levels]
-
-
 def _row(
     planned: PlannedAxis,
-    name: str,
+    level: Level,
     runs: Mapping[str, Ended],
     times: Mapping[str, Sequence[float]],
 ) -> Row:
-    level = next(level for level in planned.levels if level.name == name)
-    head = (planned.axis.name, name)
+    name, head = level.name, (planned.axis.name, level.name)
     if name in planned.refused:
         return Row(*head, f"not possible: {planned.refused[name]}", dict(level.sizes))
     one = runs[planned.runs[name]]
@@ -154,20 +154,22 @@ def _row(
     fine = planned.step_alone.get(name)
     by_step, by_mesh = separate(found, None if fine is None else _found(runs[fine]), reference)
     summary, costs = one.summary, times[one.variant.name]
-    counted = summary["inner_iterations"]
+    counted, estimates = summary["inner_iterations"], summary["indicators"]["time_step"]
+    # The largest of the pantographs' estimated errors [N].
+    told = [value for value in estimates["force_error_N"] if value is not None]
     return Row(
         *head,
         one.outcome,
         dict(level.sizes),
         errors,
         percent,
-        min(costs) / summary["simulated_s"],
-        len(costs),
-        _estimate(summary),
-        counted["rounds"] / counted["steps"],
-        by_step,
-        by_mesh,
-        one.remarks,
+        cost=min(costs) / summary["simulated_s"],
+        timings=len(costs),
+        estimate=max(told, default=math.nan),
+        iterations=counted["rounds"] / counted["steps"],
+        by_step=by_step,
+        by_mesh=by_mesh,
+        remarks=one.remarks,
     )
 
 
@@ -180,12 +182,6 @@ def _found(one: Ended) -> Found | None:
     return Found(one.summary["pantographs"], uplift, histories)
 
 
-def _estimate(summary: dict[str, Any]) -> float:
-    """The largest of the pantographs' estimated errors [N], NaN if there is none."""
-    told = [v for v in summary["indicators"]["time_step"]["force_error_N"] if v is not None]
-    return max(told, default=math.nan)
-
-
 def _cost(one: Ended) -> float:
     """Processor time of a march [s], which other work of the machine disturbs little; wall time of
     a run of a version that did not tell it."""
@@ -193,7 +189,3 @@ def _cost(one: Ended) -> float:
     if not is_number(told, 0.0):
         told = one.summary["march_wall_s"]
     return float(told)
-
-
-def _work(one: Ended) -> float:
-    return float(one.summary["n_steps"]) * float(one.summary["n_dofs"])
