@@ -124,15 +124,10 @@ class SceneWords:
 
     def draft(self) -> tuple[Draft, list[str]]:
         """The case with its assignments, not checked, and options for PETSc. Not collective."""
-        from catenary.cases.scene.input.faults import COMMAND_LINE
-        from catenary.cases.scene.input.toml_input import parse_assignment
         from catenary.cases.scene.load import read_draft
 
         changes, options = self.split()
-        draft = read_draft(self.case)
-        pairs = (parse_assignment(text) for text in changes)
-        draft = draft.shortened() if self.shortened else draft
-        return draft.assigned((key, value, COMMAND_LINE) for key, value in pairs), options
+        return read_draft(self.case, changes, self.shortened), options
 
     def load(self, *further: str) -> Scene:
         """The scene, with further assignments. Not collective."""

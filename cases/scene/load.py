@@ -92,16 +92,26 @@ class Draft:
         return copy.deepcopy(self.raw)
 
 
-def read_draft(case: str | Path) -> Draft:
+def read_draft(case: str | Path, overrides: Sequence[str] = (), shortened: bool = False) -> Draft:
     """The scene of a shipped case's name, a case file or its folder, not checked.
+
+    Parameters
+    ----------
+    overrides, shortened : as of ``load_scene``
 
     Raises
     ------
     InputError
-        If there is none, or if it is no TOML.
+        If there is none, if it is no TOML, or if no scene has a key that is assigned.
     """
     path = find_case(str(case)).absolute()
-    return Draft(read_toml(path), str(path), path.parent)
+    draft = Draft(read_toml(path), str(path), path.parent)
+    draft = draft.shortened() if shortened else draft
+    return _assigned(draft, map(Assigned, overrides))
+
+
+def _assigned(draft: Draft, assigned: Iterable[Assigned]) -> Draft:
+    return draft.assigned((*parse_assignment(one.text, one.option), one.where) for one in assigned)
 
 
 def load_scene(
@@ -124,12 +134,11 @@ def load_scene(
     InputError
         If anything is wrong: a ``SceneError`` with all faults of the scene, or one sentence.
     """
-    draft = case if isinstance(case, Draft) else read_draft(case)
-    if shortened:
-        draft = draft.shortened()
-    assigned = (*(Assigned(text) for text in overrides), *varied)
-    values = ((*parse_assignment(one.text, one.option), one.where) for one in assigned)
-    return draft.assigned(values).scene()
+    if isinstance(case, Draft):
+        draft = _assigned(case.shortened() if shortened else case, map(Assigned, overrides))
+    else:
+        draft = read_draft(case, overrides, shortened)
+    return _assigned(draft, varied).scene()
 
 
 def scene_from(raw: dict[str, Any], origin: Origin, folder: Path | None = None) -> Scene:

@@ -11,6 +11,7 @@ from mpi4py import MPI
 from program import SHORT_SCENE, catenary
 
 from catenary.cases.scene.input.case_files import shipped
+from catenary.cases.scene.load import read_draft
 from catenary.cases.studies.records import KeptRows
 from catenary.cases.studies.stability.map import Grid, make_map
 
@@ -78,7 +79,13 @@ def test_tables_are_the_same_for_any_number_at_a_time(study: str, tmp_path: Path
 def test_a_stability_map_is_the_same_in_two_processes(tmp_path: Path) -> None:
     grid = Grid((1e6, 1e7), (2.0,), (1e6,), (2.0,))
     one, two = (
-        make_map(CASE, [], True, MPI.COMM_SELF, grid, kept=KeptRows(tmp_path / str(n)), n_at_once=n)
+        make_map(
+            read_draft(CASE, (), True),
+            MPI.COMM_SELF,
+            grid,
+            kept=KeptRows(tmp_path / str(n)),
+            n_at_once=n,
+        )
         for n in (1, 2)
     )
     assert one == two

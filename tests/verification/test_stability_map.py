@@ -12,6 +12,7 @@ from mpi4py import MPI
 from scipy import linalg
 from small_lines import EN_PANTOGRAPH, HANGING, en50318_line, mesh_of, problem_of
 
+from catenary.cases.scene.load import read_draft
 from catenary.cases.studies.records import KeptRows
 from catenary.cases.studies.stability import from_matrices as theory
 from catenary.cases.studies.stability import map as map_of_stability
@@ -134,7 +135,7 @@ def test_the_map_of_a_case_is_found_drawn_and_written() -> None:
     """One point of the reference case, with a limit for all couplings but the implicit one."""
     grid = Grid((1e6,), (2.0,), (1e6,), (2.0,))
     said: list[str] = []
-    found = make_map("en50318_2002", [], True, MPI.COMM_SELF, grid, said.append)
+    found = make_map(read_draft("en50318_2002", (), True), MPI.COMM_SELF, grid, said.append)
     assert [one.coupling for one in found.limits] == list(COUPLINGS)
     assert all(one.agrees for one in found.limits)
     assert len(said) == 1 and "1e+06 N/m, 2 kg" in said[0]
@@ -175,7 +176,7 @@ def test_lines_of_other_topologies_have_maps(
     """The head touches all wires above it: two of a twin line and of an overlap, which the rule for
     one wire would give steps that are too long by a sixth and more."""
     grid = Grid((1e6,), (2.0,), (1e6,), (2.0,))
-    found = make_map(case, [], True, MPI.COMM_SELF, grid, kept=KeptRows(tmp_path))
+    found = make_map(read_draft(case, (), True), MPI.COMM_SELF, grid, kept=KeptRows(tmp_path))
     for one in found.limits:
         print(f"{case} {one.coupling}: theory {one.theory:.4g}, marched {one.marched:.4g} s")
     assert found.n_wires == n_wires
@@ -185,5 +186,5 @@ def test_lines_of_other_topologies_have_maps(
     assert ("2 contact wires meet" in draw(found).get_suptitle()) == (n_wires == 2)
     if case == "re330_stitched":  # a map that was stopped takes what is there
         monkeypatch.setattr(map_of_stability, "find", None)
-        again = make_map(case, [], True, MPI.COMM_SELF, grid, kept=KeptRows(tmp_path))
+        again = make_map(read_draft(case, (), True), MPI.COMM_SELF, grid, kept=KeptRows(tmp_path))
         assert again.limits == found.limits

@@ -31,6 +31,7 @@ def stability_map(
 ) -> int:
     """Serial."""
     from catenary.cases.process.workers import at_once
+    from catenary.cases.scene.load import read_draft
     from catenary.cases.studies.records import KeptRows
     from catenary.cases.studies.stability import map as study
     from catenary.cases.studies.stability.map import draw
@@ -38,9 +39,9 @@ def stability_map(
 
     refuse_table(out / TABLE, force)
     grid = study.QUICK if quick else study.Grid()
-    kept, scene = KeptRows(out, force), (words.case, words.changes, words.shortened)
-    comm = console.alone()
-    found = study.make_map(*scene, comm, grid, console.say, kept, at_once(n_jobs, comm))
+    draft = read_draft(words.case, words.changes, words.shortened)
+    kept, comm = KeptRows(out, force), console.alone()
+    found = study.make_map(draft, comm, grid, console.say, kept, at_once(n_jobs, comm))
     files = write_files(out, {TABLE: study.as_rows(found), PICTURE: lambda: draw(found)})
     kept.forget()
     console.say("\n" + study.as_text(found) + "\n" + "\n".join(map(str, files)))

@@ -19,6 +19,7 @@ from catenary.cases.cli.app import (
     Verbose,
     app,
     begin,
+    tell,
 )
 from catenary.cases.result_folder.output_folder import refuse_impossible
 from catenary.cases.terminal import console
@@ -80,13 +81,15 @@ def sweep(
     verbose: Verbose = False,
 ) -> int:
     """Collective."""
+    from catenary.cases.studies.sampling.samples import samples
+    from catenary.cases.studies.sampling.tables import read_sampling
     from catenary.cases.studies.sweep.jobs import RunOptions, check_statistics, parse_part
     from catenary.cases.studies.sweep.sweep import run_part, run_sweep, sweep_of
 
     own = None if part is None else parse_part(part)
 
     def read() -> tuple[tuple[Sweep, SamplingTable | None], list[str]]:
-        changes, options = words.split()
+        draft, options = words.draft()
         check_statistics(_names(plotted))
         sampling = None
         if sample is None:
@@ -96,21 +99,12 @@ def sweep(
                 "--sample makes all variants itself: give neither --vary nor --variants"
             )
         else:
-            variants, sampling = _sampled(words, changes, sample)
-
-        case, short = words.case, words.shortened
+            sampling = read_sampling(sample)
+            variants = samples(sampling, draft.scene(), str(sample))
         if reports and only_statistics:
             raise InputError("--only-statistics leaves nothing that --reports could draw")
-        made = sweep_of(
-            case,
-            variants,
-            out,
-            changes,
-            short,
-            full_report=reports,
-            only_statistics=only_statistics,
-            force=force,
-        )
+        kept = {"full_report": reports, "only_statistics": only_statistics, "force": force}
+        made = sweep_of(draft, variants, out, **kept)
         return (made, sampling), options
 
     comm, (made, sampling), arguments = begin(read, verbose, lambda made: made[0].first)
@@ -128,12 +122,11 @@ def sweep(
     from catenary.cases.studies.sweep import output as sweep_output
 
     if sampling is None:
-        console.say("\n" + sweep_output.as_text(ended))
+        text = sweep_output.as_text(ended)
     else:
         text, more = _evaluated(ended, sampling, out, comm, command, drawn)
         files = [*files, *more]
-        console.say("\n" + text)
-    console.say("\n" + "\n".join(str(path) for path in files))
+    tell(text, files)
     return verdict(ended, "sweep")
 
 
@@ -156,19 +149,6 @@ def read_variants(vary: Sequence[str] | None, named: Path | None) -> list[Varian
     table = {} if named is None else read_named(named)
     check_keys(product([], table), f"in {named}")
     return product(varied, table)
-
-
-def _sampled(
-    words: RunWords, changes: list[str], file: Path
-) -> tuple[list[Variant], SamplingTable]:
-    """The variants of a sampling file, and its tables."""
-    from catenary.cases.scene.load import load_scene
-    from catenary.cases.studies.sampling.samples import samples
-    from catenary.cases.studies.sampling.tables import read_sampling
-
-    sampling = read_sampling(file)
-    scene = load_scene(words.case, changes, words.shortened)
-    return samples(sampling, scene, str(file)), sampling
 
 
 def _evaluated(

@@ -17,7 +17,7 @@ from matplotlib.lines import Line2D
 
 from catenary.base.errors import InputError
 from catenary.cases.process.workers import WorkerLost
-from catenary.cases.scene.load import load_scene
+from catenary.cases.scene.load import Draft, load_scene
 from catenary.cases.scene.problem import resolved
 from catenary.cases.scene.run.numerics import MAX_DT
 from catenary.cases.scene.scene import Scene
@@ -153,23 +153,21 @@ class StabilityMap:
         ]
 
 
-def linear_scene(case: str, assignments: Sequence[str], shortened: bool) -> Scene:
+def linear_scene(draft: Draft) -> Scene:
     """The case as the map takes it: linear. Raises InputError if its pantograph is no chain."""
-    scene = load_scene(case, [*assignments, *_LINEAR], shortened)
+    scene = load_scene(draft, _LINEAR)
     kind = scene.train.pantographs[0].name
     if scene.pantographs[kind].type != "lumped":
         raise InputError(
             f"pantographs.{kind} of {scene.case.name} is a mechanism, but a stability map varies "
-            f"the head of a chain of masses; `catenary pantograph {case} --help` tells how to fit "
-            "one, or name a lumped one with --set train.pantographs.0.name=..."
+            f"the head of a chain of masses; `catenary pantograph {scene.case.name} --help` tells "
+            "how to fit one, or name a lumped one with --set train.pantographs.0.name=..."
         )
     return scene
 
 
 def make_map(
-    case: str,
-    assignments: Sequence[str],
-    shortened: bool,
+    draft: Draft,
     comm: Any,
     grid: Grid,
     tell: Callable[[str], None] = lambda line: None,
@@ -180,8 +178,7 @@ def make_map(
 
     ``n_at_once`` points of the map are tried at the same time, each in a process of its own.
     """
-    own = load_scene(case, list(assignments), shortened)
-    scene = linear_scene(case, assignments, shortened)
+    own, scene = draft.scene(), linear_scene(draft)
     find_all = _FindLimits(scene)
     bench, line = find_all.bench(comm)
     pairs, limits, config = grid.pairs(), [], resolved(scene)

@@ -11,7 +11,7 @@ from catenary.base.errors import InputError
 from catenary.cases.scene.input.faults import UnfitScene, shown
 from catenary.cases.scene.input.toml_input import Assigned
 from catenary.cases.scene.keys.keys import nearest
-from catenary.cases.scene.load import Draft, load_scene
+from catenary.cases.scene.load import Draft, load_scene, read_draft
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.sweep.variants import NAMES, Variant
 from catenary.postproc.report.study_table import Column
@@ -142,17 +142,11 @@ def _refuse_petsc(variant: Variant) -> None:
 
 
 def jobs_and_refused(
-    case: str | Draft,
-    variants: Sequence[Variant],
-    overrides: Sequence[str] = (),
-    shortened: bool = False,
-    *,
-    full_report: bool = False,
+    draft: Draft, variants: Sequence[Variant], full_report: bool = False
 ) -> tuple[list[Job], list[Ended]]:
-    """The jobs of the variants that can be run, and how the others ended. Not collective.
+    """The jobs of the variants of a case that can be run, and how the others ended. Not collective.
 
-    A variant breaks alone if its values do not fit together or are implausible. Arguments as of
-    ``make_jobs``.
+    A variant breaks alone if its values do not fit together or are implausible.
 
     Raises
     ------
@@ -164,7 +158,7 @@ def jobs_and_refused(
     several = len(variants) > 1
     for variant in variants:
         try:
-            scene = scene_of(case, variant, overrides, shortened, several=several)
+            scene = scene_of(draft, variant, several=several)
             jobs.append(Job(variant, scene, full_report))
         except UnfitScene as error:
             refused.append(Ended(variant, str(error)))
@@ -202,21 +196,15 @@ def make_jobs(
     InputError
         If a scene is wrong, with the variant's name if there are several.
     """
-    jobs, refused = jobs_and_refused(case, variants, overrides, shortened, full_report=full_report)
+    draft = read_draft(case, overrides, shortened)
+    jobs, refused = jobs_and_refused(draft, variants, full_report)
     if refused:
         raise InputError(f"variant {refused[0].variant.name}: {refused[0].outcome}")
     return jobs
 
 
-def scene_of(
-    case: str | Draft,
-    variant: Variant,
-    overrides: Sequence[str],
-    shortened: bool = False,
-    *,
-    several: bool,
-) -> Scene:
-    """The checked scene of a variant. Not collective.
+def scene_of(draft: Draft, variant: Variant, several: bool) -> Scene:
+    """The checked scene of a variant of a case. Not collective.
 
     Raises
     ------
@@ -227,7 +215,7 @@ def scene_of(
     """
     _refuse_petsc(variant)
     try:
-        return load_scene(case, overrides, shortened, _assigned(variant))
+        return load_scene(draft, varied=_assigned(variant))
     except UnfitScene:
         raise
     except InputError as error:

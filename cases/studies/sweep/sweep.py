@@ -35,17 +35,15 @@ class Sweep(NamedTuple):
 
 
 def sweep_of(
-    case: str | Draft,
+    draft: Draft,
     variants: Sequence[Variant],
     out: Path,
-    overrides: Sequence[str] = (),
-    shortened: bool = False,
     *,
     full_report: bool = False,
     only_statistics: bool = False,
     force: bool = False,
 ) -> Sweep:
-    """A sweep into a folder, all scenes checked. Not collective.
+    """A sweep of a case into a folder, all scenes checked. Not collective.
 
     With ``only_statistics`` there is no run of a variant on the disk, and scenes are checked when
     it is their turn.
@@ -59,10 +57,10 @@ def sweep_of(
     if only_statistics:
         from catenary.cases.studies.sweep.together import ensemble_of
 
-        ensemble = ensemble_of(case, variants, overrides, shortened)
+        ensemble = ensemble_of(draft, variants)
         refuse_other_sweep(out, variants, force)
         return Sweep(variants, [], [], ensemble)
-    jobs, refused = jobs_and_refused(case, variants, overrides, shortened, full_report=full_report)
+    jobs, refused = jobs_and_refused(draft, variants, full_report)
     refuse_other_sweep(out, variants, force)
     return Sweep(variants, jobs, refused)
 

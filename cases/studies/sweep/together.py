@@ -16,7 +16,7 @@ from catenary.cases.process.interrupts import Interrupted
 from catenary.cases.process.petsc_options import start_petsc
 from catenary.cases.process.workers import WorkerLost, at_once
 from catenary.cases.scene.input.faults import UnfitScene
-from catenary.cases.scene.load import Draft, read_draft
+from catenary.cases.scene.load import Draft
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.records import KeptRows
 from catenary.cases.studies.sweep.jobs import Ended, Part, RunOptions, interrupted, scene_of
@@ -36,24 +36,17 @@ class Ensemble(NamedTuple):
 
     Attributes
     ----------
-    draft : the case, with its own values for short runs if these are wanted
-    overrides : assignments for all variants
+    draft : the case
     variants : in their order
     first : the scene of the first variant that can be run
     """
 
     draft: Draft
-    overrides: Sequence[str]
     variants: Sequence[Variant]
     first: Scene
 
 
-def ensemble_of(
-    case: str | Path | Draft,
-    variants: Sequence[Variant],
-    overrides: Sequence[str] = (),
-    shortened: bool = False,
-) -> Ensemble:
+def ensemble_of(draft: Draft, variants: Sequence[Variant]) -> Ensemble:
     """An ensemble of which one variant at least can be run; others are looked at when it is their
     turn. Not collective.
 
@@ -63,17 +56,12 @@ def ensemble_of(
         If no variant can be run, or if a value of one that comes before the first such is out of
         bounds.
     """
-    draft = case if isinstance(case, Draft) else read_draft(case)
-    if shortened:
-        draft = draft.shortened()
     refused: CatenaryError | None = None
     for variant in variants:
         try:
-            scene = scene_of(draft, variant, overrides, several=len(variants) > 1)
+            return Ensemble(draft, variants, scene_of(draft, variant, len(variants) > 1))
         except UnfitScene as error:
             refused = refused or error
-            continue
-        return Ensemble(draft, overrides, variants, scene)
     assert refused is not None
     raise InputError(f"variant {variants[0].name}: {refused}") from refused
 
@@ -102,9 +90,9 @@ def run_ensemble(
 
     def depends_on(piece: Sequence[Variant]) -> list[Any]:
         assignments = [[variant.name, *variant.assignments] for variant in piece]
-        return [case, *ensemble.overrides, assignments]
+        return [case, assignments]
 
-    march = _March(ensemble.draft, list(ensemble.overrides))
+    march = _March(ensemble.draft)
     n_at_once = at_once(options.n_jobs, comm)
     if comm.size > 1:  # a march is one rank's: all without -j would do the same
         n_at_once = comm.size
@@ -165,8 +153,8 @@ class Marching:
 class _March:
     """Marches a piece of variants; goes to the processes that do so."""
 
-    def __init__(self, draft: Draft, overrides: list[str]) -> None:
-        self._draft, self._overrides = draft, overrides
+    def __init__(self, draft: Draft) -> None:
+        self._draft = draft
         self._marches: Any = None
 
     def __call__(self, piece: Sequence[Variant], comm: Any) -> list[list[Any]]:
@@ -177,7 +165,7 @@ class _March:
         scenes, numbers = [], []
         for number, variant in enumerate(piece):
             try:
-                scenes.append(scene_of(self._draft, variant, self._overrides, several=True))
+                scenes.append(scene_of(self._draft, variant, several=True))
                 numbers.append(number)
             except InputError as error:
                 rows[number] = [str(error), {}]
