@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from catenary.base.lone_process import alone
@@ -11,6 +12,9 @@ from catenary.scenes import SceneLike, checked, draft_of
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from catenary.cases.scene.scene import Scene as Checked
+    from catenary.cases.studies.sweep.together import Marching
 
 
 def highest_speeds(
@@ -66,25 +70,28 @@ def highest_speeds(
     """
     import pandas as pd
 
+    from catenary.cases.studies.questions import highest_speed as question
+
+    speeds = question.Speeds(float(slowest), float(fastest), float(step), float(within))
+    with _marching(scene, jobs) as (marching, own):
+        found = question.find_speeds(marching, own.case.name, speeds, list(criteria))
+    return pd.DataFrame(question.table_of_criteria(found).records())
+
+
+@contextmanager
+def _marching(scene: SceneLike, jobs: int) -> Iterator[tuple[Marching, Checked]]:
+    """What marches variants of a scene, and the scene itself."""
     own, comm = checked(scene), alone()
     from catenary.cases.process.interrupts import Interrupted
-    from catenary.cases.studies.questions.highest_speed import (
-        Speeds,
-        find_speeds,
-        table_of_criteria,
-    )
     from catenary.cases.studies.sweep.jobs import RunOptions
     from catenary.cases.studies.sweep.together import Marching
 
-    speeds = Speeds(float(slowest), float(fastest), float(step), float(within))
     with options_of(own.petsc.given()) as options:
         plan = RunOptions(petsc=options, n_jobs=jobs)
-        marching = Marching(draft_of(scene), None, comm, plan)
         try:
-            found = find_speeds(marching, own.case.name, speeds, list(criteria))
+            yield Marching(draft_of(scene), None, comm, plan), own
         except Interrupted as stopped:
             raise KeyboardInterrupt from stopped
-    return pd.DataFrame(table_of_criteria(found).records())
 
 
 def separations(
@@ -131,18 +138,9 @@ def separations(
     """
     import pandas as pd
 
-    own, comm = checked(scene), alone()
-    from catenary.cases.process.interrupts import Interrupted
-    from catenary.cases.studies.questions.separation import Distances, find_separations
-    from catenary.cases.studies.sweep.jobs import RunOptions
-    from catenary.cases.studies.sweep.together import Marching
+    from catenary.cases.studies.questions import separation as question
 
-    distances = Distances(float(nearest), float(farthest), float(step))
-    with options_of(own.petsc.given()) as options:
-        plan = RunOptions(petsc=options, n_jobs=jobs)
-        marching = Marching(draft_of(scene), None, comm, plan)
-        try:
-            found = find_separations(marching, own, distances)
-        except Interrupted as stopped:
-            raise KeyboardInterrupt from stopped
+    distances = question.Distances(float(nearest), float(farthest), float(step))
+    with _marching(scene, jobs) as (marching, own):
+        found = question.find_separations(marching, own, distances)
     return pd.DataFrame(found.table().records())

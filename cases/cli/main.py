@@ -29,8 +29,7 @@ def all_verbs() -> typer.Typer:
     # Each of these files adds its verbs, in this order of --help.
     # isort: off
     from catenary.cases.cli import plan, line, results  # noqa: F401
-    from catenary.cases.cli.studies import sweep, uncertainty, optimise, tolerance  # noqa: F401
-    from catenary.cases.cli.studies import speed, separation, what_if, worst  # noqa: F401
+    from catenary.cases.cli.studies import sweep, uncertainty, optimise, questions  # noqa: F401
     from catenary.cases.cli.studies import accuracy, hard  # noqa: F401
     from catenary.cases.cli import pantograph  # noqa: F401
     from catenary.cases.cli.studies import sensitivity, identify  # noqa: F401

@@ -116,11 +116,13 @@ def run(
     out_dir: Path,
     comm: Any,
     options: RunOptions = AS_USUAL,
+    part: Part | None = None,
 ) -> tuple[str | None, list[Ended]]:
     """Run what is not done yet, write the study's report; returns its text and the runs.
 
-    Collective. An interrupted study has no text. Runs that broke are left out of the report,
-    whose verdicts then say what cannot be decided.
+    Collective. An interrupted study has no text, nor has a ``part`` of it, whose runs alone are
+    made. Runs that broke are left out of the report, whose verdicts then say what cannot be
+    decided.
 
     Raises
     ------
@@ -130,28 +132,12 @@ def run(
     from catenary.cases.studies.sweep.run_jobs import run_jobs
 
     begin = time.perf_counter()
-    module = _load(plan.path)
-    ended = run_jobs(plan.jobs, out_dir / RUNS, comm, options, measure=_Measure(plan.path))
-    if interrupted(ended):
+    jobs = plan.jobs if part is None else part.of(plan.jobs)
+    ended = run_jobs(jobs, out_dir / RUNS, comm, options, measure=_Measure(plan.path))
+    if part is not None or interrupted(ended):
         return None, ended
-    text = on_root(comm, lambda: _conclude(plan, module, out_dir, ended, begin), takes_long=True)
+    text = on_root(comm, lambda: _conclude(plan, out_dir, ended, begin), takes_long=True)
     return text, ended
-
-
-def run_part(
-    plan: Plan, part: Part, out_dir: Path, comm: Any, options: RunOptions = AS_USUAL
-) -> list[Ended]:
-    """Make the runs of a part that are not done yet, and no report. Collective.
-
-    Raises
-    ------
-    InputError
-        As ``run``.
-    """
-    from catenary.cases.studies.sweep.run_jobs import run_jobs
-
-    own, folder = part.of(plan.jobs), out_dir / RUNS
-    return run_jobs(own, folder, comm, options, measure=_Measure(plan.path))
 
 
 @dataclass(frozen=True)
@@ -166,9 +152,7 @@ class _Measure:
         return measured
 
 
-def _conclude(
-    plan: Plan, module: ModuleType, out_dir: Path, ended: Sequence[Ended], begin: float
-) -> str:
+def _conclude(plan: Plan, out_dir: Path, ended: Sequence[Ended], begin: float) -> str:
     from catenary.cases.studies.sweep import output as sweep_output
     from catenary.postproc.report.study_report import verdict_text, write_study
     from catenary.postproc.report.study_table import write_files
@@ -177,7 +161,7 @@ def _conclude(
         one.variant.name: StudyRun(one, job.scene, out_dir / RUNS / one.variant.name)
         for one, job in zip(ended, plan.jobs, strict=True)
     }
-    study = module.conclude(runs)
+    study = _load(plan.path).conclude(runs)
     table = sweep_output.table_of(ended)
     wall = sum(one.wall for one in ended)
     facts = {

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
+
+from pydantic import BaseModel
 
 from catenary.base.errors import InputError
 from catenary.cases.studies.sampling.tables import SamplingTable
@@ -93,6 +94,21 @@ def write(
     return [*files, *output.write(out, runs, found)], found
 
 
+class _Variant(BaseModel):
+    name: str
+    assignments: Any
+
+
+class _Record(BaseModel):
+    """What is read of a sweep's record."""
+
+    case: str
+    varied: list[Any]
+    wall_s: float
+    variants: list[_Variant]
+    rows: list[dict[str, Any]]
+
+
 def _longest(samplings: Sequence[SamplingTable | None]) -> SamplingTable | None:
     """The sampling with the most samples."""
     return max(samplings, key=lambda one: 0 if one is None else one.n)
@@ -108,23 +124,16 @@ def _record(folder: Path) -> dict[str, Any]:
     """The record of a sweep's folder, checked to be one."""
     path = folder / RECORD
     try:
-        record = json.loads(path.read_text(encoding="utf-8"))
-        whole = (
-            isinstance(record["case"], str)
-            and isinstance(record["varied"], list)
-            and all(isinstance(one["name"], str) for one in record["variants"])
-            and all("assignments" in one for one in record["variants"])
-            and all(isinstance(row["variant"], str) for row in record["rows"])
-            and {frozenset(row) for row in record["rows"]} == {frozenset(record["rows"][0])}
-            and isinstance(record["wall_s"], int | float)
-        )
+        found = _Record.model_validate_json(path.read_bytes())
+        whole = {frozenset(row) for row in found.rows} == {frozenset(found.rows[0])}
+        whole = whole and all(isinstance(row.get("variant"), str) for row in found.rows)
     except OSError as error:
         raise InputError(f"{folder} holds no sweep: {path} cannot be read") from error
-    except (ValueError, KeyError, TypeError, IndexError, RecursionError) as error:
-        raise InputError(f"{path} is damaged; the sweep's command writes it again") from error
+    except (ValueError, IndexError, RecursionError):
+        whole = False
     if not whole:
         raise InputError(f"{path} is damaged; the sweep's command writes it again")
-    return dict(record)
+    return found.model_dump()
 
 
 def _by_variant(rows: Sequence[dict[str, Any]]) -> dict[str, list[dict[str, Any]]]:

@@ -1,4 +1,4 @@
-"""The verb ``optimise``."""
+"""The verbs ``optimise`` and ``tolerance``: studies over sets of scenes, by a task in a file."""
 
 from __future__ import annotations
 
@@ -52,6 +52,41 @@ def optimise(
     command = f"catenary optimise {case}"
     with held_study(out, console.alone(), command, force) as (kept, write), workers(n_jobs) as pool:
         found = study.optimise(plan, pool, kept, console.say)
+        files = write(lambda folder: output.write(folder, plan, found))
+    tell(output.as_text(plan, found), files)
+    return console.DONE
+
+
+@app.command(
+    "tolerance",
+    help="Find how far droppers, heights, tensions or any numbers of a scene may be off for each "
+    "acceptance criterion to hold with 99 %: by samples of errors, and in the worst case. The same "
+    "command continues one that was stopped.",
+    epilog="Example: catenary tolerance en50318_2002 installation.toml -o results/tolerance",
+)
+@console.guarded
+@console.serial
+def tolerance(
+    case: Case,
+    task_file: TaskFile,
+    out: Out,
+    assignments: Assignments = None,
+    n_jobs: Jobs = 1,
+    force: Force = False,
+) -> int:
+    """Serial."""
+    from catenary.cases.studies.records import held_study
+    from catenary.cases.studies.scene_sets.evaluation import workers
+    from catenary.cases.studies.task_files import read_task
+    from catenary.cases.studies.tolerance import output, study
+    from catenary.cases.studies.tolerance.task import ToleranceTask
+
+    refuse_table(out / output.TABLE, force)
+    draft, _ = SceneWords(case, assignments=assignments).draft()
+    plan = study.make_plan(draft, read_task(task_file, ToleranceTask))
+    command = f"catenary tolerance {case}"
+    with held_study(out, console.alone(), command, force) as (kept, write), workers(n_jobs) as pool:
+        found = study.find_tolerances(plan, pool, kept, console.say)
         files = write(lambda folder: output.write(folder, plan, found))
     tell(output.as_text(plan, found), files)
     return console.DONE

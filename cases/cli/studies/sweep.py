@@ -201,7 +201,7 @@ def run_study(
 
     options = RunOptions(force, arguments, console.say, n_jobs)
     if own is not None:
-        return verdict(case_study.run_part(plan, own, out, comm, options), "study")
+        return verdict(case_study.run(plan, out, comm, options, own)[1], "study")
     with held(out, comm, f"catenary run {words.case} --study"):
         report, ended = case_study.run(plan, out, comm, options)
     if report is not None:

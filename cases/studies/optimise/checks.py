@@ -133,22 +133,22 @@ def compare(
 
 
 def _rows(
-    check: str,
-    member: Member,
-    searched: bool,
-    one: Mapping[str, Any],
-    other: Mapping[str, Any],
+    check: str, member: Member, searched: bool, one: Mapping[str, Any], other: Mapping[str, Any]
 ) -> list[Row]:
     head = check, member.name, member.direction, searched
-    broke = [
-        f"{name}: {s[BROKE]}" for name, s in (("shipped", one), ("optimum", other)) if BROKE in s
-    ]
+    designs = {"shipped": one, "optimum": other}
+    broke = [f"{name}: {own[BROKE]}" for name, own in designs.items() if BROKE in own]
     if broke:
         return [Row(*head, "", {}, {}, [], "; ".join(broke))]
-    failed = _failed_anew(one, other)
+    # Acceptance criteria that the optimum fails and the case as shipped does not.
+    before, after = (
+        {row["criterion"] for row in own["acceptance"] if row["passed"] is False}
+        for own in designs.values()
+    )
+    failed = sorted(after - before)
     return [
-        Row(*head, after["name"], _figures(one, before), _figures(other, after), failed)
-        for before, after in zip(one["pantographs"], other["pantographs"], strict=True)
+        Row(*head, its["name"], _figures(one, own), _figures(other, its), failed)
+        for own, its in zip(one["pantographs"], other["pantographs"], strict=True)
     ]
 
 
@@ -156,15 +156,6 @@ def _figures(summary: Mapping[str, Any], pantograph: Mapping[str, Any]) -> dict[
     found = {name: pantograph[name] for name in COMPARED if name in OF_EACH_PANTOGRAPH}
     found[_OF_LINE] = summary["supports"][_OF_LINE]
     return {name: value for name, value in found.items() if value is not None}
-
-
-def _failed_anew(one: Mapping[str, Any], other: Mapping[str, Any]) -> list[str]:
-    """Acceptance criteria that the optimum fails and the case as shipped does not."""
-    before, after = (
-        {row["criterion"] for row in summary["acceptance"] if row["passed"] is False}
-        for summary in (one, other)
-    )
-    return sorted(after - before)
 
 
 def change(row: Row, statistic: str) -> float:

@@ -1,0 +1,248 @@
+"""Verbs for everyday questions: ``speed``, ``separation``, ``what-if`` and ``worst``."""
+
+from __future__ import annotations
+
+import tempfile
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from catenary.base.errors import InputError
+from catenary.cases.cli.app import (
+    Force,
+    Jobs,
+    RunFolder,
+    RunWords,
+    Verbose,
+    app,
+    begin,
+    folder_option,
+    tell,
+)
+from catenary.cases.result_folder.output_folder import refuse_impossible, refuse_table
+from catenary.cases.terminal import console
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from catenary.cases.scene.load import Draft
+    from catenary.cases.scene.scene import Scene
+    from catenary.cases.studies.sweep.jobs import Job
+    from catenary.cases.studies.sweep.together import Marching
+
+
+def _begun(
+    words: RunWords,
+    table: str,
+    out: Path | None,
+    check: Callable[[], object],
+    n_jobs: int,
+    force: bool,
+    verbose: bool,
+) -> tuple[Marching, Scene, Any]:
+    """What marches variants of a case, its scene, and the communicator. Collective.
+
+    Parameters
+    ----------
+    table : that the question leaves in the folder ``out``
+    check : raises InputError if what is asked for is impossible
+    """
+
+    def read() -> tuple[tuple[Draft, Scene], list[str]]:
+        check()
+        if out is not None:
+            refuse_table(out / table, force)
+        draft, options = words.draft()
+        return (draft, draft.scene()), options
+
+    comm, (draft, scene), arguments = begin(read, verbose, lambda made: made[1])
+    from catenary.cases.studies.sweep.jobs import RunOptions
+    from catenary.cases.studies.sweep.together import Marching
+
+    options = RunOptions(force, arguments, console.say, n_jobs)
+    return Marching(draft, out, comm, options), scene, comm
+
+
+@app.command(
+    "speed",
+    help="Find the highest speed at which the acceptance criteria hold, all of them and each by "
+    "itself: an ensemble over speeds, then bisection. The same command continues one that was "
+    "stopped.",
+    epilog="Example: catenary speed en50318_2002 -o results/highest --from 200 --to 360",
+)
+@console.guarded
+def speed(
+    words: RunWords,
+    slowest: Annotated[
+        float, typer.Option("--from", metavar="KM_H", help="Lowest speed [km/h].")
+    ] = 200.0,
+    fastest: Annotated[
+        float, typer.Option("--to", metavar="KM_H", help="Highest speed [km/h].")
+    ] = 360.0,
+    step: Annotated[
+        float, typer.Option(metavar="KM_H", help="Distance of the speeds marched first [km/h].")
+    ] = 10.0,
+    within: Annotated[
+        float, typer.Option(metavar="KM_H", help="How closely speeds are bisected [km/h].")
+    ] = 1.0,
+    criterion: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Part of the name of a criterion, such as deviation; repeatable. All if absent."
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        folder_option("Folder for tables and picture; without it nothing is written."),
+    ] = None,
+    n_jobs: Jobs = 1,
+    force: Force = False,
+    verbose: Verbose = False,
+) -> int:
+    """Collective."""
+    from catenary.cases.studies.questions import highest_speed as question
+
+    speeds = question.Speeds(slowest, fastest, step, within)
+
+    marching, scene, comm = _begun(words, "speed.csv", out, speeds.first, n_jobs, force, verbose)
+    from catenary.cases.studies.records import held_study
+
+    with held_study(out, comm, f"catenary speed {words.case}") as (_, write):
+        found = question.find_speeds(marching, scene.case.name, speeds, criterion or [])
+        files = write(lambda folder: question.write(folder, found))
+    tell(question.as_text(found), files)
+    return console.DONE
+
+
+@app.command(
+    "separation",
+    help="Find good and bad distances of two pantographs: deviation, least force and uplift over "
+    "the distance, where acceptance criteria fail, and which waves explain it. The same command "
+    "continues one that was stopped.",
+    epilog="Example: catenary separation en50318_2002 -o results/distances --from 50 --to 200 "
+    "--step 5",
+)
+@console.guarded
+def separation(
+    words: RunWords,
+    nearest: Annotated[
+        float, typer.Option("--from", metavar="M", help="Shortest distance [m].")
+    ] = 31.0,
+    farthest: Annotated[
+        float, typer.Option("--to", metavar="M", help="Longest distance [m].")
+    ] = 400.0,
+    step: Annotated[float, typer.Option(metavar="M", help="From one to the next [m].")] = 1.0,
+    out: Annotated[
+        Path | None,
+        folder_option("Folder for table and picture; without it nothing is written."),
+    ] = None,
+    n_jobs: Jobs = 1,
+    force: Force = False,
+    verbose: Verbose = False,
+) -> int:
+    """Collective."""
+    from catenary.cases.studies.questions import separation as question
+
+    distances = question.Distances(nearest, farthest, step)
+
+    check = distances.values
+    marching, scene, comm = _begun(words, "separation.csv", out, check, n_jobs, force, verbose)
+    from catenary.base.parallel import on_root
+    from catenary.cases.studies.records import held_study
+
+    with held_study(out, comm, f"catenary separation {words.case}") as (_, write):
+        found = question.find_separations(marching, scene, distances)
+        period = on_root(comm, lambda: question.period_in(found, scene), takes_long=True)
+        files = write(lambda folder: question.write(folder, found, period))
+    tell(question.as_text(found, period), files)
+    return console.DONE
+
+
+@app.command(
+    "what-if",
+    help="Run a case as it is and with the changes of --set, and show the differences: "
+    "statistics, uplift by support, droppers, verdicts. The same command continues runs that were "
+    "stopped.",
+    epilog="Example: catenary what-if en50318_2002 --set line.contact_wire.tension_N=22000 "
+    "-o results/tension",
+)
+@console.guarded
+def what_if(
+    words: RunWords,
+    out: Annotated[
+        Path | None,
+        folder_option("Folder for page, tables, pictures and both runs; none is kept if absent."),
+    ] = None,
+    n_jobs: Jobs = 1,
+    force: Force = False,
+    verbose: Verbose = False,
+) -> int:
+    """Collective."""
+    from catenary.base.parallel import on_root
+    from catenary.cases.studies.questions import what_if as question
+
+    def read() -> tuple[tuple[list[Job], list[str]], list[str]]:
+        changes, options = words.split()
+        jobs = question.jobs_of(words.case, changes, words.shortened)
+        if out is not None:
+            refuse_table(out / "what_if.html", force)
+        return (jobs, changes), options
+
+    comm, (jobs, changes), arguments = begin(read, verbose, lambda made: made[0][0].scene)
+    from catenary.cases.result_folder.folder_lock import held
+    from catenary.cases.studies.sweep.jobs import RunOptions
+
+    options = RunOptions(force, arguments, console.say, n_jobs)
+    with ExitStack() as stack:
+        folder = out
+        if folder is None:
+            folder = on_root(
+                comm,
+                lambda: Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="catenary_"))),
+            )
+        stack.enter_context(held(folder, comm, f"catenary what-if {words.case}"))
+        ended = question.run(jobs, folder, comm, options)
+        found = on_root(comm, lambda: question.differences(changes, ended, folder), takes_long=True)
+        files = []
+        if out is not None:
+            files = on_root(comm, lambda: question.write(folder, found), takes_long=True)
+    tell(question.as_text(found), files)
+    return console.DONE
+
+
+@app.command(
+    "worst",
+    help="Name the worst spans, supports and droppers of a run, with candidates for the cause: "
+    "defects, elasticity, reflections, ends of wires, the pantograph ahead.",
+    epilog="Example: catenary worst results/en300",
+)
+@console.guarded
+@console.serial
+def worst(
+    folder: RunFolder,
+    count: Annotated[
+        int, typer.Option("-n", "--count", min=1, max=1000, help="Places of each kind.")
+    ] = 3,
+    out: Annotated[
+        Path | None,
+        folder_option("Folder for tables of all places; without it nothing is written."),
+    ] = None,
+) -> None:
+    """Serial."""
+    from catenary.postproc.read.guard import examined
+
+    if not folder.is_dir():
+        raise InputError(f"{folder} is no folder; name the folder of a run")
+    if out is not None:
+        refuse_impossible(out)
+    console.alone()  # starts MPI as one process, before anything imports it
+    from catenary.cases.studies.questions import worst_output
+    from catenary.postproc.read.results import Results
+
+    with Results(folder, examined(folder)) as results:
+        answer = worst_output.answer_of(results, count)
+    console.say(answer.text)
+    if out is not None:
+        console.say("\n" + "\n".join(map(str, worst_output.write(out, answer))))
