@@ -5,7 +5,6 @@ A study compares many runs with what a source states of its own; who made it fil
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import partial
@@ -16,11 +15,10 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from catenary.postproc.files.csv_text import csv_text, number_text
-from catenary.postproc.files.disk import plain, write_all
 from catenary.postproc.report.page import page
 from catenary.postproc.report.pictures import figures
 from catenary.postproc.report.sections.section import Folded, Picture, Section
-from catenary.postproc.report.study_table import StudyTable, texts_table
+from catenary.postproc.report.study_table import StudyTable, texts_table, write_files
 
 REPRODUCED, NOT_REPRODUCED, UNDECIDED = "reproduced", "not reproduced", "cannot be decided"
 
@@ -98,10 +96,6 @@ def write_study(
     pictures: dict[str, bytes] = {}
     for one in study.figures:
         pictures |= figures.painted(one.name, partial(getattr, one, "figure"))
-    content: dict[str, bytes | str] = {f"{name}.png": data for name, data in pictures.items()}
-    for figure in study.figures:
-        content[f"{figure.name}.csv"] = columns_csv(figure.columns)
-    content["study.html"] = page(study.title, study.lead, _sections(study, facts), pictures)
     record = {
         "title": study.title,
         "facts": dict(facts),
@@ -112,8 +106,15 @@ def write_study(
         ],
         "runs": list(rows),
     }
-    content["study.json"] = json.dumps(plain(record), indent=1, ensure_ascii=False) + "\n"
-    return write_all(out_dir, content)
+    return write_files(
+        out_dir,
+        {
+            **{f"{name}.png": data for name, data in pictures.items()},
+            **{f"{figure.name}.csv": columns_csv(figure.columns) for figure in study.figures},
+            "study.html": page(study.title, study.lead, _sections(study, facts), pictures),
+            "study.json": record,
+        },
+    )
 
 
 def columns_csv(columns: Mapping[str, Sequence[Any] | np.ndarray]) -> str:
