@@ -17,10 +17,9 @@ from small_lines import (
     train,
 )
 
-from catenary.cases.studies.waves.energy import EnergyMotion
 from catenary.cases.studies.waves.excited import Asked, excitation_of, march, without_train
 from catenary.cases.studies.waves.measured import arrived, measured_rows, transmitted
-from catenary.cases.studies.waves.seen import WireMotion
+from catenary.cases.studies.waves.seen import EnergyMotion, WireMotion
 from catenary.cases.studies.waves.theory import wave_theory
 from catenary.mbs.lumped_data import LumpedData
 from catenary.meshgen.mesh import CONTACT_WIRE

@@ -11,13 +11,205 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
+from mpi4py import MPI
+from scipy.sparse.linalg import splu
 
-from catenary.cases.studies.waves.bench import HALF, Bench, measured
 from catenary.cases.studies.waves.theory import HIGHEST
+from catenary.meshgen.build import make_mesh
+from catenary.meshgen.hardware import Droppers, SteadyArms, Supports
+from catenary.meshgen.line import Line
+from catenary.meshgen.wires import Conductor, Piece, Profile, Section, Wire
 from catenary.postproc.report.pictures import figures
-from catenary.solver.problem.problem import Problem
+from catenary.solver.effects.build_model import build
+from catenary.solver.integrators.make_line import make_line
+from catenary.solver.model.elements import beam
+from catenary.solver.model.matrices import whole_matrix
+from catenary.solver.model.model import Block, Model, wire_elements
+from catenary.solver.model.partition import distribute
+from catenary.solver.problem.problem import Damping, Numerics, Problem
 from catenary.solver.statics.line_at_rest import LineAtRest
-from catenary.solver.waves.scattering import change_of_wire, scattered
+from catenary.solver.waves.scattering import answer, change_of_wire, scattered
+
+# Wire to both sides of the obstacle, and stations before and behind it [m].
+HALF, STATION = 600.0, 60.0
+# Elements are twice as long as what bends beside a stiff obstacle, sqrt(EI / T), in bounds [m].
+_SHORTEST, _LONGEST = 0.1, 0.2
+DT = 1e-3
+# Length of the pulse in time, one standard deviation: a third of its largest spectrum at 20 Hz [s].
+_PULSE = 0.012
+# Signals are taken until a wave of the fastest wire has run so many halves: at 2.1 the first echo
+# of an end is at a station.
+_HALVES = 1.9
+_KEPT = frozenset({"vertical", "dropper_mass", "clamp_mass", "arm_inertia", "arm_stiffness"})
+
+
+class Bench(NamedTuple):
+    """Long wires with one obstacle at `HALF` and without anything else, on which one pulse runs.
+
+    Attributes
+    ----------
+    wires : they are what waves run on, in this order
+    parts : the obstacle: groups of one member each, empty for none
+    dropper_length : of the dropper, if it is one [m]
+    beyond : what the first wire is beyond the obstacle, None for the same
+    ends : whether the wires end at the obstacle, held
+    """
+
+    wires: tuple[Wire, ...]
+    parts: tuple[Droppers | SteadyArms | Supports, ...] = ()
+    dropper_length: float = 1.0
+    beyond: Conductor | None = None
+    ends: bool = False
+
+
+class Measured(NamedTuple):
+    """Shares of waves at f frequencies, as `scattering.scattered` returns them.
+
+    Attributes
+    ----------
+    back, onward : (f, n, n) complex; onward is zero beyond an end
+    omega : (f,) the angular frequencies that the line's matrices see: a step of average
+        acceleration takes w for (2 / dt) tan(w dt / 2) [1/s]
+    """
+
+    back: np.ndarray
+    onward: np.ndarray
+    omega: np.ndarray
+
+
+def measured(bench: Bench, problem: Problem, frequency: np.ndarray) -> Measured:
+    """Run a pulse on each wire of a bench and measure what comes back and goes on. Serial.
+
+    The pulse is measured before the obstacle as it comes and as it returns, and beyond it as it
+    goes on, on each of the wires; windows in time keep them apart. There is no damping, and
+    droppers pull and push: theory has neither.
+
+    Parameters
+    ----------
+    problem : whose effects say which masses and springs the obstacle has
+    frequency : (f,) positive [Hz]
+    """
+    model = _model(bench, problem)
+    n, f = len(bench.wires), frequency.size
+    omega = 2 * np.pi * frequency
+    seen = 2.0 / DT * np.tan(0.5 * omega * DT)
+    back, onward = np.zeros((2, f, n, n), dtype=complex)
+    delays = [answer(wire, seen).wavenumber * STATION for wire in bench.wires]
+    beyond = [answer(bench.beyond or wire, seen).wavenumber * STATION for wire in bench.wires]
+    for struck in range(n):
+        time, before, behind = _signals(bench, model, struck)
+        change = np.exp(-1j * omega[:, None] * time)
+        split = 2.0 * STATION / bench.wires[struck].wave_speed
+        came = change @ np.where(time < split, before[struck], 0.0)
+        for other in range(n):
+            returned = change @ np.where(time < split, 0.0, before[other])
+            late = np.exp(1j * (delays[struck] + delays[other]))
+            back[:, other, struck] = returned / came * late
+            if not bench.ends:
+                late = np.exp(1j * (delays[struck] + beyond[other]))
+                onward[:, other, struck] = change @ behind[other] / came * late
+    return Measured(back, onward, seen)
+
+
+def _model(bench: Bench, problem: Problem) -> Model:
+    """The bench as a model."""
+    length = HALF if bench.ends else 2 * HALF
+    masts = (0.0, length) if bench.ends else (0.0, HALF, length)
+    wires = []
+    for number, wire in enumerate(bench.wires):
+        # Heights are of no effect, but droppers have a length.
+        height = 5.0 + number
+        piece = Piece(masts, (0.0,) * len(masts), (height,) * len(masts))
+        level = Profile(
+            height, masts, (0.0,) * len(masts), (Section((0.0, length), (0.0, length)),)
+        )
+        wires.append(Wire.of(wire, wire.name, wire.role, (piece,), level))
+    line = Line(
+        tuple(np.diff(masts).tolist()),
+        (0, 0),
+        "bench",
+        tuple(wires),
+        tuple(part for part in bench.parts if isinstance(part, Droppers)),
+        tuple(part for part in bench.parts if isinstance(part, SteadyArms)),
+        tuple(part for part in bench.parts if isinstance(part, Supports)),
+    )
+    bends = min(np.sqrt(wire.bending_stiffness / wire.tension) for wire in bench.wires)
+    # A whole number of them up to the stations, too.
+    a_station = round(STATION / float(np.clip(2.0 * bends, _SHORTEST, _LONGEST)))
+    mesh = make_mesh(line, a_station * round(HALF / STATION))
+    alone = replace(
+        problem, line=line, damping=Damping(0.0, 0.0), effects=problem.effects & _KEPT, incidents=()
+    )
+    model = build(alone, mesh, np.full(mesh.droppers.shape[0], bench.dropper_length))
+    if bench.beyond is not None:
+        _change(model, bench.wires[0], bench.beyond)
+    return model
+
+
+def _change(model: Model, wire: Wire, beyond: Conductor) -> None:
+    """Make a wire another one beyond the middle: its elements gain what that has more."""
+    dofs, length = wire_elements(model, wire.name, ("w", "theta_y"))
+    there = model.mesh.x(model.mesh.elements(wire.name)).min(axis=1) > HALF - 1e-6
+    dofs, length = dofs[there], length[there]
+    mass = beam.mass(length, beyond.mass_per_length - wire.mass_per_length)
+    stiffness = beam.stiffness(
+        length, beyond.bending_stiffness - wire.bending_stiffness, beyond.tension - wire.tension
+    )
+    model.blocks.append(Block(wire.name, dofs, np.arange(length.size), mass, stiffness))
+
+
+def _signals(
+    bench: Bench, model: Model, struck: int
+) -> tuple[np.ndarray, list[np.ndarray], list[np.ndarray]]:
+    """Times (t,), and deflections (t,) of each wire at the stations before and behind."""
+    displacement, velocity = _pulse(bench.wires[struck], model)
+    factor = splu(whole_matrix(model, mass=1.0, held_diagonal=1.0))
+    acceleration = factor.solve(-(whole_matrix(model, stiffness=1.0) @ displacement))
+    rows = []
+    for place in (HALF - STATION, HALF + STATION):
+        nodes = [model.mesh.wires[wire.name] for wire in bench.wires]
+        at = [own[np.argmin(np.abs(model.mesh.x(own) - place))] for own in nodes]
+        rows.append(model.dofs(np.array(at)))
+    beyond = [] if bench.beyond is None else [bench.beyond]
+    lasts = _HALVES * HALF / max(wire.wave_speed for wire in [*bench.wires, *beyond])
+    time = DT * np.arange(int(lasts / DT))
+    found = np.empty((time.size, 2, len(bench.wires)))
+    numerics = Numerics(DT, "one_solve", 0.25, 0.5, 1e-9, 1e-9, 1)
+    line = make_line(MPI.COMM_SELF, model, distribute(model, 1, 0), numerics)
+    try:
+        line.start(displacement, velocity, acceleration)
+        for number in range(time.size):
+            if number:
+                line.free_step()
+            now = line.displacement
+            found[number] = now[rows[0]], now[rows[1]]
+    finally:
+        line.destroy()
+    before, behind = found.transpose(1, 2, 0)
+    return time, list(before), list(behind)
+
+
+def _pulse(wire: Wire, model: Model) -> tuple[np.ndarray, np.ndarray]:
+    """Displacement and velocity of a pulse that runs towards the obstacle, and nowhere else.
+
+    All its waves run one way, each with its own velocity: v = -i w(k) u.
+    """
+    nodes = model.mesh.wires[wire.name]
+    x = model.mesh.x(nodes)
+    start = HALF - 2.0 * STATION
+    shape = np.exp(-0.5 * ((x - start) / (_PULSE * wire.wave_speed)) ** 2)
+    k = 2 * np.pi * np.fft.rfftfreq(x.size, x[1] - x[0])
+    omega = np.sqrt((wire.tension * k**2 + wire.bending_stiffness * k**4) / wire.mass_per_length)
+    spectrum = np.fft.rfft(shape)
+    vectors = []
+    for wave in (spectrum, -1j * omega * spectrum):
+        vector = np.zeros(model.n_dofs)
+        vector[model.dofs(nodes)] = np.fft.irfft(wave, x.size)
+        vector[model.dofs(nodes, "theta_y")] = np.fft.irfft(1j * k * wave, x.size)
+        vector[model.constrained] = 0.0
+        vectors.append(vector)
+    return vectors[0], vectors[1]
+
 
 # Frequencies at which obstacles are measured [Hz].
 FREQUENCIES = np.arange(2.0, HIGHEST + 0.5, 0.5)

@@ -19,10 +19,11 @@ from catenary.cases.scene.load import scene_from
 from catenary.cases.scene.problem import problem_of
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.waves import ends, obstacles, pictures
-from catenary.cases.studies.waves.energy import EnergyMotion, EnergySeen
 from catenary.cases.studies.waves.excited import Asked, Watch, excitation_of, without_train
 from catenary.cases.studies.waves.measured import measured_rows, transmitted
 from catenary.cases.studies.waves.seen import (
+    EnergyMotion,
+    EnergySeen,
     WavesSeen,
     WireMotion,
     course_of,
