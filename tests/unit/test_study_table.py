@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import csv
 import io
+import json
 import math
 from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from mpi4py import MPI
 from work_items import work
 
@@ -17,7 +19,13 @@ from catenary.cases.studies.hard import checks
 from catenary.cases.studies.hard.cases import HardCase, hard_cases
 from catenary.cases.studies.hard.checks import Checked, Criterion
 from catenary.cases.studies.records import FOLDER, KeptRows
-from catenary.postproc.report.study_table import Column, StudyTable, rows_csv, texts_table
+from catenary.postproc.report.study_table import (
+    Column,
+    StudyTable,
+    rows_csv,
+    texts_table,
+    write_files,
+)
 
 COMM = MPI.COMM_SELF
 COLUMNS = [
@@ -33,6 +41,31 @@ ROWS = [
     {"run": "lost", "outcome": "it fell", "std_N": None, "span_m": None, "none": None},
 ]
 TABLE = StudyTable(COLUMNS, ROWS)
+
+
+def test_files_of_a_study_are_written_by_what_they_hold(tmp_path: Path) -> None:
+    figure = Figure()
+    figure.subplots().plot([0.0, 1.0])
+    files = write_files(
+        tmp_path / "new",
+        {
+            "table.csv": TABLE,
+            "rows.csv": [{"a": 1, "b": 0.1 + 0.2}],
+            "none.csv": [],
+            "record.json": {"x": np.float64(2.0), "nan": math.nan},
+            "picture.png": lambda: figure,
+            "nothing.png": lambda: None,
+            "page.md": "# A page\n",
+        },
+    )
+    names = [path.name for path in files]
+    assert names == ["table.csv", "rows.csv", "record.json", "picture.png", "page.md"]
+    assert sorted(names) == sorted(path.name for path in (tmp_path / "new").iterdir())
+    texts = {path.name: path.read_bytes() for path in files}
+    assert texts["table.csv"].decode() == TABLE.csv()
+    assert texts["rows.csv"].decode().splitlines() == ["a,b", f"1,{0.1 + 0.2!r}"]
+    assert json.loads(texts["record.json"]) == {"x": 2.0, "nan": None}
+    assert texts["picture.png"].startswith(b"\x89PNG") and texts["page.md"] == b"# A page\n"
 
 
 def test_files_have_all_digits_and_only_their_columns() -> None:

@@ -18,7 +18,7 @@ from mpi4py import MPI
 from work_items import N_SLEEPERS, Count, sleep, sleepers, wait_for_end, work
 
 from catenary.base.errors import InputError
-from catenary.cases.process.workers import Outcome, WorkerLost, at_once, cores, each, in_order
+from catenary.cases.process.workers import Outcome, Pool, WorkerLost, at_once, cores, each, in_order
 
 pytestmark = pytest.mark.process
 COMM = MPI.COMM_SELF
@@ -38,6 +38,21 @@ def test_processes_are_others_with_one_rank_and_one_thread() -> None:
 def test_a_function_keeps_what_it_made_for_the_next_item() -> None:
     counts = sorted(outcome.get() for outcome in each(Count(), range(6), 2, COMM))
     assert sum(counts) >= 1 + 1 + 2 + 2 + 3 + 3 and max(counts) >= 3
+
+
+def test_processes_of_a_pool_last_from_one_series_to_the_next() -> None:
+    with Pool(2, work) as pool:
+        first, second = (
+            {outcome.get()[0] for outcome in pool.of(["describe"] * n)} for n in (4, 1)
+        )
+        assert second <= first and os.getpid() not in first
+        (lost,) = pool.of(["be killed"])
+        assert isinstance(lost.error, WorkerLost)
+        (found,) = pool.of([3])  # in a new process, or the other one
+        assert found.get() == 6
+    for pid in first:
+        with pytest.raises(ProcessLookupError):
+            os.kill(pid, 0)
 
 
 @pytest.mark.parametrize(

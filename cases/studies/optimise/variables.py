@@ -162,20 +162,17 @@ def _component(
         low, high = table.change
     else:
         assert table.bounds is not None
-        own = [value[entry] for entry in entries] if entries else [value]
+        own = np.array([value[entry] for entry in entries] if entries else [value])
         least, most = table.bounds
-        outside = [one for one in own if not least <= one <= most]
-        if outside:
+        outside = own[(own < least) | (own > most)]
+        if outside.size:
             raise InputError(
                 f"variables.{number}.bounds are {least:g} and {most:g}, but {table.key} has "
                 f"{outside[0]:g} in the case, where the search begins"
             )
-        both = signs or (1,)
-        downs = [
-            one - least if sign > 0 else most - one for one, sign in zip(own, both, strict=True)
-        ]
-        ups = [most - one if sign > 0 else one - least for one, sign in zip(own, both, strict=True)]
-        low, high = -min(downs), min(ups)
+        up = np.array(signs or (1,)) > 0
+        low = -float(np.where(up, own - least, most - own).min())
+        high = float(np.where(up, most - own, own - least).min())
         if high <= low:
             raise InputError(f"variables.{number}.bounds leave {table.key} no change")
     step = table.step or _USUAL_STEP * (high - low)

@@ -26,7 +26,7 @@ from catenary.cases.scene.keys.units import unit_of
 from catenary.cases.scene.load import scene_from
 from catenary.cases.scene.problem import line_of, resolved
 from catenary.cases.scene.scene import Scene
-from catenary.cases.studies.sweep.variants import is_number
+from catenary.cases.studies.sweep.variants import is_number, value_at
 
 # Patterns of the parameters that are taken if none are named, in the order in which they are taken.
 USUAL = (
@@ -261,18 +261,13 @@ class ChangedScenes:
                     yield own
 
     def _values(self, key: str) -> tuple[float, ...] | None:
-        try:
-            holder, place = _found(self._raw, key)
-        except (KeyError, IndexError, TypeError, ValueError):
-            return None
+        above, _, place = key.rpartition(".")
+        holder, value = value_at(self._raw, above), value_at(self._raw, key)
         if place == _FORCE and isinstance(holder, dict) and holder.get(_BY_SPEED):
             speeds, forces = np.array(holder[_BY_SPEED]).T
             return (float(np.interp(self._raw["train"]["speed_km_h"], speeds, forces)),)
-        value = holder.get(place) if isinstance(holder, dict) else holder[place]
         values = value if isinstance(value, list) else [value]
-        if not values or not all(is_number(one) for one in values):
-            return None
-        return tuple(map(float, values))
+        return tuple(map(float, values)) if values and all(map(is_number, values)) else None
 
     @staticmethod
     def _checked(raw: dict[str, Any]) -> Scene:
@@ -285,7 +280,9 @@ def _change(raw: dict[str, Any], parameter: Parameter, by: float) -> None:
         span, number = map(int, dropper.groups())
         _lengthen(raw, span, number, parameter.values[0] + by)
         return
-    holder, place = _found(raw, parameter.key)
+    above, _, last = parameter.key.rpartition(".")
+    holder = value_at(raw, above)
+    place = int(last) if isinstance(holder, list) else last
     if place == _FORCE and holder.get(_BY_SPEED):
         holder[_BY_SPEED] = [[speed, force + by] for speed, force in holder[_BY_SPEED]]
     elif isinstance(holder[place], list):
@@ -300,17 +297,6 @@ def _lengthen(raw: dict[str, Any], span: int, number: int, error: float) -> None
     others = [own for own in lengths.get("by_dropper", []) if own[:2] != [span, number]]
     lengths["by_dropper"] = [*others, [span, number, error]]
     raw["effects"]["dropper_lengths"] = True
-
-
-def _found(raw: Any, key: str) -> tuple[Any, Any]:
-    """The table or list that holds a key's last part, and that part as its place there."""
-    here, parts = raw, key.split(".")
-    for part in parts[:-1]:
-        here = here[int(part)] if isinstance(here, list) else here[part]
-    last: Any = int(parts[-1]) if isinstance(here, list) else parts[-1]
-    if isinstance(here, list):
-        here[last]  # raises if there is none
-    return here, last
 
 
 def _numbers(raw: Any, prefix: str = "") -> Iterator[str]:

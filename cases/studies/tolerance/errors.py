@@ -138,11 +138,8 @@ def _group(table: ErrorKind, scene: Scene, where: str) -> Group:
 
 def _of_key(table: KeyErrors, tables: dict[str, Any], where: str) -> Group:
     check_key(table.key, f"in {where}")
-    value = value_at(tables, table.key)
-    number = table.entry
-    own = value
-    if number is not None and isinstance(value, list):
-        own = value[number - 1] if number <= len(value) else None
+    value, number = value_at(tables, table.key), table.entry
+    own = value if number is None else value_at(value, str(number - 1))
     if not is_number(own):
         at = "" if number is None else f" at entry {number}"
         raise InputError(f"{where}.key is {table.key}, which has no number{at} in the scene")
