@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -28,7 +29,7 @@ from catenary.postproc.report.pictures.figures import (
     own_style,
     tidy,
 )
-from catenary.postproc.report.study_table import write_files
+from catenary.postproc.report.study_table import StudyTable, texts_table, write_files
 
 # Frequencies for the search of peaks and for the fit.
 N_SEARCHED, N_FITTED = 400, 200
@@ -116,102 +117,77 @@ def study(scene: Scene, kind: str | None, n_masses: int | None, over: Range) -> 
     at = np.geomspace(over.fit_low, over.high, N_FITTED)
     fit = fit_chain(at, response.model.receptance(at), n_masses)
     receptance = response.model.receptance(over.frequencies())
-    return PantographStudy(
-        kind,
-        scene.case.name,
-        speed,
-        force,
-        table.nominal_height_m,
-        data,
-        response,
-        over,
-        receptance,
-        fit,
-    )
+    told = kind, scene.case.name, speed, force, table.nominal_height_m
+    return PantographStudy(*told, data, response, over, receptance, fit)
 
 
 def study_text(found: PantographStudy) -> str:
     """Tables of what was found."""
-    response = found.response
-    lines = [
-        f"pantograph {found.kind} of {found.case} at {found.speed:g} km/h",
+    fit, model = found.fit, found.response.model
+    parts = [
+        f"pantograph {found.kind} of {found.case} at {found.speed:g} km/h\n"
         f"  {description_of(found.data, found.static_force)}",
-        "",
-        *_rest_rows(found),
-        "",
-        *_mode_rows(response),
-        "",
-        *_peak_rows(found),
-        "",
-        *_fit_rows(found.fit),
+        *_at_rest(found),
+        _modes(found.response).text(),
     ]
-    return "\n".join(lines)
-
-
-def _row(name: str, value: float, unit: str) -> str:
-    return f"  {name:42}{value:>12.6g}  {unit}"
-
-
-def _rest_rows(found: PantographStudy) -> list[str]:
-    response, rows = found.response, ["at rest under the wire"]
-    rows.append(_row("force on the head", response.static_force, "N"))
-    if isinstance(found.data, MultibodyData):
-        standing = stand(found.data)
-        if standing.actuator_force is not None:
-            rows.append(_row(f"force of {found.data.actuator}", standing.actuator_force, "N"))
-            rows.append(
-                _row("static force with the force given for it", standing.force_before, "N")
-            )
-        rows.append(_row("height of the arm above the base", standing.working_height, "m"))
-    rows.append(_row("lift lost per metre of raising", response.lift_stiffness, "N/m"))
-    rows += [_row(name, mass, "kg") for name, mass in response.masses.items()]
-    if isinstance(found.data, MultibodyData):
-        rows += ["", "joints missed in the given positions, before assembly"]
-        rows += [_row(miss.joint, 1e3 * miss.gap, "mm") for miss in stand(found.data).missed]
-    return rows
-
-
-def _mode_rows(response: HeadResponse) -> list[str]:
-    rows = [f"{'free motions':26}{'Hz':>10}{'damping ratio':>16}{'1/s':>11}"]
-    for mode in response.model.modes():
-        moves = "" if mode.share > UNMOVED else "  the head stays where it is"
-        if mode.root.imag == 0.0:
-            what = "grows" if mode.root.real > 0.0 else "dies out"
-            rows.append(f"  {what:24}{'-':>10}{'-':>16}{mode.root.real:>+11.4g}{moves}")
-        else:
-            rows.append(
-                f"  {'swings':24}{mode.frequency:>10.4g}{mode.damping_ratio:>16.4g}"
-                f"{mode.root.real:>+11.4g}{moves}"
-            )
-    if response.model.n_left_out:
-        rows.append(
-            f"  left out: {response.model.n_left_out} that nothing resists and the head does not "
-            f"drive, of {', '.join(response.model.left_out)}"
+    if model.n_left_out:
+        parts[-1] += (
+            f"\nleft out: {model.n_left_out} that nothing resists and the head does not drive, of "
+            f"{', '.join(model.left_out)}"
         )
-    return rows
+    head = f"lumped model fitted from {fit.lowest:g} to {fit.highest:g} Hz: {fit_error(fit)}"
+    columns = zip(fit.data.masses, fit.data.stiffnesses, fit.data.dampings, strict=True)
+    rows = [[k, *(f"{one:.5g}" for one in own)] for k, own in enumerate(columns, start=1)]
+    masses = texts_table(["mass", "kg", "N/m below", "N s/m below"], rows, right=(1, 2, 3))
+    return "\n\n".join([*parts, _peaks(found), f"{head}\n{masses.text()}"])
 
 
-def _peak_rows(found: PantographStudy) -> list[str]:
+def _figures(title: str, rows: Sequence[tuple[str, float, str]]) -> str:
+    """Names, values and units below a title."""
+    cells = [(name, f"{value:.6g}", unit) for name, value, unit in rows]
+    return texts_table([title, "", ""], cells, right=(1,)).text()
+
+
+def _at_rest(found: PantographStudy) -> Iterator[str]:
+    response = found.response
+    rows = [("force on the head", response.static_force, "N")]
+    if isinstance(found.data, MultibodyData):
+        standing, given = stand(found.data), "static force with the force given for it"
+        if standing.actuator_force is not None:
+            rows.append((f"force of {found.data.actuator}", standing.actuator_force, "N"))
+            rows.append((given, standing.force_before, "N"))
+        rows.append(("height of the arm above the base", standing.working_height, "m"))
+    rows.append(("lift lost per metre of raising", response.lift_stiffness, "N/m"))
+    rows += [(name, mass, "kg") for name, mass in response.masses.items()]
+    yield _figures("at rest under the wire", rows)
+    if isinstance(found.data, MultibodyData):
+        missed = [(miss.joint, 1e3 * miss.gap, "mm") for miss in stand(found.data).missed]
+        yield _figures("joints missed in the given positions, before assembly", missed)
+
+
+def _modes(response: HeadResponse) -> StudyTable:
+    rows = []
+    for mode in response.model.modes():
+        cells: list[str | None] = ["swings", f"{mode.frequency:.4g}", f"{mode.damping_ratio:.4g}"]
+        if mode.root.imag == 0.0:
+            cells = ["grows" if mode.root.real > 0.0 else "dies out", None, None]
+        moves = "" if mode.share > UNMOVED else "the head stays where it is"
+        rows.append([*cells, f"{mode.root.real:+.4g}", moves])
+    return texts_table(["free motions", "Hz", "damping ratio", "1/s", ""], rows, right=(1, 2, 3))
+
+
+def _peaks(found: PantographStudy) -> str:
     over = found.range
     at = np.geomspace(over.low, over.high, max(N_SEARCHED, over.n_points))
-    rows = [f"{'peaks of the receptance':26}{'Hz':>10}{'mm/N':>16}{'phase, deg':>13}"]
-    for peak in peaks(found.response.model, at):
-        phase = math.degrees(np.angle(peak.receptance))
-        rows.append(
-            f"{'':28}{peak.frequency:>8.4g}{1e3 * abs(peak.receptance):>16.4g}{phase:>13.1f}"
-        )
-    return rows if len(rows) > 1 else [f"no peak of the receptance from {over.low:g} to "
-                                       f"{over.high:g} Hz"]  # fmt: skip
-
-
-def _fit_rows(fit: ChainFit) -> list[str]:
     rows = [
-        f"lumped model fitted from {fit.lowest:g} to {fit.highest:g} Hz: {fit_error(fit)}",
-        f"  {'mass':6}{'kg':>12}{'N/m below':>14}{'N s/m below':>14}",
-    ]
-    columns = zip(fit.data.masses, fit.data.stiffnesses, fit.data.dampings, strict=True)
-    rows += [f"  {k + 1:<6}{m:>12.5g}{s:>14.5g}{c:>14.5g}" for k, (m, s, c) in enumerate(columns)]
-    return rows
+        ("", f"{peak.frequency:.4g}", f"{1e3 * abs(peak.receptance):.4g}",
+         f"{math.degrees(np.angle(peak.receptance)):.1f}")
+        for peak in peaks(found.response.model, at)
+    ]  # fmt: skip
+    if not rows:
+        return f"no peak of the receptance from {over.low:g} to {over.high:g} Hz"
+    heads = ["peaks of the receptance", "Hz", "mm/N", "phase, deg"]
+    return texts_table(heads, rows, right=(1, 2, 3)).text()
 
 
 def fit_error(fit: ChainFit) -> str:
