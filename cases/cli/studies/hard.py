@@ -52,35 +52,32 @@ def hard(
         return hard_cases(names)
 
     comm, cases, arguments = begin(lambda: (read(), []), verbose, lambda cases: cases[0].scene())
-    from catenary.base.parallel import on_root
     from catenary.cases.process.petsc_options import start_petsc
     from catenary.cases.process.workers import at_once
     from catenary.cases.studies.hard import checks
-    from catenary.cases.studies.records import KeptRows
+    from catenary.cases.studies.records import held_study
     from catenary.postproc.report.study_table import remark_lines, write_files
 
     if comm.size > 1 and n_jobs != 1:
         raise InputError(f"-j is {n_jobs} on {comm.size} ranks, of which each case is to take all")
-    kept = KeptRows(out, force and comm.rank == 0)
     found: list[Criterion] = []
     told: dict[str, dict[str, list[str]]] = {}
     petsc = partial(start_petsc, arguments)
-    checked = checks.check_cases(cases, comm, shortened, kept, at_once(n_jobs, comm), petsc)
-    for number, case in enumerate(cases, start=1):
-        console.say(f"[{number}/{len(cases)}] {case.name}: {case.what}")
-        rows, remarks = next(checked)
-        console.say("\n".join(checks.line(row) for row in rows))
-        found += rows
-        told[case.name] = remarks
+    with held_study(out, comm, "catenary hard", force) as (kept, write):
+        checked = checks.check_cases(cases, comm, shortened, kept, at_once(n_jobs, comm), petsc)
+        for number, case in enumerate(cases, start=1):
+            console.say(f"[{number}/{len(cases)}] {case.name}: {case.what}")
+            rows, told[case.name] = next(checked)
+            console.say("\n".join(checks.line(row) for row in rows))
+            found += rows
+        tables = checks.criteria(found, told), checks.page(cases, found, told)
+        content = dict(zip(TABLES, tables, strict=True))
+        files = write(lambda folder: write_files(folder, content))
     failed = [row for row in found if not row.passed]
     lines = remark_lines(march for remarks in told.values() for march in remarks.items())
     if lines:
         console.say("\n" + "\n".join(lines) + "\n")
-    if out is not None:
-        folder = out
-        tables = checks.criteria(found, told), checks.page(cases, found, told)
-        files = on_root(comm, lambda: write_files(folder, dict(zip(TABLES, tables, strict=True))))
-        kept.forget()
+    if files:
         console.say("\n".join(map(str, files)))
     console.say(
         f"{len(cases)} hard cases on {comm.size} rank{'s' if comm.size > 1 else ''}: "
