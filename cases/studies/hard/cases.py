@@ -2,12 +2,11 @@
 
 The table ``hard/hard.toml`` holds them; a case that is not in it is not run. Each is a variant of a
 shipped case. Limits in the table are the answer's own (what may be pressed, lifted, lost); limits
-that follow from round-off and from the methods stand in `hard_checks`.
+that follow from round-off and from the methods stand in `hard/checks.py`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from functools import cache
 from itertools import product
 from pathlib import Path
@@ -114,14 +113,13 @@ class HardCase(Table):
 
     def scene(self, short: bool = False, halvings: int = 0, fixed_point: bool = False) -> Scene:
         """Its scene with the step halved so often, or by the paper's correction."""
-        words = [*_common(), *self.set, *(self.short if short else [])]
-        if fixed_point:
-            words += _CORRECTION
-        scene = load_scene(_base(), words)
+        table = collection()
+        words = [*table.common, *self.set, *(self.short if short else [])]
+        words += _CORRECTION if fixed_point else ()
+        scene = load_scene(table.base, words)
         if halvings:
-            scene = load_scene(
-                _base(), [*words, f"numerics.dt_s={scene.numerics.dt_s / 2**halvings!r}"]
-            )
+            dt = scene.numerics.dt_s / 2**halvings
+            scene = load_scene(table.base, [*words, f"numerics.dt_s={dt!r}"])
         return scene
 
 
@@ -149,19 +147,14 @@ class Collection(Table):
 
     def all_cases(self) -> list[HardCase]:
         """The cases, and each line under each condition unless a case has that name."""
-        listed = {case.name for case in self.cases}
-        return [*self.cases, *(case for case in self._crossed() if case.name not in listed)]
-
-    def _crossed(self) -> Iterator[HardCase]:
+        found = {case.name: case for case in self.cases}
         for line, condition in product(self.lines, self.conditions):
-            if condition.name not in line.without:
-                yield condition.model_copy(
-                    update={
-                        "name": f"{line.name}_{condition.name}",
-                        "what": f"{line.what}: {condition.what}",
-                        "set": [*line.set, *condition.set],
-                    }
-                )
+            name = f"{line.name}_{condition.name}"
+            if condition.name not in line.without and name not in found:
+                what, words = f"{line.what}: {condition.what}", [*line.set, *condition.set]
+                own = {"name": name, "what": what, "set": words}
+                found[name] = condition.model_copy(update=own)
+        return list(found.values())
 
 
 @cache
@@ -174,9 +167,9 @@ def collection() -> Collection:
         If the table is wrong.
     """
     found = read_task(TABLE, Collection)
-    names = [case.name for case in found.all_cases()]
-    if len(set(names)) != len(names):
-        raise InputError(f"{TABLE} has two cases of one name")
+    for entries in (found.cases, found.lines, found.conditions):
+        if len({one.name for one in entries}) < len(entries):
+            raise InputError(f"{TABLE} has two entries of one name")
     return found
 
 
@@ -193,11 +186,3 @@ def hard_cases(names: list[str] | None = None) -> list[HardCase]:
         if name not in cases:
             raise InputError(f"there is no hard case {name}; there are {', '.join(cases)}")
     return [cases[name] for name in names] if names else list(cases.values())
-
-
-def _base() -> str:
-    return collection().base
-
-
-def _common() -> list[str]:
-    return collection().common

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -63,11 +62,11 @@ def _level(one: Tolerance) -> str:
 
 def installer_table(plan: Plan, found: Sequence[Tolerance]) -> StudyTable:
     """How far each error may go for all criteria that the line keeps without errors."""
-    rows: list[dict[str, Any]] = []
+    rows = []
     together = _tightest([one for one in found if one.error == ALL])
     for group in plan.groups:
         own = _tightest([one for one in found if one.error == group.table.name])
-        row: dict[str, Any] = {"error": group.table.name, "unit": group.unit, "n": len(group.names)}
+        row = {"error": group.table.name, "unit": group.unit, "n": len(group.names)}
         row |= {"alone": "none", "by": "", "together": ""}
         if own is not None:
             row |= {"alone": _level(own), "by": own.criterion}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -79,10 +80,9 @@ def _sobol(table: RunTable, sampling: SamplingTable) -> tuple[list[dict[str, Any
 def _interactions(
     here: dict[str, Any], sampling: SamplingTable, found: Any
 ) -> Iterator[dict[str, Any]]:
-    for i, key in enumerate(sampling.columns):
-        for j in range(i + 1, len(sampling.columns)):
-            row = {name: float(found[name][i, j]) for name in ("S2", "S2_conf")}
-            yield {**here, "key": key, "with": sampling.columns[j], **row}
+    for (i, key), (j, other) in combinations(enumerate(sampling.columns), 2):
+        row = {name: float(found[name][i, j]) for name in ("S2", "S2_conf")}
+        yield {**here, "key": key, "with": other, **row}
 
 
 def ranked_inputs(table: RunTable) -> list[str]:
@@ -144,17 +144,10 @@ def _given_data(table: RunTable) -> tuple[list[dict[str, Any]], list[str]]:
             finally:
                 np.random.set_state(before)
             ranks = known[keys].rank().corrwith(known[statistic].rank())
+            here = {"statistic": statistic, "pantograph": pantograph}
             for i, key in enumerate(keys):
-                rows.append(
-                    {
-                        "statistic": statistic,
-                        "pantograph": pantograph,
-                        "key": key,
-                        "S1": float(found["S1"][i]),
-                        "S1_conf": float(found["S1_conf"][i]),
-                        "rank_correlation": float(ranks[key]),
-                    }
-                )
+                row = {name: float(found[name][i]) for name in ("S1", "S1_conf")}
+                rows.append({**here, "key": key, **row, "rank_correlation": float(ranks[key])})
     if few:
         notes.append(f"first-order indices need at least {_FEWEST} runs")
     return rows, notes
