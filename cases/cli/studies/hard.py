@@ -56,7 +56,7 @@ def hard(
     from catenary.cases.process.workers import at_once
     from catenary.cases.studies.hard import checks
     from catenary.cases.studies.records import held_study
-    from catenary.postproc.report.study_table import remark_lines, write_files
+    from catenary.postproc.report.study_table import Content, remark_lines, write_files
 
     if comm.size > 1 and n_jobs != 1:
         raise InputError(f"-j is {n_jobs} on {comm.size} ranks, of which each case is to take all")
@@ -70,8 +70,9 @@ def hard(
             rows, told[case.name] = next(checked)
             console.say("\n".join(checks.line(row) for row in rows))
             found += rows
-        tables = checks.criteria(found, told), checks.page(cases, found, told)
-        content = dict(zip(TABLES, tables, strict=True))
+        table, page = TABLES
+        content: dict[str, Content] = {table: checks.criteria(found, told)}
+        content[page] = checks.page(cases, found, told)
         files = write(lambda folder: write_files(folder, content))
     failed = [row for row in found if not row.passed]
     lines = remark_lines(march for remarks in told.values() for march in remarks.items())

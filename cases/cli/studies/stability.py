@@ -34,14 +34,15 @@ def stability_map(
     from catenary.cases.scene.load import read_draft
     from catenary.cases.studies.records import held_study
     from catenary.cases.studies.stability import map as study
-    from catenary.postproc.report.study_table import write_files
+    from catenary.postproc.report.study_table import Content, write_files
 
     refuse_table(out / TABLE, force)
     grid, comm = study.QUICK if quick else study.Grid(), console.alone()
     draft = read_draft(words.case, words.changes, words.shortened)
     with held_study(out, comm, f"catenary stability-map {words.case}", force) as (kept, write):
         found = study.make_map(draft, comm, grid, console.say, kept, at_once(n_jobs, comm))
-        content = {TABLE: study.as_rows(found), PICTURE: lambda: study.draw(found)}
+        content: dict[str, Content] = {TABLE: study.as_rows(found)}
+        content[PICTURE] = lambda: study.draw(found)
         files = write(lambda folder: write_files(folder, content))
     console.say("\n" + study.as_text(found) + "\n" + "\n".join(map(str, files)))
     return console.DONE if all(one.agrees for one in found.limits) else console.NOT_ACCEPTED
