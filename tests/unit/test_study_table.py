@@ -16,7 +16,7 @@ from work_items import work
 
 from catenary.cases.process.workers import WorkerLost
 from catenary.cases.studies.hard import checks
-from catenary.cases.studies.hard.cases import HardCase, hard_cases
+from catenary.cases.studies.hard.cases import hard_cases
 from catenary.cases.studies.hard.checks import Checked, Criterion
 from catenary.cases.studies.records import FOLDER, KeptRows
 from catenary.postproc.report.study_table import (
@@ -168,13 +168,13 @@ def test_a_hard_case_that_was_measured_is_not_measured_again(
     (case,) = hard_cases(["undamped_line"])
     calls: list[bool] = []
 
-    def measured(case: HardCase, world: object, alone: object, short: bool) -> Checked:
-        calls.append(short)
-        found = [Criterion(case.name, "drift", 1e-12, math.inf, True, "a note")]
-        return Checked(found, {case.name: ["stiff"]})
+    def measured(one: checks._OneCase) -> Checked:
+        calls.append(one.short)
+        found = [Criterion(one.case.name, "drift", 1e-12, math.inf, True, "a note")]
+        return Checked(found, {one.case.name: ["stiff"]})
 
-    monkeypatch.setattr(checks, "_checked", measured)
+    monkeypatch.setattr(checks._OneCase, "checked", measured)
     for short in (True, True, False):
         (found,) = checks.check_cases([case], COMM, short, KeptRows(tmp_path))
-        assert found == measured(case, COMM, COMM, short)
+        assert found == measured(checks._OneCase(case, COMM, short))
     assert calls == [True, True, True, False, False]
