@@ -310,6 +310,7 @@ def write(folder: Path, study: SpeedStudy) -> list[Path]:
     return write_files(folder, {TABLE: criteria, RUNS: runs, RECORD: record, PICTURE: drawn})
 
 
+@figures.own_style()
 def draw(study: SpeedStudy) -> Figure | None:
     """Deviation, extremes and uplift over speed with their limits; speeds at which all criteria
     hold are shaded. None if fewer than two speeds could be run."""

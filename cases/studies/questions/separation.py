@@ -325,6 +325,7 @@ def write(folder: Path, study: SeparationStudy, period: Period) -> list[Path]:
     return write_files(folder, {TABLE: table, RECORD: record, PICTURE: drawn})
 
 
+@figures.own_style()
 def draw(study: SeparationStudy, period: Period) -> Figure | None:
     """Deviation, least force and uplift over the distance, and as a line those of one pantograph
     alone; at distances of whole periods of the ringing the ground is shaded. None if fewer than two

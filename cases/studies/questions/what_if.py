@@ -292,6 +292,7 @@ def _sections(found: Differences) -> Iterator[Section]:
         yield Section("Remarks", remarks)
 
 
+@figures.own_style()
 def draw_forces(a: Results, b: Results) -> Figure:
     """Contact forces of both runs along the track, a panel for each pantograph that both have."""
     n = min(a.n_pantographs, b.n_pantographs)
@@ -311,6 +312,7 @@ def draw_forces(a: Results, b: Results) -> Figure:
     return figure
 
 
+@figures.own_style()
 def draw_uplift(a: Results, b: Results) -> Figure:
     """Largest uplift at each steady arm of both runs."""
     figure, (axes,) = figures.stacked(3.2, 1)
