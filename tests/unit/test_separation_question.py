@@ -84,7 +84,10 @@ def test_the_worse_pantograph_decides_and_failing_stretches_are_joined() -> None
     text = as_text(study, nowhere)
     assert "arcing: at 30-40, 60 m" in text
     assert "1 of 5 distances could not be run, the first is 70 m: is too far" in text
-    assert "fewer than 12 distances; waves travel back every 91 m." in text and "nan" not in text
+    assert (
+        "fewer than 12 distances; waves from the leading one repeat every 91 m." in text
+        and "nan" not in text
+    )
 
 
 SPEED, WAVES, SPAN = 80.0, 120.0, 50.0

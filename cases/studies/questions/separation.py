@@ -201,7 +201,10 @@ def period_in(study: SeparationStudy, scene: Scene) -> Period:
 
     problem = problem_of(scene)
     first, last = middle_span(problem.line)
-    theory = wave_theory(problem, line_at_rest(problem, mesh_of(scene)))
+    try:
+        theory = wave_theory(problem, line_at_rest(problem, mesh_of(scene)))
+    except InputError:  # a line that cannot hang, of which no distance was run
+        return Period(np.nan, np.nan, np.full(2, np.nan), np.nan)
     known = [row for row in study.done if row["std_trailing_N"] is not None]
     d, sigma = (np.array([row[name] for row in known]) for name in (DISTANCE, "std_trailing_N"))
     return period_of(d, sigma, theory, last - first)
@@ -288,8 +291,8 @@ def _explained(period: Period) -> str:
             f"A period of {period.fitted:.0f} m explains {share:.0f} % of the variance of the "
             "trailing one's deviation"
         )
-    rings = f"spans ring every {low:.0f} to {high:.0f} m, " if np.isfinite(low) else ""
-    return f"{found}; {rings}waves travel back every {period.travel:.0f} m."
+    rings = f"spans ring once in {low:.0f} to {high:.0f} m, " if np.isfinite(low) else ""
+    return f"{found}; {rings}waves from the leading one repeat every {period.travel:.0f} m."
 
 
 def _stretches(rows: Sequence[Row], name: str) -> str:
