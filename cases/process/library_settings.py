@@ -7,6 +7,8 @@ import gc
 import os
 import sys
 
+from catenary.base.parallel import launched_by_mpirun
+
 
 def choose() -> None:
     """Set what Python and libraries read when they are loaded. Not collective."""
@@ -29,3 +31,6 @@ def choose() -> None:
     os.environ.setdefault("OMPI_MCA_opal_signal", "")
     # One process alone starts no others: Open MPI need not start its daemon beside it for them.
     os.environ.setdefault("OMPI_MCA_ess_singleton_isolated", "1")
+    if not launched_by_mpirun():
+        # Nor need it try the networks of a cluster, a third of its start.
+        os.environ.setdefault("OMPI_MCA_pml", "ob1")

@@ -119,7 +119,7 @@ def text_faults(raw: Any, origin: Origin) -> list[Fault]:
 def _texts(value: Any, key: str, origin: Origin) -> Iterator[Fault]:
     if isinstance(value, str):
         prose = key.rsplit(".", 1)[-1] in _PROSE
-        for letter in value:
+        for letter in "" if value.isprintable() else value:
             if steers(letter) and not (prose and letter in "\n\t\r"):
                 yield Fault(
                     key,
@@ -130,7 +130,7 @@ def _texts(value: Any, key: str, origin: Origin) -> Iterator[Fault]:
     elif isinstance(value, dict):
         for name, inner in value.items():
             below = f"{key}.{name}" if key else str(name)
-            if any(steers(letter) for letter in str(name)):
+            if not str(name).isprintable() and any(map(steers, str(name))):
                 yield Fault(
                     below, f"{plain(below, 200)} {origin.of(key)} is a key with a control character"
                 )
