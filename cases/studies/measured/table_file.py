@@ -87,6 +87,21 @@ def places_of(
         assert measured.time is not None
         times = column_of(table, path, measured.time.column) * measured.time.factor
         places = start + speed * times
+    return evened_out(places, path)
+
+
+def evened_out(places: np.ndarray, path: str) -> np.ndarray:
+    """Places (n,) that were rounded, at equal distances [m].
+
+    Parameters
+    ----------
+    path : what sentences call the table
+
+    Raises
+    ------
+    InputError
+        If they are not equidistant, or too few.
+    """
     if len(places) < LEAST_SAMPLES:
         raise InputError(f"{path} has {len(places)} rows; at least {LEAST_SAMPLES} are needed")
     even = np.linspace(places[0], places[-1], len(places))

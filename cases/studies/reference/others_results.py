@@ -13,7 +13,7 @@ from scipy.interpolate import CubicSpline
 from catenary.base.errors import InputError
 from catenary.cases.scene.input.plain_text import plain
 from catenary.cases.scene.problem import problem_of
-from catenary.cases.studies.identification.measurement import read_table
+from catenary.cases.studies.measured.table_file import column_of, evened_out, read_table
 from catenary.cases.studies.reference.convergence import HISTORY, OF_FORCE, rms
 from catenary.cases.studies.reference.solutions import PLACE, Solution, read
 from catenary.postproc.evaluate import filters
@@ -23,8 +23,6 @@ TIME = "time_s"
 _QUANTITY, _VALUE, _OF, _CONFIGURATION = "quantity", "value", "of", "configuration"
 # Spacing at which extremes of a curve below 20 Hz are looked for [m].
 _FINE = 0.02
-# Samples are equidistant if their spacings differ by less than this part.
-_EVEN = 0.02
 # A filter leaves 1e-4 of what is beyond a record's end after so many periods of its cut-off.
 _SETTLED = 6.0
 _FROM_STATISTICS = {
@@ -96,7 +94,7 @@ def _add_statistics(
             raise InputError(
                 f'{name} has no column "{column}": a table of statistics has {", ".join(needed)}'
             )
-    values = _numbers(table, name, _VALUE)
+    values = column_of(table, name, _VALUE)
     for row, value in zip(table.to_dict("records"), values.tolist(), strict=True):
         of, quantity = str(row[_OF]), str(row[_QUANTITY])
         own = configuration or str(row[_CONFIGURATION])
@@ -121,7 +119,7 @@ def _add_forces(one: Others, table: pd.DataFrame, name: str, is_filtered: bool) 
         )
     for of in there:
         place, dt = _places_of(solution, of, table, name)
-        force = _numbers(table, name, f"{of}_N")
+        force = column_of(table, name, f"{of}_N")
         start, end = solution.stretch
         if place[0] > start + 1e-6 or place[-1] < end - 1e-6:
             raise InputError(
@@ -154,24 +152,22 @@ def _places_of(
     """Places of the samples [m], and the time between two [s]."""
     train = problem_of(solution.configuration.scene()).train
     if PLACE in table:
-        place = _numbers(table, name, PLACE)
+        place = column_of(table, name, PLACE)
     elif TIME in table:
         number = list(solution.forces).index(of)
         start = train.start - train.placements[number].behind
-        place = start + train.speed * _numbers(table, name, TIME)
+        place = start + train.speed * column_of(table, name, TIME)
     else:
         raise InputError(f"{name} has neither a column {PLACE} nor {TIME}")
-    gaps = np.diff(place)
-    spacing = float(gaps.mean()) if gaps.size else 0.0
-    if spacing <= 0 or np.ptp(gaps) > 2 * _EVEN * spacing + 2e-4:
-        raise InputError(f"{name} must have equidistant samples in ascending order")
+    place = evened_out(place, name)
+    spacing = place[1] - place[0]
     dt = spacing / train.speed
     if 2.0 * filters.CUT_OFF * dt >= 1.0:
         raise InputError(
             f"{name} has a sample every {spacing:.3g} m, {1 / dt:.3g} a second: a force up to "
             f"{filters.CUT_OFF:g} Hz takes more than {2 * filters.CUT_OFF:g}"
         )
-    return np.linspace(place[0], place[-1], place.size), dt
+    return place, dt
 
 
 def _remark_on_ends(one: Others, of: str, place: np.ndarray, dt: float) -> None:
@@ -184,11 +180,3 @@ def _remark_on_ends(one: Others, of: str, place: np.ndarray, dt: float) -> None:
             f"The record of the {of} goes on only {beyond:.1f} m beyond the stretch: the 20 Hz "
             f"filter needs {reach:.0f} m, and the force near its end is distorted."
         )
-
-
-def _numbers(table: pd.DataFrame, name: str, column: str) -> np.ndarray:
-    values = pd.to_numeric(table[column], errors="coerce").to_numpy(dtype=float)
-    wrong = np.flatnonzero(~np.isfinite(values))
-    if wrong.size:
-        raise InputError(f'{name} has in row {wrong[0] + 1} of column "{column}" no finite number')
-    return np.asarray(values)
