@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Iterator
+from dataclasses import replace
 
 import matplotlib
 import numpy as np
 from matplotlib.artist import Artist
-from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection, PolyCollection
@@ -16,21 +16,14 @@ from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.figure import Figure
 
 from catenary.meshgen.mesh import DROPPERS
+from catenary.postproc.film import scenery as drawn
 from catenary.postproc.film.projection import EYE, Colours, Picture, Projection, room_above
 from catenary.postproc.film.scenery import (
-    COLOURS,
-    CONTACT,
-    DROPPER_FORCES,
-    FORCES,
     LOOKS,
-    MOTIONS,
     PANTOGRAPHS,
-    SLACK,
-    THICK,
     TRACK,
     TRAIN,
-    UNKNOWN,
-    WIRE,
+    LinePart,
     Places,
     Scenery,
 )
@@ -131,11 +124,11 @@ class Drawing:
         if any(shape.schematic for shape in self._scenery.shapes):
             parts.append("arms are schematic")
         write(_LINE[0], 0.896, ",  ".join(parts), fontsize=14, color="#50555c")
-        self.words = self._text(_LINE[0], 0.925, 17)
+        self.words = write(_LINE[0], 0.925, "", fontsize=17, animated=True)
         _, title, low, high = self._colours
-        bars = [(0.56, MOTIONS, 1e3 * low, 1e3 * high, f"{title} [mm]")]
+        bars = [(0.56, drawn.MOTIONS, 1e3 * low, 1e3 * high, f"{title} [mm]")]
         if strongest is not None and DROPPERS in self._scenery.line:
-            bars.append((0.79, DROPPER_FORCES, 0.0, strongest, "dropper force [N]"))
+            bars.append((0.79, drawn.DROPPER_FORCES, 0.0, strongest, "dropper force [N]"))
         for left, stops, bottom, top, label in bars:
             axes = self.figure.add_axes((left, 0.935, 0.195, 0.016))
             shown = ScalarMappable(Normalize(bottom, top), ramp(stops))
@@ -145,10 +138,7 @@ class Drawing:
             axes.tick_params(labelsize=13, length=4)
             write(left, 0.965, label, fontsize=14)
         if len(bars) > 1:
-            write(0.985, 0.965, "- - -  slack", fontsize=14, color=SLACK, ha="right")
-
-    def _text(self, x: float, y: float, size: float) -> Artist:
-        return self.figure.text(x, y, "", fontsize=size, animated=True)
+            write(0.985, 0.965, "- - -  slack", fontsize=14, color=drawn.SLACK, ha="right")
 
     def _add_lines(self, strongest: float | None) -> None:
         """All that moves, empty, from behind to the front."""
@@ -170,23 +160,23 @@ class Drawing:
             self._still[MASTS].set_linewidths(_USUAL * LOOKS[CLAMPS].thick)
         width = _USUAL * LOOKS[DROPPERS].thick
         self.droppers = lines(
-            linewidths=width, cmap=ramp(DROPPER_FORCES), norm=Normalize(0.0, strongest or 1.0)
+            linewidths=width, cmap=ramp(drawn.DROPPER_FORCES), norm=Normalize(0.0, strongest or 1.0)
         )
-        self.droppers.get_cmap().set_bad(UNKNOWN)
-        self.slack = lines(linewidths=1.3 * width, colors=SLACK, linestyles=(0, (2.5, 2.0)))
+        self.droppers.get_cmap().set_bad(drawn.UNKNOWN)
+        self.slack = lines(linewidths=1.3 * width, colors=drawn.SLACK, linestyles=(0, (2.5, 2.0)))
         self.slack.set_capstyle("butt")
         limits = Normalize(1e3 * self._colours.low, 1e3 * self._colours.high)
-        self.wires = lines(cmap=ramp(MOTIONS), norm=limits)
+        self.wires = lines(cmap=ramp(drawn.MOTIONS), norm=limits)
         about = self._scenery.parts[PANTOGRAPHS].fields
         self.bodies = lines(
-            linewidths=[_USUAL * THICK[kind] for kind in about["kind"].tolist()],
-            colors=[COLOURS[p % len(COLOURS)] for p in about["number"].tolist()],
+            linewidths=[_USUAL * drawn.THICK[kind] for kind in about["kind"].tolist()],
+            colors=[drawn.COLOURS[p % len(drawn.COLOURS)] for p in about["number"].tolist()],
         )
         self._arrows = lines(linewidths=2.0, colors="black")
         self.values = [
             axes.text(
-                0.0, 0.0, "", color=COLOURS[p % len(COLOURS)], fontsize=17, fontweight="bold",
-                ha="left", va="center", clip_on=True, animated=True,
+                0.0, 0.0, "", color=drawn.COLOURS[p % len(drawn.COLOURS)], fontsize=17,
+                fontweight="bold", ha="left", va="center", clip_on=True, animated=True,
                 bbox={"facecolor": "white", "alpha": 0.75, "edgecolor": "none", "pad": 2.0},
             )
             for p in range(self._scenery.data.n_pantographs)
@@ -228,16 +218,16 @@ class Drawing:
         else:
             self._axes.set_xlim(*span)
         wires: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
-        for kind, cells, rest, of in self._parts:
-            by = of.moved(moved)
-            x = rest[cells, 0]
+        for part in self._parts:
+            kind, rest, by = part.kind, part.rest, part.moved(moved)
+            x = rest[part.cells, 0]
             chosen = (x.max(axis=1) >= low) & (x.min(axis=1) <= high)
             if kind == DROPPERS:
                 chosen &= data.gone > data.time[row]
-            ends = cells[chosen]
+            ends = part.cells[chosen]
             lines = self._projection.seen(rest[ends].reshape(-1, 3), by[ends].reshape(-1, 3), eye)
             lines = lines.reshape(-1, 2, 2)
-            if kind in (CONTACT, WIRE):
+            if kind in (drawn.CONTACT, drawn.WIRE):
                 colour = 1e3 * by[ends, self._colours.axis].mean(axis=1)
                 wires.append((lines, colour, np.full(len(lines), _USUAL * LOOKS[kind].thick)))
             elif kind == DROPPERS:
@@ -277,7 +267,7 @@ class Drawing:
             moved[:, 0] *= along
         self.bodies.set_segments(seen(rest, moved, eye)[parts[PANTOGRAPHS].cells])
         arrows = []
-        tops = seen(*beside[FORCES], eye)
+        tops = seen(*beside[drawn.FORCES], eye)
         for force, at, text in zip(data.force[row].tolist(), tops, self.values, strict=True):
             arrow = self._arrow(max(force, 0.0)) + at
             arrows.append(arrow)
@@ -303,7 +293,10 @@ class Drawing:
         """The picture as it stands, (height, width, 4) uint8, valid until the next one."""
         with _styled():
             if self._ground is None:
-                _add_legend(self.chart)
+                self.chart.legend(
+                    loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=4, frameon=False,
+                    borderaxespad=0.1,
+                )  # fmt: skip
                 self._canvas.draw()
                 self._ground = self._canvas.copy_from_bbox(self.figure.bbox)
             self._canvas.restore_region(self._ground)
@@ -318,24 +311,13 @@ def ramp(stops: tuple[str, ...]) -> LinearSegmentedColormap:
     return LinearSegmentedColormap.from_list("ramp", stops)
 
 
-def _add_legend(axes: Axes) -> None:
-    axes.legend(
-        loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=4, frameon=False, borderaxespad=0.1
-    )
-
-
-def _seen_parts(scenery: Scenery, view: View) -> list[tuple]:
-    """Kind, cells, points and motion of the parts of the line that a view shows.
-
-    From the side an arm is a dot before its mast; from above a mast is a line across the track.
-    """
-    found = []
-    for part in scenery.line.values():
-        cells, rest, nodes = part.cells, part.rest, part
-        if part.kind == ARMS and view is View.SIDE:
-            continue
-        if part.kind == MASTS and view is View.PLAN:
-            rest = rest.copy()
-            rest[0::2, 1], rest[1::2, 1] = -_ACROSS, _ACROSS
-        found.append((part.kind, cells, rest, nodes))
+def _seen_parts(scenery: Scenery, view: View) -> list[LinePart]:
+    """Parts of the line that a view shows: from the side an arm is a dot before its mast, and from
+    above a mast is a line across the track."""
+    found = [one for one in scenery.line.values() if one.kind != ARMS or view is not View.SIDE]
+    for number, one in enumerate(found):
+        if one.kind == MASTS and view is View.PLAN:
+            across = np.tile([-_ACROSS, _ACROSS], len(one.cells))
+            rest = np.column_stack([one.rest[:, 0], across, one.rest[:, 2]])
+            found[number] = replace(one, rest=rest)
     return found

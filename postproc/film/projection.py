@@ -22,7 +22,7 @@ _SHARE = 0.4
 _BESIDE, _LEAST, _BEYOND = 1.0, 1.3, 0.6
 # Room above a contact wire without another wire [m].
 _LEAST_ABOVE = 0.8
-# Motions smaller than this are drawn as if they were that large [m].
+# Smaller motions are not seen [m].
 _SMALLEST = 1e-4
 # From the right and above: how far along the track, and up, what is a metre to the left is drawn.
 _DEPTH = 0.25, 0.35
@@ -38,10 +38,6 @@ class Scale:
     size: float
     motion: float
     along: float = 1.0
-
-    def drawn(self, rest: np.ndarray, moved: np.ndarray | float = 0.0) -> np.ndarray:
-        """Height or width in the drawing of what rests at one [m] and has moved [m]."""
-        return np.asarray(self.size * rest + self.motion * moved)
 
 
 @dataclass(frozen=True)
@@ -65,7 +61,7 @@ class Projection:
         eye : place along the track from where it is looked at from behind [m]
         """
         moved = np.broadcast_to(moved, rest.shape)
-        aside, up = (self.scale.drawn(rest[:, axis], moved[:, axis]) for axis in (1, 2))
+        aside, up = (self.scale.size * rest[:, 1:] + self.scale.motion * moved[:, 1:]).T
         along = rest[:, 0] + moved[:, 0]
         if self.view is View.PLAN:
             return np.column_stack([along, aside])
@@ -128,13 +124,17 @@ class Picture:
         Parameters
         ----------
         extremes : (2, 3) of the motion [m], see `Snapshots.extremes`
-        motion : the factor of motions if it is given
+        motion : the factor of motions if it is given; otherwise the largest motion fills a share
+            of the room between the wires, and nothing is drawn larger that hardly moves
         """
         plan = self.view is View.PLAN
         axes = {View.SIDE: [2], View.PLAN: [1]}.get(self.view, [1, 2])
         largest = float(np.abs(extremes[:, axes]).max())
-        between = _BESIDE if plan else room_between(data)
-        return scale_for(self.width, self.high - self.low, self.aspect, between, largest, motion)
+        size = round_down(self.width / self.aspect / (self.high - self.low))
+        if motion is None:
+            wanted = _SHARE * size * (_BESIDE if plan else room_between(data))
+            motion = size if largest < _SMALLEST else max(size, round_down(wanted / largest))
+        return Scale(size, motion, max(1.0, round_down(np.sqrt(size))))
 
     def colours(self, extremes: np.ndarray) -> Colours:
         """What colours show: uplift, from above the motion sideways if there is one."""
@@ -154,32 +154,6 @@ def room_between(data: FilmData) -> float:
 def room_above(data: FilmData) -> float:
     """Height above the contact wire that arrows have, also where nothing hangs there [m]."""
     return max(room_between(data), _LEAST_ABOVE)
-
-
-def scale_for(
-    width_m: float,
-    room_m: float,
-    aspect: float,
-    between_m: float,
-    largest_m: float,
-    motion: float | None = None,
-) -> Scale:
-    """The scale that fills a picture.
-
-    Parameters
-    ----------
-    width_m : length of line in the picture
-    room_m : from the lowest to the highest thing drawn, or from side to side
-    aspect : width of the picture over its height
-    between_m : room that motions are compared with
-    largest_m : motion that is drawn; nothing moves if it is smaller than a tenth of a millimetre
-    motion : the factor of motions if it is given, at least that of heights otherwise
-    """
-    size = round_down(width_m / aspect / room_m)
-    if motion is None:
-        wanted = _SHARE * between_m * size / max(largest_m, _SMALLEST)
-        motion = max(round_down(wanted), size) if largest_m >= _SMALLEST else size
-    return Scale(size, motion, max(1.0, round_down(np.sqrt(size))))
 
 
 def _round_up(value: float) -> float:

@@ -57,19 +57,14 @@ class _Wire:
         """Whether its motion along the track and sideways was recorded."""
         return self.values.ndim == 2
 
-    @property
-    def x(self) -> np.ndarray:
-        """Places of its points along the track [m]."""
-        return self.block.points[:, 0]
-
     def shown(self, number: int) -> tuple[int, int]:
         """Its first point in a snapshot, and the number of points."""
         return int(self.block.first[number]), int(self.block.count[number])
 
-    def motion(self, number: int, first: int, count: int) -> np.ndarray:
-        """Motion of ``count`` points from number ``first`` on in a snapshot, (count, 3) [m]."""
-        begin = int(self.start[number]) + first - int(self.block.first[number])
-        values = np.asarray(self.values[begin : begin + count], dtype=float)
+    def motion(self, number: int) -> np.ndarray:
+        """Motion of the points in a snapshot, (count, 3) [m]."""
+        begin = int(self.start[number])
+        values = np.asarray(self.values[begin : begin + self.shown(number)[1]], dtype=float)
         return values if self.has_vectors else values[:, None] * [0.0, 0.0, 1.0]
 
 
@@ -157,7 +152,7 @@ class Snapshots:
         scalar = all("uplift" in file[name] for name in wires)
         self.field = "uplift" if scalar else "displacement_Z"
         self.has_vectors = all(wire.has_vectors for wire in self._wires.values())
-        shown = sum(w.x.size if w.rests else w.block.count for w in self._wires.values())
+        shown = sum(len(w.block.points) if w.rests else w.block.count for w in self._wires.values())
         self.whole = bool(np.all(shown == self._n_nodes))
 
     def __enter__(self) -> Snapshots:
@@ -176,8 +171,8 @@ class Snapshots:
         """From and to of the wires whose motion a snapshot tells, as far as each reaches [m]."""
         ends = []
         for wire in self._wires.values():
-            first, count = (0, wire.x.size) if wire.rests else wire.shown(number)
-            ends.append(wire.x[[first, first + count - 1]])
+            first, count = (0, len(wire.block.points)) if wire.rests else wire.shown(number)
+            ends.append(wire.block.points[[first, first + count - 1], 0])
         low, high = np.array(ends).reshape(-1, 2).T
         return float(low.min(initial=np.inf)), float(high.max(initial=-np.inf))
 
@@ -267,7 +262,7 @@ class Snapshots:
                 if wire.rests:
                     moved[wire.block.nodes] = 0.0
                 first, count = wire.shown(number)
-                shown = wire.motion(number, first, count)
+                shown = wire.motion(number)
                 moved[wire.block.nodes[first : first + count]] = shown
                 valid = valid and bool(np.isfinite(shown).all())
         except (IndexError, KeyError, OSError, TypeError, ValueError) as error:

@@ -86,14 +86,20 @@ def test_factors_are_round_and_never_larger(value: float, expected: float) -> No
     assert projection.round_down(value) == pytest.approx(expected)
 
 
-def test_a_drawing_lifts_by_the_factor_of_motions() -> None:
-    drawn = projection.Scale(8.0, 60.0).drawn(np.array([5.0, 5.0]), np.array([0.0, 0.05]))
-    np.testing.assert_allclose(drawn, [40.0, 43.0])
+def test_the_largest_uplift_stays_between_the_wires(folder: Path) -> None:
+    with pictures_of(folder, Wish()) as made:
+        scale, data = made.drawing._projection.scale, made._scenery.data
+        largest = made.drawing._colours.high
+    between = projection.room_between(data)
+    assert 0.2 * between * scale.size < scale.motion * largest < 0.5 * between * scale.size
 
 
-def test_the_largest_uplift_stays_between_the_wires() -> None:
-    found = projection.scale_for(110.0, 6.0, 2.5, 1.2, 0.1)
-    assert 0.2 * 1.2 * found.size < found.motion * 0.1 < 0.5 * 1.2 * found.size
+def test_what_does_not_move_is_not_drawn_larger(folder: Path) -> None:
+    with pictures_of(folder, Wish()) as made:
+        picture, data = made.drawing._picture, made._scenery.data
+    found = picture.scale(data, np.zeros((2, 3)), None)
+    assert found.motion == found.size
+    assert picture.scale(data, np.zeros((2, 3)), 70.0).motion == 70.0
 
 
 def test_snapshots_are_those_of_the_fields(folder: Path, make_march: Any) -> None:
@@ -103,11 +109,6 @@ def test_snapshots_are_those_of_the_fields(folder: Path, make_march: Any) -> Non
         np.testing.assert_allclose(snapshots.times, 0.05 * np.arange(21))
         expected = march.wave(0.35, points[:, 0])
         np.testing.assert_allclose(snapshots.uplift(7), expected, atol=1e-8)
-
-
-def test_what_does_not_move_is_not_drawn_larger() -> None:
-    found = projection.scale_for(110.0, 6.0, 2.5, 1.2, 0.0)
-    assert found.motion == found.size
 
 
 def test_each_view_shows_its_two_directions() -> None:
@@ -176,7 +177,7 @@ def test_between_snapshots_the_line_moves_on(
 
 def test_a_point_that_one_snapshot_lacks_is_taken_from_the_nearest(folder: Path) -> None:
     with Snapshots(folder, 10) as snapshots:
-        snapshots._n_nodes = snapshots._wires["contact_wire"].x.size * 2
+        snapshots._n_nodes = len(snapshots._wires["contact_wire"].block.points) * 2
         snapshots._of_this_line = True
         whole = snapshots.frame(0.36).moved
         snapshots._kept.clear()
