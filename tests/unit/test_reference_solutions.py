@@ -193,6 +193,12 @@ def test_a_table_of_statistics_is_judged(tmp_path: Path) -> None:
     assert done.exit_code == 3 and FAILED in done.output
 
 
+def rows(spacing: float) -> str:
+    """Twenty samples of a constant force."""
+    lines = (f"{spacing * (k + 1):g},2" for k in range(20))
+    return "\n".join(["place_m,pantograph_N", *lines, ""])
+
+
 @pytest.mark.parametrize(
     ("content", "of", "sentence"),
     [
@@ -200,11 +206,15 @@ def test_a_table_of_statistics_is_judged(tmp_path: Path) -> None:
         ("place_m,pantograph_N\n1,2\n2,3\n", "ac_simple_275", "did you mean ac_simple_275_"),
         ("place_m,force\n1,2\n2,3\n", ONE, "has no column pantograph_N"),
         ("x,pantograph_N\n1,2\n2,3\n", ONE, "neither a column place_m nor time_s"),
-        ("place_m,pantograph_N\n1,2\n1,3\n", ONE, "equidistant samples in ascending order"),
-        ("place_m,pantograph_N\n1,2\n2,3\n", ONE, "covers 1.0 to 2.0 m"),
-        ("place_m,pantograph_N\n", ONE, "equidistant samples in ascending order"),
-        ("place_m,pantograph_N\n0,2\n2000,3\n", ONE, "has a sample every 2e.03 m"),
-        ("place_m,pantograph_N\n1,2\n2,\n", ONE, 'in row 2 of column "pantograph_N"'),
+        ("place_m,pantograph_N\n" + 20 * "1,2\n", ONE, "equidistant samples in ascending order"),
+        (rows(1.0), ONE, "covers 1.0 to 20.0 m"),
+        ("place_m,pantograph_N\n", ONE, "has 0 rows; at least 20 are needed"),
+        (rows(2000.0), ONE, "has a sample every 2e.03 m"),
+        (
+            "place_m,pantograph_N\n1,2\n2,\n" + 18 * "3,2\n",
+            ONE,
+            'in row 2 of column "pantograph_N"',
+        ),
         ("of,quantity,value\nline,uplift,2\n", ONE, 'has "uplift" of "line"'),
         ("of,quantity,value\nroof,std_N,2\n", ONE, "has figures of pantograph, line"),
         ("of,quantity,value\nline,max_uplift_mm,2\n", None, 'has no column "configuration"'),
