@@ -13,21 +13,21 @@ from catenary.solver.integrators.line_integrator import LineIntegrator
 from catenary.solver.kernels import native
 from catenary.solver.linear.pieces.column_pieces import columns_of
 from catenary.solver.linear.unit_responses import ShortColumns
-from catenary.solver.model.switching_links import LinkArrays, LinkTable, Riders
+from catenary.solver.model.switching_links import Dependents, LinkArrays, LinkTable
 
 
 class Followed(NamedTuple):
     """Links that a rank follows, in the order along the track, as kernels take them: their
     ``numbers`` (n,) in the line, ``links`` (``LinkArrays``) and ``reserve`` (n,) [N], as a free
-    step leaves it; which of them may switch, ``moving`` (2,); their ``riders``, of numbers
-    ``riding`` (m,)."""
+    step leaves it; which of them may switch, ``moving`` (2,); their ``dependents``, of numbers
+    ``dependent_numbers`` (m,)."""
 
     numbers: np.ndarray
     links: LinkArrays
     reserve: np.ndarray
     moving: np.ndarray
-    riders: Riders
-    riding: np.ndarray
+    dependents: Dependents
+    dependent_numbers: np.ndarray
 
 
 class FollowedLinks:
@@ -41,9 +41,9 @@ class FollowedLinks:
     ----------
     table : LinkTable of the whole line
     local : LinkArrays of the whole table, with local unknowns, of which other ranks own some
-    numbers : (n,) numbers in the table of those that may carry, but riders
+    numbers : (n,) numbers in the table of those that may carry, but dependents
     links : LinkArrays of these, with local unknowns
-    riders, riding : of these, and their numbers (m,) in the table
+    dependents, dependent_numbers : of these, and their numbers (m,) in the table
     reserve : (n,) what was found last, here or by a free step of the line [N]
     moving : (2,) first of them that may switch and the one after the last; all, if there is no
         window
@@ -55,13 +55,15 @@ class FollowedLinks:
         self._mine = mine
         unknowns, weights, law = table.arrays
         self.local = LinkArrays(unknowns - line.ownership.first, weights, law.copy())
-        self.numbers = np.flatnonzero(mine & ~table.broken & ~table.rides)
+        self.numbers = np.flatnonzero(mine & ~table.broken & ~table.is_dependent)
         self.links = self.local.of(self.numbers)
-        self.riding = np.flatnonzero(mine & ~table.broken & table.rides)
-        masters = table.master[self.riding]
-        ends = np.append(self.numbers, table.master.size)
-        self.riders = Riders(self.local.of(self.riding), np.searchsorted(masters, ends))
-        self._master = np.searchsorted(self.numbers, masters)
+        self.dependent_numbers = np.flatnonzero(mine & ~table.broken & table.is_dependent)
+        leaders = table.leader[self.dependent_numbers]
+        ends = np.append(self.numbers, table.leader.size)
+        self.dependents = Dependents(
+            self.local.of(self.dependent_numbers), np.searchsorted(leaders, ends)
+        )
+        self._leader = np.searchsorted(self.numbers, leaders)
         self._released = self.links.law["released"].copy()
         self.reserve = np.zeros(self.numbers.size)
         self.moving = np.array([0, self.numbers.size], dtype=np.int64)
@@ -72,15 +74,18 @@ class FollowedLinks:
         """Take the laws (n,) of the links of the whole line, which are the same but for reserves at
         rest. Not collective."""
         self.local.law[:] = law
-        self.links.law[:], self.riders.links.law[:] = law[self.numbers], law[self.riding]
+        self.links.law[:], self.dependents.links.law[:] = (
+            law[self.numbers],
+            law[self.dependent_numbers],
+        )
 
     @property
     def followed(self) -> Followed:
         """The same as kernels take it."""
         links = self.numbers, self.links, self.reserve, self.moving
-        return Followed(*links, self.riders, self.riding)
+        return Followed(*links, self.dependents, self.dependent_numbers)
 
-    def shown(self, component: str) -> tuple[np.ndarray, LinkArrays, Riders]:
+    def shown(self, component: str) -> tuple[np.ndarray, LinkArrays, Dependents]:
         """Numbers among those of its component, and arrays, of all links that this rank owns,
         broken ones included, and what bends of these add to their forces."""
         numbers = self.table.of_component(component)
@@ -88,7 +93,7 @@ class FollowedLinks:
         bends, begin = self.table.bends_of(numbers)
         add = self.local.of(bends)
         add.law["released"] *= self.table.pulls[bends]
-        return self.table.index[numbers], self.local.of(numbers), Riders(add, begin)
+        return self.table.index[numbers], self.local.of(numbers), Dependents(add, begin)
 
     def find_reserve(self) -> np.ndarray:
         """Reserve in the line's present motion [N], shape (n,), overwritten by the next call."""
@@ -101,21 +106,22 @@ class FollowedLinks:
 
     @cached_property
     def _across(self) -> tuple[np.ndarray, Callable[[], None]]:
-        """Reserve of riders, and what finds it."""
-        found = np.zeros(self.riding.size)
+        """Reserve of dependents, and what finds it."""
+        found = np.zeros(self.dependent_numbers.size)
         motion = self._line.motion.read
-        return found, native.reserves.bound(motion, self.riders.links, found)
+        return found, native.reserves.bound(motion, self.dependents.links, found)
 
     def compensation(self) -> np.ndarray:
-        """Compensations of links, then of riders, in the line's present motion [N], (n + m,) (eq.
-        2.7)."""
+        """Compensations of links, then of dependents, in the line's present motion [N], (n + m,).
+
+        By equation (2.7) of the paper."""
         reserve = self.find_reserve()
         own = self._released * np.maximum(0.0, -reserve)
-        if not self.riding.size:
+        if not self.dependent_numbers.size:
             return np.asarray(own)
         across, find = self._across
         find()
-        carries = self.riders.links.law["released"] * (reserve[self._master] < 0.0)
+        carries = self.dependents.links.law["released"] * (reserve[self._leader] < 0.0)
         return np.concatenate([own, -carries * across])
 
     def energy_of_switching(self, displacement: np.ndarray, begin: int, end: int) -> float:
@@ -124,16 +130,16 @@ class FollowedLinks:
 
         ``displacement`` (n_local,) of the line [m]; of the links from ``begin`` to ``end``.
         """
-        links = self.links, self.riders
+        links = self.links, self.dependents
         return float(native.energy_of_switching(displacement, *links, begin, end))
 
     def loads(self, compensation: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
         """Local unknowns and forces of compensations (n,) [N] of all of them, or (n + m,) with
-        riders."""
+        dependents."""
         found = []
         for part, links in zip(
             np.split(compensation, [self.numbers.size]),
-            (self.links, self.riders.links),
+            (self.links, self.dependents.links),
             strict=True,
         ):
             acting = np.flatnonzero(part)
@@ -166,7 +172,7 @@ class LinkCoupling:
         self._followed, table = followed, followed.table
         unknowns, weights, law = table.arrays
         self._per_acceleration = np.zeros(law.size)
-        owned = np.concatenate([followed.numbers, followed.riding])
+        owned = np.concatenate([followed.numbers, followed.dependent_numbers])
         own = law[owned]
         self._per_acceleration[owned] = own["stiffness"] * line.position_factor
         self._per_acceleration[owned] += own["damping"] * line.velocity_factor
@@ -179,7 +185,7 @@ class LinkCoupling:
             band = comm.reduce(band, root=0)
         if band is not None:
             released, slackens = table.arrays.law["released"].copy(), table.slackens
-            behind = np.arange(law.size) - table.master
+            behind = np.arange(law.size) - table.leader
             self.coupled = Coupled(band, released, slackens, behind, np.zeros(law.size))
 
     def _band_of(self, columns: ShortColumns) -> np.ndarray:

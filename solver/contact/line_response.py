@@ -74,8 +74,8 @@ class Coupled(NamedTuple):
     ``band`` (n_links, 2 half + 1): ``band[e, d - e + half]`` is by how much a unit compensation of
     link e takes off the reserve of link d; ``released`` (n_links,) share of what is beyond its
     reserve that a link's compensation is; ``slackens`` (n_links,) whether it is one that slackens,
-    and no stop that closes; ``behind`` (n_links,) of a rider how many numbers its master is before
-    it, 0 of others; ``drop`` (n_links,) room to work, all zero before and after.
+    and no stop that closes; ``behind`` (n_links,) of a dependent how many numbers its leader is
+    before it, 0 of others; ``drop`` (n_links,) room to work, all zero before and after.
     """
 
     band: np.ndarray

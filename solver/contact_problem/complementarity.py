@@ -10,14 +10,14 @@ All forces act through the line's and the pantographs' compliance within the ste
 
 The reserve of a dropper is the tension that it would carry if it pushed, or that of its spring
 alone where dampers of slack droppers are kept in action; a share r of its stiffness may be kept,
-released = 1 - r. Stops and others with a gap, and riders, whose s has any sign while that of their
-master is not zero: `model.switching_links`.
+released = 1 - r. Stops and others with a gap, and dependents, whose s has any sign while that of
+their leader is not zero: `model.switching_links`.
 
 With the law linear, or replaced by its tangent, this is a linear complementarity problem. Its
 matrix is a P-matrix, so that it has one solution, unless the convective part of a contact damper
-outweighs the compliances, or there are riders (docs/theory/one_solve.md). An active-set iteration
-(semismooth Newton) finds it, mostly in one or two rounds; a set that cycles is handed to pivoting,
-and a step without solution ends the run with a sentence. A law that is not linear is linearised
+outweighs the compliances, or there are dependents (docs/theory/one_solve.md). An active-set
+iteration (semismooth Newton) finds it, mostly in one or two rounds; a set that cycles is handed to
+pivoting, and a step without solution ends the run with a sentence. A law that is not linear is linearised
 again at what was found: Newton's method, which for a convex spring comes from one side and cannot
 overshoot.
 """

@@ -17,8 +17,8 @@ class System(NamedTuple):
 
 
 class Signs(NamedTuple):
-    """Of m unknowns: which may have any sign, ``always``; of a rider's how many rows its master's
-    is before it, which it acts with, 0 of others, ``behind``."""
+    """Of m unknowns: which may have any sign, ``always``; of a dependent's how many rows its
+    leader's is before it, which it acts with, 0 of others, ``behind``."""
 
     always: np.ndarray
     behind: np.ndarray

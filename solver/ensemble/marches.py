@@ -21,7 +21,7 @@ from catenary.solver.ensemble.shared_line import N_LANES, Lane, SharedLine
 from catenary.solver.integrators.line_state import Motion
 from catenary.solver.kernels import native
 from catenary.solver.kernels.flush_to_zero import flushed
-from catenary.solver.model.switching_links import NO_LINKS, Riders
+from catenary.solver.model.switching_links import NO_LINKS, Dependents
 from catenary.solver.problem.contact_laws import uses_rate
 from catenary.solver.problem.problem import steps_of
 from catenary.solver.schemes.one_solve import OneSolve
@@ -204,11 +204,11 @@ def _steps(
 
 def _nothing_of_line(motion: Motion) -> Shown:
     """What rows show of the line."""
-    no_riders = Riders(NO_LINKS, np.zeros(1, dtype=np.int64))
+    no_dependents = Dependents(NO_LINKS, np.zeros(1, dtype=np.int64))
     ends = np.array([0, 1])
     columns = Columns(ends, ends, *np.zeros((2, 2, 3), dtype=np.int32))
     none = np.zeros(0, dtype=np.int64)
-    links = NO_LINKS, NO_LINKS, no_riders, no_riders
+    links = NO_LINKS, NO_LINKS, no_dependents, no_dependents
     return Shown(motion, none, *links, np.zeros(0), columns)
 
 

@@ -217,7 +217,7 @@ def _same_links(one: LinkTable, other: LinkTable) -> bool:
             if name != "rest"
         )
         and np.array_equal(one.broken, other.broken)
-        and np.array_equal(one.master, other.master)
+        and np.array_equal(one.leader, other.leader)
         and np.array_equal(one.bent, other.bent)
     )
 

@@ -70,9 +70,9 @@ class Changes(NamedTuple):
 
 
 class PassParts(NamedTuple):
-    """What passes are made of besides layouts; ``make_ups`` as in ``Sections``."""
+    """What passes are made of besides layouts; ``station_types`` as in ``Sections``."""
 
-    make_ups: Sequence[Sequence[int]]
+    station_types: Sequence[Sequence[int]]
     rows: ProductArrays
     factors: FactorArrays
     arrays: PassArrays
@@ -96,7 +96,7 @@ class StationPasses:
     ----------
     native : what takes a step, for loops that take steps themselves
     are_compiled : whether kernels were compiled for what its stations join
-    rows, columns : layouts of each make-up, of rows and of factors, as kernels take them
+    rows, columns : layouts of each station type, of rows and of factors, as kernels take them
     parts : PassParts
     factors : as given
     known : what the motion keeps besides x, y and z, or nothing
@@ -132,7 +132,7 @@ class StationPasses:
         self.columns = columns = [part.native for part in factors.layout.parts]
         self.are_compiled = all(map(native.are_compiled, rows, columns))
         arrays = PassArrays(read, velocity, loads, answer, motion.read, known, predicted)
-        stations = product.stations.make_ups, product.arrays, factors.arrays
+        stations = product.stations.station_types, product.arrays, factors.arrays
         self.parts = PassParts(*stations, arrays, changes)
         self.native = native.TwoPasses(rows, columns, self.parts)
         self.known = known

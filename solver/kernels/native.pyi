@@ -200,10 +200,10 @@ def are_compiled_for_scenes(rows: Layout, factors: Layout) -> bool:
     """Whether this processor has kernels that step several scenes side by side."""
 
 class Products:
-    """Products with rows of K, and C, of stations of each make-up."""
+    """Products with rows of K, and C, of stations of each type."""
 
     def __init__(
-        self, layouts: Sequence[Layout], make_ups: Sequence[Sequence[int]], rows: object
+        self, layouts: Sequence[Layout], station_types: Sequence[Sequence[int]], rows: object
     ) -> None: ...
     def multiply(
         self,
@@ -216,10 +216,10 @@ class Products:
         """Fill in the rows from ``begin`` to ``end`` of ``result``."""
 
 class Solves:
-    """Solves with factors of stations of each make-up."""
+    """Solves with factors of stations of each type."""
 
     def __init__(
-        self, layouts: Sequence[Layout], make_ups: Sequence[Sequence[int]], factors: object
+        self, layouts: Sequence[Layout], station_types: Sequence[Sequence[int]], factors: object
     ) -> None: ...
     def solve(self, right: np.ndarray, answer: np.ndarray) -> None:
         """Fill ``answer``, which may be ``right``."""

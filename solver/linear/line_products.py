@@ -162,8 +162,8 @@ class LineProducts:
         self._stiffness = self._rows_of("stiffness")
         if operator is None or self._stiffness is None:
             return None
-        make_ups = rows.make_ups if rows.varies else ()
-        self.layout = layout_of(operator.blocks, self._stiffness.blocks, make_ups)
+        station_types = rows.station_types if rows.varies else ()
+        self.layout = layout_of(operator.blocks, self._stiffness.blocks, station_types)
         return operator if self.layout is not None else None
 
     @cached_property

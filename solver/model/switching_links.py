@@ -11,8 +11,9 @@ place adds the change of slope times the way there to what the other link goes o
 with L where that pulls, with -L where it pushes, so that s = max(0, -R) of each. A table of slopes
 has as many s as bends, and its link carries the sum.
 
-A *rider* is a link of K that carries while its *master* does: what a dropper's force does across it
-goes with the dropper. Where the master has R < 0, its riders get s = -released R, of any sign.
+A dependent link, *dependent* for short, is a link of K that carries while its leading link, its
+*leader*, does: what a dropper's force does across it goes with the dropper. Where the leader has
+R < 0, its dependents get s = -released R, of any sign.
 """
 
 from __future__ import annotations
@@ -45,9 +46,9 @@ class LinkArrays(NamedTuple):
         return LinkArrays(self.unknowns[which], self.weights[which], self.law[which])
 
 
-class Riders(NamedTuple):
-    """What goes with links that switch: ``links`` of m riders, of which those from ``begin[d]`` to
-    ``begin[d + 1]`` go with link d, ``begin`` (n + 1,)."""
+class Dependents(NamedTuple):
+    """What goes with links that switch: ``links`` of m dependents, of which those from
+    ``begin[d]`` to ``begin[d + 1]`` go with link d, ``begin`` (n + 1,)."""
 
     links: LinkArrays
     begin: np.ndarray
@@ -58,16 +59,16 @@ NO_LINKS = LinkArrays(np.zeros((0, 2), np.int64), np.zeros((0, 2)), np.zeros(0, 
 
 @dataclass(frozen=True)
 class LinkTable:
-    """All links that are followed, the same on every rank, in order of place; riders right behind
-    their master.
+    """All links that are followed, the same on every rank, in order of place; dependents right
+    behind their leader.
 
     Attributes
     ----------
     arrays : LinkArrays, in a number all over the line
     components : names of components
-    component, index : (n,) which of these each is of, -1 for riders and bends, and its
+    component, index : (n,) which of these each is of, -1 for dependents and bends, and its
         number there
-    master : (n,) number of the link that each switches with, for most its own
+    leader : (n,) number of the link that each switches with, for most its own
     bent : (n,) number of the link that each bends, -1 of others and where that is not followed
     pulls : (n,) what a unit compensation of a bend adds to the force of its link, 1 or -1
     broken : (n,) whether it carries nothing any longer
@@ -79,7 +80,7 @@ class LinkTable:
     components: tuple[str, ...]
     component: np.ndarray
     index: np.ndarray
-    master: np.ndarray
+    leader: np.ndarray
     bent: np.ndarray
     pulls: np.ndarray
     broken: np.ndarray
@@ -90,9 +91,9 @@ class LinkTable:
         return bool(self.arrays.law["released"].any())
 
     @property
-    def rides(self) -> np.ndarray:
+    def is_dependent(self) -> np.ndarray:
         """(n,) whether each switches with a link before it."""
-        return np.asarray(self.master != np.arange(self.master.size))
+        return np.asarray(self.leader != np.arange(self.leader.size))
 
     @property
     def slackens(self) -> np.ndarray:
@@ -139,7 +140,7 @@ def switching_links(model: Model, dropper_force: np.ndarray) -> LinkTable:
         broken.append(out)
     sizes = [part.law.size for part in parts]
     own = np.arange(sum(sizes))
-    masters, bent, pulls = [own], [np.full(own.size, -1)], [np.ones(own.size)]
+    leaders, bent, pulls = [own], [np.full(own.size, -1)], [np.ones(own.size)]
     # With which link or bend each dropper slackens.
     slackens = np.zeros(0, dtype=np.int64)
     for links, first in zip(model.links, firsts, strict=True):
@@ -154,15 +155,15 @@ def switching_links(model: Model, dropper_force: np.ndarray) -> LinkTable:
         sign = np.sign(bends.change * bends.side)
         arrays = _bends(links, bends, alpha[bends.link], sign)
         arrays.law["carried"][slack] = 1.0
-        masters.append(sum(part.law.size for part in parts) + np.arange(slack.size))
-        slackens[bends.link[slack]] = masters[-1][slack]
+        leaders.append(sum(part.law.size for part in parts) + np.arange(slack.size))
+        slackens[bends.link[slack]] = leaders[-1][slack]
         parts.append(arrays._replace(weights=arrays.weights * free[arrays.unknowns]))
         bent.append(numbers[bends.link])
         pulls.append(np.where(turned[bends.link], -sign, sign))
         broken.append(np.zeros(slack.size, dtype=bool))
-    for arrays, droppers in _riders(model):
+    for arrays, droppers in _dependents(model):
         parts.append(arrays._replace(weights=arrays.weights * free[arrays.unknowns]))
-        masters.append(slackens[droppers])
+        leaders.append(slackens[droppers])
         bent.append(np.full(droppers.size, -1))
         pulls.append(np.ones(droppers.size))
         broken.append(np.zeros(droppers.size, dtype=bool))
@@ -171,13 +172,13 @@ def switching_links(model: Model, dropper_force: np.ndarray) -> LinkTable:
     m = max(m, 2)
     parts = [padded(part, m) for part in parts]
     arrays = LinkArrays(*(np.concatenate(same) for same in zip(*parts, strict=True)))
-    # By place, then by number; riders stand behind the masters of which they have the number.
-    master = np.concatenate(masters)
-    order = np.lexsort((master, arrays.law["place"]))
+    # By place, then by number; dependents stand behind the leaders of which they have the number.
+    leader = np.concatenate(leaders)
+    order = np.lexsort((leader, arrays.law["place"]))
     place_of = np.empty(order.size, dtype=np.int64)
     place_of[order] = np.arange(order.size)
     distinct = tuple(dict.fromkeys(names))
-    component = np.full(master.size, -1)
+    component = np.full(leader.size, -1)
     component[own] = np.repeat([distinct.index(name) for name in names], sizes)
     index = np.zeros(component.size, dtype=np.int64)
     for number in range(len(distinct)):
@@ -192,7 +193,7 @@ def switching_links(model: Model, dropper_force: np.ndarray) -> LinkTable:
         distinct,
         component[order],
         index[order],
-        place_of[master[order]],
+        place_of[leader[order]],
         np.where(bends_of < 0, -1, place_of[bends_of]),
         np.concatenate(pulls)[order],
         np.concatenate(broken)[order],
@@ -257,7 +258,7 @@ def _bends(links: Links, bends: Bends, alpha: np.ndarray, sign: np.ndarray) -> L
     return LinkArrays(unknowns[bends.link], sign[:, None] * weights[bends.link], law)
 
 
-def _riders(model: Model) -> list[tuple[LinkArrays, np.ndarray]]:
+def _dependents(model: Model) -> list[tuple[LinkArrays, np.ndarray]]:
     """What goes with droppers that may slacken, and numbers of these."""
     found: list[tuple[LinkArrays, np.ndarray]] = []
     if model.droppers is None:

@@ -112,8 +112,8 @@ class WholeSystem:
         table = switching_links(model, form.dropper_force)
         kept = np.flatnonzero(table.arrays.law["released"] > 0.0)
         self._links = table.arrays.of(kept)
-        # Which of them decides on each: riders go with another.
-        self._master = np.searchsorted(kept, table.master[kept])
+        # Which of them decides on each: dependents go with another.
+        self._leader = np.searchsorted(kept, table.leader[kept])
         unknowns, weights, _ = self._links
         m = unknowns.shape[1]
         self._link_at = np.stack(
@@ -200,8 +200,8 @@ class WholeSystem:
         return int((switched & (self._links.law["carried"] > 0.0)).sum())
 
     def _switched(self, reserve: np.ndarray) -> np.ndarray:
-        """Which links have switched, (n_links,) bool: riders with their masters."""
-        return np.asarray(reserve[self._master] < 0.0)
+        """Which links have switched, (n_links,) bool: dependents with their leaders."""
+        return np.asarray(reserve[self._leader] < 0.0)
 
     def place(self, head_height: np.ndarray) -> None:
         """Let bases that rise do so from where heads start, (n_pantographs,) [m]."""

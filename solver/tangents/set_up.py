@@ -185,7 +185,7 @@ def set_up_of(
             "places of nodes": wires.nodes["x"].copy(),
             "places of droppers and other links": laws["place"],
             "which links there are": np.stack(
-                [links.component, links.index, links.master, links.bent]
+                [links.component, links.index, links.leader, links.bent]
             ),
             "which links are taut at rest, or what slack ones keep": np.stack(
                 [laws["released"], laws["carried"], links.broken]

@@ -23,7 +23,7 @@ from catenary.solver.statics.line_at_rest import line_at_rest
 # and a strip answers to the wires that are there. It is measured on the shipped line, which has
 # four such spans of 30, as many of 24 as a tension section of 1.2 km has; the line for tests has
 # four of 14. That of stitched wires, too, is the shipped one: shorter ones have no kernels for runs
-# of stations of one make-up.
+# of stations of one type.
 STITCHED, COMPOUND = "line.stitch_wire=", "line.auxiliary_wire="
 SIMPLE = "line.topology=simple"
 LINES: dict[str, tuple[str, list[str], list[str], float]] = {

@@ -93,10 +93,10 @@ def layout(matrix: sparse.bsr_matrix) -> Layout:
 
 def sections_of(present: np.ndarray) -> Sections:
     """Stations that have the places ``present`` (n_stations, width) of a cross-section."""
-    rows, make_up = np.unique(present, axis=0, return_inverse=True)
-    make_ups = tuple(tuple(map(int, np.flatnonzero(row))) for row in rows)
+    rows, station_type = np.unique(present, axis=0, return_inverse=True)
+    station_types = tuple(tuple(map(int, np.flatnonzero(row))) for row in rows)
     starts = np.concatenate([[0], np.cumsum(present.sum(axis=1))])
-    return Sections(starts, make_up, make_ups, present.shape[1])
+    return Sections(starts, station_type, station_types, present.shape[1])
 
 
 def lacking(matrix: sparse.bsr_matrix, present: np.ndarray) -> sparse.bsr_matrix:

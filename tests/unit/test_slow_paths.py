@@ -95,7 +95,7 @@ def test_estimates_know_the_unknowns_of_stations() -> None:
     assert ratio == pytest.approx(STATION_COST[12])
 
 
-def test_estimates_count_the_stations_of_each_make_up() -> None:
+def test_estimates_count_the_stations_of_each_station_type() -> None:
     elastic = [
         f"line.{wire}.{key}"
         for wire in ("contact_wire", "messenger_wire")

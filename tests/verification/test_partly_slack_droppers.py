@@ -40,17 +40,17 @@ TOLERANCE = 1e-9
 
 @dataclass
 class Step:
-    """Droppers with ``riders`` each: reserves (n,) as if all carried, and what unit compensations
-    (n,) take off them, masters first in each group."""
+    """Droppers with ``dependents`` each: reserves (n,) as if all carried, and what unit
+    compensations (n,) take off them, leaders first in each group."""
 
     reserve: np.ndarray
     coupling: np.ndarray
-    riders: int
+    dependents: int
 
     @property
     def behind(self) -> np.ndarray:
         size = self.reserve.size
-        return np.arange(size) % (self.riders + 1)
+        return np.arange(size) % (self.dependents + 1)
 
     def found(self) -> InnerSolution:
         """What the program finds."""
@@ -76,15 +76,15 @@ class Step:
 
     def sets(self) -> list[np.ndarray]:
         """All sets of slack droppers that fit their own signs, as compensations."""
-        size, masters = self.reserve.size, np.flatnonzero(self.behind == 0)
+        size, leaders = self.reserve.size, np.flatnonzero(self.behind == 0)
         matrix, fitting = np.eye(size) - self.coupling, []
-        for slack in itertools.product([False, True], repeat=masters.size):
-            acts = np.repeat(slack, self.riders + 1)
+        for slack in itertools.product([False, True], repeat=leaders.size):
+            acts = np.repeat(slack, self.dependents + 1)
             x = np.zeros(size)
             x[acts] = np.linalg.solve(matrix[np.ix_(acts, acts)], -self.reserve[acts])
             tension = self.reserve - self.coupling @ x
             if all((x[d] > 0.0) if s else (tension[d] >= 0.0)
-                   for d, s in zip(masters, slack, strict=True)):  # fmt: skip
+                   for d, s in zip(leaders, slack, strict=True)):  # fmt: skip
                 fitting.append(x)
         return fitting
 
@@ -94,7 +94,7 @@ class Step:
         reserve, apart = self.reserve - self.coupling @ slack, 0.0
         for d in np.flatnonzero(self.behind == 0):
             apart = max(apart, abs(slack[d] - max(0.0, -reserve[d])))
-            own = np.arange(d + 1, d + 1 + self.riders)
+            own = np.arange(d + 1, d + 1 + self.dependents)
             if reserve[d] > TOLERANCE:
                 share = 0.0
             elif reserve[d] < -TOLERANCE:
@@ -106,11 +106,11 @@ class Step:
         return apart
 
 
-def random_step(seed: int, droppers: int, riders: int, lean: float) -> Step:
+def random_step(seed: int, droppers: int, dependents: int, lean: float) -> Step:
     """A step of a random line: positive definite without its droppers, whose directions along and
     across are joined by ``lean``."""
     rng = np.random.default_rng(seed)
-    n = droppers * (riders + 1)
+    n = droppers * (dependents + 1)
     size = n + 2
     root = rng.normal(size=(size, size))
     rest = np.eye(size) + lean * root @ root.T
@@ -119,15 +119,15 @@ def random_step(seed: int, droppers: int, riders: int, lean: float) -> Step:
     step = rest + (directions * gains) @ directions.T
     coupling = gains[:, None] * (directions.T @ np.linalg.inv(step) @ directions)
     reserve = rng.normal(size=n)
-    reserve[np.arange(n) % (riders + 1) == 0] *= 0.3
-    return Step(reserve, coupling, riders)
+    reserve[np.arange(n) % (dependents + 1) == 0] *= 0.3
+    return Step(reserve, coupling, dependents)
 
 
 steps = st.builds(
     random_step,
     seed=st.integers(0, 2**32 - 1),
     droppers=st.integers(1, 4),
-    riders=st.sampled_from([1, 2]),
+    dependents=st.sampled_from([1, 2]),
     lean=st.sampled_from([0.0, 0.01, 0.3]),
 )
 
@@ -156,7 +156,7 @@ def test_one_dropper_among_many_has_its_share() -> None:
         few.coupling,
     )
     reserve[few.reserve.size :: 6] = -1.0  # each second one is slack
-    step = Step(reserve, coupling, few.riders)
+    step = Step(reserve, coupling, few.dependents)
     found = step.found()
     assert found.pivoted
     print(f"solves: {found.rounds}")
@@ -165,8 +165,8 @@ def test_one_dropper_among_many_has_its_share() -> None:
 
 
 def test_random_lines_have_none_one_or_two_sets_of_slack_droppers() -> None:
-    """So the matrix with riders is no P-matrix; without riders, or where nothing joins along and
-    across, there is exactly one set."""
+    """So the matrix with dependents is no P-matrix; without dependents, or where nothing joins
+    along and across, there is exactly one set."""
     joined = [len(random_step(seed, 2, 1, 0.3).sets()) for seed in range(400)]
     apart = [len(random_step(seed, 2, 1, 0.0).sets()) for seed in range(400)]
     alone = [len(random_step(seed, 2, 0, 0.3).sets()) for seed in range(400)]
@@ -225,7 +225,7 @@ def test_one_dropper_of_a_line_may_be_neither_taut_nor_slack(dt: float, side: fl
         assert step.violation(slack) < TOLERANCE
         assert pivoted == (expected == 0)
         if expected == 0:
-            # At no tension the rider keeps what takes T to zero: g w_lm Q = T_s.
+            # At no tension the dependent keeps what takes T to zero: g w_lm Q = T_s.
             reserve = step.reserve - step.coupling @ slack
             carried = reserve[1] + slack[1]
             assert carried == pytest.approx(free[0] / (gains[0] * w[0, 1]), rel=1e-6)

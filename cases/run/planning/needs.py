@@ -166,7 +166,9 @@ def needs_with_mesh(scene: Scene, mesh: LineMesh) -> Needs:
     slow_path = slow_path_of(problem, numbering) or single_steps_of(problem)
     extent = extent_of(mesh)
     stations: Counter[int] = Counter()
-    for places, count in zip(numbering.make_ups, np.bincount(numbering.make_up), strict=True):
+    for places, count in zip(
+        numbering.station_types, np.bincount(numbering.station_type), strict=True
+    ):
         stations[len(places)] += int(count)
     return needs_of(scene, problem, extent, numbering.n_unknowns, stations, slow_path)
 

@@ -48,7 +48,7 @@ class RepeatedMarch:
         self._march = March(comm, problem, at_rest.model, at_rest.form, at_rest.lift)
         self.n_unknowns = at_rest.model.numbering.n_unknowns
         self.widths = self._march.station_widths
-        makes = at_rest.model.numbering.make_ups
+        makes = at_rest.model.numbering.station_types
         self.unknowns_of_a_station = min(map(len, makes)), max(map(len, makes))
         kept = _Kept(first)
         outcome = self._march.run([kept])

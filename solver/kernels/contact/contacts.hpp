@@ -37,9 +37,9 @@ struct Followed {
     std::span<const double> reserve;  ///< as a free step leaves it [N]
     std::span<const int64_t>
         moving;  ///< (2,) the first that may switch, and the one after the last
-    Riders riders;
-    std::span<const int64_t> riding;  ///< numbers of the riders
-    CATENARY_RECORD(numbers, links, reserve, moving, riders, riding)
+    Dependents dependents;
+    std::span<const int64_t> dependent_numbers;  ///< numbers of the dependents
+    CATENARY_RECORD(numbers, links, reserve, moving, dependents, dependent_numbers)
 };
 
 /// Columns of A^-1 for compensations of all links of the line: that of link d is of the local

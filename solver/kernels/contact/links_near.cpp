@@ -73,7 +73,8 @@ double least_reserve(int64_t link, const Contacts& contacts, const Bounds& bound
 }  // namespace
 
 int64_t watch(const Contacts& contacts, const Share& share) {
-    const auto& [numbers, links, reserve, moving, riders, riding] = contacts.followed;
+    const auto& [numbers, links, reserve, moving, dependents, dependent_numbers] =
+        contacts.followed;
     const auto laws = links.law;
     const double margin = share.bounds.loss[0], reach = contacts.gains.reach;
     const auto [lowest, highest] = std::ranges::minmax_element(contacts.touches, {}, &Touch::x);
@@ -104,8 +105,9 @@ int64_t watch(const Contacts& contacts, const Share& share) {
         candidate = candidate || least_reserve(d, contacts, share.bounds) < margin;
         if (!candidate) continue;
         put(numbers[d], reserve[d], links, d);
-        for (int64_t r = riders.begin[d]; r < riders.begin[d + 1]; ++r)
-            put(riding[r], reserve_of(r, riders.links, contacts.motion), riders.links, r);
+        for (int64_t r = dependents.begin[d]; r < dependents.begin[d + 1]; ++r)
+            put(dependent_numbers[r], reserve_of(r, dependents.links, contacts.motion),
+                dependents.links, r);
     }
     return count;
 }

@@ -57,9 +57,9 @@ struct Share {
 /// Fill in a rank's share; the motion is that without forces of contacts and of links that switch.
 void respond(const Contacts& contacts, const Share& share);
 
-/// Number of links that may switch within the bounds of a share, riders included; a row each, as
-/// far as they fit, those of riders behind those of their masters. Contacts touch those within
-/// reach. -1 if a reserve is not finite.
+/// Number of links that may switch within the bounds of a share, dependents included; a row each,
+/// as far as they fit, those of dependents behind those of their leaders. Contacts touch those
+/// within reach. -1 if a reserve is not finite.
 int64_t watch(const Contacts& contacts, const Share& share);
 
 }  // namespace catenary

@@ -11,8 +11,8 @@ struct System {
     CATENARY_RECORD(matrix, right, solution)
 };
 
-/// Of m unknowns: which may have any sign; of a rider's how many rows its master's is before it,
-/// which it acts with, 0 of others.
+/// Of m unknowns: which may have any sign; of a dependent's how many rows its leader's is before
+/// it, which it acts with, 0 of others.
 struct Signs {
     std::span<bool> always;
     std::span<int64_t> behind;

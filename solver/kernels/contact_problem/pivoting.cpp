@@ -144,10 +144,10 @@ Pivoted pivot_from(const System& system, const Signs& signs, const Room& room) {
     return {false, most, n_turned, 0};
 }
 
-/// Finds what share of each master's riders is released: all below no tension, none above it.
+/// Finds what share of each leader's dependents is released: all below no tension, none above it.
 ///
 /// With shares given, what is left is a problem with a P-matrix whose solution goes continuously
-/// with them; so there are shares that agree with it. They are sought for the masters that went
+/// with them; so there are shares that agree with it. They are sought for the leaders that went
 /// round in a circle; others keep all or nothing, as the set has it, unless their tension then
 /// disagrees.
 class Shares : public Map {
@@ -163,41 +163,41 @@ class Shares : public Map {
             is_sought_[room_.pivoting.turned[t]] = true;
         int64_t n_sought = 0;
         for (int64_t i = 0; i < n_; ++i) {
-            if (signs_.behind[i] == 1) masters_[n_masters_++] = i - 1;
+            if (signs_.behind[i] == 1) leaders_[n_leaders_++] = i - 1;
             shares_[i] = room_.acts[i] ? 1.0 : 0.0;
             // Near what was right for the shares before.
             room_.acts[i] = signs_.always[i] || system_.solution[i] > 0.0;
             none_[i] = 0;
         }
-        for (int64_t master : masters()) n_sought += is_sought_[master];
+        for (int64_t leader : leaders()) n_sought += is_sought_[leader];
         if (n_sought == 0)
-            for (int64_t master : masters()) is_sought_[master] = true;
+            for (int64_t leader : leaders()) is_sought_[leader] = true;
     }
 
     /// Find them; whether there are such. The solution is that for them.
     bool find() {
         while (true) {
             int64_t n = 0;
-            for (int64_t master : masters())
-                if (is_sought_[master]) place_[n++] = shares_[master];
+            for (int64_t leader : leaders())
+                if (is_sought_[leader]) place_[n++] = shares_[leader];
             const auto place = place_.first(n);
             put_excess();
             n = 0;
-            for (int64_t master : masters())
-                if (is_sought_[master]) place_[n++] -= excess_[master];
+            for (int64_t leader : leaders())
+                if (is_sought_[leader]) place_[n++] -= excess_[leader];
             const bool found =
                 find_zero(*this, place, kFirstGrid, kAgreement, room_.pivoting.path, room_);
             take(place);
             put_excess();
             bool more = false;
-            for (int64_t master : masters()) {
-                const double left = shares_[master] > 0.0 ? excess_[master] : -excess_[master];
-                if (is_sought_[master] || (found && left <= kAgreement)) continue;
-                is_sought_[master] = more = true;
+            for (int64_t leader : leaders()) {
+                const double left = shares_[leader] > 0.0 ? excess_[leader] : -excess_[leader];
+                if (is_sought_[leader] || (found && left <= kAgreement)) continue;
+                is_sought_[leader] = more = true;
             }
             if (!more) return found;
-            for (int64_t master : masters())
-                if (std::isnan(shares_[master])) shares_[master] = 0.0;
+            for (int64_t leader : leaders())
+                if (std::isnan(shares_[leader])) shares_[leader] = 0.0;
         }
     }
     int64_t rounds() const { return rounds_; }
@@ -208,21 +208,21 @@ class Shares : public Map {
         take(place);
         put_excess();
         int64_t n = 0;
-        for (int64_t master : masters())
-            if (is_sought_[master]) {
-                value[n] = excess_[master] + place[n] - shares_[master];
+        for (int64_t leader : leaders())
+            if (is_sought_[leader]) {
+                value[n] = excess_[leader] + place[n] - shares_[leader];
                 ++n;
             }
     }
 
   private:
-    std::span<const int64_t> masters() const { return masters_.first(n_masters_); }
+    std::span<const int64_t> leaders() const { return leaders_.first(n_leaders_); }
     void take(std::span<const double> place) {
         int64_t n = 0;
-        for (int64_t master : masters())
-            if (is_sought_[master]) shares_[master] = std::clamp(place[n++], 0.0, 1.0);
+        for (int64_t leader : leaders())
+            if (is_sought_[leader]) shares_[leader] = std::clamp(place[n++], 0.0, 1.0);
     }
-    /// Fill in the tension of masters where it is above zero, less their compensation where it is
+    /// Fill in the tension of leaders where it is above zero, less their compensation where it is
     /// not; no number where there is none.
     void put_excess() {
         const auto& [matrix, right, solution] = system_;
@@ -239,23 +239,23 @@ class Shares : public Map {
         const Pivoted pivoted = pivot_from({partly, right_, solution}, {free_, none_}, room_);
         rounds_ += pivoted.rounds;
         const bool is_known = pivoted.found && ++looks_ < kMostLooks;
-        for (int64_t master : masters()) {
-            double left = -right[master] - solution[master];
-            for (int64_t j = 0; j < n_; ++j) left += matrix(master, j) * solution[j];
-            excess_[master] = is_known ? left / size_ : std::numeric_limits<double>::quiet_NaN();
+        for (int64_t leader : leaders()) {
+            double left = -right[leader] - solution[leader];
+            for (int64_t j = 0; j < n_; ++j) left += matrix(leader, j) * solution[j];
+            excess_[leader] = is_known ? left / size_ : std::numeric_limits<double>::quiet_NaN();
         }
     }
 
     const System& system_;
     const Signs& signs_;
     const Room& room_;
-    int64_t n_, n_masters_ = 0, rounds_ = 0, looks_ = 0;
+    int64_t n_, n_leaders_ = 0, rounds_ = 0, looks_ = 0;
     double size_;  ///< of right-hand sides
     std::span<double> shares_ = room_.pivoting.numbers[0].first(n_),
                       right_ = room_.pivoting.numbers[1].first(n_),
                       excess_ = room_.pivoting.numbers[2].first(n_),
                       place_ = room_.pivoting.numbers[3].first(n_);
-    std::span<int64_t> masters_ = room_.pivoting.counts[0].first(n_),
+    std::span<int64_t> leaders_ = room_.pivoting.counts[0].first(n_),
                        none_ = room_.pivoting.counts[1].first(n_);
     std::span<bool> is_sought_ = room_.pivoting.marks[1].first(n_),
                     free_ = room_.pivoting.marks[2].first(n_);

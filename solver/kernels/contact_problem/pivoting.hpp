@@ -1,5 +1,6 @@
 #pragma once
-// What finds a step's forces where the active set cycles: pivoting, and riders that carry in part.
+// What finds a step's forces where the active set cycles: pivoting, and dependents that carry in
+// part.
 //
 // Contacts and links alone are a linear complementarity problem with a P-matrix, which pivoting
 // solves. Bends of one link, and a wheel that slips one way or the other, have a row each, of which
@@ -8,10 +9,10 @@
 // law, one at a time, and with a law that rises all over it does not come back to one: with all
 // rows before its own solved for, what it lacks has one sign to either side of where it stays.
 //
-// Nor is the matrix one with riders: what a dropper does across it is whole while it is taut and
-// nothing while it is slack, whatever its tension, so that it jumps where that passes zero. If the
-// jump tightens the dropper that slackens, it is neither taut nor slack. The step then ends with
-// its tension at zero and riders that carry in part (docs/theory/lateral.md).
+// Nor is the matrix one with dependents: what a dropper does across it is whole while it is taut
+// and nothing while it is slack, whatever its tension, so that it jumps where that passes zero. If
+// the jump tightens the dropper that slackens, it is neither taut nor slack. The step then ends
+// with its tension at zero and dependents that carry in part (docs/theory/lateral.md).
 #include "contact_problem/active_set.hpp"
 
 namespace catenary {
@@ -25,8 +26,8 @@ struct Found {
 /// Solve for signs by the active set, and by `pivot` where that does not settle.
 Found find_solution(const System& system, const Signs& signs, int64_t max_rounds, const Room& room);
 
-/// Murty's least-index pivoting: slower, but it cannot cycle for a P-matrix. Riders go with their
-/// masters, in part if there is no other solution. Returns the rounds needed, which are not
+/// Murty's least-index pivoting: slower, but it cannot cycle for a P-matrix. Dependents go with
+/// their leaders, in part if there is no other solution. Returns the rounds needed, which are not
 /// positive if there is no solution.
 int64_t pivot(const System& system, const Signs& signs, const Room& room);
 

@@ -16,7 +16,7 @@ struct Coupled {
                                        ///< unit compensation of link e takes off the reserve of d
     std::span<const double> released;  ///< what of what is beyond its reserve is a compensation
     std::span<const bool> slackens;    ///< whether it slackens, and is no stop that closes
-    std::span<const int64_t> behind;   ///< of a rider how many numbers its master is before it
+    std::span<const int64_t> behind;   ///< of a dependent how many numbers its leader is before it
     std::span<double> drop;            ///< room to work, all zero before and after
     CATENARY_RECORD(band, released, slackens, behind, drop)
 };
@@ -74,7 +74,7 @@ bool subtract(const Affine& heads, const Affine& line, std::span<const double> p
 bool any_switched(const LinkRows& rows, int64_t count, const Coupled& coupled,
                   std::span<const double> force);
 /// Put the rows and columns of the first `count` links beside those of the n contacts, and which of
-/// them are behind a master. `by_depth` and `by_rate` (n,) are what depth and rate are worth.
+/// them are behind a leader. `by_depth` and `by_rate` (n,) are what depth and rate are worth.
 void couple(const LinkRows& rows, int64_t count, const Coupled& coupled,
             std::span<const double> by_depth, std::span<const double> by_rate,
             const Unknowns& unknowns);

@@ -18,8 +18,9 @@ Line line_of(const PassParts& parts) {
         if (!kernels.back())
             throw std::invalid_argument("no kernels take several scenes of these layouts");
     }
-    if (parts.make_ups.size() < kernels.size()) throw std::invalid_argument("a make-up is missing");
-    return Line(std::move(kernels), parts.make_ups, kScenes);
+    if (parts.station_types.size() < kernels.size())
+        throw std::invalid_argument("a station type is missing");
+    return Line(std::move(kernels), parts.station_types, kScenes);
 }
 
 /// Numbers of all scenes, wherever they stand.

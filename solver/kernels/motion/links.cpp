@@ -50,7 +50,7 @@ void forces_within(const Motion& motion, const Links& links, int64_t begin, int6
     });
 }
 
-void add_bends(const Motion& motion, const Riders& bends, int64_t begin, int64_t end,
+void add_bends(const Motion& motion, const Dependents& bends, int64_t begin, int64_t end,
                std::span<double> result) {
     if (bends.links.law.empty()) return;
     for (int64_t link = begin; link < end; ++link)
@@ -60,7 +60,7 @@ void add_bends(const Motion& motion, const Riders& bends, int64_t begin, int64_t
 }
 
 double energy_of_switching(std::span<const double> displacement, const Links& links,
-                           const Riders& riders, int64_t begin, int64_t end) {
+                           const Dependents& dependents, int64_t begin, int64_t end) {
     auto stretch_of = [&](const Links& of, int64_t link) {
         double stretch = 0.0;
         for (int64_t k = 0; k < of.unknowns.columns; ++k)
@@ -74,9 +74,9 @@ double energy_of_switching(std::span<const double> displacement, const Links& li
         const double beyond = std::min(law.rest + law.stiffness * stretch_of(links, link), 0.0);
         energy -= law.released * beyond * beyond / (2.0 * law.stiffness);
         if (!(beyond < 0.0)) continue;
-        for (int64_t r = riders.begin[link]; r < riders.begin[link + 1]; ++r) {
-            const Reserve& own = riders.links.law[r];
-            const double across = stretch_of(riders.links, r);
+        for (int64_t r = dependents.begin[link]; r < dependents.begin[link + 1]; ++r) {
+            const Reserve& own = dependents.links.law[r];
+            const double across = stretch_of(dependents.links, r);
             energy -= 0.5 * own.released * own.stiffness * across * across;
         }
     }

@@ -22,7 +22,7 @@ struct Links {
 };
 
 /// What goes with links: those from begin[d] to begin[d + 1] go with link d.
-struct Riders {
+struct Dependents {
     Links links;
     std::span<const int64_t> begin;
     CATENARY_RECORD(links, begin)
@@ -55,11 +55,11 @@ void forces_within(const Motion& motion, const Links& links, int64_t begin, int6
                    std::span<double> result);
 /// Add what bends of links from `begin` to `end` do beyond them to forces [N]; of a bend that
 /// pushes `released` is below zero.
-void add_bends(const Motion& motion, const Riders& bends, int64_t begin, int64_t end,
+void add_bends(const Motion& motion, const Dependents& bends, int64_t begin, int64_t end,
                std::span<double> result);
 /// What elastic energy lacks where links from `begin` to `end` have switched, and what goes with
 /// them [J], were they springs.
 double energy_of_switching(std::span<const double> displacement, const Links& links,
-                           const Riders& riders, int64_t begin, int64_t end);
+                           const Dependents& dependents, int64_t begin, int64_t end);
 
 }  // namespace catenary

@@ -22,7 +22,7 @@ struct Shown {
     Motion motion;
     std::span<const int64_t> arms;  ///< unknowns of vertical displacement at steady arms
     Links droppers, others;         ///< droppers, and all other links
-    Riders dropper_bends, other_bends;
+    Dependents dropper_bends, other_bends;
     std::span<double> other_force;  ///< room for the forces of the latter [N]
     Columns columns;                ///< of arms, droppers and others
     CATENARY_RECORD(motion, arms, droppers, others, dropper_bends, other_bends, other_force,

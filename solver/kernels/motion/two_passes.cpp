@@ -15,15 +15,16 @@ double* in(std::span<double> numbers) {
 }
 
 Line line_of(const std::vector<std::pair<Layout, Layout>>& layouts,
-             const std::vector<std::vector<int>>& make_ups) {
+             const std::vector<std::vector<int>>& station_types) {
     std::vector<std::unique_ptr<Kernels>> kernels;
     for (const auto& [rows, factors] : layouts) {
         kernels.push_back(kernels_of(rows, factors));
         if (!kernels.back())
             throw std::invalid_argument("no kernels take stations of these layouts");
     }
-    if (make_ups.size() < kernels.size()) throw std::invalid_argument("a make-up is missing");
-    return Line(std::move(kernels), make_ups);
+    if (station_types.size() < kernels.size())
+        throw std::invalid_argument("a station type is missing");
+    return Line(std::move(kernels), station_types);
 }
 
 CATENARY_FOR_TARGETS
@@ -37,7 +38,7 @@ void add_up(std::span<double> result, const double* velocity, const double* late
 }  // namespace
 
 TwoPasses::TwoPasses(PassParts parts)
-    : parts_(std::move(parts)), line_(line_of(parts_.layouts, parts_.make_ups)) {
+    : parts_(std::move(parts)), line_(line_of(parts_.layouts, parts_.station_types)) {
     const PassArrays& arrays = parts_.arrays;
     work_.product = parts_.rows.product();
     work_.product.factor = in(arrays.factor);

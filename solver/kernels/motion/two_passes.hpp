@@ -22,13 +22,13 @@ struct PassArrays {
 
 /// A line of stations with what steps of it are made of.
 struct PassParts {
-    std::vector<std::pair<Layout, Layout>> layouts;  ///< of rows and factors, for each make-up
-    std::vector<std::vector<int>> make_ups;          ///< see `Line`
+    std::vector<std::pair<Layout, Layout>> layouts;  ///< of rows and factors, for each station type
+    std::vector<std::vector<int>> station_types;     ///< see `Line`
     ProductArrays rows;
     FactorArrays factors;
     PassArrays arrays;
     Changes changes;
-    CATENARY_RECORD(layouts, make_ups, rows, factors, arrays, changes)
+    CATENARY_RECORD(layouts, station_types, rows, factors, arrays, changes)
 };
 
 /// Links that are looked at on the way back, which is taken in stretches of so many pairs of

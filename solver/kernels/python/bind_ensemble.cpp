@@ -13,7 +13,7 @@ PassParts parts_of(const std::vector<Layout>& rows, const std::vector<Layout>& f
     };
     PassParts found;
     for (size_t k = 0; k < rows.size(); ++k) found.layouts.emplace_back(rows[k], factors.at(k));
-    convert("make_ups", found.make_ups);
+    convert("station_types", found.station_types);
     convert("rows", found.rows);
     convert("factors", found.factors);
     convert("arrays", found.arrays);

@@ -70,20 +70,20 @@ std::unique_ptr<Kernels> there(std::unique_ptr<Kernels> kernels) {
     return kernels;
 }
 
-/// A line with kernels for every make-up, of `n` of which there are layouts.
+/// A line with kernels for every station type, of `n` of which there are layouts.
 template <class KernelsOf>
-Line line_of(size_t n, const MakeUps& make_ups, KernelsOf kernels_of_make_up) {
+Line line_of(size_t n, const MakeUps& station_types, KernelsOf kernels_of_type) {
     std::vector<std::unique_ptr<Kernels>> kernels;
-    for (size_t k = 0; k < n; ++k) kernels.push_back(there(kernels_of_make_up(k)));
-    if (make_ups.size() < n) throw py::value_error("a make-up is missing");
-    return Line(std::move(kernels), make_ups);
+    for (size_t k = 0; k < n; ++k) kernels.push_back(there(kernels_of_type(k)));
+    if (station_types.size() < n) throw py::value_error("a station type is missing");
+    return Line(std::move(kernels), station_types);
 }
 
 /// Products with rows of K, and -C.
 class Products {
   public:
-    Products(const Layouts& layouts, const MakeUps& make_ups, const py::object& rows)
-        : line_(line_of(layouts.size(), make_ups,
+    Products(const Layouts& layouts, const MakeUps& station_types, const py::object& rows)
+        : line_(line_of(layouts.size(), station_types,
                         [&](size_t k) { return kernels_of_rows(layouts[k]); })),
           rows_(From<ProductArrays>::convert(rows, "rows", kept_)) {
         work_.product = rows_.product();
@@ -93,7 +93,7 @@ class Products {
             const auto starts = rows_.sections.starts.subspan(first, n);
             starts_.assign(starts.begin(), starts.end());
             for (auto& start : starts_) start -= starts[0];
-            work_.factored.places = {starts_.data(), &rows_.sections.make_up[first]};
+            work_.factored.places = {starts_.data(), &rows_.sections.station_type[first]};
         }
         line_.set_runs(work_, n, 0);
     }
@@ -117,8 +117,8 @@ class Products {
 /// Solves with factors.
 class Solves {
   public:
-    Solves(const Layouts& layouts, const MakeUps& make_ups, const py::object& factors)
-        : line_(line_of(layouts.size(), make_ups,
+    Solves(const Layouts& layouts, const MakeUps& station_types, const py::object& factors)
+        : line_(line_of(layouts.size(), station_types,
                         [&](size_t k) { return kernels_of_factors(layouts[k]); })),
           factors_(From<FactorArrays>::convert(factors, "factors", kept_)) {
         work_.factored = factors_.factored();
@@ -150,7 +150,7 @@ class HeldPasses : public TwoPasses {
         };
         PassParts found;
         for (size_t k = 0; k < rows.size(); ++k) found.layouts.emplace_back(rows[k], factors.at(k));
-        convert("make_ups", found.make_ups);
+        convert("station_types", found.station_types);
         convert("rows", found.rows);
         convert("factors", found.factors);
         convert("arrays", found.arrays);

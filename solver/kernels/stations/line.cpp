@@ -5,16 +5,16 @@
 
 namespace catenary {
 
-Line::Line(std::vector<std::unique_ptr<Kernels>> kernels, std::vector<std::vector<int>> make_ups,
-           int scenes)
-    : kernels_(std::move(kernels)), make_ups_(std::move(make_ups)), scenes_(scenes) {
-    const size_t n = make_ups_.size();
+Line::Line(std::vector<std::unique_ptr<Kernels>> kernels,
+           std::vector<std::vector<int>> station_types, int scenes)
+    : kernels_(std::move(kernels)), station_types_(std::move(station_types)), scenes_(scenes) {
+    const size_t n = station_types_.size();
     place_.assign(n * n * kMostUnknowns, -1);
     for (size_t from = 0; from < n; ++from)
         for (size_t to = 0; to < n; ++to)
-            for (size_t u = 0; u < make_ups_[to].size(); ++u) {
-                const auto& there = make_ups_[from];
-                const auto found = std::find(there.begin(), there.end(), make_ups_[to][u]);
+            for (size_t u = 0; u < station_types_[to].size(); ++u) {
+                const auto& there = station_types_[from];
+                const auto found = std::find(there.begin(), there.end(), station_types_[to][u]);
                 if (found != there.end())
                     place_[(from * n + to) * kMostUnknowns + u] =
                         static_cast<int8_t>(found - there.begin());
@@ -26,7 +26,7 @@ void Line::set_runs(const Work& work, int64_t n, int64_t low) {
     run_number_.clear();
     const Places &solved = work.factored.places, &read = work.product.places;
     const int64_t first = work.product.first;
-    if (!solved.make_up) {
+    if (!solved.station_type) {
         const int64_t pitch = kernels_[0]->rows.unknowns * scenes_;
         // There is one station more to be read at both ends.
         runs_.push_back({-1, n + 1, pitch * first, 0, -pitch * low});
@@ -34,9 +34,9 @@ void Line::set_runs(const Work& work, int64_t n, int64_t low) {
     }
     run_number_.resize(n);
     for (int64_t begin = 0, end; begin < n; begin = end) {
-        for (end = begin; end < n && solved.make_up[end] == solved.make_up[begin]; ++end)
+        for (end = begin; end < n && solved.station_type[end] == solved.station_type[begin]; ++end)
             run_number_[end] = static_cast<int32_t>(runs_.size());
-        const int64_t before = kernels_[solved.make_up[begin]]->rows.unknowns * begin;
+        const int64_t before = kernels_[solved.station_type[begin]]->rows.unknowns * begin;
         const int64_t here = solved.starts[begin] - before;
         const int64_t by_read = read.starts ? read.starts[first + begin] - before : 0;
         const int64_t own = here - solved.starts[low];
@@ -47,22 +47,23 @@ void Line::set_runs(const Work& work, int64_t n, int64_t low) {
 void Line::convert(int from, int to, Station& station) const {
     if (from == to) return;
     const Station given = station;
-    const int8_t* place = &place_[(from * make_ups_.size() + to) * kMostUnknowns];
+    const int8_t* place = &place_[(from * station_types_.size() + to) * kMostUnknowns];
     double* unknown = station.unknowns;
-    for (size_t u = 0; u < make_ups_[to].size(); ++u)
+    for (size_t u = 0; u < station_types_[to].size(); ++u)
         for (int s = 0; s < scenes_; ++s)
             *unknown++ = place[u] < 0 ? 0.0 : given.unknowns[place[u] * scenes_ + s];
 }
 
-/// Fill in a station in the order of another make-up.
-void Line::outside(const Work& work, int64_t station, int make_up, Outside& found) const {
+/// Fill in a station in the order of another station type.
+void Line::outside(const Work& work, int64_t station, int station_type, Outside& found) const {
     const Product& product = work.product;
     const int64_t at = product.first + station;
     const int8_t* place =
-        &place_[(product.places.make_up[at] * make_ups_.size() + make_up) * kMostUnknowns];
+        &place_[(product.places.station_type[at] * station_types_.size() + station_type) *
+                kMostUnknowns];
     const double* position = product.factor + product.places.starts[at] * scenes_;
     const double* velocity = product.velocity + product.places.starts[at] * scenes_;
-    for (int u = 0, to = 0; u < static_cast<int>(make_ups_[make_up].size()); ++u)
+    for (int u = 0, to = 0; u < static_cast<int>(station_types_[station_type].size()); ++u)
         for (int s = 0; s < scenes_; ++s, ++to) {
             const int from = place[u] * scenes_ + s;
             found.position[to] = place[u] < 0 ? 0.0 : position[from];
@@ -70,15 +71,15 @@ void Line::outside(const Work& work, int64_t station, int make_up, Outside& foun
         }
 }
 
-/// Find what products need of the stations beside a chain, where these are of other make-ups.
-void Line::look_outside(const Work& work, Chain& chain, int make_up, int step) const {
+/// Find what products need of the stations beside a chain, where these are of other station types.
+void Line::look_outside(const Work& work, Chain& chain, int station_type, int step) const {
     const Run& run = *chain.run;
     if (work.right) return;
     const int64_t before = chain.first - step, after = chain.first + step * chain.n;
     chain.has_before = before < run.begin || before >= run.end;
     chain.has_after = after < run.begin || after >= run.end;
-    if (chain.has_before) outside(work, before, make_up, chain.before);
-    if (chain.has_after) outside(work, after, make_up, chain.after);
+    if (chain.has_before) outside(work, before, station_type, chain.before);
+    if (chain.has_after) outside(work, after, station_type, chain.after);
 }
 
 void Line::multiply(const Work& work, int64_t begin, int64_t end, double* result) const {
@@ -87,16 +88,16 @@ void Line::multiply(const Work& work, int64_t begin, int64_t end, double* result
         chain.run = &run_of(i);
         chain.first = i;
         chain.n = std::min(end, chain.run->end) - i;
-        look_outside(work, chain, make_up(work, i), 1);
-        kernels_[make_up(work, i)]->multiply(work, chain, result + chain.run->solved);
+        look_outside(work, chain, station_type(work, i), 1);
+        kernels_[station_type(work, i)]->multiply(work, chain, result + chain.run->solved);
     }
 }
 
 /// One of two chains: how far it is, and what it has of the station before.
 struct Line::Way {
-    int step;            ///< 1 towards the end of the line, -1 towards its start
-    int64_t next, left;  ///< next station, and how many are left
-    int make_up = 0;     ///< that `beside` has the order of
+    int step;              ///< 1 towards the end of the line, -1 towards its start
+    int64_t next, left;    ///< next station, and how many are left
+    int station_type = 0;  ///< that `beside` has the order of
     Station beside{};
     Chain chain{};
 };
@@ -115,13 +116,13 @@ void Line::begin(Way& way, int64_t n) const {
 void Line::take(const Work& work, bool forth, Way& one, Way* other) const {
     for (Way* way : {&one, other}) {
         if (!way) continue;
-        const int here = make_up(work, way->next);
-        convert(way->make_up, here, way->beside);
-        way->make_up = here;
+        const int here = station_type(work, way->next);
+        convert(way->station_type, here, way->beside);
+        way->station_type = here;
         way->chain.beside = &way->beside;
         if (forth) look_outside(work, way->chain, here, way->step);
     }
-    const Kernels& kernels = *kernels_[one.make_up];
+    const Kernels& kernels = *kernels_[one.station_type];
     if (other)
         forth ? kernels.forth(work, one.chain, other->chain)
               : kernels.back(work, one.chain, other->chain);
@@ -139,7 +140,7 @@ void Line::take(const Work& work, bool forth, Way& one, Way* other) const {
 void Line::go_on(const Work& work, bool forth, Way& a, Way& b, int64_t n) const {
     begin(a, n);
     begin(b, n);
-    if (a.left > 0 && b.left > 0 && alike(make_up(work, a.next), make_up(work, b.next))) {
+    if (a.left > 0 && b.left > 0 && alike(station_type(work, a.next), station_type(work, b.next))) {
         a.chain.n = b.chain.n = std::min(a.chain.n, b.chain.n);
         take(work, forth, a, &b);
     } else if (b.left == 0 || (a.left > 0 && a.chain.n <= b.chain.n)) {
@@ -156,19 +157,19 @@ bool Line::alike(int one, int other) const {
 
 /// Eliminate from both ends, and solve for the station where both chains meet.
 Station Line::forth(const Work& work, int64_t begin, int64_t end, int64_t middle) const {
-    Way a{1, begin, middle - begin + 1, make_up(work, begin)};
-    Way b{-1, end - 1, end - 1 - middle, make_up(work, end - 1)};
+    Way a{1, begin, middle - begin + 1, station_type(work, begin)};
+    Way b{-1, end - 1, end - 1 - middle, station_type(work, end - 1)};
     while (a.left + b.left > 0) go_on(work, true, a, b, end - begin);
-    const int here = make_up(work, middle);
-    convert(b.make_up, here, b.beside);
+    const int here = station_type(work, middle);
+    convert(b.station_type, here, b.beside);
     kernels_[here]->meet(work, run_of(middle), middle, b.beside);
     return b.beside;
 }
 
 void Line::solve(const Work& work, int64_t n, int64_t middle) const {
     const Station met = forth(work, 0, n, middle);
-    Way a{-1, middle - 1, middle, make_up(work, middle), met};
-    Way b{1, middle + 1, n - 1 - middle, make_up(work, middle), met};
+    Way a{-1, middle - 1, middle, station_type(work, middle), met};
+    Way b{1, middle + 1, n - 1 - middle, station_type(work, middle), met};
     while (a.left + b.left > 0) go_on(work, false, a, b, n);
 }
 
@@ -177,8 +178,8 @@ void Line::step(const Work& work, const Ends& ends, int64_t stretch, Around& aro
     // They may have been moved.
     const auto [begin, end, low, high, middle] = ends;
     const Station met = forth(work, begin, end, middle);
-    Way a{-1, middle - 1, middle - low, make_up(work, middle), met};
-    Way b{1, middle + 1, high - 1 - middle, make_up(work, middle), met};
+    Way a{-1, middle - 1, middle - low, station_type(work, middle), met};
+    Way b{1, middle + 1, high - 1 - middle, station_type(work, middle), met};
     const int64_t pairs = std::min(a.left, b.left);
     int64_t followed = 0;
     while (a.left + b.left > 0) {

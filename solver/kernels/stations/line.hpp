@@ -28,10 +28,10 @@ struct Table {
     const double* at(int64_t station) const { return numbers + begins[station]; }
 };
 
-/// Where stations begin in vectors, and of which make-up each is; none if all are alike.
+/// Where stations begin in vectors, and of which station type each is; none if all are alike.
 struct Places {
     const int64_t* starts = nullptr;
-    const uint8_t* make_up = nullptr;
+    const uint8_t* station_type = nullptr;
 };
 
 /// What products read. Station i of the line is `first` + i of `places`.
@@ -68,11 +68,11 @@ struct StationMotion {
     Changes changes{};
 };
 
-/// Stations of one make-up beside each other, at equal distances in vectors.
+/// Stations of one type beside each other, at equal distances in vectors.
 struct Run {
     int64_t begin = 0, end = 0;
-    /// Where station 0 would be if all had this make-up: in what products read, in what is solved
-    /// for, in the motion.
+    /// Where station 0 would be if all had this station type: in what products read, in what is
+    /// solved for, in the motion.
     int64_t read = 0, solved = 0, own = 0;
 };
 
@@ -86,11 +86,11 @@ struct Work {
     StationMotion motion;
 };
 
-/// Unknowns of a station in the order of its make-up, each in all scenes.
+/// Unknowns of a station in the order of its station type, each in all scenes.
 struct Station {
     double unknowns[kMostNumbers];
 };
-/// Displacement and velocity of a station outside of a run, in the order of the run's make-up.
+/// Displacement and velocity of a station outside of a run, in the order of the run's station type.
 struct Outside {
     double position[kMostNumbers], velocity[kMostNumbers];
 };
@@ -100,10 +100,10 @@ struct Chain {
     int64_t first, n;
     Outside before, after;  ///< of the stations beside it, as far as they are outside of the run
     bool has_before = false, has_after = false;
-    Station* beside;  ///< of the station before: in and out, in the order of the run's make-up
+    Station* beside;  ///< of the station before: in and out, in the order of the run's station type
 };
 
-/// Kernels of the stations of one make-up.
+/// Kernels of the stations of one type.
 class Kernels {
   public:
     virtual ~Kernels() = default;
@@ -143,13 +143,13 @@ class Around {
     virtual void after_stretch() = 0;
 };
 
-/// A line whose stations are of one or of several make-ups.
+/// A line whose stations are of one or of several station types.
 class Line {
   public:
-    /// `make_ups`: places in a cross-section of the stations of each make-up, of which the first
-    /// `kernels.size()` have kernels; one that has all places if stations are alike. Numbers of
-    /// each unknown in `scenes` scenes follow each other.
-    Line(std::vector<std::unique_ptr<Kernels>> kernels, std::vector<std::vector<int>> make_ups,
+    /// `station_types`: places in a cross-section of the stations of each type, of which
+    /// the first `kernels.size()` have kernels; one that has all places if stations are alike.
+    /// Numbers of each unknown in `scenes` scenes follow each other.
+    Line(std::vector<std::unique_ptr<Kernels>> kernels, std::vector<std::vector<int>> station_types,
          int scenes = 1);
 
     /// Find the runs of stations that are solved for, n in all, of which motion begins at `low`.
@@ -163,24 +163,25 @@ class Line {
     const Run& run_of(int64_t station) const {
         return runs_[run_number_.empty() ? 0 : run_number_[station]];
     }
-    int make_up(const Work& work, int64_t station) const {
-        const uint8_t* of = work.factored.places.make_up;
+    int station_type(const Work& work, int64_t station) const {
+        const uint8_t* of = work.factored.places.station_type;
         return of ? of[station] : 0;
     }
     struct Way;
     bool alike(int one, int other) const;
     void convert(int from, int to, Station&) const;
-    void outside(const Work&, int64_t station, int make_up, Outside&) const;
-    void look_outside(const Work&, Chain&, int make_up, int step) const;
+    void outside(const Work&, int64_t station, int station_type, Outside&) const;
+    void look_outside(const Work&, Chain&, int station_type, int step) const;
     void begin(Way&, int64_t n) const;
     void take(const Work&, bool forth, Way& one, Way* other) const;
     void go_on(const Work&, bool forth, Way& a, Way& b, int64_t n) const;
     Station forth(const Work&, int64_t begin, int64_t end, int64_t middle) const;
 
     std::vector<std::unique_ptr<Kernels>> kernels_;
-    std::vector<std::vector<int>> make_ups_;
+    std::vector<std::vector<int>> station_types_;
     int scenes_;
-    std::vector<int8_t> place_;  ///< of each unknown of a make-up in another, -1 if it has none
+    std::vector<int8_t>
+        place_;  ///< of each unknown of a station type in another, -1 if it has none
     std::vector<Run> runs_;
     std::vector<int32_t> run_number_;
 };

@@ -6,14 +6,14 @@
 
 namespace catenary {
 
-/// Where stations begin in vectors, and of which make-up each is; both empty if all are alike.
+/// Where stations begin in vectors, and of which station type each is; both empty if all are alike.
 struct Sections {
     std::span<const int64_t> starts;
-    std::span<const uint8_t> make_up;
-    CATENARY_RECORD(starts, make_up)
+    std::span<const uint8_t> station_type;
+    CATENARY_RECORD(starts, station_type)
 
     Places places() const {
-        return starts.empty() ? Places{} : Places{starts.data(), make_up.data()};
+        return starts.empty() ? Places{} : Places{starts.data(), station_type.data()};
     }
 };
 

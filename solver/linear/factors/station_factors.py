@@ -25,7 +25,7 @@ from catenary.solver.linear.factors.meeting_station import (
 )
 from catenary.solver.linear.stations.sections import Places, Sections
 from catenary.solver.linear.stations.station_layout import Layout
-from catenary.solver.linear.stations.station_products import kinds_by_make_up, of_pairs
+from catenary.solver.linear.stations.station_products import kinds_by_type, of_pairs
 from catenary.solver.linear.stations.station_rows import StationRows, rows_of
 
 
@@ -48,7 +48,7 @@ class StationFactors:
     ----------
     layout : Layout
     starts : (n + 1,) first unknown of each station, and how many unknowns there are
-    kinds : (n,) of the stations, see ``kinds_by_make_up``
+    kinds : (n,) of the stations, see ``kinds_by_type``
     blocks : of each kind half of S^-1, with S the diagonal block after elimination, and, unless the
         layout is sparse, -B^T S^-1, with B the block towards the middle; packed by the layout
     beside_kinds, besides : kinds of the matrix's own blocks between stations, and of each kind
@@ -89,7 +89,7 @@ class StationFactors:
     @cached_property
     def _solves(self) -> native.Solves:
         layouts = [part.native for part in self.layout.parts]
-        return native.Solves(layouts, self.stations.make_ups, self.arrays)
+        return native.Solves(layouts, self.stations.station_types, self.arrays)
 
     def solve(self, right: np.ndarray, answer: np.ndarray) -> None:
         """Make ``answer`` that to ``right``, of all unknowns, perhaps the same array."""
@@ -118,7 +118,7 @@ def station_factors(
     """Factors of a positive definite matrix in sorted blocks, or of its rows by stations.
 
     It is eliminated towards the middle of the stations from ``low`` to ``high``, all by default.
-    ``stations`` may be of several make-ups. The middle may be moved if it ``turns``.
+    ``stations`` may be of several station types. The middle may be moved if it ``turns``.
 
     None if it is not block tridiagonal by stations, or if a station is joined to unknowns of one
     beside it that it lacks itself. A matrix that is not positive definite gives
@@ -136,8 +136,8 @@ def station_factors(
     if besides is None:
         return None
     found = FoundFactors.of(rows, None if turns else (low + high) // 2)
-    make_up = stations.make_up[rows.chosen][found.kinds]
-    kinds, numbers, n_kinds = packed_factors(layout, make_up, found)
+    station_type = stations.station_type[rows.chosen][found.kinds]
+    kinds, numbers, n_kinds = packed_factors(layout, station_type, found)
     of_station = kinds[found.numbers]
     if not turns:
         return StationFactors(layout, stations, of_station, numbers, low, high, n_kinds, besides)
@@ -158,7 +158,7 @@ def layout_of_factors(layout: Layout, blocks: np.ndarray) -> Layout:
     """
     joined = (blocks[0] != 0).any(axis=0) | (blocks[2] != 0).any(axis=0)
     joined |= of_pairs(layout.pitch)
-    return Layout(layout.widths, beside=joined, make_ups=layout.make_ups, factors=True)
+    return Layout(layout.widths, beside=joined, station_types=layout.station_types, factors=True)
 
 
 def completed(rows: StationRows, stations: Sections) -> StationRows:
@@ -181,17 +181,17 @@ def packed_blocks(layout: Layout, factors: np.ndarray) -> np.ndarray:
 
 
 def packed_factors(
-    layout: Layout, make_up: np.ndarray, found: FoundFactors
+    layout: Layout, station_type: np.ndarray, found: FoundFactors
 ) -> tuple[np.ndarray, np.ndarray, int]:
-    """Kinds of factors, their numbers and how many there are; see ``kinds_by_make_up``.
+    """Kinds of factors, their numbers and how many there are; see ``kinds_by_type``.
 
-    ``make_up`` (m,) is that of each factor.
+    ``station_type`` (m,) is that of each factor.
     """
 
     def pack(part: Layout, rows: slice | np.ndarray) -> np.ndarray:
         return packed_blocks(part, found.factors[rows])
 
-    return kinds_by_make_up(layout, make_up, pack)[:3]
+    return kinds_by_type(layout, station_type, pack)[:3]
 
 
 def besides_of(
@@ -204,7 +204,7 @@ def besides_of(
         packed = [part.packed(-rows.blocks[place][chosen], "beside") for place in (0, 2)]
         return np.concatenate(packed, axis=1)
 
-    kinds, numbers, _, count = kinds_by_make_up(layout, stations.make_up[rows.chosen], pack)
+    kinds, numbers, _, count = kinds_by_type(layout, stations.station_type[rows.chosen], pack)
     joined = np.count_nonzero(rows.blocks[0]) + np.count_nonzero(rows.blocks[2])
     return (kinds[rows.kinds], numbers) if count == joined else None
 

@@ -81,8 +81,8 @@ class FactorPieces:
         found = FoundFactors(found.factors[used], found.kinds[used], place)
         if not np.isfinite(found.factors).all():
             raise RunBroken("the step operator cannot be factored: it is singular or not finite")
-        make_up = stations.make_up[whole.chosen][found.kinds]
-        kinds, packed, _ = packed_factors(self._layout, make_up, found)
+        station_type = stations.station_type[whole.chosen][found.kinds]
+        kinds, packed, _ = packed_factors(self._layout, station_type, found)
         kinds, size = kinds[place] + self._blocks.put(piece.slot, packed), piece.end - piece.begin
         begin, end, turning = piece.begin, piece.end, self._turning
         turning.to_end[begin:end], turning.to_start[begin:end] = kinds[: 2 * size].reshape(2, -1)

@@ -119,7 +119,7 @@ class OperatorPieces:
         sums = [of for _, _, *both in self._products for of in both if of is not None]
         operator, *found = rows.operator_and(self._coefficients, sums)
         self.factors.make(piece, operator)
-        part, made = self._stations.make_up[piece.begin : piece.end], iter(found)
+        part, made = self._stations.station_type[piece.begin : piece.end], iter(found)
         for table, product, _, damping in self._products:
             own = next(made).part(piece.own)
             damped = None if damping is None else next(made).part(piece.own)
@@ -169,9 +169,9 @@ def layouts_of(
     if joined is None:
         return None
     operator, stiffness, mass = joined
-    make_ups = stations.make_ups if stations.varies else ()
+    station_types = stations.station_types if stations.varies else ()
     # Products with M, for energies, are of the same layout.
-    layout = layout_of(operator, stiffness | mass, make_ups)
+    layout = layout_of(operator, stiffness | mass, station_types)
     if layout is None:
         return None
     piece = pieces.first()

@@ -138,7 +138,7 @@ class Slots:
     ----------
     n_slots : of the table
     room : kinds that a slot has room for
-    widths : numbers of a kind of each make-up
+    widths : numbers of a kind of each station type
     """
 
     def __init__(self, n_slots: int, room: int, widths: tuple[int, ...]) -> None:

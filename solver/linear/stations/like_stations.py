@@ -51,7 +51,7 @@ class LikeStations:
         # What tells unknowns of a station from each other: their place in it, and whether one is
         # held.
         name = (2 * (np.arange(low, high) - starts[station]) + held).astype(np.uint64)
-        self.marks = _mixed(numbering.make_up[first:last].astype(np.uint64))
+        self.marks = _mixed(numbering.station_type[first:last].astype(np.uint64))
         self.marks += _sums(station[constrained], _mixed(name[constrained]), n)
         for number, block in enumerate(model.blocks):
             dofs, kind, table = _elements_between(block, low, high)

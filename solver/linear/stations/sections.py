@@ -21,11 +21,11 @@ class Places(NamedTuple):
     Attributes
     ----------
     starts : (n,) first unknown of each
-    make_up : (n,) of each
+    station_type : (n,) of each
     """
 
     starts: np.ndarray
-    make_up: np.ndarray
+    station_type: np.ndarray
 
 
 ALIKE = Places(np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.uint8))
@@ -38,65 +38,67 @@ class Sections:
     Attributes
     ----------
     starts : (n + 1,) first unknown of each, counted from the first station's, and of the one after
-    make_up : (n,) of each
-    make_ups : places in a cross-section of the stations of each make-up
+    station_type : (n,) of each
+    station_types : places in a cross-section of the stations of each type
     width : places of a cross-section
     """
 
     starts: np.ndarray
-    make_up: np.ndarray
-    make_ups: tuple[tuple[int, ...], ...]
+    station_type: np.ndarray
+    station_types: tuple[tuple[int, ...], ...]
     width: int
 
     @classmethod
     def alike(cls, n: int, width: int) -> Sections:
         """Stations that have all places."""
-        make_up = np.zeros(n, dtype=np.int64)
-        return cls(width * np.arange(n + 1), make_up, (tuple(range(width)),), width)
+        station_type = np.zeros(n, dtype=np.int64)
+        return cls(width * np.arange(n + 1), station_type, (tuple(range(width)),), width)
 
     @classmethod
     def of(cls, numbering: Unknowns, low: int, high: int) -> Sections:
         """Stations of the unknowns [``low``, ``high``), which are whole ones."""
         first, last = numbering.stations_over(low, high)
         starts = numbering.starts[first : last + 1] - numbering.starts[first]
-        make_up = numbering.make_up[first:last]
-        return cls(starts, make_up, numbering.make_ups, numbering.width)
+        station_type = numbering.station_type[first:last]
+        return cls(starts, station_type, numbering.station_types, numbering.width)
 
     @property
     def size(self) -> int:
         """Number of stations."""
-        return int(self.make_up.size)
+        return int(self.station_type.size)
 
     @property
     def varies(self) -> bool:
         """Whether some stations lack a place."""
-        return any(len(places) < self.width for places in self.make_ups)
+        return any(len(places) < self.width for places in self.station_types)
 
     def part(self, first: int, last: int) -> Sections:
         """Stations from ``first`` to before ``last``."""
         starts = self.starts[first : last + 1] - self.starts[first]
-        return Sections(starts, self.make_up[first:last], self.make_ups, self.width)
+        return Sections(starts, self.station_type[first:last], self.station_types, self.width)
 
     def places(self) -> Places:
         """What kernels read of them."""
         if not self.varies:
             return ALIKE
-        return Places(self.starts[:-1].astype(np.int64), self.make_up.astype(np.uint8))
+        return Places(self.starts[:-1].astype(np.int64), self.station_type.astype(np.uint8))
 
     def padded(self) -> Sections:
         """The same with a station of all places more at both ends."""
         whole = tuple(range(self.width))
-        make_ups = self.make_ups if whole in self.make_ups else (*self.make_ups, whole)
-        number = make_ups.index(whole)
+        station_types = (
+            self.station_types if whole in self.station_types else (*self.station_types, whole)
+        )
+        number = station_types.index(whole)
         starts = self.width + np.r_[-self.width, self.starts, self.starts[-1] + self.width]
-        return Sections(starts, np.r_[number, self.make_up, number], make_ups, self.width)
+        return Sections(starts, np.r_[number, self.station_type, number], station_types, self.width)
 
     def missing(self) -> np.ndarray:
         """Whether a station lacks a place, shape (n, width)."""
-        lacks = np.ones((len(self.make_ups), self.width), dtype=bool)
-        for row, places in zip(lacks, self.make_ups, strict=True):
+        lacks = np.ones((len(self.station_types), self.width), dtype=bool)
+        for row, places in zip(lacks, self.station_types, strict=True):
             row[list(places)] = False
-        return lacks[self.make_up]
+        return lacks[self.station_type]
 
 
 def neighbours(
@@ -141,7 +143,7 @@ def _of_varying(matrix: sparse.bsr_matrix, first: int, columns: Sections) -> np.
 def places_of(unknowns: np.ndarray, columns: Sections) -> tuple[np.ndarray, np.ndarray]:
     """Station of each unknown, and its place in a cross-section."""
     station = np.searchsorted(columns.starts, unknowns, side="right") - 1
-    place_of = np.full((len(columns.make_ups), columns.width), -1)
-    for row, places in zip(place_of, columns.make_ups, strict=True):
+    place_of = np.full((len(columns.station_types), columns.width), -1)
+    for row, places in zip(place_of, columns.station_types, strict=True):
         row[: len(places)] = places
-    return station, place_of[columns.make_up[station], unknowns - columns.starts[station]]
+    return station, place_of[columns.station_type[station], unknowns - columns.starts[station]]

@@ -16,7 +16,7 @@ from catenary.solver.kernels import native
 # Unknowns of a station that kernels take.
 MOST_UNKNOWNS = native.MOST_UNKNOWNS
 # Parameters of a layout.
-_SETTINGS = ("widths", "own", "beside", "damped", "make_ups", "factors")
+_SETTINGS = ("widths", "own", "beside", "damped", "station_types", "factors")
 
 
 class Layout:
@@ -31,13 +31,13 @@ class Layout:
         beside it; all of each plane by default. Of factors the former is what elimination joins
     damped : whether a product with K is one with C as well
     factors : whether of factors
-    make_ups : places in a cross-section that stations of each make-up have; none if all have all
+    station_types : places in a cross-section that stations of each type have; none if all have all
 
     Attributes
     ----------
     pitch : unknowns of a cross-section
     whole, places, number : of one of its ``parts``: what it is a part of, which unknowns of that it
-        has, and of which make-up it is
+        has, and of which station type it is
     """
 
     whole: Layout | None = None
@@ -50,7 +50,7 @@ class Layout:
         own: np.ndarray | None = None,
         beside: np.ndarray | None = None,
         damped: bool = False,
-        make_ups: tuple[tuple[int, ...], ...] = (),
+        station_types: tuple[tuple[int, ...], ...] = (),
         factors: bool = False,
     ) -> None:
         self.widths = tuple(widths)
@@ -59,7 +59,7 @@ class Layout:
         together = plane[:, None] == plane
         self.own = together if own is None else own & together
         self.beside = together if beside is None else beside & together
-        self.damped, self.make_ups, self.factors = bool(damped), make_ups, bool(factors)
+        self.damped, self.station_types, self.factors = bool(damped), station_types, bool(factors)
         self.pitch = plane.size
 
     def __eq__(self, other: object) -> bool:
@@ -72,7 +72,7 @@ class Layout:
     def key(self) -> tuple[object, ...]:
         """All that makes a layout."""
         own = self.widths, self.own.tobytes(), self.beside.tobytes()
-        more = self.damped, self.make_ups, self.factors, self.number
+        more = self.damped, self.station_types, self.factors, self.number
         return (*own, *more, None if self.whole is None else self.whole.key)
 
     def changed(self, **settings: Any) -> Layout:
@@ -81,16 +81,16 @@ class Layout:
 
     @property
     def varies(self) -> bool:
-        """Whether stations are of several make-ups, of which this may be one."""
-        return bool(self.make_ups) or self.whole is not None
+        """Whether stations are of several station types, of which this may be one."""
+        return bool(self.station_types) or self.whole is not None
 
     @cached_property
     def parts(self) -> tuple[Layout, ...]:
-        """Layouts of each make-up; if there is one only, this itself."""
-        return tuple(self._part(n) for n in range(len(self.make_ups))) or (self,)
+        """Layouts of each station type; if there is one only, this itself."""
+        return tuple(self._part(n) for n in range(len(self.station_types))) or (self,)
 
     def _part(self, number: int) -> Layout:
-        places = self.make_ups[number]
+        places = self.station_types[number]
         widths = tuple(int(width) for width in np.bincount(self._plane[list(places)]) if width)
         own, beside = (joined[np.ix_(places, places)] for joined in (self.own, self.beside))
         part = Layout(widths, own, beside, self.damped, factors=self.factors)

@@ -23,9 +23,9 @@ from catenary.solver.linear.stations.unique_rows import kinds_of
 
 
 def layout_of(
-    operator: np.ndarray, stiffness: np.ndarray, make_ups: tuple[tuple[int, ...], ...] = ()
+    operator: np.ndarray, stiffness: np.ndarray, station_types: tuple[tuple[int, ...], ...] = ()
 ) -> Layout | None:
-    """Layout of a line by its blocks of A and K, see ``neighbours``, and by the make-ups of its
+    """Layout of a line by its blocks of A and K, see ``neighbours``, and by the types of its
     stations if there are several.
 
     None if there are more unknowns than kernels take.
@@ -35,7 +35,7 @@ def layout_of(
     if sum(widths) > MOST_UNKNOWNS:
         return None
     pairs = of_pairs(sum(widths))
-    return joining(Layout(widths, pairs, pairs, make_ups=make_ups), stiffness)
+    return joining(Layout(widths, pairs, pairs, station_types=station_types), stiffness)
 
 
 def of_pairs(size: int) -> np.ndarray:
@@ -64,20 +64,20 @@ def _planes(joined: np.ndarray) -> tuple[int, ...]:
     return tuple(int(width) for width in np.diff(ends, prepend=-1))
 
 
-def kinds_by_make_up(
-    layout: Layout, make_up: np.ndarray, pack: Callable[[Layout, Any], np.ndarray]
+def kinds_by_type(
+    layout: Layout, station_type: np.ndarray, pack: Callable[[Layout, Any], np.ndarray]
 ) -> tuple[np.ndarray, np.ndarray, int, int]:
     """Kinds (n,) of stations, the numbers of all kinds in a row, how many kinds there are, and how
     many numbers of all stations are not zero.
 
-    ``pack`` returns the numbers of stations in the layout of their make-up, (n, m). A kind is the
+    ``pack`` returns the numbers of stations in the layout of their type, (n, m). A kind is the
     place of its first number, int32.
     """
-    begins, numbers = np.zeros(make_up.size, dtype=np.int32), [np.zeros(0)]
+    begins, numbers = np.zeros(station_type.size, dtype=np.int32), [np.zeros(0)]
     end = n_kinds = count = 0
     # Blocks of large vectors begin at lines of a cache if those of small ones stand behind them.
     for number in sorted(range(len(layout.parts)), key=lambda n: -layout.parts[n].pitch):
-        stations = np.flatnonzero(make_up == number) if layout.varies else slice(None)
+        stations = np.flatnonzero(station_type == number) if layout.varies else slice(None)
         packed = pack(layout.parts[number], stations)
         count += np.count_nonzero(packed)
         first, kinds = kinds_of(packed)
@@ -104,7 +104,7 @@ class StationProduct:
     ----------
     layout : Layout
     stations : of the factor
-    kinds : (n,) of its rows, see ``kinds_by_make_up``
+    kinds : (n,) of its rows, see ``kinds_by_type``
     blocks : of each kind the diagonal block of K, then what joins it to the stations before and
         after it; the same of -C; all as products read them, see ``Layout``
     first : station in the factor of the first row; the factor has one before and one after all
@@ -129,7 +129,7 @@ class StationProduct:
     @cached_property
     def _products(self) -> native.Products:
         layouts = [part.native for part in self.layout.parts]
-        return native.Products(layouts, self.stations.make_ups, self.arrays)
+        return native.Products(layouts, self.stations.station_types, self.arrays)
 
     def multiply(
         self, factor: np.ndarray, result: np.ndarray, velocity: np.ndarray | None = None
@@ -165,18 +165,20 @@ def station_product(
     if columns is None:
         columns = Sections.alike(first + n_rows + 1, layout.pitch)
     stations = columns.padded()
-    packed = packed_rows(layout, rows, damped, stations.make_up[first + 1 : first + 1 + n_rows])
+    packed = packed_rows(
+        layout, rows, damped, stations.station_type[first + 1 : first + 1 + n_rows]
+    )
     if packed is None:
         return None
     return StationProduct(layout, stations, *packed[:2], first + 1, packed[2])
 
 
 def packed_rows(
-    layout: Layout, rows: StationRows, damping: StationRows | None, make_up: np.ndarray
+    layout: Layout, rows: StationRows, damping: StationRows | None, station_type: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, int] | None:
     """Kinds and numbers of stations as ``StationProduct`` keeps them, and how many kinds there are.
 
-    ``make_up`` (n,) of the stations; None if the matrices join what the layout does not.
+    ``station_type`` (n,) of the stations; None if the matrices join what the layout does not.
     """
     numbers: list[tuple[np.ndarray, Literal["own", "beside"]]] = []
     for part, sign in ((rows, 1.0), (damping, -1.0)):
@@ -188,7 +190,7 @@ def packed_rows(
         packed = [part.packed(blocks[which], place) for blocks, place in numbers]
         return np.concatenate(packed, axis=1)
 
-    kinds, packed, n_kinds, count = kinds_by_make_up(layout, make_up[rows.chosen], pack)
+    kinds, packed, n_kinds, count = kinds_by_type(layout, station_type[rows.chosen], pack)
     if count != sum(np.count_nonzero(blocks) for blocks, _ in numbers):
         return None
     return kinds[rows.kinds], packed, n_kinds

@@ -21,7 +21,7 @@ from catenary.solver.model.unknowns.stations import Stations, stations_of
 
 # Unknowns of a group in a station above which solving by nodes is faster.
 _WIDEST_GROUP = 12
-# Make-ups of stations that a line may have, each with loops of its own; of more the rarer ones are
+# Types of stations that a line may have, each with loops of its own; of more the rarer ones are
 # filled up to a whole cross-section.
 MOST_MAKE_UPS = 4
 
@@ -33,7 +33,7 @@ Group = Mapping[str, tuple[str, ...]]
 class Unknowns:
     """Numbers and places of unknowns, those of held ones included.
 
-    A cross-section has a place for each unknown that a station may have. Stations of one make-up
+    A cross-section has a place for each unknown that a station may have. Stations of one type
     have the same places. What a station has without a node is missing: a held unknown.
 
     Attributes
@@ -44,8 +44,8 @@ class Unknowns:
     station : (n_nodes,) of each node
     starts : (n_stations + 1,) number of the first unknown of each station, and how many there are
     planes : places of a cross-section in each group
-    make_ups : places of each make-up, ascending, as unknowns of a station follow each other
-    make_up : (n_stations,) of each station
+    station_types : places of each type, ascending, as unknowns of a station follow each other
+    station_type : (n_stations,) of each station
     in_stations : whether matrices join stations to those beside them only, as far as wires and
         droppers tell; if not, each node is a station
     low, high : (n_stations,) ascending places [m]: no node from a station on stands before its low,
@@ -57,8 +57,8 @@ class Unknowns:
     station: np.ndarray
     starts: np.ndarray
     planes: tuple[int, ...]
-    make_ups: tuple[tuple[int, ...], ...]
-    make_up: np.ndarray
+    station_types: tuple[tuple[int, ...], ...]
+    station_type: np.ndarray
     in_stations: bool
     low: np.ndarray
     high: np.ndarray
@@ -81,7 +81,7 @@ class Unknowns:
     @cached_property
     def block(self) -> int:
         """Largest size of square blocks that every station can be cut into."""
-        return int(np.gcd.reduce([len(places) for places in self.make_ups]))
+        return int(np.gcd.reduce([len(places) for places in self.station_types]))
 
     @cached_property
     def missing(self) -> np.ndarray:
@@ -201,20 +201,20 @@ def number_unknowns(
         ]
     )
     planes = tuple(int(has_name[:, [names.index(n) for n in own]].sum()) for own in group_names)
-    present, make_up = _make_ups(stations, padded)
+    present, station_type = _station_types(stations, padded)
     there = present[:, places[:, 0]]
-    make_ups = tuple(tuple(map(int, np.flatnonzero(row))) for row in there)
-    # Where the unknown of a slot stands among those of a station of each make-up.
-    offset = np.full((len(make_ups), *has_name.shape), -1)
+    station_types = tuple(tuple(map(int, np.flatnonzero(row))) for row in there)
+    # Where the unknown of a slot stands among those of a station of each station type.
+    offset = np.full((len(station_types), *has_name.shape), -1)
     offset[:, places[:, 0], places[:, 1]] = np.where(there, np.cumsum(there, axis=1) - 1, -1)
-    starts = np.concatenate([[0], np.cumsum(there.sum(axis=1)[make_up])])
+    starts = np.concatenate([[0], np.cumsum(there.sum(axis=1)[station_type])])
     station = stations.of_node
-    own = starts[station][:, None] + offset[make_up[station], stations.slot]
+    own = starts[station][:, None] + offset[station_type[station], stations.slot]
     numbers = np.where(numbers == 0, own, -1)
-    low, high = _bounds(mesh, station, make_up.size)
+    low, high = _bounds(mesh, station, station_type.size)
     in_stations = stations.join_neighbours
     return Unknowns(
-        names, numbers, station, starts, planes, make_ups, make_up, in_stations, low, high
+        names, numbers, station, starts, planes, station_types, station_type, in_stations, low, high
     )
 
 
@@ -222,22 +222,22 @@ def _names_of(group: Group) -> tuple[str, ...]:
     return tuple(dict.fromkeys(name for own in group.values() for name in own))
 
 
-def _make_ups(stations: Stations, padded: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Slots of each make-up, (n, n_slots), and make-up of each station.
+def _station_types(stations: Stations, padded: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Slots of each station type, (n, n_slots), and station type of each station.
 
     The smallest are first, which mostly are the commonest, whatever the line: lines of the same
-    make-ups then have loops in common.
+    station types then have loops in common.
     """
     present = stations.present | padded
     if present.all():
         return present[:1], np.zeros(len(present), dtype=np.int64)
-    rows, make_up, counts = np.unique(present, axis=0, return_inverse=True, return_counts=True)
+    rows, station_type, counts = np.unique(present, axis=0, return_inverse=True, return_counts=True)
     if stations.join_neighbours and counts.size > MOST_MAKE_UPS:
         rare = np.argsort(-counts, kind="stable")[MOST_MAKE_UPS - 1 :]
-        present = present | np.isin(make_up, rare)[:, None]
-        rows, make_up = np.unique(present, axis=0, return_inverse=True)
+        present = present | np.isin(station_type, rare)[:, None]
+        rows, station_type = np.unique(present, axis=0, return_inverse=True)
     order = np.argsort(rows.sum(axis=1), kind="stable")
-    return rows[order], np.argsort(order)[make_up]
+    return rows[order], np.argsort(order)[station_type]
 
 
 def _bounds(mesh: LineMesh, station: np.ndarray, n_stations: int) -> tuple[np.ndarray, np.ndarray]:

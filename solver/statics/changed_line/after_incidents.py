@@ -220,10 +220,10 @@ def _compensation(line: ChangedLine, displacement: np.ndarray, velocity: np.ndar
     )
     reserve = law["rest"] + law["stiffness"] * stretch + law["damping"] * rate
     # Other links are the same before and after an incident.
-    owner = np.where(table.bent >= 0, table.bent, table.master)
-    owner = np.where(table.bent[owner] >= 0, table.bent[owner], owner)  # of riders of bends
+    owner = np.where(table.bent >= 0, table.bent, table.leader)
+    owner = np.where(table.bent[owner] >= 0, table.bent[owner], owner)  # of dependents of bends
     acts = np.isin(owner, table.of_component(DROPPERS)) & ~table.broken[owner]
-    acts &= reserve[table.master] < 0.0
+    acts &= reserve[table.leader] < 0.0
     total = np.zeros(line.model.n_dofs)
     np.add.at(total, unknowns[acts], (law["released"] * reserve)[acts, None] * weights[acts])
     return total

@@ -16,7 +16,7 @@ from catenary.solver.contact.train.pantographs import Pantographs
 from catenary.solver.integrators.line_state import Motion
 from catenary.solver.kernels import native
 from catenary.solver.model.gauges import Gauges, gauges_of
-from catenary.solver.model.switching_links import NO_LINKS, LinkArrays, Riders, padded
+from catenary.solver.model.switching_links import NO_LINKS, Dependents, LinkArrays, padded
 from catenary.solver.problem.watched_links import GAUGES
 from catenary.solver.schemes.scheme import Scheme
 from catenary.solver.statics.changed_line.after_incidents import ChangedLine
@@ -57,8 +57,8 @@ class Shown(NamedTuple):
     arms: np.ndarray
     droppers: LinkArrays
     others: LinkArrays
-    dropper_bends: Riders
-    other_bends: Riders
+    dropper_bends: Dependents
+    other_bends: Dependents
     other_force: np.ndarray
     columns: Columns
 
@@ -153,8 +153,8 @@ class Showing:
         self,
         droppers: LinkArrays,
         others: LinkArrays,
-        dropper_bends: Riders,
-        other_bends: Riders,
+        dropper_bends: Dependents,
+        other_bends: Dependents,
         other_force: np.ndarray,
     ) -> Shown:
         """Where a row's values of the line come from, and which change with which stations."""
@@ -362,17 +362,17 @@ def _owned_gauges(
 
 def _further_links(
     links: FollowedLinks, watched: Mapping[str, LinkArrays]
-) -> tuple[LinkArrays, Riders, np.ndarray, dict[str, np.ndarray]]:
+) -> tuple[LinkArrays, Dependents, np.ndarray, dict[str, np.ndarray]]:
     """Owned links of one sign beside droppers, then gauges, bends of these, room for their forces
     [N], and that by component and by what a gauge shows."""
     shown = {name: links.shown(name)[1:] for name in links.table.components if name != DROPPERS}
     parts = {name: own for name, (own, _) in shown.items()} | dict(watched)
     if not parts:
-        return NO_LINKS, Riders(NO_LINKS, np.zeros(1, dtype=np.int64)), np.zeros(0), {}
+        return NO_LINKS, Dependents(NO_LINKS, np.zeros(1, dtype=np.int64)), np.zeros(0), {}
     counts = [np.diff(bends.begin) for _, bends in shown.values()]
     counts += [np.zeros(part.law.size, dtype=np.int64) for part in watched.values()]
     added = [bends.links for _, bends in shown.values()] or [NO_LINKS]
-    bends = Riders(_one_after_another(added), np.cumsum(np.concatenate([[0], *counts])))
+    bends = Dependents(_one_after_another(added), np.cumsum(np.concatenate([[0], *counts])))
     width = max(part.unknowns.shape[1] for part in parts.values())
     wide = [padded(part, width) for part in parts.values()]
     ends = np.cumsum([part.law.size for part in wide])

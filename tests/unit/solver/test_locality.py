@@ -157,9 +157,11 @@ def test_columns_that_leak_are_refused(stepper: LineIntegrator) -> None:
 def test_windows_hold_all_unknowns_within_reach() -> None:
     """Stations of nodes that stand apart: of the second from 1.0 to 1.2 m."""
     low, high = np.array([[0.0, 1.0, 2.5, 4.0], [0.0, 1.2, 2.5, 4.0]])
-    make_up, station, numbers = np.zeros(4, np.int64), np.arange(8) // 2, np.arange(8)[:, None]
+    station_type, station, numbers = np.zeros(4, np.int64), np.arange(8) // 2, np.arange(8)[:, None]
     starts, places = np.arange(0, 10, 2), ((0, 1),)
-    numbering = Unknowns(("w",), numbers, station, starts, (2,), places, make_up, True, low, high)
+    numbering = Unknowns(
+        ("w",), numbers, station, starts, (2,), places, station_type, True, low, high
+    )
     windows = Windows(numbering, 1.3)
     assert windows.around(2.5, 2.5) == (2, 6)
     assert windows.around(0.0, 0.0) == (0, 4)

@@ -139,7 +139,7 @@ def test_each_of_two_sections_has_twins_of_its_own(topology: str) -> None:
     assert len(pairs) == (2 if topology == "twin" else 4)
     mesh = mesh_of(line, 2)
     found = numbered(mesh, pairs)
-    assert found.width == 8 and set(map(len, found.make_ups)) == {4, 8}
+    assert found.width == 8 and set(map(len, found.station_types)) == {4, 8}
     for name, other in pairs.items():
         own, beside = (found.numbers[mesh.wires[wire]] for wire in (name, other))
         assert np.array_equal(own, beside)

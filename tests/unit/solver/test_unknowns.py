@@ -162,7 +162,7 @@ def test_a_station_has_the_wires_that_pass_it_or_those_beside_it() -> None:
     inside = np.zeros(widths.size, dtype=bool)
     inside[39:61] = True
     assert (widths == np.where(inside, 6, 4)).all()
-    assert found.make_ups == ((0, 1, 2, 3), (0, 1, 2, 3, 4, 5)) and found.block == 2
+    assert found.station_types == ((0, 1, 2, 3), (0, 1, 2, 3, 4, 5)) and found.block == 2
     # One station without a node of the wire at either end of it.
     low, high = found.starts[[39, 60]] + 4
     assert (found.missing == [low, low + 1, high, high + 1]).all()
@@ -177,10 +177,10 @@ def test_a_station_has_the_wires_that_pass_it_or_those_beside_it() -> None:
 
 
 @pytest.mark.parametrize(("first", "last"), [(20, 30), (5, 75)])
-def test_make_ups_come_in_one_order_whichever_is_the_commonest(first: int, last: int) -> None:
+def test_station_types_come_in_one_order_whichever_is_the_commonest(first: int, last: int) -> None:
     mesh = with_wire(paired(), STITCH, first, last)
     found = number_unknowns(mesh, [vertical(mesh)], padded=False)
-    assert found.make_ups == ((0, 1, 2, 3), (0, 1, 2, 3, 4, 5))
+    assert found.station_types == ((0, 1, 2, 3), (0, 1, 2, 3, 4, 5))
     check(mesh, found)
 
 
@@ -194,7 +194,7 @@ def test_a_wire_takes_the_slot_of_one_that_has_ended() -> None:
     check(mesh, found)
     # The fourth begins where the third has just ended, and both are there in between.
     assert found.width == 8
-    assert set(found.make_ups) == {
+    assert set(found.station_types) == {
         tuple(range(4)),
         tuple(range(6)),
         tuple(range(8)),
@@ -202,14 +202,14 @@ def test_a_wire_takes_the_slot_of_one_that_has_ended() -> None:
     }
 
 
-def test_rare_make_ups_are_filled_up() -> None:
+def test_rare_station_types_are_filled_up() -> None:
     mesh = paired()
     for number, (first, last) in enumerate(((5, 80), (15, 70), (25, 60), (35, 50))):
         mesh = with_wire(mesh, f"{STITCH}_{number}", first, last)
     found = number_unknowns(mesh, [vertical(mesh)], padded=False)
     check(mesh, found)
-    assert len(found.make_ups) == MOST_MAKE_UPS and found.width == 12
-    assert max(map(len, found.make_ups)) == 12
+    assert len(found.station_types) == MOST_MAKE_UPS and found.width == 12
+    assert max(map(len, found.station_types)) == 12
 
 
 def test_pieces_of_one_wire_take_a_slot_one_after_the_other() -> None:

@@ -1,4 +1,4 @@
-"""Stations of several make-ups: products and solves against dense ones."""
+"""Stations of several types: products and solves against dense ones."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def parts(
     assert stations.varies
     blocks = neighbours(matrix, 0, stations)
     assert blocks is not None
-    layout = layout_of(blocks, blocks, stations.make_ups)
+    layout = layout_of(blocks, blocks, stations.station_types)
     assert layout is not None and layout.widths == LINES[name]
     damping = 0.3 * matrix if damped else None
     product = station_product(
@@ -117,7 +117,7 @@ def test_wires_that_meet_without_a_common_station_are_left_to_petsc() -> None:
     assert parts("overlap", ends=0)[2] is None
 
 
-def test_blocks_of_one_make_up_are_kept_once() -> None:
+def test_blocks_of_one_station_type_are_kept_once() -> None:
     _, product, factors = parts("stitch")
     assert product is not None and factors is not None
     # The line repeats after seven stations; the wire comes and goes at five places.

@@ -58,7 +58,7 @@ def small(monkeypatch: pytest.MonkeyPatch) -> None:
         (1.0, {"damping": Damping(2e-3, 0.0, {"droppers": (1e-4, 0.0)})}),
         (1.0, {"line": stitched_line(SPANS)}),
     ],
-    ids=["newmark", "hht", "components", "make-ups"],
+    ids=["newmark", "hht", "components", "station types"],
 )
 def test_pieces_give_what_the_whole_line_gives(
     seconds: float, changes: dict[str, Any], monkeypatch: pytest.MonkeyPatch

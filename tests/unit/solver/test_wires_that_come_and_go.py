@@ -35,9 +35,9 @@ def model(by_component: bool) -> Model:
 
 def test_stations_are_as_wide_as_the_wires_that_are_there() -> None:
     numbering = model(False).numbering
-    assert numbering.in_stations and numbering.make_ups == (tuple(range(4)), tuple(range(6)))
+    assert numbering.in_stations and numbering.station_types == (tuple(range(4)), tuple(range(6)))
     # Nine metres to either side of two supports, and a station more at both ends of each piece.
-    assert numbering.size < 4.8 * numbering.make_up.size
+    assert numbering.size < 4.8 * numbering.station_type.size
     assert numbering.missing.size == 2 * 4
 
 
