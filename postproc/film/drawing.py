@@ -241,7 +241,7 @@ class Drawing:
             lines, colour, thick = (np.concatenate(own) for own in zip(*wires, strict=True))
             self.wires.set_segments(list(lines))
             self.wires.set_array(colour)
-            self.wires.set_linewidth(thick)
+            self.wires.set_linewidth(thick.tolist())
         self._show_beside(row, beside, eye)
 
     def _show_droppers(self, lines: np.ndarray, forces: np.ndarray | None) -> None:
