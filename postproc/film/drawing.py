@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import Any
 
 import matplotlib
 import numpy as np
@@ -126,7 +127,9 @@ class Drawing:
         write(_LINE[0], 0.896, ",  ".join(parts), fontsize=14, color="#50555c")
         self.words = write(_LINE[0], 0.925, "", fontsize=17, animated=True)
         _, title, low, high = self._colours
-        bars = [(0.56, drawn.MOTIONS, 1e3 * low, 1e3 * high, f"{title} [mm]")]
+        bars: list[tuple[float, tuple[str, ...], float, float, str]] = [
+            (0.56, drawn.MOTIONS, 1e3 * low, 1e3 * high, f"{title} [mm]")
+        ]
         if strongest is not None and DROPPERS in self._scenery.line:
             bars.append((0.79, drawn.DROPPER_FORCES, 0.0, strongest, "dropper force [N]"))
         for left, stops, bottom, top, label in bars:
@@ -144,7 +147,7 @@ class Drawing:
         """All that moves, empty, from behind to the front."""
         axes = self._axes
 
-        def lines(**how: object) -> LineCollection:
+        def lines(**how: Any) -> LineCollection:
             made = LineCollection([], animated=True, capstyle="round", **how)
             axes.add_collection(made, autolim=False)
             return made
@@ -157,7 +160,7 @@ class Drawing:
             for kind in (TRACK, MASTS, ARMS, CLAMPS)
         }
         if self._picture.view is View.PLAN:
-            self._still[MASTS].set_linewidths(_USUAL * LOOKS[CLAMPS].thick)
+            self._still[MASTS].set_linewidth(_USUAL * LOOKS[CLAMPS].thick)
         width = _USUAL * LOOKS[DROPPERS].thick
         self.droppers = lines(
             linewidths=width, cmap=ramp(drawn.DROPPER_FORCES), norm=Normalize(0.0, strongest or 1.0)
@@ -233,19 +236,19 @@ class Drawing:
             elif kind == DROPPERS:
                 self._show_droppers(lines, None if forces is None else forces[chosen])
             else:
-                self._still[kind].set_segments(lines)
+                self._still[kind].set_segments(list(lines))
         if wires:
             lines, colour, thick = (np.concatenate(own) for own in zip(*wires, strict=True))
-            self.wires.set_segments(lines)
+            self.wires.set_segments(list(lines))
             self.wires.set_array(colour)
-            self.wires.set_linewidths(thick)
+            self.wires.set_linewidth(thick.tolist())
         self._show_beside(row, beside, eye)
 
     def _show_droppers(self, lines: np.ndarray, forces: np.ndarray | None) -> None:
         slack = np.zeros(len(lines), dtype=bool) if forces is None else forces <= 0.0
-        self.droppers.set_segments(lines[~slack])
+        self.droppers.set_segments(list(lines[~slack]))
         self.droppers.set_array(np.full(len(lines), np.nan) if forces is None else forces[~slack])
-        self.slack.set_segments(lines[slack])
+        self.slack.set_segments(list(lines[slack]))
 
     def _show_beside(self, row: int, beside: dict[str, Places], eye: float) -> None:
         """Show train, track, pantographs and forces."""
@@ -253,7 +256,7 @@ class Drawing:
         rest, moved = beside[TRACK]
         if self._picture.view is View.ALONG:
             rest = np.column_stack([np.clip(rest[:, 0], eye, eye + EYE + _SEEN_AHEAD), rest[:, 1:]])
-        self._still[TRACK].set_segments(seen(rest, moved, eye)[parts[TRACK].cells])
+        self._still[TRACK].set_segments(list(seen(rest, moved, eye)[parts[TRACK].cells]))
         if TRAIN in parts:
             corners = seen(*beside[TRAIN], eye)[parts[TRAIN].cells]
             shades = parts[TRAIN].fields["face"]
@@ -265,7 +268,7 @@ class Drawing:
             along = self._projection.scale.along
             rest[:, 0] = middle + along * (rest[:, 0] - middle)
             moved[:, 0] *= along
-        self.bodies.set_segments(seen(rest, moved, eye)[parts[PANTOGRAPHS].cells])
+        self.bodies.set_segments(list(seen(rest, moved, eye)[parts[PANTOGRAPHS].cells]))
         arrows = []
         tops = seen(*beside[drawn.FORCES], eye)
         for force, at, text in zip(data.force[row].tolist(), tops, self.values, strict=True):
@@ -274,7 +277,7 @@ class Drawing:
             text.set_text(f"{force:.0f} N")
             beyond = 0.012 * np.ptp(self._axes.get_xlim())
             text.set_position((at[0] + beyond, arrow[..., 1].max()))
-        self._arrows.set_segments(np.concatenate(arrows))
+        self._arrows.set_segments(list(np.concatenate(arrows)))
 
     def _arrow(self, force: float) -> np.ndarray:
         """Stem and tip of the arrow of a force, (3, 2, 2); from above a cross."""
