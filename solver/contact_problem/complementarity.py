@@ -17,9 +17,9 @@ With the law linear, or replaced by its tangent, this is a linear complementarit
 matrix is a P-matrix, so that it has one solution, unless the convective part of a contact damper
 outweighs the compliances, or there are dependents (docs/theory/one_solve.md). An active-set
 iteration (semismooth Newton) finds it, mostly in one or two rounds; a set that cycles is handed to
-pivoting, and a step without solution ends the run with a sentence. A law that is not linear is linearised
-again at what was found: Newton's method, which for a convex spring comes from one side and cannot
-overshoot.
+pivoting, and a step without solution ends the run with a sentence. A law that is not linear is
+linearised again at what was found: Newton's method, which for a convex spring comes from one side
+and cannot overshoot.
 """
 
 from __future__ import annotations
