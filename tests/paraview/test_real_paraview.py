@@ -127,9 +127,9 @@ def test_both_readers_play_all_times(folder: Path, reader: str, tmp_path: Path) 
     line, arms, forces, train, track = (found[str(name)] for name in names)
     assert line["times"] == arms["times"] == forces["times"] and len(line["times"]) > 20
     assert train["times"] == line["times"]
-    # Head, frame and two springs of each.
+    # Head, arms and lift of each.
     (points,) = {row[0] for row in arms["ranges"]}
-    assert points == n * (6 + 4 + 2 * 10)
+    assert points == n * (6 + 9 + 6)
     assert [row[0] for row in forces["ranges"]] == [n] * len(arms["times"])
     for row, place in ((arms["ranges"][0], first), (arms["ranges"][-1], last)):
         low, high = row[1][:2]
