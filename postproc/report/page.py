@@ -95,6 +95,6 @@ def _weasyprint() -> tuple[Any, Any]:
     except (ImportError, OSError) as error:  # OSError: of Pango, which is no package of Python
         raise InputError(
             f"--pdf needs the package weasyprint and the library Pango ({error}): pip install "
-            "'catenary[pdf]', and on Debian apt-get install libpango-1.0-0 libpangoft2-1.0-0"
+            "'catenary[report]', and on Debian apt-get install libpango-1.0-0 libpangoft2-1.0-0"
         ) from error
     return HTML, URLFetcher
