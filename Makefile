@@ -67,7 +67,7 @@ test: setup ## lint and tests, also on several ranks
 	@$(MAKE) --no-print-directory test-mpi
 
 test-studies: setup ## whole studies: hard cases, stability, accuracy, waves, the paper's; random scenes
-	$(PYTEST_SHARED) -m study tests/regression tests/verification tests/unit
+	$(PYTEST_SHARED) -m "study and not long" tests/regression tests/verification tests/unit
 
 test-unit: setup ## tests of single parts
 	$(PYTEST_SHARED) tests/unit
@@ -100,8 +100,9 @@ fuzz: setup ## random small problems; scenes: 4000 that run, 4000 refused, 50 sw
 	FUZZ_SEED=$(SEED) FUZZ_WINDOWS=300 $(PYTEST) -q tests/regression/test_fuzz_windows.py
 	FUZZ_SEED=$(SEED) FUZZ_CASES=100 timeout 1800 mpirun -n 2 $(MPI_SHARED) $(MPI_PYTEST) -q tests/regression/test_fuzz.py
 
-long-runs: setup ## all bodies of a pantograph over 20 s and ten minutes, 1000 spans killed, exact windows, 540 km
+long-runs: setup ## 20 s and ten minutes of all bodies, 1000 spans killed, exact windows, 540 km; reference solutions
 	$(PYTEST) -q -s $(LONG_RUNS)
+	$(PYTEST) -q -p no:benchmark -m long tests/verification
 
 test-paraview: setup ## open runs in the ParaView of this machine (Debian: paraview python3-paraview xvfb)
 	@command -v pvpython >/dev/null && command -v xvfb-run >/dev/null || \

@@ -78,6 +78,7 @@ def extrapolated(coarse: float, fine: float) -> tuple[float, float]:
 
 
 @pytest.mark.study
+@pytest.mark.long
 @pytest.mark.timeout(3600)
 @pytest.mark.parametrize("name", STUDIES)
 def test_plain_finite_differences_reach_a_reference_solution(name: str) -> None:
@@ -128,6 +129,7 @@ def test_plain_finite_differences_reach_a_march() -> None:
 
 
 @pytest.mark.study
+@pytest.mark.long
 @pytest.mark.timeout(3600)
 def test_the_shipped_solutions_are_made_by_the_command(tmp_path: Path) -> None:
     name = "dc_simple_200_one"
