@@ -3,31 +3,22 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from catenary.postproc.evaluate.wording import UNCOMPARED
 from catenary.postproc.files.disk import plain, write_all
-from catenary.postproc.measurements.comparison import (
-    LINE_TEST,
-    Comparison,
-    Overlay,
-    UpliftAtSupports,
-)
+from catenary.postproc.measurements.comparison import LINE_TEST, Comparison
 from catenary.postproc.report.page import page
 from catenary.postproc.report.sections.section import Picture, Section, Text
 from catenary.postproc.report.study_table import Column, StudyTable
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
 PAGE, SUMMARY, FIGURES = "measurement.html", "measurement.json", "figures.csv"
 FORCES, UPLIFTS = "forces.csv", "uplifts.csv"
-_PLACE = "position along the track [m]"
 _FORCE, _UPLIFT = "measured_force", "measured_uplift"
 NO_ERRORS = "No error is seen: the measurement is that of this run, but for noise."
 WHOSE = "An error is one of the measurement, of its description, or of the scene that was run."
@@ -136,10 +127,12 @@ def uplifts_table(found: Comparison) -> StudyTable:
 
 def write(folder: Path, found: Comparison) -> list[Path]:
     """Write page, tables, JSON and pictures into a folder; returns the files. Not collective."""
+    # A text does without Matplotlib.
+    from catenary.postproc.measurements import drawings
     from catenary.postproc.report.pictures.figures import painted
 
-    pictures = painted(_FORCE, lambda: _draw_forces(found.overlays))
-    pictures |= painted(_UPLIFT, lambda: _draw_uplifts(found.uplift))
+    pictures = painted(_FORCE, lambda: drawings.forces(found.overlays))
+    pictures |= painted(_UPLIFT, lambda: drawings.uplifts(found.uplift))
     content: dict[str, bytes | str] = {f"{name}.png": data for name, data in pictures.items()}
     content[FIGURES], content[FORCES] = figures_table(found).csv(), forces_table(found).csv()
     if found.uplift is not None:
@@ -160,40 +153,6 @@ def _sections(found: Comparison) -> Iterator[Section]:
         uplift = Picture(_UPLIFT, "Largest uplifts at supports", _nothing)
         yield Section("Uplift", [replace(uplifts_table(found), title="")], [uplift])
     yield Section("Remarks", [Text(text, "remark") for text in found.remarks])
-
-
-def _draw_forces(overlays: Sequence[Overlay]) -> Figure | None:
-    """Measured forces and those of the run along the track, a panel for each pantograph."""
-    # A text does without Matplotlib.
-    from catenary.postproc.report.pictures.envelope import thinned
-    from catenary.postproc.report.pictures.figures import curve, legend_above, stacked, tidy
-
-    n = len(overlays)
-    if not n:
-        return None
-    figure, panels = stacked(0.7 + 2.7 * n, n, shared=True)
-    for axes, own in zip(panels, overlays, strict=True):
-        for number, (values, label) in enumerate(((own.run, "run"), (own.measured, "measured"))):
-            chosen = thinned(values)
-            curve(axes, own.place[chosen], values[chosen], number, label)
-        tidy(axes, "", "contact force [N]", own.pantograph.capitalize())
-        legend_above(axes)
-    panels[-1].set_xlabel(_PLACE)
-    return figure
-
-
-def _draw_uplifts(own: UpliftAtSupports | None) -> Figure | None:
-    """Largest uplifts at supports, measured and of the run; None if they were not measured."""
-    from catenary.postproc.report.pictures.figures import curve, legend_above, stacked, tidy
-
-    if own is None:
-        return None
-    figure, (axes,) = stacked(3.0, 1)
-    for number, (values, label) in enumerate(((own.run, "run"), (own.measured, "measured"))):
-        curve(axes, own.place, 1e3 * values, number, label, "o")
-    tidy(axes, _PLACE, "largest uplift [mm]")
-    legend_above(axes)
-    return figure
 
 
 def _nothing() -> None:

@@ -58,7 +58,8 @@ def test_snapshots_show_what_moves(window: str, run: Run) -> None:
     beyond the front of the fastest waves, where displacements are below 1e-6 of it
     (``window.choice``)."""
     with Results(run(window, True)) as results:
-        n_nodes = results.line("node_points").shape[0]
+        points = results.line("node_points")[:, 0]
+        n_nodes = points.size
     apart = {"spans": RESOLVED, "exact": 1e-6}[window]
     with (
         Snapshots(run(window, True), n_nodes) as every,
@@ -72,9 +73,9 @@ def test_snapshots_show_what_moves(window: str, run: Run) -> None:
         for number in range(every.times.size):
             shown, known = part.uplift(number), every.uplift(number)
             assert np.abs(shown - known).max() <= apart * largest
-        x = START + SPAN * 15.0
-        assert part.uplift_at(2, "contact_wire", x) == 0.0
-        assert part.uplift_at(2, "contact_wire", START) != 0.0
+        far, near = (np.abs(points - x).argmin() for x in (START + SPAN * 15.0, START))
+        assert part.uplift(2)[far] == 0.0
+        assert part.uplift(2)[near] != 0.0
     sizes = [(run(window, whole) / "fields.h5").stat().st_size for whole in (False, True)]
     # At most 11 of 60 spans, or 2 * (152 m/s * 0.8 s + 108 m) = 460 m of 3240; tables and
     # points at rest of the whole line, 32 bytes a node, beside 17 snapshots of 16 bytes.

@@ -282,7 +282,7 @@ def test_verb_tells_how_the_seven_bodies_of_the_case_stand(tmp_path: Path) -> No
     assert result.exit_code == 0, result.output
     figures = dict(
         re.findall(
-            r"^  (force of actuator|joint_\d|frame .*?|head .*?)  +(\S+)  ", result.output, re.M
+            r"^(force of actuator|joint_\d|frame .*?|head .*?)  +(\S+)  ", result.output, re.M
         )
     )
     check("actuator [N]", float(figures["force of actuator"]), 9890.0, within=98.9)

@@ -151,8 +151,9 @@ def verdict(found: Identification) -> str:
     """Whether the residuals are those of noise as it was stated."""
     judged = found.judged
     large = [name for name, one in judged.items() if one.is_too_large]
-    coloured = [name for name, one in judged.items() if one.is_coloured]
     small = [name for name, one in judged.items() if one.is_too_small]
+    # What lies far below the noise has the colour of round-off, or of a noise that was overstated.
+    coloured = [name for name, one in judged.items() if one.is_coloured and name not in small]
     wrong = []
     if large:
         wrong.append(f"the residual of {' and '.join(large)} is larger than noise and priors allow")

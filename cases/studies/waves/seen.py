@@ -250,7 +250,7 @@ class EnergyMotion:
         # Droppers and their bends: see `_switched`.
         table = switching_links(model, rest.form.dropper_force)
         owner = np.where(table.bent < 0, np.arange(table.bent.size), table.bent)
-        mine = np.isin(owner, table.of_component(DROPPERS)) & ~table.rides & ~table.broken
+        mine = np.isin(owner, table.of_component(DROPPERS)) & ~table.is_dependent & ~table.broken
         self._links = table.arrays.of(mine & (table.arrays.law["released"] > 0.0))
         self._link_stretch = self._stretch[self._links.unknowns[:, 0]]
         self._before: tuple[float, np.ndarray] | None = None

@@ -31,8 +31,9 @@ from catenary.solver.problem.problem import Damping, Placement, Problem
 from catenary.solver.time_loop.views.channels import PANTOGRAPH, RUN
 
 ROOT = Path(__file__).parents[3]
-# Keys of tables that the head of a result file has itself: when an incident happens, and where.
-OWN_KEYS = {"time_s", "at_m"}
+# Keys of tables that the head of a result file has itself: when an incident happens, and where;
+# where the arrivals of reflections at a pantograph begin to count.
+OWN_KEYS = {"time_s", "at_m", "start_m"}
 
 
 @pytest.fixture
