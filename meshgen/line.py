@@ -100,8 +100,8 @@ class Line(Spans):
     @cached_property
     def dropper_x(self) -> np.ndarray:
         """Places of the lower ends of all droppers, ascending [m]; read-only."""
-        places = [np.zeros(0), *(group.lower_x for group in self.droppers)]
-        return read_only(np.sort(np.concatenate(places)))
+        places = np.concatenate([np.zeros(0), *(group.lower_x for group in self.droppers)])
+        return read_only(np.sort(places))
 
     def droppers_of_span(self, span: int) -> np.ndarray:
         """Places of the lower ends of a span's droppers, ascending [m]; spans count from 0."""

@@ -63,9 +63,11 @@ class Pictures:
         --------
         >>> figure = run.plot("histogram")
         """
+        from catenary.postproc.report.pictures.figures import fitted
+
         for own, _, draw in drawings(self._results, self._evaluated()):
             if own == name and (figure := draw()) is not None:
-                return figure
+                return fitted(figure)
         raise InputError(f"the run has no picture {name}; it has {', '.join(self.names)}")
 
     def force(self) -> Figure:

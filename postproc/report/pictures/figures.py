@@ -250,6 +250,13 @@ def svg(figure: Figure) -> bytes:
     return stream.getvalue()
 
 
+@own_style()
+def fitted(figure: Figure) -> Figure:
+    """``figure`` with room for its legends, and no formulas in its texts."""
+    _prepared(figure)
+    return figure
+
+
 def _prepared(figure: Figure) -> FigureCanvasAgg:
     """The canvas of a figure whose legends have room and whose texts are no formulas."""
     for text in _texts(figure):
