@@ -9,18 +9,17 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
-# Files to begin with, as cores become free: those that compile most. The first compiles the loop of
-# steps, which takes longest and which nearly all later files need; the next ones compile parts of
-# lines of other widths in the meantime. No two cores compile the same at a time.
+# Files to begin with, as cores become free: those that take longest, so that none is left to one
+# core at the end.
 FIRST = (
-    "regression/test_cases.py",
-    "unit/solver/test_repeated_blocks.py",
-    "unit/solver/test_station_passes.py",
-    "unit/solver/test_lines_in_two_passes.py",
-    "unit/solver/test_varying_stations.py",
-    "unit/solver/test_wires_that_come_and_go.py",
-    "regression/test_hard_cases.py",
-    "regression/test_fuzz.py",
+    "regression/test_documents.py",
+    "regression/test_interruption.py",
+    "unit/test_runs_side_by_side.py",
+    "regression/test_fuzz_damage.py",
+    "unit/test_full_report.py",
+    "verification/test_dropper_curves.py",
+    "unit/postproc/test_own_style.py",
+    "verification/test_ensembles.py",
 )
 
 # Hypothesis draws the same examples for everybody: what fails in one place fails in all. Others are
