@@ -265,10 +265,12 @@ SCENES: dict[str, tuple[str, list[str], dict[str, float]]] = {
     ),
 }
 LONG = {
+    # Stations whose rows agree in 38 bits have one, and which these are changes with a parameter: forces
+    # of this line move by 5e-12 of the largest then. Steps are so large that this is below the bound.
     "stitched": (
         "re330_stitched",
         [],
-        {"line.stitch_wire.tension_N": 1e-5, "line.messenger_wire.mass_kg_per_m": 1e-5},
+        {"line.stitch_wire.tension_N": 4e-5, "line.messenger_wire.mass_kg_per_m": 2e-5},
     ),
     "twin": (
         "dc_twin",
