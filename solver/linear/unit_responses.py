@@ -17,7 +17,7 @@ from catenary.base.errors import RunBroken
 from catenary.solver.kernels import native
 from catenary.solver.linear.operator_bands import OperatorBands
 from catenary.solver.linear.stations.like_stations import LikeStations
-from catenary.solver.linear.stations.unique_rows import kinds_of
+from catenary.solver.model.alike import kinds_of
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import Ownership
 from catenary.solver.model.unknowns.registry import Unknowns

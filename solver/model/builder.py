@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from catenary.meshgen.mesh import DROPPERS
+from catenary.solver.model.alike import alike
 from catenary.solver.model.elements import beam
 from catenary.solver.model.link_directions import dropper_directions
 from catenary.solver.model.links import BOTH, NO_BENDS, PULLS, Bends, Direction, Links, law
@@ -46,23 +47,13 @@ class ModelBuilder:
             return
         dofs, length = wire_elements(self.model, wire, unknowns)
         data = self.problem.line.wire(wire)
-        tension = self.model.tension_of(wire)
-        lengths, tensions, kind = beam.alike(length, tension)
-        mass = beam.mass(lengths, data.mass_per_length)
-        stiffness = beam.stiffness(lengths, data.bending_stiffness, tensions)
-        load = data.mass_per_length * beam.uniform_load(lengths)
-        if data.worn:
-            section, bending = data.left_of(self.mesh.x(self.mesh.elements(wire)))
-            worn = section < 1.0
-            # Each worn element is a kind of its own, after those that are alike.
-            kind[worn] = lengths.size + np.arange(np.count_nonzero(worn))
-            own, left = length[worn], section[worn, None, None]
-            bent = beam.stiffness(own, data.bending_stiffness, 0.0)
-            pulled = beam.stiffness(own, 0.0, tension[worn])
-            mass = np.concatenate([mass, left * beam.mass(own, data.mass_per_length)])
-            stiffness = np.concatenate([stiffness, bending[worn, None, None] * bent + pulled])
-            own_load = data.mass_per_length * beam.uniform_load(own) * section[worn, None]
-            load = np.concatenate([load, own_load])
+        section, bending = data.left_of(self.mesh.x(self.mesh.elements(wire)))
+        each = np.column_stack([length, self.model.tension_of(wire), section, bending])
+        first, kind = alike(each)
+        length, tension, section, bending = each[first].T
+        mass = beam.mass(length, data.mass_per_length * section)
+        stiffness = beam.stiffness(length, data.bending_stiffness * bending, tension)
+        load = (data.mass_per_length * section)[:, None] * beam.uniform_load(length)
         lateral = tuple(unknowns) == _LATERAL
         self.add_block(Block(wire, dofs, kind, mass, stiffness, of_shape=True, lateral=lateral))
         if unknowns[0] == "w":
@@ -79,9 +70,8 @@ class ModelBuilder:
     ) -> None:
         """Springs from nodes to the ground [N/m], without force in the equilibrium."""
         values = np.broadcast_to(np.asarray(stiffness, dtype=float), nodes.shape)
-        self._add_block(
-            component, self.model.dofs(nodes, unknown)[:, None], None, values[:, None, None].copy()
-        )
+        dofs = self.model.dofs(nodes, unknown)[:, None]
+        self.add_elements(component, dofs, stiffness=values[:, None, None])
 
     def add_masses(
         self,
@@ -97,7 +87,7 @@ class ModelBuilder:
         """
         values = np.broadcast_to(np.asarray(mass, dtype=float), nodes.shape)
         dofs = self.model.dofs(nodes, unknown)
-        self._add_block(component, dofs[:, None], values[:, None, None].copy(), None)
+        self.add_elements(component, dofs[:, None], mass=values[:, None, None])
         for name in _LEVEL if unknown == "w" else ():
             there = self.model.numbering.has(nodes, name)
             if there.any():
@@ -111,7 +101,7 @@ class ModelBuilder:
         """Point masses (n,) [kg] at places of wires in the vertical plane, which they weigh on."""
         unknowns, weights = places
         matrices = mass[:, None, None] * weights[:, :, None] * weights[:, None, :]
-        self._add_block(component, unknowns, matrices, None)
+        self.add_elements(component, unknowns, mass=matrices)
         self.model.hanging.append(Hanging(unknowns, mass[:, None] * weights))
 
     def add_links(
@@ -137,8 +127,8 @@ class ModelBuilder:
             if (law["acts"] != BOTH).any():
                 raise ValueError(f"links of one sign need a name of their own, not {component}")
         model.links.append(links)
-        matrices, kind = links.stiffness_matrices, np.arange(len(direction.unknowns))
-        self.add_block(Block(component, direction.unknowns, kind, None, matrices, None, of_shape))
+        stiffness = links.stiffness_matrices
+        self.add_elements(component, direction.unknowns, stiffness=stiffness, of_shape=of_shape)
         return links
 
     def add_droppers(self) -> None:
@@ -154,8 +144,7 @@ class ModelBuilder:
         for number, group in enumerate(self.problem.line.droppers):
             mine = mesh.dropper_group == number
             unknowns = model.droppers.direction.unknowns[mine]
-            kind = np.arange(len(unknowns))
-            self.add_block(Block(group.name, unknowns, kind, None, matrices[mine], of_shape=True))
+            self.add_elements(group.name, unknowns, stiffness=matrices[mine], of_shape=True)
             if self.problem.slack_dampers_act and slack[mine].any():
                 self._add_dampers(group.name, mine & slack)
 
@@ -167,16 +156,27 @@ class ModelBuilder:
         kept = (model.dropper_damping - model.released_damping)[which]
         lacking = (1.0 - model.simulated.kept_ratio) * kept
         damping = lacking[:, None, None] * weights[:, :, None] * weights[:, None, :]
-        kind = np.arange(unknowns.shape[0])
-        self.add_block(Block(component, unknowns, kind, None, None, damping))
+        self.add_elements(component, unknowns, damping=damping)
 
     def add_load(self, load: Load) -> None:
         """A load in time, of one of the kinds in ``model/loads.py``."""
         self.model.loads.append(load)
         self._n_terms += len(load.unknowns)
 
+    def add_elements(
+        self,
+        component: str,
+        dofs: np.ndarray,
+        mass: np.ndarray | None = None,
+        stiffness: np.ndarray | None = None,
+        damping: np.ndarray | None = None,
+        of_shape: bool = False,
+    ) -> None:
+        """Elements with a matrix each, see ``Block.of_elements``; masses carry no weight."""
+        self.add_block(Block.of_elements(component, dofs, mass, stiffness, damping, of_shape))
+
     def add_block(self, block: Block) -> None:
-        """Element matrices of any kind; those of masses carry no weight."""
+        """Elements of which like ones share matrices already; masses carry no weight."""
         dofs, kind = (part.astype(np.int32, copy=False) for part in (block.dofs, block.kind))
         self.model.blocks.append(replace(block, dofs=dofs, kind=kind))
         self._n_terms += block.dofs.shape[0]
@@ -214,14 +214,3 @@ class ModelBuilder:
         held = [model.numbering.missing, *self._constrained]
         model.constrained = np.unique(np.concatenate(held))
         return model
-
-    def _add_block(
-        self,
-        component: str,
-        dofs: np.ndarray,
-        mass: np.ndarray | None,
-        stiffness: np.ndarray | None,
-        kind: np.ndarray | None = None,
-    ) -> None:
-        kind = np.arange(dofs.shape[0]) if kind is None else kind
-        self.add_block(Block(component, dofs, kind, mass, stiffness))

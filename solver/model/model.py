@@ -16,6 +16,7 @@ import numpy as np
 from catenary.meshgen.hardware import Slopes
 from catenary.meshgen.mesh import LineMesh
 from catenary.meshgen.wires import Role
+from catenary.solver.model.alike import alike
 from catenary.solver.model.links import Links
 from catenary.solver.model.loads import Load
 from catenary.solver.model.rest_shape import Equilibrium
@@ -50,6 +51,26 @@ class Block:
     damping: np.ndarray | None = None
     of_shape: bool = False
     lateral: bool = False
+
+    @classmethod
+    def of_elements(
+        cls,
+        component: str,
+        dofs: np.ndarray,
+        mass: np.ndarray | None = None,
+        stiffness: np.ndarray | None = None,
+        damping: np.ndarray | None = None,
+        of_shape: bool = False,
+    ) -> Block:
+        """A block of elements (n, m) whose matrices (n, m, m) are given, each its own.
+
+        Elements that rounding alone tells from each other have the matrices of the first of them.
+        """
+        terms = [mass, stiffness, damping]
+        rows = [term.reshape(len(dofs), -1) for term in terms if term is not None]
+        first, kind = alike(np.hstack(rows))
+        mass, stiffness, damping = (None if term is None else term[first] for term in terms)
+        return cls(component, dofs, kind, mass, stiffness, damping, of_shape)
 
     def near(self, first: int, last: int) -> slice | np.ndarray:
         """Elements among which are all with unknowns from ``first`` to before ``last``."""

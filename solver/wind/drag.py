@@ -17,6 +17,7 @@ from collections.abc import Callable
 import numpy as np
 from scipy import sparse
 
+from catenary.solver.model.alike import alike
 from catenary.solver.model.elements import beam
 from catenary.solver.model.loads import FieldLoad
 from catenary.solver.model.model import Block, Model, wire_elements
@@ -92,9 +93,8 @@ def damping_blocks(model: Model, wind: Wind) -> list[Block]:
             speed = np.abs(across_at(wind, tunnels, middle))
             share = 1.0 if plane is LATERAL else 0.5
             rate = share * wind.density * drag_width(wire) * speed
-            # Length and rate as one number, of which NumPy finds those that are alike.
-            alike, kind = np.unique(np.round(length, 9) + 1j * rate, return_inverse=True)
-            matrices = alike.imag[:, None, None] * beam.mass(alike.real, 1.0)
+            first, kind = alike(np.column_stack([length, rate]))
+            matrices = beam.mass(length[first], rate[first])
             found.append(Block(wire.name, dofs, kind, None, None, matrices))
     return found
 

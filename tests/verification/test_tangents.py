@@ -265,8 +265,9 @@ SCENES: dict[str, tuple[str, list[str], dict[str, float]]] = {
     ),
 }
 LONG = {
-    # Stations whose rows agree in 38 bits have one, and which these are changes with a parameter: forces
-    # of this line move by 5e-12 of the largest then. Steps are so large that this is below the bound.
+    # Elements that agree in 38 bits have one matrix, and which these are changes with a parameter:
+    # forces of this line move by 5e-12 of the largest then. Steps are so large that this is below
+    # the bound.
     "stitched": (
         "re330_stitched",
         [],

@@ -155,7 +155,7 @@ def _change(model: Model, wire: Wire, beyond: Conductor) -> None:
     stiffness = beam.stiffness(
         length, beyond.bending_stiffness - wire.bending_stiffness, beyond.tension - wire.tension
     )
-    model.blocks.append(Block(wire.name, dofs, np.arange(length.size), mass, stiffness))
+    model.blocks.append(Block.of_elements(wire.name, dofs, mass, stiffness))
 
 
 def _signals(

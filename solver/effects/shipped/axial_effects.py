@@ -11,6 +11,7 @@ from catenary.meshgen.wires import End
 from catenary.solver.effects.effect import Effect, register
 from catenary.solver.effects.shipped import vertical_effects  # noqa: F401  (built before)
 from catenary.solver.model import axial_elements, wire_ends
+from catenary.solver.model.alike import alike
 from catenary.solver.model.link_directions import across_droppers, between_nodes
 from catenary.solver.model.links import PULLS, PUSHES, Direction, law, slips
 from catenary.solver.model.model import Block
@@ -56,15 +57,15 @@ def _add_bars(builder: ModelBuilder, name: str) -> None:
     unknowns = axial_elements.unknowns_along(model, name)
     rows = axial_elements.strain_rows(model, name)
     left, _ = data.left_of(model.mesh.x(model.mesh.elements(name)))
-    alike, kind = np.unique(np.column_stack([rows, left]), axis=0, return_inverse=True)
-    alike, left = alike[:, :-1], alike[:, -1]
-    length = 1.0 / alike[:, 1]
+    first, kind = alike(np.column_stack([rows, left]))
+    rows, left = rows[first], left[first]
+    length = 1.0 / rows[:, 1]
     stiffness = (data.axial_stiffness * left * length)[:, None, None] * (
-        alike[:, :, None] * alike[:, None, :]
+        rows[:, :, None] * rows[:, None, :]
     )
     mass = np.zeros_like(stiffness)
     mass[:, :2, :2] = axial_elements.bar_mass(left * length, data.mass_per_length)
-    builder.add_block(Block(name, unknowns, kind.ravel(), mass, stiffness, of_shape=True))
+    builder.add_block(Block(name, unknowns, kind, mass, stiffness, of_shape=True))
 
 
 def _add_pendulums(builder: ModelBuilder) -> None:
@@ -74,9 +75,7 @@ def _add_pendulums(builder: ModelBuilder) -> None:
     matrices = stiffness[:, None, None] * weights[:, :, None] * weights[:, None, :]
     for number, droppers in enumerate(line.droppers):
         mine = mesh.dropper_group == number
-        kind = np.arange(np.count_nonzero(mine))
-        block = Block(droppers.name, unknowns[mine], kind, None, matrices[mine], of_shape=True)
-        builder.add_block(block)
+        builder.add_elements(droppers.name, unknowns[mine], stiffness=matrices[mine], of_shape=True)
     for number, arms in enumerate(line.steady_arms):
         if model.simulated.lateral:
             continue  # bars, which swing along the track as well
@@ -133,8 +132,7 @@ def _add_friction(builder: ModelBuilder, ends: list[wire_ends.WireEnd]) -> None:
         ]
     ).T
     damping = 0.5 * (high - low) / CREEP
-    kind = np.arange(nodes.size)
-    builder.add_block(Block(TENSIONERS, unknowns, kind, None, None, damping[:, None, None].copy()))
+    builder.add_elements(TENSIONERS, unknowns, damping=damping[:, None, None])
     outwards = np.array([[float(end.outwards)] for end in ends])
     x = builder.mesh.x(nodes)
     # A wire that pulls more than the band allows moves inwards, one that pulls less outwards.

@@ -12,7 +12,6 @@ from catenary.meshgen.line import Line
 from catenary.solver.effects.effect import Effect, register
 from catenary.solver.effects.shipped import irregularity_effects  # noqa: F401  (built before)
 from catenary.solver.model.link_directions import at_places
-from catenary.solver.model.model import Block
 from catenary.solver.problem.defects import (
     HardSpot,
     Kink,
@@ -67,8 +66,7 @@ def _hard_spots(builder: ModelBuilder) -> None:
             builder.add_masses_at(spot.wire, place, np.array([spot.mass]))
         if spot.stiffness:
             spring = spot.stiffness * place.weights[:, :, None] * place.weights[:, None, :]
-            unknowns, kind = place.unknowns, np.zeros(1, dtype=np.int64)
-            builder.add_block(Block(spot.wire, unknowns, kind, None, spring))
+            builder.add_elements(spot.wire, place.unknowns, stiffness=spring)
 
 
 def _kinks(laws: Simulated, problem: Problem) -> Simulated:

@@ -46,8 +46,8 @@ def layer_blocks(model: Model, begin: float, end: float, damping: float) -> list
         inside = np.flatnonzero(rate > 0.0)
         if inside.size:
             matrices = rate[inside, None, None] * block.mass[block.kind[inside]]
-            dofs, kind = block.dofs[inside], np.arange(inside.size)
-            found.append(Block(block.component, dofs, kind, None, None, matrices))
+            dofs = block.dofs[inside]
+            found.append(Block.of_elements(block.component, dofs, damping=matrices))
     return found
 
 
@@ -94,9 +94,7 @@ def _lines_beyond(builder: ModelBuilder) -> None:
                     f"{error}, as where nothing holds a wire"
                 ) from error
     for end in ends:  # once both are found, as these are no part of what goes on
-        kind = np.zeros(1, dtype=np.int64)
-        matrices = end.mass[None], end.stiffness[None]
-        builder.add_block(Block(_BEYOND, end.unknowns[None], kind, *matrices))
+        builder.add_elements(_BEYOND, end.unknowns[None], end.mass[None], end.stiffness[None])
         builder.add_load(MemoryLoad(end.unknowns, numerics.dt, steps_of(problem), end.memory))
 
 

@@ -11,7 +11,6 @@ from catenary.solver.effects.effect import Effect, register
 from catenary.solver.effects.shipped import vertical_effects  # noqa: F401  (built before)
 from catenary.solver.model.link_directions import between_nodes, sideways_of_droppers
 from catenary.solver.model.links import Direction, law
-from catenary.solver.model.model import Block
 
 if TYPE_CHECKING:
     from catenary.meshgen.hardware import SteadyArms
@@ -65,11 +64,11 @@ def _bars(builder: ModelBuilder, arms: SteadyArms, mine: np.ndarray) -> None:
     laws = law(builder.mesh.x(nodes), arms.kind.bar_stiffness, rest=tension)
     builder.add_links(name, Direction(unknowns, -unit), laws, of_shape=True)
     across = np.eye(len(names)) - unit[:, :, None] * unit[:, None, :]
-    matrices, kind = (tension / length)[:, None, None] * across, np.arange(nodes.size)
-    builder.add_block(Block(name, unknowns, kind, None, matrices, of_shape=True))
+    pull = (tension / length)[:, None, None]
+    builder.add_elements(name, unknowns, stiffness=pull * across, of_shape=True)
     if swings and not slewed:
-        along, values = model.dofs(nodes, "u")[:, None], (tension / length)[:, None, None]
-        builder.add_block(Block(name, along, kind, None, values, of_shape=True))
+        along = model.dofs(nodes, "u")[:, None]
+        builder.add_elements(name, along, stiffness=pull, of_shape=True)
 
 
 def _add_stiffness(
@@ -82,8 +81,7 @@ def _add_stiffness(
     """Springs along some of the directions, which are never cut [N/m]."""
     unknowns, weights = direction.unknowns[which], direction.weights[which]
     matrices = stiffness[which, None, None] * weights[:, :, None] * weights[:, None, :]
-    kind = np.arange(len(unknowns))
-    builder.add_block(Block(component, unknowns, kind, None, matrices, of_shape=True))
+    builder.add_elements(component, unknowns, stiffness=matrices, of_shape=True)
 
 
 register(

@@ -12,15 +12,12 @@ from functools import cached_property
 
 import numpy as np
 
-from catenary.solver.linear.stations.unique_rows import digests
+from catenary.solver.model.alike import digests
 from catenary.solver.model.model import Block, Model
 
 # Odd numbers without a pattern: of Knuth's linear congruential generator and of SplitMix64.
 _RATIO = 6364136223846793005
 _FIRST, _SECOND = np.uint64(0xBF58476D1CE4E5B9), np.uint64(0x94D049BB133111EB)
-# Bits of the numbers of elements that are alike: those that follow are what rounding leaves of
-# places along the line and of its shape at rest.
-_EQUAL_BITS = 38
 # Sums of parts of so many bits are exact in float64, of up to 2^32 of them.
 _BITS = 21
 
@@ -57,7 +54,7 @@ class LikeStations:
             dofs, kind, table = _elements_between(block, low, high)
             if not dofs.size:
                 continue  # of no element, as droppers that a line does not have
-            of_kind = _mixed(digests(_rounded(table)) + np.uint64(number + 1))
+            of_kind = _mixed(digests(table) + np.uint64(number + 1))
             at, own = station[dofs - low], name[dofs - low]
             apart = (at - at.min(axis=1, keepdims=True)).astype(np.uint64)
             element = of_kind[kind]
@@ -99,14 +96,6 @@ def _elements_between(block: Block, low: int, high: int) -> tuple[np.ndarray, ..
         terms = [term[used] for term in terms]
     rows = [term.reshape(len(term), math.prod(term.shape[1:])) for term in terms]
     return dofs, kind, np.hstack(rows)
-
-
-def _rounded(table: np.ndarray) -> np.ndarray:
-    """Rows of numbers without the bits that rounding takes; what is nothing beside the largest of a
-    row is zero."""
-    least = np.ldexp(np.abs(table).max(axis=1, initial=0.0), -_EQUAL_BITS)[:, None]
-    mantissa, exponent = np.frexp(np.where(np.abs(table) < least, 0.0, table))
-    return np.ldexp(np.rint(np.ldexp(mantissa, _EQUAL_BITS)), exponent - _EQUAL_BITS)
 
 
 def _mixed(numbers: np.ndarray) -> np.ndarray:

@@ -19,7 +19,7 @@ from catenary.solver.kernels import aligned_arrays, native
 from catenary.solver.linear.stations.sections import Places, Sections
 from catenary.solver.linear.stations.station_layout import MOST_UNKNOWNS, Layout
 from catenary.solver.linear.stations.station_rows import StationRows, rows_of
-from catenary.solver.linear.stations.unique_rows import kinds_of
+from catenary.solver.model.alike import kinds_of
 
 
 def layout_of(

@@ -8,26 +8,15 @@ from __future__ import annotations
 import numpy as np
 
 
-def alike(length: np.ndarray, tension: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Lengths (k,) [m] and tensions (k,) [N] of elements that are not alike, and which of these
-    each of all elements (n,) is."""
-    if not tension.size or (tension == tension[0]).all():
-        lengths, kind = np.unique(length, return_inverse=True)
-        return lengths, np.full(lengths.size, tension[0] if tension.size else 0.0), kind
-    # Length and tension as one number.
-    found, kind = np.unique(length + 1j * tension, return_inverse=True)
-    return found.real.copy(), found.imag.copy(), kind
-
-
 def stiffness(
-    length: np.ndarray, bending_stiffness: float, tension: float | np.ndarray
+    length: np.ndarray, bending_stiffness: float | np.ndarray, tension: float | np.ndarray
 ) -> np.ndarray:
     """Element matrices K = EI K_L + F K_G of eq. (2.1).
 
     Parameters
     ----------
     length : ndarray, shape (n,) [m]
-    bending_stiffness : EI [N m2]
+    bending_stiffness : EI [N m2], of all elements or (n,) of each
     tension : F [N], positive in tension, of all elements or (n,) of each
 
     Returns
@@ -53,8 +42,9 @@ def stiffness(
     ] * geometric
 
 
-def mass(length: np.ndarray, mass_per_length: float) -> np.ndarray:
-    """Consistent mass matrices, shape (n, 4, 4), for lengths [m] and mass per length [kg/m]."""
+def mass(length: np.ndarray, mass_per_length: float | np.ndarray) -> np.ndarray:
+    """Consistent mass matrices, shape (n, 4, 4), for lengths (n,) [m] and masses per length, of all
+    or (n,) of each [kg/m]."""
     one = np.ones_like(length)
     shape = _matrix(
         [156 * one, 22 * length, 54 * one, -13 * length],

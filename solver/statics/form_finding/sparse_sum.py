@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy import sparse
 
+from catenary.solver.model.alike import alike
 from catenary.solver.model.elements import beam, exact_beam
 from catenary.solver.model.model import Model
 
@@ -44,9 +45,9 @@ def wire_parts(model: Model, at: np.ndarray, exact: bool = False) -> list[Part]:
         length = mesh.x(second) - mesh.x(first)
         dofs = np.stack([at[first], at[first] + 1, at[second], at[second] + 1], axis=1)
         tension = wire.tension_at(0.5 * (mesh.x(first) + mesh.x(second)))
-        lengths, tensions, kind = beam.alike(length, tension)
+        chosen, kind = alike(np.column_stack([length, tension]))
         elements = exact_beam if exact else beam
-        stiffness = elements.stiffness(lengths, wire.bending_stiffness, tensions)
+        stiffness = elements.stiffness(length[chosen], wire.bending_stiffness, tension[chosen])
         parts.append(Part(dofs, stiffness, kind))
     return parts
 

@@ -1,4 +1,4 @@
-"""Rows of a table that are the same, found once.
+"""Rows of a table that are the same, or the same but for rounding, found once.
 
 Spans of a line are alike, so that its matrices have few unique rows, however long it is.
 """
@@ -6,6 +6,10 @@ Spans of a line are alike, so that its matrices have few unique rows, however lo
 from __future__ import annotations
 
 import numpy as np
+
+# Bits of numbers that are alike: those that follow are what rounding leaves of places along the
+# line and of its shape at rest.
+_EQUAL_BITS = 38
 
 
 def kinds_of(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -20,6 +24,14 @@ def kinds_of(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         # Two different rows of one digest, as good as impossible, or what is no number.
         return np.arange(rows.shape[0]), np.arange(rows.shape[0], dtype=np.int32)
     return first, kinds.astype(np.int32)
+
+
+def alike(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """``kinds_of`` rows that agree in all but their last bits; what is nothing beside the largest
+    of a row counts as zero."""
+    least = np.ldexp(np.abs(rows).max(axis=1, initial=0.0), -_EQUAL_BITS)[:, None]
+    mantissa, exponent = np.frexp(np.where(np.abs(rows) < least, 0.0, rows))
+    return kinds_of(np.ldexp(np.rint(np.ldexp(mantissa, _EQUAL_BITS)), exponent - _EQUAL_BITS))
 
 
 def digests(rows: np.ndarray) -> np.ndarray:
