@@ -67,7 +67,8 @@ class Block:
         Elements that rounding alone tells from each other have the matrices of the first of them.
         """
         terms = [mass, stiffness, damping]
-        rows = [term.reshape(len(dofs), -1) for term in terms if term is not None]
+        n, m = dofs.shape
+        rows = [term.reshape(n, m * m) for term in terms if term is not None]
         first, kind = alike(np.hstack(rows))
         mass, stiffness, damping = (None if term is None else term[first] for term in terms)
         return cls(component, dofs, kind, mass, stiffness, damping, of_shape)
