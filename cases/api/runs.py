@@ -85,8 +85,7 @@ def run(
         options = stack.enter_context(options_of(tables.petsc.given()))
         stack.enter_context(_shown(progress, comm))
         folder = Path(out) if out is not None else stack.enter_context(_temporary(comm, "run"))
-        from catenary.cases.run.one_rank import on_as_many
-        from catenary.cases.run.runner import run_case
+        from catenary.cases.run.runner import on_as_many, run_case
 
         ended = on_as_many(
             tables,

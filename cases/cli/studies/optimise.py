@@ -7,7 +7,16 @@ from typing import Annotated
 
 import typer
 
-from catenary.cases.cli.app import Assignments, Case, Force, Jobs, Out, SceneWords, app, tell
+from catenary.cases.cli.app import (
+    Assignments,
+    Case,
+    Force,
+    Jobs,
+    Out,
+    SceneWords,
+    serial_verb,
+    tell,
+)
 from catenary.cases.result_folder.output_folder import refuse_table
 from catenary.cases.terminal import console
 
@@ -16,7 +25,7 @@ TaskFile = Annotated[
 ]
 
 
-@app.command(
+@serial_verb(
     "optimise",
     help="Choose droppers, tensions, pantographs or any numbers of a scene for the smallest "
     "standard deviation of the contact force, or another statistic, over both directions, several "
@@ -25,8 +34,6 @@ TaskFile = Annotated[
     epilog="Example: catenary optimise ac_simple droppers.toml -o results/optimum "
     "--set train.speed_km_h=320",
 )
-@console.guarded
-@console.serial
 def optimise(
     case: Case,
     task_file: TaskFile,
@@ -57,15 +64,13 @@ def optimise(
     return console.DONE
 
 
-@app.command(
+@serial_verb(
     "tolerance",
     help="Find how far droppers, heights, tensions or any numbers of a scene may be off for each "
     "acceptance criterion to hold with 99 %: by samples of errors, and in the worst case. The same "
     "command continues one that was stopped.",
     epilog="Example: catenary tolerance en50318_2002 installation.toml -o results/tolerance",
 )
-@console.guarded
-@console.serial
 def tolerance(
     case: Case,
     task_file: TaskFile,

@@ -17,9 +17,9 @@ from catenary.cases.cli.app import (
     RunWords,
     Vary,
     Verbose,
-    app,
     begin,
     tell,
+    verb,
 )
 from catenary.cases.result_folder.output_folder import refuse_impossible
 from catenary.cases.terminal import console
@@ -35,14 +35,13 @@ if TYPE_CHECKING:
 _SHOWN_BROKEN, _SHOWN_REFUSED = 3, 20
 
 
-@app.command(
+@verb(
     "sweep",
     help="Run variants of a case and put their statistics side by side. The "
     "same command continues a sweep that was stopped.",
     epilog="Example: catenary sweep en50318_2002 -o results/speeds --vary "
     "train.speed_km_h=200,250,300 --vary contact.stiffness_N_per_m=2e4,5e4",
 )
-@console.guarded
 def sweep(
     words: RunWords,
     out: Out,
