@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from catenary.base.errors import CatenaryError, InputError
 from catenary.cases.process.interrupts import Interrupted
@@ -31,24 +31,8 @@ _MOST, _LEAST, _PIECES = 64, 4, 16
 _KEPT = ("pantographs", "droppers", "acceptance", "not_judged", "passed", "remarks")
 
 
-class Ensemble(NamedTuple):
-    """Variants of a case.
-
-    Attributes
-    ----------
-    draft : the case
-    variants : in their order
-    first : the scene of the first variant that can be run
-    """
-
-    draft: Draft
-    variants: Sequence[Variant]
-    first: Scene
-
-
-def ensemble_of(draft: Draft, variants: Sequence[Variant]) -> Ensemble:
-    """An ensemble of which one variant at least can be run; others are looked at when it is their
-    turn. Not collective.
+def first_scene(draft: Draft, variants: Sequence[Variant]) -> Scene:
+    """The scene of the first variant that can be run. Not collective.
 
     Raises
     ------
@@ -59,7 +43,7 @@ def ensemble_of(draft: Draft, variants: Sequence[Variant]) -> Ensemble:
     refused: CatenaryError | None = None
     for variant in variants:
         try:
-            return Ensemble(draft, variants, scene_of(draft, variant, len(variants) > 1))
+            return scene_of(draft, variant, len(variants) > 1)
         except UnfitScene as error:
             refused = refused or error
     assert refused is not None
@@ -67,7 +51,12 @@ def ensemble_of(draft: Draft, variants: Sequence[Variant]) -> Ensemble:
 
 
 def run_ensemble(
-    ensemble: Ensemble, out: Path | None, comm: Any, options: RunOptions, part: Part | None = None
+    draft: Draft,
+    variants: Sequence[Variant],
+    out: Path | None,
+    comm: Any,
+    options: RunOptions,
+    part: Part | None = None,
 ) -> list[Ended]:
     """March what is not done yet, and say how variants ended, in their order. Collective.
 
@@ -76,23 +65,24 @@ def run_ensemble(
 
     Parameters
     ----------
+    draft, variants : the case, and how it is changed
     out : folder in which pieces of work are kept, None to keep none
     part : of the pieces of work, all if None
     """
-    size = max(_LEAST, min(_MOST, -(-len(ensemble.variants) // _PIECES)))
-    pieces = [ensemble.variants[at : at + size] for at in range(0, len(ensemble.variants), size)]
+    size = max(_LEAST, min(_MOST, -(-len(variants) // _PIECES)))
+    pieces = [variants[at : at + size] for at in range(0, len(variants), size)]
     if part is not None:
         pieces = part.of(pieces)
     variants = [variant for piece in pieces for variant in piece]
     kept = KeptRows(out, options.force)
-    told = json.dumps(ensemble.draft.table(), sort_keys=True, default=str)
+    told = json.dumps(draft.table(), sort_keys=True, default=str)
     case = hashlib.sha256(told.encode()).hexdigest()
 
     def depends_on(piece: Sequence[Variant]) -> list[Any]:
         assignments = [[variant.name, *variant.assignments] for variant in piece]
         return [case, assignments]
 
-    march = _March(ensemble.draft)
+    march = _March(draft)
     n_at_once = at_once(options.n_jobs, comm)
     if comm.size > 1:  # a march is one rank's: all without -j would do the same
         n_at_once = comm.size
@@ -143,7 +133,8 @@ class Marching:
         Interrupted
             If a signal came.
         """
-        ended = run_ensemble(ensemble_of(self.draft, variants), self.out, self.comm, self.options)
+        first_scene(self.draft, variants)
+        ended = run_ensemble(self.draft, variants, self.out, self.comm, self.options)
         self.options = self.options._replace(force=False)  # which would forget these
         if interrupted(ended):
             raise Interrupted("the study was interrupted; the same command continues it")
