@@ -129,8 +129,15 @@ def uncertainty(
             raise InputError(f"the table has columns of several lengths: {error}") from error
         runs = run_table(frame, sampling)
     found = evaluate(runs)
-    rows = found.statistics, found.quantiles, found.probabilities, found.sensitivity
-    return Uncertainty(*map(pd.DataFrame, rows), found.method, found.notes, found.n_done)
+    return Uncertainty(
+        pd.DataFrame(found.statistics),
+        pd.DataFrame(found.quantiles),
+        pd.DataFrame(found.probabilities),
+        pd.DataFrame(found.sensitivity),
+        found.method,
+        found.notes,
+        found.n_done,
+    )
 
 
 def sampling_like(sample: Mapping[str, Any] | str | Path) -> tuple[SamplingTable, str]:

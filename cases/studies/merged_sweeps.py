@@ -13,11 +13,8 @@ from catenary.base.errors import InputError
 from catenary.cases.studies.sampling.tables import SamplingTable
 from catenary.cases.studies.sweep.output import RECORD, table_files
 from catenary.cases.studies.uncertainty import output
-from catenary.cases.studies.uncertainty.evaluation import Uncertainty, evaluate
-from catenary.cases.studies.uncertainty.run_table import (
-    read_sampling_beside,
-    run_table,
-)
+from catenary.cases.studies.uncertainty.evaluation import Uncertainty
+from catenary.cases.studies.uncertainty.run_table import read_sampling_beside
 from catenary.postproc.report.study_table import Column, StudyTable, write_files
 
 _DONE = "done"
@@ -89,9 +86,8 @@ def write(
     files = write_files(out, table_files(record, table))
     if sampling is None:
         return files, None
-    runs = run_table(rows, sampling)
-    found = evaluate(runs)
-    return [*files, *output.write(out, runs, found)], found
+    found, more = output.write_evaluated(out, rows, sampling)
+    return [*files, *more], found
 
 
 class _Variant(BaseModel):

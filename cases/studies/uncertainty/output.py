@@ -13,14 +13,17 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
+from catenary.cases.studies.sampling.tables import SamplingTable
 from catenary.cases.studies.sweep.jobs import STATISTICS
 from catenary.cases.studies.sweep.output import PLOTTED, key_in_words
 from catenary.cases.studies.uncertainty.estimates import quantile, student
-from catenary.cases.studies.uncertainty.evaluation import Row, Uncertainty, independent_runs
-from catenary.cases.studies.uncertainty.run_table import (
-    SAMPLING,
-    RunTable,
+from catenary.cases.studies.uncertainty.evaluation import (
+    Row,
+    Uncertainty,
+    evaluate,
+    independent_runs,
 )
+from catenary.cases.studies.uncertainty.run_table import SAMPLING, RunTable, run_table
 from catenary.cases.studies.uncertainty.sensitivity import ranked_inputs
 from catenary.postproc.report.pictures import figures
 from catenary.postproc.report.study_table import Column, Content, StudyTable, write_files
@@ -202,12 +205,21 @@ def write(
     found : their evaluation
     plotted : statistics that are drawn; the usual ones if there are none
     """
-    content: dict[str, Content] = {RECORD: found.as_table()}
+    content: dict[str, Content] = {RECORD: vars(found)}
     if table.sampling is not None:
         content[SAMPLING] = table.sampling.model_dump(exclude_none=True)
     for name, draw in PICTURES.items():
         content[name] = partial(draw, table, plotted)
     return write_files(out, content)
+
+
+def write_evaluated(
+    out: Path, rows: Sequence[Row], sampling: SamplingTable, plotted: Sequence[str] = ()
+) -> tuple[Uncertainty, list[Path]]:
+    """Evaluate rows of a sweep of samples, and write that as ``write``. Not collective."""
+    table = run_table(rows, sampling)
+    found = evaluate(table)
+    return found, write(out, table, found, plotted)
 
 
 def as_text(found: Uncertainty) -> str:
