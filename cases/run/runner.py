@@ -327,7 +327,7 @@ def _at_rest(
 
     def make_mesh() -> LineMesh:
         mesh = mesh_of(scene)
-        if scene.mesh_file() is not None:
+        if scene.mesh.file is not None:
             judge(run_size(needs_with_mesh(scene, mesh)))
         return mesh
 

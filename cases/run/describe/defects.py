@@ -22,7 +22,6 @@ from catenary.cases.scene.run.incidents import (
     Incident,
     TensionLossTable,
     at_step,
-    dropper_place,
 )
 from catenary.cases.scene.scene import Scene
 from catenary.meshgen.line import Line
@@ -147,12 +146,14 @@ def incident_facts(scene: Scene, problem: Problem) -> list[dict[str, Any]]:
 
 
 def _place(table: Incident, line: Line) -> dict[str, float]:
-    return {"at_m": dropper_place(table, line)} if isinstance(table, DropperBreakTable) else {}
+    if not isinstance(table, DropperBreakTable):
+        return {}
+    return {"at_m": place_of(line, table.span, table.dropper)}
 
 
 def _sentence(table: Incident, line: Line) -> str:
     if isinstance(table, DropperBreakTable):
-        x = dropper_place(table, line)
+        x = place_of(line, table.span, table.dropper)
         return f"dropper {table.dropper} of span {table.span}, at {x:g} m, breaks"
     if isinstance(table, TensionLossTable):
         left = table.share * line.wire(table.wire).tension / 1e3

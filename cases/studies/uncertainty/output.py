@@ -25,6 +25,7 @@ from catenary.cases.studies.uncertainty.evaluation import (
 )
 from catenary.cases.studies.uncertainty.run_table import SAMPLING, RunTable, run_table
 from catenary.cases.studies.uncertainty.sensitivity import ranked_inputs
+from catenary.postproc.evaluate.wording import capital
 from catenary.postproc.report.pictures import figures
 from catenary.postproc.report.study_table import Column, Content, StudyTable, write_files
 
@@ -234,7 +235,7 @@ def as_text(found: Uncertainty) -> str:
         )
     shown = [row for row in found.sensitivity if "with" not in row and _is_shown(row)]
     if shown:
-        parts.append(_first_letter(found.method) + "\n" + _indices(shown).text())
+        parts.append(capital(found.method) + "\n" + _indices(shown).text())
     told = found.remarks[:_MOST_REMARKS]
     lines = [f"REMARK      {one['n']} of {found.n_runs} runs: {one['remark']}" for one in told]
     lines += [f"NOTE        {note}" for note in found.notes]
@@ -314,7 +315,3 @@ def _bounds(row: Row, name: str) -> str:
     """Bounds of an estimate; a dash stands for one that too few samples leave open."""
     low, high = (row[f"{name}_{end}"] for end in ("low", "high"))
     return " to ".join("-" if one != one else f"{one:.4g}" for one in (low, high))
-
-
-def _first_letter(text: str) -> str:
-    return text[:1].upper() + text[1:]
