@@ -295,7 +295,7 @@ def _array_script(
         verb = ["run", *told, "--study"]
     else:
         variants = read_variants(vary, named)
-        jobs = sweep_of(words.draft()[0], variants, out).jobs or ()
+        jobs = sweep_of(words.draft()[0], variants, out).jobs
         verb = ["sweep", *told, *(word for text in vary or [] for word in ("--vary", text))]
         verb += [] if named is None else ["--variants", str(named.absolute())]
     needs = total_needs(each.scene for each in jobs)

@@ -16,24 +16,22 @@ from catenary.cases.studies.sweep.variants import Variant
 if TYPE_CHECKING:
     from catenary.cases.scene.scene import Scene
     from catenary.cases.studies.sweep.jobs import Part
+    from catenary.cases.studies.sweep.together import Ensemble
 
 
 class Sweep(NamedTuple):
-    """Variants of a case whose scenes are checked, or are when it is their turn.
+    """Variants of a case, the jobs of those that can be run, and how the others ended; or, of a
+    sweep that keeps statistics alone, an ``ensemble``."""
 
-    Attributes
-    ----------
-    draft, variants : the case, and how it is changed
-    first : the scene of the first variant that can be run
-    jobs : of those that can be run; None if statistics alone are kept
-    refused : how the others ended
-    """
-
-    draft: Draft
     variants: Sequence[Variant]
-    first: Scene
-    jobs: Sequence[Job] | None = None
-    refused: Sequence[Ended] = ()
+    jobs: list[Job]
+    refused: list[Ended]
+    ensemble: Ensemble | None = None
+
+    @property
+    def first(self) -> Scene:
+        """The scene of the first variant that can be run."""
+        return self.jobs[0].scene if self.ensemble is None else self.ensemble.first
 
 
 def sweep_of(
@@ -57,14 +55,14 @@ def sweep_of(
         one has not, and ``force`` is not given.
     """
     if only_statistics:
-        from catenary.cases.studies.sweep.together import first_scene
+        from catenary.cases.studies.sweep.together import ensemble_of
 
-        made = Sweep(draft, variants, first_scene(draft, variants))
-    else:
-        jobs, refused = jobs_and_refused(draft, variants, full_report)
-        made = Sweep(draft, variants, jobs[0].scene, jobs, refused)
+        ensemble = ensemble_of(draft, variants)
+        refuse_other_sweep(out, variants, force)
+        return Sweep(variants, [], [], ensemble)
+    jobs, refused = jobs_and_refused(draft, variants, full_report)
     refuse_other_sweep(out, variants, force)
-    return made
+    return Sweep(variants, jobs, refused)
 
 
 def run_sweep(
@@ -94,7 +92,7 @@ def run_sweep(
     if show is not None:
         show = show or output.PLOTTED
     with held(out, comm, command):
-        if sweep.jobs is None:
+        if sweep.ensemble is not None:
             on_root(comm, lambda: refuse_earlier(out, options.force))
         ended = in_order(sweep.variants, _run(sweep, out, comm, options), sweep.refused)
         files = on_root(comm, lambda: output.write(out, name, ended, show), takes_long=True)
@@ -120,13 +118,13 @@ def _run(
     sweep: Sweep, out: Path, comm: Any, options: RunOptions, part: Part | None = None
 ) -> list[Ended]:
     """Run what is not done yet of a sweep or a part of it. Collective."""
-    if sweep.jobs is None:
-        from catenary.cases.studies.sweep.together import run_ensemble
+    if sweep.ensemble is None:
+        from catenary.cases.studies.sweep.run_jobs import run_jobs
 
-        return run_ensemble(sweep.draft, sweep.variants, out, comm, options, part)
-    from catenary.cases.studies.sweep.run_jobs import run_jobs
+        return run_jobs(sweep.jobs if part is None else part.of(sweep.jobs), out, comm, options)
+    from catenary.cases.studies.sweep.together import run_ensemble
 
-    return run_jobs(sweep.jobs if part is None else part.of(sweep.jobs), out, comm, options)
+    return run_ensemble(sweep.ensemble, out, comm, options, part)
 
 
 def refuse_other_sweep(out: Path, variants: Sequence[Variant], force: bool) -> None:

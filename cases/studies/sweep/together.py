@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from catenary.base.errors import CatenaryError, InputError
 from catenary.cases.process.interrupts import Interrupted
@@ -31,8 +31,24 @@ _MOST, _LEAST, _PIECES = 64, 4, 16
 _KEPT = ("pantographs", "droppers", "acceptance", "not_judged", "passed", "remarks")
 
 
-def first_scene(draft: Draft, variants: Sequence[Variant]) -> Scene:
-    """The scene of the first variant that can be run. Not collective.
+class Ensemble(NamedTuple):
+    """Variants of a case.
+
+    Attributes
+    ----------
+    draft : the case
+    variants : in their order
+    first : the scene of the first variant that can be run
+    """
+
+    draft: Draft
+    variants: Sequence[Variant]
+    first: Scene
+
+
+def ensemble_of(draft: Draft, variants: Sequence[Variant]) -> Ensemble:
+    """An ensemble of which one variant at least can be run; others are looked at when it is their
+    turn. Not collective.
 
     Raises
     ------
@@ -43,7 +59,7 @@ def first_scene(draft: Draft, variants: Sequence[Variant]) -> Scene:
     refused: CatenaryError | None = None
     for variant in variants:
         try:
-            return scene_of(draft, variant, len(variants) > 1)
+            return Ensemble(draft, variants, scene_of(draft, variant, len(variants) > 1))
         except UnfitScene as error:
             refused = refused or error
     assert refused is not None
@@ -51,12 +67,7 @@ def first_scene(draft: Draft, variants: Sequence[Variant]) -> Scene:
 
 
 def run_ensemble(
-    draft: Draft,
-    variants: Sequence[Variant],
-    out: Path | None,
-    comm: Any,
-    options: RunOptions,
-    part: Part | None = None,
+    ensemble: Ensemble, out: Path | None, comm: Any, options: RunOptions, part: Part | None = None
 ) -> list[Ended]:
     """March what is not done yet, and say how variants ended, in their order. Collective.
 
@@ -65,24 +76,23 @@ def run_ensemble(
 
     Parameters
     ----------
-    draft, variants : the case, and how it is changed
     out : folder in which pieces of work are kept, None to keep none
     part : of the pieces of work, all if None
     """
-    size = max(_LEAST, min(_MOST, -(-len(variants) // _PIECES)))
-    pieces = [variants[at : at + size] for at in range(0, len(variants), size)]
+    size = max(_LEAST, min(_MOST, -(-len(ensemble.variants) // _PIECES)))
+    pieces = [ensemble.variants[at : at + size] for at in range(0, len(ensemble.variants), size)]
     if part is not None:
         pieces = part.of(pieces)
     variants = [variant for piece in pieces for variant in piece]
     kept = KeptRows(out, options.force)
-    told = json.dumps(draft.table(), sort_keys=True, default=str)
+    told = json.dumps(ensemble.draft.table(), sort_keys=True, default=str)
     case = hashlib.sha256(told.encode()).hexdigest()
 
     def depends_on(piece: Sequence[Variant]) -> list[Any]:
         assignments = [[variant.name, *variant.assignments] for variant in piece]
         return [case, assignments]
 
-    march = _March(draft)
+    march = _March(ensemble.draft)
     n_at_once = at_once(options.n_jobs, comm)
     if comm.size > 1:  # a march is one rank's: all without -j would do the same
         n_at_once = comm.size
@@ -133,8 +143,7 @@ class Marching:
         Interrupted
             If a signal came.
         """
-        first_scene(self.draft, variants)
-        ended = run_ensemble(self.draft, variants, self.out, self.comm, self.options)
+        ended = run_ensemble(ensemble_of(self.draft, variants), self.out, self.comm, self.options)
         self.options = self.options._replace(force=False)  # which would forget these
         if interrupted(ended):
             raise Interrupted("the study was interrupted; the same command continues it")
