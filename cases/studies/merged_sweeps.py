@@ -36,7 +36,7 @@ def merge(folders: Sequence[Path]) -> tuple[dict[str, Any], SamplingTable | None
     """
     records = [_record(folder) for folder in folders]
     samplings = [read_sampling_beside(folder) for folder in folders]
-    first, sampling = records[0], _longest(samplings)
+    first, sampling = records[0], max(samplings, key=lambda one: 0 if one is None else one.n)
     for folder, record, other in zip(folders[1:], records[1:], samplings[1:], strict=True):
         for what, one, two in (
             ("case", first["case"], record["case"]),
@@ -103,11 +103,6 @@ class _Record(BaseModel):
     wall_s: float
     variants: list[_Variant]
     rows: list[dict[str, Any]]
-
-
-def _longest(samplings: Sequence[SamplingTable | None]) -> SamplingTable | None:
-    """The sampling with the most samples."""
-    return max(samplings, key=lambda one: 0 if one is None else one.n)
 
 
 def _endless(sampling: SamplingTable | None) -> SamplingTable | None:

@@ -248,15 +248,13 @@ def _sentence(name: str, found: Arrivals) -> str:
     )
 
 
-def _meets_in_stretch(found: Arrivals, course: Course) -> bool:
-    return found.far_end is not None and found.far_end.at < course.stretch[1]
-
-
 def _reflections(scene: Scene, traced: Traced) -> list[str]:
     felt = [
         i
         for i, course in enumerate(traced.courses)
-        if _meets_in_stretch(traced.found[i], course) and reflection_felt(traced.line, course)
+        if (far := traced.found[i].far_end) is not None
+        and far.at < course.stretch[1]
+        and reflection_felt(traced.line, course)
     ]
     if not felt:
         return []

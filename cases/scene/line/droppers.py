@@ -63,7 +63,7 @@ class DropperPattern(Table):
         exactly_one(self, "span_m", "spans")
         ascending(self.spans or [], "spans")
         ascending(self.positions_m, "positions_m")
-        _one_pre_sag_each(self.pre_sag_mm, len(self.positions_m))
+        one_pre_sag_each(self.pre_sag_mm, len(self.positions_m))
         return self
 
 
@@ -163,13 +163,14 @@ class DropperTable(HangingTable):
             if mixed and self.pre_sag_mid_mm is not None:
                 raise ValueError("takes pre_sag_mm in the patterns or pre_sag_mid_mm, not both")
         if self.positions_m is not None:
-            _one_pre_sag_each(self.pre_sag_mm, len(self.positions_m))
+            one_pre_sag_each(self.pre_sag_mm, len(self.positions_m))
         if self.count is not None:
-            _one_pre_sag_each(self.pre_sag_mm, self.count)
+            one_pre_sag_each(self.pre_sag_mm, self.count)
         return self
 
 
-def _one_pre_sag_each(pre_sag: list[float] | None, n_droppers: int) -> None:
+def one_pre_sag_each(pre_sag: list[float] | None, n_droppers: int) -> None:
+    """That a list of pre-sags has one per dropper; ValueError if not, with a predicate."""
     if pre_sag is not None and len(pre_sag) != n_droppers:
         raise ValueError(
             f"must give one pre_sag_mm per dropper, but there are {len(pre_sag)} values "

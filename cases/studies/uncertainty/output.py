@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -302,13 +301,9 @@ def _indices(shown: list[Row]) -> StudyTable:
         *([Column("ST", "ST", ".2f"), Column("ST_conf", "+-", ".2f")] if total else []),
         *([] if total else [Column("rank_correlation", "rank corr.", ".2f")]),
     ]
-    rows = [{name: _known(value) for name, value in row.items()} for row in shown]
+    # None where a value is no number.
+    rows = [{n: None if value != value else value for n, value in row.items()} for row in shown]
     return StudyTable(columns, rows)
-
-
-def _known(value: Any) -> Any:
-    """A cell's value, None where it is no number."""
-    return None if value != value else value
 
 
 def _bounds(row: Row, name: str) -> str:
