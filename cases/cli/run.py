@@ -119,9 +119,9 @@ def restart(
 ) -> int:
     """Collective."""
     from catenary.cases.process.petsc_options import split_extras
-    from catenary.cases.run.extending import EVALUATED, UNTIL, extended_scene
 
     def read() -> tuple[Scene, list[str]]:
+        from catenary.cases.run.continuing import EVALUATED, UNTIL, extended_scene
         from catenary.postproc.read.guard import examined
         from catenary.postproc.read.results import Results
 
