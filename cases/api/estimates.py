@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,100 +14,65 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from catenary.cases.studies.sampling.tables import SamplingTable
-    from catenary.cases.studies.uncertainty.evaluation import Uncertainty as Evaluated
 
 
+@dataclass(frozen=True, repr=False)
 class Uncertainty:
     """Estimates from a table of runs, with bounds of 95 % confidence: what ``uncertainty`` gives.
 
     Bounds are columns with the end ``_low`` and ``_high``, NaN where too few runs leave them open.
     ``pantograph`` is empty for statistics of the line.
 
+    Attributes
+    ----------
+    statistics : pandas.DataFrame
+        Mean and standard deviation of each statistic with bounds, and its extremes.
+    quantiles : pandas.DataFrame
+        Quantiles of each statistic, with bounds by order statistics.
+    probabilities : pandas.DataFrame
+        Probability that each acceptance criterion fails, with Clopper-Pearson bounds.
+    sensitivity : pandas.DataFrame
+        Sensitivity indices of each statistic and key.
+    method : str
+        Which sensitivity indices these are.
+    notes : list of str
+        Sentences on what is left out.
+
     Examples
     --------
-    >>> table = {"variant": ["a", "b", "c"], "outcome": "done", "std_N": [25.0, 27.0, 32.0]}
-    >>> catenary.uncertainty(table)
-    <catenary.Uncertainty: 3 runs>
+    >>> found = catenary.uncertainty(
+    ...     {
+    ...         "variant": ["a", "b", "c"],
+    ...         "outcome": ["done", "done", "broke"],
+    ...         "std_N": [25.0, 27.0, None],
+    ...         "failed": [[], ["arcing NQ"], []],
+    ...         "passed": [True, False, None],
+    ...     }
+    ... )
+    >>> found
+    <catenary.Uncertainty: 2 runs>
+    >>> found.statistics["mean"].tolist(), found.sensitivity.empty
+    ([26.0], True)
+    >>> found.quantiles[found.quantiles.probability == 0.5].value.tolist()
+    [26.0]
+    >>> found.probabilities["probability"].tolist()
+    [0.5, 0.5]
+    >>> found.method
+    'first-order indices from given data (RBD-FAST with the correction of Tissot and Prieur)'
+    >>> found.notes[0]
+    '1 run of 3 did not end; estimates are of the others'
     """
 
-    def __init__(self, found: Evaluated) -> None:
-        self._found = found
-
-    @property
-    def statistics(self) -> pd.DataFrame:
-        """Mean and standard deviation of each statistic with bounds, and its extremes.
-
-        Examples
-        --------
-        >>> table = {"variant": ["a", "b", "c"], "outcome": "done", "std_N": [25.0, 27.0, 32.0]}
-        >>> catenary.uncertainty(table).statistics["mean"].tolist()
-        [28.0]
-        """
-        return _frame(self._found.statistics)
-
-    @property
-    def quantiles(self) -> pd.DataFrame:
-        """Quantiles of each statistic, with bounds by order statistics.
-
-        Examples
-        --------
-        >>> table = {"variant": ["a", "b", "c"], "outcome": "done", "std_N": [25.0, 27.0, 32.0]}
-        >>> quantiles = catenary.uncertainty(table).quantiles
-        >>> quantiles[quantiles.probability == 0.5].value.tolist()
-        [27.0]
-        """
-        return _frame(self._found.quantiles)
-
-    @property
-    def probabilities(self) -> pd.DataFrame:
-        """Probability that each acceptance criterion fails, with Clopper-Pearson bounds.
-
-        Examples
-        --------
-        >>> table = {"variant": ["a", "b"], "failed": [[], ["arcing NQ"]], "passed": [True, False]}
-        >>> catenary.uncertainty(table).probabilities["probability"].tolist()
-        [0.5, 0.5]
-        """
-        return _frame(self._found.probabilities)
-
-    @property
-    def sensitivity(self) -> pd.DataFrame:
-        """Sensitivity indices of each statistic and key; ``method`` says of which kind.
-
-        Examples
-        --------
-        >>> table = {"variant": ["a", "b", "c"], "outcome": "done", "std_N": [25.0, 27.0, 32.0]}
-        >>> catenary.uncertainty(table).sensitivity.empty
-        True
-        """
-        return _frame(self._found.sensitivity)
-
-    @property
-    def method(self) -> str:
-        """Which sensitivity indices these are.
-
-        Examples
-        --------
-        >>> table = {"variant": ["a", "b", "c"], "outcome": "done", "std_N": [25.0, 27.0, 32.0]}
-        >>> catenary.uncertainty(table).method
-        'first-order indices from given data (RBD-FAST with the correction of Tissot and Prieur)'
-        """
-        return self._found.method
-
-    @property
-    def notes(self) -> list[str]:
-        """Sentences on what is left out.
-
-        Examples
-        --------
-        >>> table = {"variant": ["a", "b"], "outcome": ["done", "broke"], "std_N": [25.0, None]}
-        >>> catenary.uncertainty(table).notes
-        ['1 run of 2 did not end; estimates are of the others']
-        """
-        return list(self._found.notes)
+    statistics: pd.DataFrame
+    quantiles: pd.DataFrame
+    probabilities: pd.DataFrame
+    sensitivity: pd.DataFrame
+    method: str
+    notes: list[str]
+    _n_runs: int
 
     def __repr__(self) -> str:
-        return f"<catenary.Uncertainty: {self._found.n_done} runs>"
+        return f"<catenary.Uncertainty: {self._n_runs} runs>"
 
 
 def uncertainty(
@@ -153,12 +119,25 @@ def uncertainty(
 
     sampling = None if sample is None else sampling_like(sample)[0]
     if isinstance(table, str | Path):
-        found = read_run_table(Path(table))
+        runs = read_run_table(Path(table))
         if sampling is not None:
-            found = run_table(found.frame, sampling, str(table))
+            runs = run_table(runs.frame, sampling, str(table))
     else:
-        found = run_table(_columns(pd, table), sampling)
-    return Uncertainty(evaluate(found))
+        try:
+            frame = pd.DataFrame(table)
+        except ValueError as error:
+            raise InputError(f"the table has columns of several lengths: {error}") from error
+        runs = run_table(frame, sampling)
+    found = evaluate(runs)
+    return Uncertainty(
+        pd.DataFrame(found.statistics),
+        pd.DataFrame(found.quantiles),
+        pd.DataFrame(found.probabilities),
+        pd.DataFrame(found.sensitivity),
+        found.method,
+        found.notes,
+        found.n_done,
+    )
 
 
 def sampling_like(sample: Mapping[str, Any] | str | Path) -> tuple[SamplingTable, str]:
@@ -175,16 +154,3 @@ def sampling_like(sample: Mapping[str, Any] | str | Path) -> tuple[SamplingTable
         where = "the table given as sample"
         return sampling_of(plain_value(sample, "sample"), where), where
     return read_sampling(Path(sample)), str(sample)
-
-
-def _columns(pd: Any, table: Any) -> pd.DataFrame:
-    try:
-        return pd.DataFrame(table)
-    except ValueError as error:
-        raise InputError(f"the table has columns of several lengths: {error}") from error
-
-
-def _frame(rows: list[dict[str, Any]]) -> pd.DataFrame:
-    import pandas as pd
-
-    return pd.DataFrame(rows)

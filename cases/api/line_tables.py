@@ -38,7 +38,7 @@ def check(scene: SceneLike) -> list[str]:
     >>> catenary.check("en50318_2002")
     []
     """
-    from catenary.cases.run.checking import check_line
+    from catenary.cases.run.at_rest.static_table import check_line
 
     return check_line(checked(scene)).warnings
 

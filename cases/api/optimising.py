@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -134,12 +133,7 @@ def optimise(
     if out is not None:
         refuse_table(Path(out) / output.RECORD, force)
     plan = study.make_plan(draft_of(scene), _task(task, OptimiseTask))
-    kept = KeptRows(None if out is None else Path(out), force)
-    with _workers(jobs) as pool:
-        found = study.optimise(plan, pool, kept, _line if progress else _nothing)
-    if out is not None:
-        output.write(Path(out), plan, found)
-        kept.forget()
+    found = _found(plan, study.optimise, output, out, jobs, force, progress)
     return [_optimum(scene, plan, one) for one in found]
 
 
@@ -212,27 +206,34 @@ def tolerance(
     if out is not None:
         refuse_table(Path(out) / output.TABLE, force)
     plan = study.make_plan(draft_of(scene), _task(task, ToleranceTask))
-    kept = KeptRows(None if out is None else Path(out), force)
-    with _workers(jobs) as pool:
-        found = study.find_tolerances(plan, pool, kept, _line if progress else _nothing)
-    if out is not None:
-        output.write(Path(out), plan, found)
-        kept.forget()
+    found = _found(plan, study.find_tolerances, output, out, jobs, force, progress)
     rows: Sequence[Mapping[str, Any]] = output.table_of(found).records()
     return pd.DataFrame(rows)
 
 
-@contextmanager
-def _workers(jobs: int) -> Iterator[Any]:
-    """Processes that share runs; a signal to them is one to this process."""
+def _found(
+    plan: Any,
+    find: Callable[..., Any],
+    output: Any,
+    out: str | Path | None,
+    jobs: int,
+    force: bool,
+    progress: bool,
+) -> Any:
+    """What a planned study finds, which its ``output`` writes; a signal is one to this process."""
     from catenary.cases.process.interrupts import Interrupted
     from catenary.cases.studies.scene_sets.evaluation import workers
 
+    kept = KeptRows(None if out is None else Path(out), force)
     try:
         with workers(jobs) as pool:
-            yield pool
+            found = find(plan, pool, kept, _line if progress else _nothing)
     except Interrupted as stopped:
         raise KeyboardInterrupt from stopped
+    if out is not None:
+        output.write(Path(out), plan, found)
+        kept.forget()
+    return found
 
 
 def _task(task: Task, model: Any) -> Any:

@@ -27,7 +27,6 @@ from catenary.scenes import SceneLike, checked, draft_of, plain_value
 if TYPE_CHECKING:
     import pandas as pd
 
-    from catenary.cases.studies.sampling.tables import SamplingTable
     from catenary.results import Run
 
 _PROGRESS = "catenary.progress"
@@ -85,8 +84,7 @@ def run(
         options = stack.enter_context(options_of(tables.petsc.given()))
         stack.enter_context(_shown(progress, comm))
         folder = Path(out) if out is not None else stack.enter_context(_temporary(comm, "run"))
-        from catenary.cases.run.one_rank import on_as_many
-        from catenary.cases.run.runner import run_case
+        from catenary.cases.run.runner import on_as_many, run_case
 
         ended = on_as_many(
             tables,
@@ -196,7 +194,11 @@ def sweep(
         # Times of a rank are its own.
         rows = on_root(comm, lambda: table_of(ended).records())
         if sampling is not None and out is not None:
-            _evaluate(rows, sampling, folder, comm, program)
+            from catenary.cases.result_folder.folder_lock import held
+            from catenary.cases.studies.uncertainty.output import write_evaluated
+
+            with held(folder, comm, program):
+                on_root(comm, lambda: write_evaluated(folder, rows, sampling), takes_long=True)
     if interrupted(ended):
         raise KeyboardInterrupt
     return pd.DataFrame(rows)
@@ -215,23 +217,6 @@ def _listed(vary: Mapping[str, Sequence[Any]] | None) -> list[Variant]:
     variants = product(varied, {})
     check_keys(variants, "in vary")
     return variants
-
-
-def _evaluate(
-    rows: list[dict[str, Any]], sampling: SamplingTable, folder: Path, comm: Any, program: str
-) -> None:
-    """Write what a table of samples says into the folder of the sweep. Collective."""
-    from catenary.cases.result_folder.folder_lock import held
-    from catenary.cases.studies.uncertainty import output
-    from catenary.cases.studies.uncertainty.evaluation import evaluate
-    from catenary.cases.studies.uncertainty.run_table import run_table
-
-    def work() -> None:
-        table = run_table(rows, sampling)
-        output.write(folder, table, evaluate(table))
-
-    with held(folder, comm, program):
-        on_root(comm, work, takes_long=True)
 
 
 def _communicator(comm: Any) -> Any:

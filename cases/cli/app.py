@@ -6,6 +6,7 @@ Backends are imported inside the verbs, so that --help stays quick.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
@@ -21,6 +22,8 @@ if TYPE_CHECKING:
     from catenary.cases.scene.load import Draft
     from catenary.cases.scene.scene import Scene
 
+    Command = Callable[..., int | None]
+
 T = TypeVar("T")
 
 app: typer.Typer = typer.Typer(
@@ -33,6 +36,18 @@ app: typer.Typer = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
+
+def verb(name: str, *, help: str, epilog: str, serial: bool = False) -> Callable[[Command], Any]:
+    """Adds a function as a verb, see ``console.guarded``; a serial one runs on rank 0 alone."""
+
+    def added(function: Command) -> Any:
+        guarded = console.guarded(console.serial(function) if serial else function)
+        return app.command(name, help=help, epilog=epilog)(guarded)
+
+    return added
+
+
+serial_verb = partial(verb, serial=True)
 RunFolder = Annotated[
     Path,
     typer.Argument(

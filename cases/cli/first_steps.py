@@ -1,4 +1,4 @@
-"""The verbs ``new`` and ``doctor``: a case to begin with, and whether the program works here."""
+"""The verbs ``list``, ``new`` and ``doctor``: what there is to begin with, and whether it works."""
 
 from __future__ import annotations
 
@@ -10,19 +10,98 @@ import typer
 
 from catenary.base.errors import InputError
 from catenary.cases.cli import completion
-from catenary.cases.cli.app import app
+from catenary.cases.cli.app import serial_verb
 from catenary.cases.terminal import console
 
 
-@app.command(
+@serial_verb(
+    "list",
+    help="List the shipped cases, keys of a scene, ready pantographs, rule books, or the schema of "
+    "case.toml.",
+    epilog="Example: catenary list --keys damping",
+)
+def list_cases(
+    keys: Annotated[
+        bool, typer.Option("--keys", help="Every key of a scene, its unit, default and meaning.")
+    ] = False,
+    pantographs: Annotated[
+        bool,
+        typer.Option("--pantographs", help="Ready pantographs, for pantographs.NAME.model."),
+    ] = False,
+    schema: Annotated[
+        bool,
+        typer.Option(
+            "--schema", help="The JSON schema of case.toml, for editors that complete keys."
+        ),
+    ] = False,
+    rules: Annotated[
+        bool,
+        typer.Option("--rules", help="Rule books that judge a run, for evaluation.rules."),
+    ] = False,
+    wanted: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="FILTER",
+            autocompletion=completion.keys,
+            help="With --keys: a part of a key, or a pattern with * and ?; tells also bounds, the "
+            "words that a key accepts, and typical values. With --rules: a book, whose criteria "
+            "and limits are told.",
+        ),
+    ] = None,
+) -> None:
+    """Serial."""
+    given = [
+        name
+        for name, on in (
+            ("--keys", keys),
+            ("--pantographs", pantographs),
+            ("--rules", rules),
+            ("--schema", schema),
+        )
+        if on
+    ]
+    if len(given) > 1:
+        raise InputError(
+            "list takes one of --keys, --pantographs, --rules and --schema, not "
+            f"{' and '.join(given)}"
+        )
+    if rules:
+        from catenary.cases.terminal.rule_list import book_table, criteria_text
+
+        console.say(book_table() if wanted is None else criteria_text(wanted))
+        return
+    if keys:
+        from catenary.cases.terminal.key_list import key_details, key_table
+
+        console.say(key_table() if wanted is None else key_details(wanted))
+        return
+    if wanted is not None:
+        raise InputError(f"{wanted} filters keys: write `catenary list --keys {wanted}`")
+    if schema:
+        import json
+
+        from catenary.cases.terminal.json_schema import scene_schema
+
+        console.say(json.dumps(scene_schema(), indent=1))
+        return
+    if pantographs:
+        from catenary.cases.terminal.terminal_text import pantograph_table
+
+        console.say(pantograph_table())
+        return
+    from catenary.cases.scene.input.case_files import entries
+    from catenary.cases.terminal import terminal_text
+
+    console.say(terminal_text.case_table(entries()))
+
+
+@serial_verb(
     "new",
     help="Write a commented case to begin with into the new folder NAME: NAME/case.toml, which "
     "`check` and `run` take. Without --topology it asks which kind of line, on a terminal.",
     epilog="Example: catenary new my_line --topology stitched --spans spans.csv --droppers "
     "droppers.csv",
 )
-@console.guarded
-@console.serial
 def new(
     folder: Annotated[
         Path, typer.Argument(parser=console.folder, metavar="NAME", help="Folder to make.")
@@ -79,15 +158,13 @@ def new(
     )
 
 
-@app.command(
+@serial_verb(
     "doctor",
     help="Check that Catenary works here: packages, compiled kernels, PETSc, MPI, HDF5, compiler, "
     "films, ParaView, file locks, memory. A line each says OK, missing or broken, and how to mend "
     "it; exits with 1 if no run is possible.",
     epilog="Example: catenary doctor",
 )
-@console.guarded
-@console.serial
 def doctor() -> int:
     """Serial."""
     from catenary.base.parallel import launched_by_mpirun

@@ -8,19 +8,17 @@ from typing import Annotated
 import typer
 
 from catenary.base.errors import InputError
-from catenary.cases.cli.app import Force, SceneWords, app
+from catenary.cases.cli.app import Force, SceneWords, serial_verb
 from catenary.cases.terminal import console
 from catenary.postproc.evaluate.wording import counted
 
 
-@app.command(
+@serial_verb(
     "check",
     help="Check a case: keys, bounds, geometry, effects, mesh, pantographs, and that no dropper is "
     "slack at rest. Writes nothing.",
     epilog="Example: catenary check my_line/case.toml --set line.dropper.pre_sag_mid_mm=60",
 )
-@console.guarded
-@console.serial
 def check(
     words: SceneWords,
 ) -> int:
@@ -34,7 +32,7 @@ def check(
             console.complain(line)
         return console.BAD_INPUT
     # What a refusal does not need is imported once the scene is valid.
-    from catenary.cases.run.checking import check_line
+    from catenary.cases.run.at_rest.static_table import check_line
 
     found = check_line(scene)
     console.say("\n".join(found.sentences))
@@ -43,13 +41,11 @@ def check(
     return console.DONE
 
 
-@app.command(
+@serial_verb(
     "mesh",
     help="Write the mesh of a case as a Gmsh file, or a drawing to scale of its line at rest.",
     epilog="Example: catenary mesh re330_stitched -o re330.svg",
 )
-@console.guarded
-@console.serial
 def mesh(
     words: SceneWords,
     out: Annotated[
@@ -75,13 +71,11 @@ def mesh(
     console.say(f"{out}: {made.n_nodes} nodes, {counted(made.droppers.shape[0], 'dropper')}")
 
 
-@app.command(
+@serial_verb(
     "static",
     help="Print the dropper table, registration, sag and elasticity of a case at rest.",
     epilog="Example: catenary static ac_simple -o droppers.csv",
 )
-@console.guarded
-@console.serial
 def static(
     words: SceneWords,
     out: Annotated[
@@ -141,14 +135,12 @@ def static(
         console.say(temperatures(scene, [warmer], None))
 
 
-@app.command(
+@serial_verb(
     "prepare",
     help="Write a line with its pantographs for steps from outside: a C program, a real-time "
     "computer or a controller in Python.",
     epilog="Example: catenary prepare en50318_2002 -o en300.line --set train.speed_km_h=300",
 )
-@console.guarded
-@console.serial
 def prepare(
     words: SceneWords,
     out: Annotated[Path, typer.Option("-o", "--out", help="File to write: *.line.")],

@@ -15,7 +15,6 @@ from catenary.cases.process import (
     interrupts,
     library_settings,
     matplotlib_setup,
-    memory_limit,
 )
 from catenary.cases.terminal import console
 
@@ -30,11 +29,9 @@ def all_verbs() -> typer.Typer:
     # isort: off
     from catenary.cases.cli import plan, line, results  # noqa: F401
     from catenary.cases.cli.studies import sweep, uncertainty, optimise, questions  # noqa: F401
-    from catenary.cases.cli.studies import accuracy, hard, reference  # noqa: F401
-    from catenary.cases.cli import pantograph  # noqa: F401
-    from catenary.cases.cli.studies import sensitivity, identify  # noqa: F401
+    from catenary.cases.cli.studies import numerics, reference, parameters  # noqa: F401
     from catenary.cases.cli.studies import stability, waves, scaling  # noqa: F401
-    from catenary.cases.cli import lists, first_steps  # noqa: F401
+    from catenary.cases.cli import first_steps  # noqa: F401
 
     # isort: on
     return application.app
@@ -69,7 +66,7 @@ def main() -> None:
     interrupts.install(several_ranks=launched_by_mpirun())
     matplotlib_setup.choose_folder()
     matplotlib_setup.leave_out_settings()
-    if too_little := memory_limit.complaint():
+    if too_little := library_settings.too_little_memory():
         console.complain(too_little)
         sys.exit(console.BAD_INPUT)
     if launched_by_mpirun():

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from catenary.base.errors import InputError
-from catenary.cases.cli.app import Force, Jobs, SceneWords, app, folder_option, tell
+from catenary.cases.cli.app import Force, Jobs, SceneWords, folder_option, serial_verb, tell
 from catenary.cases.terminal import console
 
 if TYPE_CHECKING:
@@ -18,15 +18,13 @@ _RUNS = "runs"
 _MOST_ROUNDS = 1000
 
 
-@app.command(
+@serial_verb(
     "plan",
     help="Print what a case simulates and what not, and what it will cost. With --cost, run it "
     "with each effect the other way, and print what a step then takes and what changes.",
     epilog="Example: catenary plan ac_simple --set train.speed_km_h=320; "
     "catenary plan ambrosio2012 --cost --stretch-m 100 -o results/cost",
 )
-@console.guarded
-@console.serial
 def plan(
     words: SceneWords,
     cost: Annotated[

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from catenary.base.errors import CatenaryError, InputError
-from catenary.cases.cli.app import Force, RunFolder, app, folder_option
+from catenary.cases.cli.app import Force, RunFolder, folder_option, serial_verb
 from catenary.cases.terminal import console
 from catenary.postproc.film.wish import View
 
@@ -30,14 +30,12 @@ FromWhere = Annotated[
 ]
 
 
-@app.command(
+@serial_verb(
     "report",
     help="Write the full report of a run from its result file, with data sheets, worst places, "
     "spectra and vector pictures.",
     epilog="Example: catenary report results/en300 --pdf",
 )
-@console.guarded
-@console.serial
 def report(
     folder: RunFolder,
     pdf: Annotated[bool, typer.Option("--pdf", help="Write report.pdf too, on A4.")] = False,
@@ -93,7 +91,7 @@ def report(
     console.say("\n".join(str(path) for path in written.files))
 
 
-@app.command(
+@serial_verb(
     "compare",
     help="Print the figures of several runs side by side and which of their differences are "
     "more than chance, or compare a run with a measured passage: errors of the measurement, "
@@ -101,8 +99,6 @@ def report(
     epilog="Example: catenary compare results/coarse results/fine, or with a measurement: "
     "catenary compare results/en300 measured.csv --description measured.toml -o results/measured",
 )
-@console.guarded
-@console.serial
 def compare(
     first: Annotated[Path, typer.Argument(help="Folder of a run.")],
     others: Annotated[
@@ -165,14 +161,12 @@ def _compare_measured(
         console.say("\n" + "\n".join(map(str, output.write(out, found))))
 
 
-@app.command(
+@serial_verb(
     "animate",
     help="Make a film of a run, film.mp4 and film.gif: the line and its pantographs, the contact "
     "force beneath, from the snapshots of fields.h5.",
     epilog="Example: catenary animate results/en300 --from 2 --to 6 --camera trailing",
 )
-@console.guarded
-@console.serial
 def animate(
     folder: RunFolder,
     start: Annotated[
@@ -231,14 +225,12 @@ def animate(
         )
 
 
-@app.command(
+@serial_verb(
     "paraview",
     help="Write paraview/view.py into the folder of a run: a script that opens it in ParaView, "
     "with pantographs, forces and masts, heights and motions drawn larger.",
     epilog="Example: catenary paraview results/en300",
 )
-@console.guarded
-@console.serial
 def paraview(
     folder: RunFolder,
     motion: Motion = None,

@@ -21,8 +21,9 @@ from catenary.cases.cli.app import (
     Strict,
     Vary,
     Verbose,
-    app,
     begin,
+    serial_verb,
+    verb,
 )
 from catenary.cases.result_folder.output_folder import refuse_impossible
 from catenary.cases.terminal import console
@@ -33,13 +34,12 @@ if TYPE_CHECKING:
     from catenary.cases.scene.scene import Scene
 
 
-@app.command(
+@verb(
     "run",
     help="Simulate a case and write its results into a folder.",
     epilog="Example: catenary run en50318_2002 -o results/en300 --set train.speed_km_h=300 "
     "-- -log_view; catenary run ambrosio2012 --study -o results/study",
 )
-@console.guarded
 def run(
     words: RunWords,
     out: Out,
@@ -71,8 +71,7 @@ def run(
 
     comm, scene, arguments = begin(read, verbose, lambda scene: scene)
     from catenary.cases.run.describe.arrivals import arrival_warnings
-    from catenary.cases.run.one_rank import on_as_many
-    from catenary.cases.run.runner import run_case
+    from catenary.cases.run.runner import on_as_many, run_case
 
     def warn() -> None:
         for text in arrival_warnings(scene):
@@ -94,14 +93,13 @@ def run(
     return _end(result, out, strict)
 
 
-@app.command(
+@verb(
     "restart",
     help="Continue an interrupted or broken run from the last state in its result file, or let one "
     "that is done go on to a later end.",
     epilog="Example: catenary restart results/en300; catenary restart results/en300 --until-m 900 "
     "--evaluate 600:840",
 )
-@console.guarded
 def restart(
     folder: RunFolder,
     extras: PetscOptions = None,
@@ -121,9 +119,9 @@ def restart(
 ) -> int:
     """Collective."""
     from catenary.cases.process.petsc_options import split_extras
-    from catenary.cases.run.extending import EVALUATED, UNTIL, extended_scene
 
     def read() -> tuple[Scene, list[str]]:
+        from catenary.cases.run.continuing import EVALUATED, UNTIL, extended_scene
         from catenary.postproc.read.guard import examined
         from catenary.postproc.read.results import Results
 
@@ -140,8 +138,7 @@ def restart(
         return extended_scene(config, str(results.path), until_m, evaluate), options
 
     comm, scene, arguments = begin(read, verbose, lambda scene: scene)
-    from catenary.cases.run.one_rank import on_as_many
-    from catenary.cases.run.runner import restart_case
+    from catenary.cases.run.runner import on_as_many, restart_case
 
     result = on_as_many(
         scene,
@@ -182,7 +179,7 @@ def _end(result: RunOutcome, folder: Path, strict: bool) -> int:
     return console.NOT_ACCEPTED if strict and result.accepted is False else console.DONE
 
 
-@app.command(
+@serial_verb(
     "submit",
     help="Hand a run to SLURM: a job with time and memory from the plan, and jobs that continue it "
     "where a limit of time or a lost node ends one. With --array a sweep or study: a job array "
@@ -190,8 +187,6 @@ def _end(result: RunOutcome, folder: Path, strict: bool) -> int:
     epilog="Example: catenary submit en50318_2002 -o results/en300 --ranks 4 --print > job.sh; "
     "catenary submit en50318_2002 -o results/speeds --array 10 --vary train.speed_km_h=200,250,300",
 )
-@console.guarded
-@console.serial
 def submit(
     words: RunWords,
     out: Out,
@@ -288,7 +283,7 @@ def _array_script(
     """The script of a sweep or study whose scenes are all checked."""
     from catenary.cases.cli.studies.sweep import read_variants
     from catenary.cases.run.planning.needs import total_needs
-    from catenary.cases.run.planning.slurm_array import array_script
+    from catenary.cases.run.planning.slurm_script import array_script
     from catenary.cases.studies.case_study import make_plan
     from catenary.cases.studies.sweep.sweep import sweep_of
 

@@ -1,10 +1,14 @@
-"""What libraries are told before they are loaded. Not for other people's Python programs."""
+"""What libraries are told before they are loaded, and whether they have memory to be loaded.
+
+Not for other people's Python programs.
+"""
 
 from __future__ import annotations
 
 import atexit
 import gc
 import os
+import resource
 import sys
 
 from catenary.base.parallel import launched_by_mpirun
@@ -34,3 +38,19 @@ def choose() -> None:
     if not launched_by_mpirun():
         # Nor need it try the networks of a cluster, a third of its start.
         os.environ.setdefault("OMPI_MCA_pml", "ob1")
+
+
+# Address space that program and libraries take before any data, with a margin; a report of a short
+# run was written within 0.7 GB, and OpenBLAS tries for ever to get memory within 0.45 GB [B].
+LEAST = 700_000_000
+
+
+def too_little_memory() -> str:
+    """Why the program cannot work within this process's limit, "" if it can. Not collective."""
+    limit, _ = resource.getrlimit(resource.RLIMIT_AS)
+    if limit == resource.RLIM_INFINITY or limit >= LEAST:
+        return ""
+    return (
+        f"this process may take {limit / 1e6:.0f} MB of memory (ulimit -v), and the program with "
+        f"its libraries needs {LEAST / 1e6:.0f} MB before any data; raise the limit"
+    )

@@ -70,7 +70,7 @@ class Owner:
             return False
         except OSError:  # of another user
             pass
-        return _started(self.pid) in ("", self.started) and not _is_zombie(self.pid)
+        return _started(self.pid) in ("", self.started) and _stat(self.pid)[:1] != ["Z"]
 
 
 def myself(command: str) -> Owner:
@@ -117,10 +117,6 @@ def _started(pid: int) -> str:
     """When a process was started, in the kernel's ticks since the machine's; empty if unknown."""
     words = _stat(pid)
     return words[19] if len(words) > 19 else ""
-
-
-def _is_zombie(pid: int) -> bool:
-    return _stat(pid)[:1] == ["Z"]
 
 
 def _stat(pid: int) -> list[str]:

@@ -1,8 +1,10 @@
-"""What a run can be continued from: a valid state of the same line, train and method."""
+"""Runs that go on: from a valid state of the same line, train and method, and beyond their end."""
 
 from __future__ import annotations
 
 import contextlib
+import copy
+import math
 import os
 from collections.abc import Mapping
 from pathlib import Path
@@ -11,6 +13,9 @@ from typing import Any
 import numpy as np
 
 from catenary.base.errors import InputError
+from catenary.cases.scene.input.faults import Origin
+from catenary.cases.scene.load import scene_from
+from catenary.cases.scene.scene import Scene
 from catenary.postproc.channels.header import Header
 from catenary.postproc.files.hdf5.self_contained import open_own
 from catenary.postproc.files.own_files import FIELD_FILES
@@ -29,6 +34,7 @@ _RECORDED = ("contact_force", "head_height", "wire_height", "strip_force", "cont
 _ROUNDING = 1e-9
 # Another machine's rounding at rest, as a share and as a size [m], [N].
 _RELATIVE, _ABSOLUTE = 1e-6, 1e-6
+UNTIL, EVALUATED = "--until-m", "--evaluate"
 
 
 def state_to_continue(result: Path, beyond_end: bool = False) -> dict[str, Any]:
@@ -155,3 +161,42 @@ def _same(one: Any, other: Any) -> bool:
 
 def _refusal(result: Path, what: str) -> InputError:
     return InputError(f"{result} cannot be continued: {what}; start the run anew")
+
+
+def extended_scene(
+    config: dict[str, Any], file: str, until: float | None, evaluated: str | None
+) -> Scene:
+    """The checked scene of a run with a later end, or another evaluated stretch. Not collective.
+
+    Parameters
+    ----------
+    config : of the run's result file
+    file : its path, for sentences
+    until : where the leading pantograph is to stop [m], None for where it stops now
+    evaluated : ``FROM:TO`` [m], None for the stretch as it is
+
+    Raises
+    ------
+    InputError
+        If that is not later, or impossible.
+    """
+    raw, given = copy.deepcopy(config), []
+    if until is not None:
+        end = float(raw["train"]["end_m"])
+        if not (math.isfinite(until) and until > end):
+            raise InputError(
+                f"{UNTIL} is {until:g}, but must be greater than {end:g}: the run ends there"
+            )
+        raw["train"]["end_m"] = until
+        given.append(("train.end_m", f"on the command line ({UNTIL})"))
+    if evaluated is not None:
+        try:
+            first, last = (float(part) for part in evaluated.split(":"))
+        except ValueError:
+            raise InputError(
+                f"{EVALUATED} is {evaluated}, but must be two places [m] as from:to, e.g. 360:600"
+            ) from None
+        raw["evaluation"] |= {"from_m": first, "to_m": last}
+        where = f"on the command line ({EVALUATED})"
+        given += [("evaluation.from_m", where), ("evaluation.to_m", where)]
+    return scene_from(raw, Origin(file, tuple(given), recorded=True))

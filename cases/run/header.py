@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 
 from catenary.cases.process.versions import versions
 from catenary.cases.run.describe.arrivals import arrival_facts
-from catenary.cases.run.describe.defects import defect_facts
-from catenary.cases.run.describe.incidents import incident_facts
+from catenary.cases.run.describe.defects import defect_facts, incident_facts
 from catenary.cases.run.describe.pantographs import header_words
 from catenary.cases.run.planning.plan import effect_rows
 from catenary.cases.scene.problem import resolved

@@ -8,17 +8,19 @@ from __future__ import annotations
 
 import json
 import logging
-from collections.abc import Callable, Sequence
-from contextlib import ExitStack
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
 from catenary.base.errors import CatenaryError, RunBroken
 from catenary.base.freed_memory import give_back_long_line
 from catenary.base.parallel import on_root
+from catenary.base.petsc import PETSc
 from catenary.cases.process.interrupts import Phase, StopRequest
 from catenary.cases.result_folder.folder_lock import held
 from catenary.cases.result_folder.output_folder import (
@@ -28,7 +30,6 @@ from catenary.cases.result_folder.output_folder import (
     prepare,
 )
 from catenary.cases.run.header import header_of
-from catenary.cases.run.performance import Phases, performance
 from catenary.cases.run.planning.needs import (
     flush_cadence,
     needs_before_meshing,
@@ -49,6 +50,7 @@ from catenary.postproc.record.run_watch import RunWatch, StripWatch, watch_caden
 from catenary.postproc.record.snapshots.blocks import RecordedLine
 from catenary.postproc.record.snapshots.fields import FieldRecorder
 from catenary.solver.problem.problem import Problem
+from catenary.solver.problem.window import OFF
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest_on_all
 from catenary.solver.statics.stability_of_rest import refuse_lost_wire
 from catenary.solver.time_loop.march import March, Outcome
@@ -60,6 +62,73 @@ if TYPE_CHECKING:
 logger = logging.getLogger("catenary.runner")
 
 RESULT = "run.h5"
+T = TypeVar("T")
+
+
+class Phases:
+    """Wall time of the phases of a run [s], each shown while it lasts, and also a PETSc log stage.
+
+    Collective by use.
+    """
+
+    def __init__(self, progress: Progress) -> None:
+        self.wall: dict[str, float] = {}
+        self.progress = progress
+
+    @contextmanager
+    def __call__(self, name: str) -> Iterator[None]:
+        """Time what happens inside."""
+        begin = time.perf_counter()
+        stage = PETSc.Log.Stage(name)
+        stage.push()
+        try:
+            with self.progress.phase(name):
+                yield
+        finally:
+            stage.pop()
+            self.wall[name] = time.perf_counter() - begin
+
+
+def performance(outcome: Outcome, phases: Phases, n_ranks: int) -> dict[str, Any]:
+    """What is known at the end; after a restart, of the last part."""
+    counted: dict[str, float] = dict(outcome.counters)
+    if outcome.traffic is not None:
+        # Of the rank that sends most; a whole number unless droppers of other ranks slacken.
+        counted["messages_per_step"], counted["message_bytes_per_step"] = (
+            round(value, 3) for value in outcome.traffic
+        )
+    return {
+        "n_ranks": n_ranks,
+        "march_wall_s": outcome.wall,
+        "march_cpu_s": outcome.cpu,
+        "records_wall_s": outcome.finishing,
+        "phase_wall_s": phases.wall,
+        "inner_iterations": counted,
+        "detour": outcome.slow_path,
+    }
+
+
+def on_as_many(scene: Scene, comm: Any, run: Callable[[Any], T]) -> T:
+    """What ``run`` returns for the ranks that a scene needs. Collective.
+
+    A window is some tens of spans, which one rank steps in less time than two can agree on: rank 0
+    runs alone, as if the others were not there, and these sleep until it is done. A signal to
+    them changes nothing; an MPI launcher hands it to rank 0 as well.
+    """
+    if comm.size == 1 or scene.window.mode == OFF:
+        return run(comm)
+    from mpi4py import MPI
+
+    if comm.rank == 0:
+        logger.warning(
+            "window.mode is %s: what moves is so short that one rank steps it; the other %d wait "
+            "and make nothing faster, start it without mpirun",
+            scene.window.mode,
+            comm.size - 1,
+        )
+        return on_root(comm, lambda: run(MPI.COMM_SELF), takes_long=True)
+    with StopRequest():
+        return on_root(comm, lambda: run(MPI.COMM_SELF), takes_long=True)
 
 
 @dataclass
@@ -258,7 +327,7 @@ def _at_rest(
 
     def make_mesh() -> LineMesh:
         mesh = mesh_of(scene)
-        if scene.mesh_file() is not None:
+        if scene.mesh.file is not None:
             judge(run_size(needs_with_mesh(scene, mesh)))
         return mesh
 

@@ -34,9 +34,9 @@ def mesh_of(scene: Scene, path: Path | None = None) -> LineMesh:
     InputError
         If the user's mesh is refused.
     """
-    line, own = line_of(scene), scene.mesh_file()
+    line, own = line_of(scene), scene.mesh.file
     if own is not None:
-        return use_mesh(line, own)
+        return use_mesh(line, Path(own))
     size = size_of(scene)
     if size is not None and size.nodes > MANY_NODES:
         logging.getLogger("catenary.mesh").warning("%s", size.sentence())
@@ -56,7 +56,7 @@ def write_mesh_of(scene: Scene, path: Path, force: bool) -> LineMesh:
     InputError
         If the scene brings its own mesh or the file cannot or must not be written.
     """
-    if scene.mesh_file() is not None:
+    if scene.mesh.file is not None:
         raise InputError(
             f"mesh.file {scene.origin.of('mesh.file')} names a mesh already; there is none to make"
         )

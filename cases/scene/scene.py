@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Collection, Iterator
-from pathlib import Path
 from typing import Any
 
 from pydantic import Field, PrivateAttr
@@ -132,7 +131,3 @@ class Scene(Table):
         """Whether no effect that is on lifts a limit."""
         known, switches = effect_registry.registry(), self.switches()
         return not any(limit in known[name].lifts for name, on in switches.items() if on)
-
-    def mesh_file(self) -> Path | None:
-        """The user's own mesh, None if the mesh is made from the line."""
-        return None if self.mesh.file is None else Path(self.mesh.file)

@@ -13,11 +13,8 @@ from catenary.base.errors import InputError
 from catenary.cases.studies.sampling.tables import SamplingTable
 from catenary.cases.studies.sweep.output import RECORD, table_files
 from catenary.cases.studies.uncertainty import output
-from catenary.cases.studies.uncertainty.evaluation import Uncertainty, evaluate
-from catenary.cases.studies.uncertainty.run_table import (
-    read_sampling_beside,
-    run_table,
-)
+from catenary.cases.studies.uncertainty.evaluation import Uncertainty
+from catenary.cases.studies.uncertainty.run_table import read_sampling_beside
 from catenary.postproc.report.study_table import Column, StudyTable, write_files
 
 _DONE = "done"
@@ -39,7 +36,7 @@ def merge(folders: Sequence[Path]) -> tuple[dict[str, Any], SamplingTable | None
     """
     records = [_record(folder) for folder in folders]
     samplings = [read_sampling_beside(folder) for folder in folders]
-    first, sampling = records[0], _longest(samplings)
+    first, sampling = records[0], max(samplings, key=lambda one: 0 if one is None else one.n)
     for folder, record, other in zip(folders[1:], records[1:], samplings[1:], strict=True):
         for what, one, two in (
             ("case", first["case"], record["case"]),
@@ -89,9 +86,8 @@ def write(
     files = write_files(out, table_files(record, table))
     if sampling is None:
         return files, None
-    runs = run_table(rows, sampling)
-    found = evaluate(runs)
-    return [*files, *output.write(out, runs, found)], found
+    found, more = output.write_evaluated(out, rows, sampling)
+    return [*files, *more], found
 
 
 class _Variant(BaseModel):
@@ -107,11 +103,6 @@ class _Record(BaseModel):
     wall_s: float
     variants: list[_Variant]
     rows: list[dict[str, Any]]
-
-
-def _longest(samplings: Sequence[SamplingTable | None]) -> SamplingTable | None:
-    """The sampling with the most samples."""
-    return max(samplings, key=lambda one: 0 if one is None else one.n)
 
 
 def _endless(sampling: SamplingTable | None) -> SamplingTable | None:

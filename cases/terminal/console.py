@@ -28,6 +28,7 @@ _RANK_VARIABLES = ("OMPI_COMM_WORLD_RANK", "PMI_RANK", "PMIX_RANK")
 # The option that ``guarded`` adds to every verb, and whether the present one has it.
 Quiet = Annotated[bool, typer.Option("-q", "--quiet", help="Print nothing but errors.")]
 _quiet = False
+_BY_NAME = inspect.Parameter.KEYWORD_ONLY
 # What the verb that runs tells when it has come to its end.
 _last_words: list[Callable[[], None]] = []
 
@@ -219,20 +220,16 @@ def guarded(command: Callable[..., int | None]) -> Callable[..., None]:
     # The command line is made from signature and annotations.
     parameters: list[inspect.Parameter] = []
     for name, one in signature.parameters.items():
-        parameters += _fields_of(groups[name]) if name in groups else [_by_name(one)]
+        own = _fields_of(groups[name]) if name in groups else [one.replace(kind=_BY_NAME)]
+        parameters += own
     parameters.append(_parameter("quiet", Quiet, False))
     wrapped.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
     wrapped.__annotations__ = {one.name: one.annotation for one in parameters}
     return wrapped
 
 
-def _by_name(one: inspect.Parameter) -> inspect.Parameter:
-    return one.replace(kind=inspect.Parameter.KEYWORD_ONLY)
-
-
 def _parameter(name: str, annotation: Any, default: Any) -> inspect.Parameter:
-    kind = inspect.Parameter.KEYWORD_ONLY
-    return inspect.Parameter(name, kind, default=default, annotation=annotation)
+    return inspect.Parameter(name, _BY_NAME, default=default, annotation=annotation)
 
 
 def _fields_of(group: Any) -> list[inspect.Parameter]:

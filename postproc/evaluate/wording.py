@@ -15,6 +15,11 @@ def fixed(value: float, digits: int) -> str:
     return text.removeprefix("-") if not text.strip("-0.") else text
 
 
+def capital(text: str) -> str:
+    """``text`` with a capital first letter, the others as they are."""
+    return text[:1].upper() + text[1:]
+
+
 def counted(number: int, noun: str, plural: str = "") -> str:
     """``1 rank``, ``2 ranks``; ``plural`` where an s at the end does not make it."""
     return f"{number} {noun if number == 1 else plural or f'{noun}s'}"

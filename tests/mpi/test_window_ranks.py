@@ -17,8 +17,7 @@ import pytest
 from mpi4py import MPI
 
 from catenary.base.errors import InputError
-from catenary.cases.run.one_rank import on_as_many
-from catenary.cases.run.runner import RunOutcome, run_case
+from catenary.cases.run.runner import RunOutcome, on_as_many, run_case
 from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.scene import Scene
 

@@ -12,7 +12,7 @@ from damaging import unseal
 from program import MPIRUN, assert_same_histories, assert_sound, catenary, short_run
 
 from catenary.base.errors import InputError
-from catenary.cases.run.extending import extended_scene
+from catenary.cases.run.continuing import extended_scene
 from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.problem import resolved
 from catenary.postproc.read.results import Results

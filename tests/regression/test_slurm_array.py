@@ -15,8 +15,7 @@ from program import SHORT_SCENE, catenary
 
 from catenary.base.errors import InputError
 from catenary.cases.run.planning.needs import NeedsOfRuns, total_needs
-from catenary.cases.run.planning.slurm_array import array_script
-from catenary.cases.run.planning.slurm_script import Job
+from catenary.cases.run.planning.slurm_script import Job, array_script
 from catenary.cases.scene.load import load_scene
 
 pytestmark = pytest.mark.process

@@ -20,10 +20,8 @@ import catenary
 from catenary.base.errors import InputError
 from catenary.cases.cli.main import app
 from catenary.cases.scene.load import load_scene
-from catenary.cases.studies.identification.measurement import Measurement
-from catenary.cases.studies.identification.noise import Whitening, correlation
-from catenary.cases.studies.identification.posterior import posterior_of
-from catenary.cases.studies.identification.residuals import innovations_of, judge
+from catenary.cases.studies.identification.measurement import Measurement, Whitening, correlation
+from catenary.cases.studies.identification.posterior import innovations_of, judge, posterior_of
 from catenary.cases.studies.identification.task import Task
 from catenary.cases.studies.measured.description import Measured
 from catenary.cases.studies.measured.table_file import read_table

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import catenary
-from catenary.cases.run.checking import check_line
+from catenary.cases.run.at_rest.static_table import check_line
 from catenary.cases.scene.input.case_files import find_case
 from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.problem import resolved

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from catenary.base.errors import InputError
-from catenary.cases.run.describe.incidents import incident_facts
+from catenary.cases.run.describe.defects import incident_facts
 from catenary.cases.run.planning.plan import make_plan, plan_text
 from catenary.cases.scene.input.faults import Origin
 from catenary.cases.scene.load import load_scene, scene_from

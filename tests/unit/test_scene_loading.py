@@ -195,8 +195,8 @@ def test_a_mesh_file_is_relative_to_its_case_or_to_the_working_directory(
     case = there / "case.toml"
     case.write_text(text.replace("elements_per_gap = 8", 'file = "own.msh"'))
     monkeypatch.chdir(here)
-    assert load_scene(case).mesh_file() == there / "own.msh"
-    assert load_scene(case, ["mesh.file=own.msh"]).mesh_file() == here / "own.msh"
+    assert load_scene(case).mesh.file == str(there / "own.msh")
+    assert load_scene(case, ["mesh.file=own.msh"]).mesh.file == str(here / "own.msh")
     assert resolved(load_scene(case))["mesh"] == {"file": str(there / "own.msh")}
 
 

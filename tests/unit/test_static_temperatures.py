@@ -11,8 +11,7 @@ from typer.testing import CliRunner
 
 from catenary.base.errors import InputError
 from catenary.cases.cli.main import app
-from catenary.cases.run.at_rest.temperatures import range_of
-from catenary.cases.run.describe.temperatures import temperature_text
+from catenary.cases.run.at_rest.temperatures import range_of, temperature_text
 from catenary.solver.model.wire_ends import WireEnd
 from catenary.solver.statics.tension_along import LineAtTemperature, WireAtRest
 

@@ -22,8 +22,7 @@ from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.identification.fitted_march import FittedMarch
 from catenary.cases.studies.identification.measurement import Measurement
 from catenary.cases.studies.identification.output import as_text, verdict
-from catenary.cases.studies.identification.posterior import posterior_of
-from catenary.cases.studies.identification.residuals import innovations_of, judge
+from catenary.cases.studies.identification.posterior import innovations_of, judge, posterior_of
 from catenary.cases.studies.identification.study import Identification, identify
 from catenary.cases.studies.identification.task import Task
 from catenary.cases.studies.measured.table_file import read_table

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 from measuring import check
+from mpi4py import MPI
 from small_lines import (
     BARE,
     EN_CONTACT_WIRE,
@@ -17,17 +19,29 @@ from small_lines import (
     train,
 )
 
-from catenary.cases.studies.waves.excited import Asked, excitation_of, march, without_train
+from catenary.cases.studies.waves.excited import Asked, Watch, excitation_of, without_train
 from catenary.cases.studies.waves.measured import arrived, measured_rows, transmitted
-from catenary.cases.studies.waves.seen import EnergyMotion, WireMotion
+from catenary.cases.studies.waves.seen import EnergyMotion, NodeMotion, WireMotion
 from catenary.cases.studies.waves.theory import wave_theory
 from catenary.mbs.lumped_data import LumpedData
 from catenary.meshgen.mesh import CONTACT_WIRE
 from catenary.solver.problem.contact_laws import LinearLaw
-from catenary.solver.statics.line_at_rest import line_at_rest
-from catenary.solver.waves.excitation import Blow, MovingForce
+from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest
+from catenary.solver.time_loop.march import March
+from catenary.solver.waves.excitation import Blow, Excitation, MovingForce
+from catenary.solver.waves.excitation_load import load_of
 
 SPEED = EN_CONTACT_WIRE.wave_speed
+
+
+def march(
+    rest: LineAtRest, excitation: Excitation, every: float, seen: Sequence[NodeMotion]
+) -> None:
+    """March to the end and show the motion each ``every`` seconds."""
+    dt = rest.problem.numerics.dt
+    rest.model.loads.append(load_of(excitation, rest.model, dt))
+    with March(MPI.COMM_SELF, *rest) as run:
+        assert run.run([Watch(max(1, round(every / dt)), seen)]).outcome == "done"
 
 
 def test_the_energy_of_a_band_arrives_at_its_mean_group_velocity() -> None:

@@ -68,7 +68,7 @@ def test_the_force_changes_where_the_wave_is_met(
     start = problem.train.start
     course = Course(start, problem.train.end, problem.train.speed, problem.evaluation, start, start)
     line = wave_line(problem)
-    soonest = from_far_end(line, course, speed=BENDING * line.fastest)
+    soonest = from_far_end(line._replace(speed=BENDING * line.fastest), course)
     assert soonest is not None
     print(
         f"{case}, {short} spans, {speed} km/h: differs from {first:.1f} m on, long waves are met "

@@ -2,21 +2,74 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
-from catenary.cases.cli.app import Assignments, Case, Force, Jobs, Out, SceneWords, app, tell
+from catenary.cases.cli.app import (
+    Assignments,
+    Case,
+    Force,
+    Jobs,
+    Out,
+    SceneWords,
+    serial_verb,
+    tell,
+)
 from catenary.cases.result_folder.output_folder import refuse_table
 from catenary.cases.terminal import console
 
-TaskFile = Annotated[
-    Path, typer.Argument(metavar="FILE", help="TOML file with the task.", show_default=False)
-]
+
+@dataclass
+class TaskWords:
+    """A case, the task of a study over a set of its scenes, and how that is made."""
+
+    case: Case
+    task_file: Annotated[
+        Path, typer.Argument(metavar="FILE", help="TOML file with the task.", show_default=False)
+    ]
+    out: Out
+    assignments: Assignments = None
+    n_jobs: Jobs = 1
+    force: Force = False
+
+    def run(
+        self,
+        verb: str,
+        table: str,
+        task: type,
+        make_plan: Callable[..., Any],
+        find: Callable[..., Any],
+        output: Any,
+    ) -> int:
+        """Plan the study, find what it looks for, and leave what its ``output`` writes.
+
+        Serial. ``table`` is one of its files, ``task`` the model of the task.
+        """
+        from catenary.cases.studies.records import held_study
+        from catenary.cases.studies.scene_sets.evaluation import workers
+        from catenary.cases.studies.task_files import read_task
+
+        out, command = self.out, f"catenary {verb} {self.case}"
+        refuse_table(out / table, self.force)
+        draft, _ = SceneWords(self.case, assignments=self.assignments).draft()
+        plan = make_plan(draft, read_task(self.task_file, task))
+        for sentence in plan.warnings:
+            console.warn(sentence)
+        with (
+            held_study(out, console.alone(), command, self.force) as (kept, write),
+            workers(self.n_jobs) as pool,
+        ):
+            found = find(plan, pool, kept, console.say)
+            files = write(lambda folder: output.write(folder, plan, found))
+        tell(output.as_text(plan, found), files)
+        return console.DONE
 
 
-@app.command(
+@serial_verb(
     "optimise",
     help="Choose droppers, tensions, pantographs or any numbers of a scene for the smallest "
     "standard deviation of the contact force, or another statistic, over both directions, several "
@@ -25,68 +78,26 @@ TaskFile = Annotated[
     epilog="Example: catenary optimise ac_simple droppers.toml -o results/optimum "
     "--set train.speed_km_h=320",
 )
-@console.guarded
-@console.serial
-def optimise(
-    case: Case,
-    task_file: TaskFile,
-    out: Out,
-    assignments: Assignments = None,
-    n_jobs: Jobs = 1,
-    force: Force = False,
-) -> int:
+def optimise(words: TaskWords) -> int:
     """Serial."""
-    from catenary.cases.studies.optimise import study
-    from catenary.cases.studies.optimise.task import OptimiseTask
-    from catenary.cases.studies.task_files import read_task
-
-    refuse_table(out / "optimise.json", force)
-    draft, _ = SceneWords(case, assignments=assignments).draft()
-    plan = study.make_plan(draft, read_task(task_file, OptimiseTask))
-    for sentence in plan.warnings:
-        console.warn(sentence)
     from catenary.cases.studies.optimise import output
-    from catenary.cases.studies.records import held_study
-    from catenary.cases.studies.scene_sets.evaluation import workers
+    from catenary.cases.studies.optimise.study import make_plan, optimise
+    from catenary.cases.studies.optimise.task import OptimiseTask
 
-    command = f"catenary optimise {case}"
-    with held_study(out, console.alone(), command, force) as (kept, write), workers(n_jobs) as pool:
-        found = study.optimise(plan, pool, kept, console.say)
-        files = write(lambda folder: output.write(folder, plan, found))
-    tell(output.as_text(plan, found), files)
-    return console.DONE
+    return words.run("optimise", output.RECORD, OptimiseTask, make_plan, optimise, output)
 
 
-@app.command(
+@serial_verb(
     "tolerance",
     help="Find how far droppers, heights, tensions or any numbers of a scene may be off for each "
     "acceptance criterion to hold with 99 %: by samples of errors, and in the worst case. The same "
     "command continues one that was stopped.",
     epilog="Example: catenary tolerance en50318_2002 installation.toml -o results/tolerance",
 )
-@console.guarded
-@console.serial
-def tolerance(
-    case: Case,
-    task_file: TaskFile,
-    out: Out,
-    assignments: Assignments = None,
-    n_jobs: Jobs = 1,
-    force: Force = False,
-) -> int:
+def tolerance(words: TaskWords) -> int:
     """Serial."""
-    from catenary.cases.studies.records import held_study
-    from catenary.cases.studies.scene_sets.evaluation import workers
-    from catenary.cases.studies.task_files import read_task
-    from catenary.cases.studies.tolerance import output, study
+    from catenary.cases.studies.tolerance import output
+    from catenary.cases.studies.tolerance.study import find_tolerances, make_plan
     from catenary.cases.studies.tolerance.task import ToleranceTask
 
-    refuse_table(out / output.TABLE, force)
-    draft, _ = SceneWords(case, assignments=assignments).draft()
-    plan = study.make_plan(draft, read_task(task_file, ToleranceTask))
-    command = f"catenary tolerance {case}"
-    with held_study(out, console.alone(), command, force) as (kept, write), workers(n_jobs) as pool:
-        found = study.find_tolerances(plan, pool, kept, console.say)
-        files = write(lambda folder: output.write(folder, plan, found))
-    tell(output.as_text(plan, found), files)
-    return console.DONE
+    return words.run("tolerance", output.TABLE, ToleranceTask, make_plan, find_tolerances, output)

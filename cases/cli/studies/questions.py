@@ -16,10 +16,11 @@ from catenary.cases.cli.app import (
     RunFolder,
     RunWords,
     Verbose,
-    app,
     begin,
     folder_option,
+    serial_verb,
     tell,
+    verb,
 )
 from catenary.cases.result_folder.output_folder import refuse_impossible, refuse_table
 from catenary.cases.terminal import console
@@ -65,14 +66,13 @@ def _begun(
     return Marching(draft, out, comm, options), scene, comm
 
 
-@app.command(
+@verb(
     "speed",
     help="Find the highest speed at which the acceptance criteria hold, all of them and each by "
     "itself: an ensemble over speeds, then bisection. The same command continues one that was "
     "stopped.",
     epilog="Example: catenary speed en50318_2002 -o results/highest --from 200 --to 360",
 )
-@console.guarded
 def speed(
     words: RunWords,
     slowest: Annotated[
@@ -116,7 +116,7 @@ def speed(
     return console.DONE
 
 
-@app.command(
+@verb(
     "separation",
     help="Find good and bad distances of two pantographs: deviation, least force and uplift over "
     "the distance, where acceptance criteria fail, and which waves explain it. The same command "
@@ -124,7 +124,6 @@ def speed(
     epilog="Example: catenary separation en50318_2002 -o results/distances --from 50 --to 200 "
     "--step 5",
 )
-@console.guarded
 def separation(
     words: RunWords,
     nearest: Annotated[
@@ -160,7 +159,7 @@ def separation(
     return console.DONE
 
 
-@app.command(
+@verb(
     "what-if",
     help="Run a case as it is and with the changes of --set, and show the differences: "
     "statistics, uplift by support, droppers, verdicts. The same command continues runs that were "
@@ -168,7 +167,6 @@ def separation(
     epilog="Example: catenary what-if en50318_2002 --set line.contact_wire.tension_N=22000 "
     "-o results/tension",
 )
-@console.guarded
 def what_if(
     words: RunWords,
     out: Annotated[
@@ -212,14 +210,12 @@ def what_if(
     return console.DONE
 
 
-@app.command(
+@serial_verb(
     "worst",
     help="Name the worst spans, supports and droppers of a run, with candidates for the cause: "
     "defects, elasticity, reflections, ends of wires, the pantograph ahead.",
     epilog="Example: catenary worst results/en300",
 )
-@console.guarded
-@console.serial
 def worst(
     folder: RunFolder,
     count: Annotated[

@@ -7,7 +7,17 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from catenary.cases.cli.app import Force, Jobs, Out, Strict, Verbose, app, begin, folder_option
+from catenary.cases.cli.app import (
+    Force,
+    Jobs,
+    Out,
+    Strict,
+    Verbose,
+    begin,
+    folder_option,
+    serial_verb,
+    verb,
+)
 from catenary.cases.result_folder.output_folder import refuse_table
 from catenary.cases.terminal import console
 
@@ -16,14 +26,13 @@ if TYPE_CHECKING:
     from catenary.cases.studies.sweep.jobs import Job
 
 
-@app.command(
+@verb(
     "reference",
     help="Make the reference solutions anew: models of EN 50318 at two speeds under one and two "
     "pantographs, refined in step and mesh, with error bars. Takes an hour; the same command "
     "continues what was stopped.",
     epilog="Example: catenary reference ac_simple -o results/reference -j 0",
 )
-@console.guarded
 def reference(
     out: Out,
     names: Annotated[
@@ -65,14 +74,12 @@ def reference(
     return console.DONE
 
 
-@app.command(
+@serial_verb(
     "judge",
     help="Compare results of any program with the reference solutions: differences, error bars, "
     "tolerances of EN 50318, verdicts.",
     epilog="Example: catenary judge forces.csv --of ac_simple_275_one -o results/judged",
 )
-@console.guarded
-@console.serial
 def judge(
     files: Annotated[
         list[Path],
@@ -112,13 +119,12 @@ def judge(
     return console.NOT_ACCEPTED if strict and any_failed(pages.rows_of(found)) else console.DONE
 
 
-@app.command(
+@verb(
     "validate",
     help="Validate this installation by the steps of EN 50318: line at rest, reference model of "
     "2002, reference models in the manner of 2018; write the statement with all figures.",
     epilog="Example: catenary validate -o results/validation -j 0",
 )
-@console.guarded
 def validate(
     out: Out,
     n_jobs: Jobs = 1,

@@ -7,11 +7,11 @@ from typing import Annotated
 import typer
 
 from catenary.base.errors import InputError
-from catenary.cases.cli.app import SceneWords, app
+from catenary.cases.cli.app import SceneWords, verb
 from catenary.cases.terminal import console
 
 
-@app.command(
+@verb(
     "scaling",
     help="Predict what a step of a case takes on many ranks, from latency and bandwidth of "
     "messages: those between the ranks that it is started on, or given ones. On several ranks it "
@@ -19,7 +19,6 @@ from catenary.cases.terminal import console
     epilog="Example: mpirun -n 8 --oversubscribe catenary scaling ambrosio2012 "
     "--ranks 64,512,4096 --set line.n_spans=10000",
 )
-@console.guarded
 def scaling(
     words: SceneWords,
     ranks: Annotated[

@@ -6,22 +6,20 @@ from typing import Annotated
 
 import typer
 
-from catenary.cases.cli.app import Force, Jobs, Out, SceneWords, app
+from catenary.cases.cli.app import Force, Jobs, Out, SceneWords, serial_verb
 from catenary.cases.result_folder.output_folder import refuse_table
 from catenary.cases.terminal import console
 
 TABLE, PICTURE = "stability_map.csv", "stability_map.png"
 
 
-@app.command(
+@serial_verb(
     "stability-map",
     help="Find the largest stable step of every coupling against contact stiffness and head mass, "
     "from the matrices of a step and by marching, and draw it. Some three minutes; exits with 3 "
     "if matrices and marches do not agree. The same command continues one that was stopped.",
     epilog="Example: catenary stability-map en50318_2002 -o results/stability",
 )
-@console.guarded
-@console.serial
 def stability_map(
     words: SceneWords,
     out: Out,

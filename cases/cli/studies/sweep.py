@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -17,9 +17,9 @@ from catenary.cases.cli.app import (
     RunWords,
     Vary,
     Verbose,
-    app,
     begin,
     tell,
+    verb,
 )
 from catenary.cases.result_folder.output_folder import refuse_impossible
 from catenary.cases.terminal import console
@@ -35,14 +35,13 @@ if TYPE_CHECKING:
 _SHOWN_BROKEN, _SHOWN_REFUSED = 3, 20
 
 
-@app.command(
+@verb(
     "sweep",
     help="Run variants of a case and put their statistics side by side. The "
     "same command continues a sweep that was stopped.",
     epilog="Example: catenary sweep en50318_2002 -o results/speeds --vary "
     "train.speed_km_h=200,250,300 --vary contact.stiffness_N_per_m=2e4,5e4",
 )
-@console.guarded
 def sweep(
     words: RunWords,
     out: Out,
@@ -124,8 +123,16 @@ def sweep(
     if sampling is None:
         text = sweep_output.as_text(ended)
     else:
-        text, more = _evaluated(ended, sampling, out, comm, command, drawn)
-        files = [*files, *more]
+        from catenary.base.parallel import on_root
+        from catenary.cases.result_folder.folder_lock import held
+        from catenary.cases.studies.uncertainty import output
+
+        rows = sweep_output.table_of(ended).records()
+        with held(out, comm, command):
+            found, more = on_root(
+                comm, lambda: output.write_evaluated(out, rows, sampling, drawn), takes_long=True
+            )
+        text, files = output.as_text(found), [*files, *more]
     tell(text, files)
     return verdict(ended, "sweep")
 
@@ -149,32 +156,6 @@ def read_variants(vary: Sequence[str] | None, named: Path | None) -> list[Varian
     table = {} if named is None else read_named(named)
     check_keys(product([], table), f"in {named}")
     return product(varied, table)
-
-
-def _evaluated(
-    ended: Sequence[Ended],
-    sampling: SamplingTable,
-    out: Path,
-    comm: Any,
-    command: str,
-    plotted: Sequence[str],
-) -> tuple[str, list[Path]]:
-    """Evaluate the table of samples and write that; its text and the files. Collective."""
-    from catenary.base.parallel import on_root
-    from catenary.cases.result_folder.folder_lock import held
-    from catenary.cases.studies.sweep.output import table_of
-    from catenary.cases.studies.uncertainty import output
-    from catenary.cases.studies.uncertainty.evaluation import evaluate
-    from catenary.cases.studies.uncertainty.run_table import run_table
-
-    def work() -> tuple[str, list[Path]]:
-        table = run_table(table_of(ended).records(), sampling)
-        found = evaluate(table)
-        return output.as_text(found), output.write(out, table, found, plotted)
-
-    with held(out, comm, command):
-        done: tuple[str, list[Path]] = on_root(comm, work, takes_long=True)
-    return done
 
 
 def run_study(

@@ -8,19 +8,17 @@ from typing import Annotated
 import typer
 
 from catenary.base.errors import InputError
-from catenary.cases.cli.app import Force, app, folder_option
+from catenary.cases.cli.app import Force, folder_option, serial_verb
 from catenary.cases.result_folder.output_folder import refuse_table
 from catenary.cases.terminal import console
 
 
-@app.command(
+@serial_verb(
     "uncertainty",
     help="Evaluate the table of a sweep: quantiles, probabilities that acceptance criteria fail, "
     "sensitivity indices, all with 95 % bounds, and pictures.",
     epilog="Example: catenary uncertainty results/tolerances",
 )
-@console.guarded
-@console.serial
 def uncertainty(
     table: Annotated[
         Path,
@@ -53,14 +51,12 @@ def uncertainty(
     console.say("\n" + "\n".join(str(path) for path in files))
 
 
-@app.command(
+@serial_verb(
     "merge",
     help="Join sweeps of one case that ran in several folders, such as the parts of --part, into "
     "one table. Folders that contradict each other are refused.",
     epilog="Example: catenary merge results/part_1 results/part_2 -o results/tolerances",
 )
-@console.guarded
-@console.serial
 def merge(
     folders: Annotated[list[Path], typer.Argument(help="Folders of sweeps, at least two.")],
     out: Annotated[Path, folder_option("Folder for the table.")],

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from catenary.base.errors import InputError
-from catenary.cases.cli.app import Force, SceneWords, app, folder_option
+from catenary.cases.cli.app import Force, SceneWords, folder_option, serial_verb
 from catenary.cases.result_folder.output_folder import refuse_impossible, refuse_table
 from catenary.cases.terminal import console
 
@@ -54,7 +54,7 @@ class Excited:
     ] = None
 
 
-@app.command(
+@serial_verb(
     "waves",
     help="Analyse wave propagation along a line under a train, a moving force, a pulse or a "
     "hammer: motion over place and time, in the frame of the train, and over wavenumber and "
@@ -63,8 +63,6 @@ class Excited:
     epilog="Example: catenary waves en50318_2002 -o results/waves; catenary waves results/waves; "
     "catenary waves en50318_2002 --excite hammer --at-m 630 -o results/hammer",
 )
-@console.guarded
-@console.serial
 def waves(
     words: WaveWords,
     excited: Excited,

@@ -1,19 +1,63 @@
-"""The line at rest as tables, without a run."""
+"""A line at rest, without a march: its tables, and what is said of one that is valid."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
 
-from catenary.cases.run.at_rest.installed import installed
+from catenary.cases.run.describe.arrivals import arrival_facts
+from catenary.cases.run.describe.pantographs import kind_lines
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.problem import problem_of
 from catenary.cases.scene.scene import Scene
 from catenary.cases.terminal.terminal_text import static_text
+from catenary.meshgen.line import Line
+from catenary.meshgen.mesh import LineMesh
+from catenary.meshgen.wires import End
 from catenary.postproc.channels.header import line_datasets, static_datasets
+from catenary.postproc.evaluate.wording import counted
+from catenary.postproc.read.registration import Registration
+from catenary.solver.model.rest_shape import Equilibrium
 from catenary.solver.statics.form_finding.equilibrium import lengths_to_cut
-from catenary.solver.statics.line_at_rest import line_at_rest
+from catenary.solver.statics.line_at_rest import line_at_rest, stable_form
+from catenary.solver.statics.stability_of_rest import refuse_lost_wire
+
+
+def installed(line: Line, mesh: LineMesh, height: np.ndarray) -> dict[str, np.ndarray]:
+    """Names of the wires that droppers join, and lengths of wires between clamps.
+
+    Parameters
+    ----------
+    height : (n_nodes,) of the line at rest [m]
+
+    Returns
+    -------
+    ``line/dropper_upper``, ``line/dropper_lower`` : (n_droppers,) names of wires
+    ``static/lengths/NAME`` : length along each piece of a wire whose ends are clamped [m]
+    """
+    group = mesh.dropper_group
+    ends = (
+        ("upper", [own.upper for own in line.droppers]),
+        ("lower", [own.lower for own in line.droppers]),
+    )
+    found = {f"line/dropper_{end}": np.array(names, dtype=str)[group] for end, names in ends}
+    for wire in line.wires:
+        if all(End.CLAMPED in piece.ends for piece in wire.pieces):
+            nodes = mesh.wires[wire.name]
+            pieces = np.split(nodes, mesh.breaks.get(wire.name, np.zeros(0, dtype=int)))
+            lengths = [np.hypot(np.diff(mesh.x(own)), np.diff(height[own])).sum() for own in pieces]
+            found[f"static/lengths/{wire.name}"] = np.array(lengths)
+    return found
+
+
+def registration_of(mesh: LineMesh, form: Equilibrium) -> Registration | None:
+    """Steady arms at rest, None if wires do not move sideways, so that nothing pushes an arm."""
+    if form.lateral is None:
+        return None
+    x, nodes = mesh.x(mesh.steady_arms), mesh.steady_arms
+    return Registration(x, form.lateral.y[nodes], form.lateral.arm_force, form.lateral.arm_tension)
 
 
 def static_table(scene: Scene) -> dict[str, np.ndarray]:
@@ -39,3 +83,38 @@ def rest_text(scene: Scene, table: Mapping[str, np.ndarray]) -> str:
     lengths = [scene.pantographs[place.name].strips.length_m for place in scene.train.pantographs]
     half_heads = [0.5 * length for length in lengths if length is not None]
     return static_text(table, problem_of(scene).line, min(half_heads, default=None))
+
+
+class Checked(NamedTuple):
+    """What a check found: sentences on line, pantographs and waves, and warnings."""
+
+    sentences: list[str]
+    warnings: list[str]
+
+
+def check_line(scene: Scene) -> Checked:
+    """Mesh and hang the line of a scene. Not collective.
+
+    Raises
+    ------
+    InputError
+        If the line is impossible: a dropper slack at rest, a wire that droppers cannot hold.
+    """
+    problem = problem_of(scene)
+    mesh = mesh_of(scene)
+    model, form = stable_form(problem, mesh)
+    refuse_lost_wire(model, form)
+    waves = arrival_facts(scene, problem)
+    arms = registration_of(mesh, form)
+    sentences = [
+        f"{scene.case.name} is valid: {counted(problem.line.n_spans, 'span')}, "
+        f"{problem.line.support_positions[-1]:g} m, {counted(mesh.droppers.shape[0], 'dropper')}, "
+        f"{mesh.n_nodes} nodes",
+        *(
+            f"pantograph {name}, " + "\n  ".join(lines)
+            for name, lines in kind_lines(scene, problem).items()
+        ),
+        f"ends: {'; '.join(waves['ends'])}",
+        *(fact["says"] for fact in waves["pantographs"]),
+    ]
+    return Checked(sentences, [*waves["warnings"], *([] if arms is None else arms.warnings())])

@@ -1,11 +1,10 @@
-"""Sentences on waves from the ends of the line and on the run-in: plan, check, result file."""
+"""Sentences on the ends of the line, waves from them, and the run-in: plan, check, result file."""
 
 from __future__ import annotations
 
 import math
 from typing import Any, NamedTuple
 
-from catenary.cases.run.describe.ends import end_sentences, end_warnings, lets_waves_out
 from catenary.cases.run.describe.wave_arrivals import (
     SHORT_RUN_IN,
     Arrivals,
@@ -22,9 +21,55 @@ from catenary.cases.scene.scene import Scene
 from catenary.meshgen.line import Line
 from catenary.meshgen.slowest_wave import bends, slowest_wave_of, wave_of_two_spans
 from catenary.meshgen.wires import Wire
+from catenary.postproc.evaluate.wording import counted
 from catenary.solver.effects.all_effects import simulated
-from catenary.solver.problem.ends import EndCondition
+from catenary.solver.problem.ends import AbsorbingLayer, EndCondition, Periodic
 from catenary.solver.problem.problem import Problem
+
+SIDES = ("start", "end")
+
+
+def end_sentences(problem: Problem) -> tuple[str, str]:
+    """How the line begins and how it ends, in words."""
+    start, end = (f"{side} {_of_end(kind)}" for side, kind in zip(SIDES, problem.ends, strict=True))
+    return start, end
+
+
+def lets_waves_out(end: EndCondition) -> bool:
+    """Whether an end sends back so little that no wave from there is looked for."""
+    return isinstance(end, AbsorbingLayer | Periodic)
+
+
+def end_warnings(problem: Problem) -> list[str]:
+    """What about the ends may spoil a run, in sentences."""
+    line, train = problem.line, problem.train
+    masts, n = line.support_positions, line.n_spans
+    start, end = problem.ends
+    rear = train.start - max(place.behind for place in train.placements)
+    said = []
+    if isinstance(start, AbsorbingLayer) and rear < masts[start.n_spans]:
+        said.append(_inside("start", f"starts at {rear:g} m", float(masts[start.n_spans])))
+    if isinstance(end, AbsorbingLayer) and train.end > masts[n - end.n_spans]:
+        said.append(_inside("end", f"runs to {train.end:g} m", float(masts[n - end.n_spans])))
+    return said
+
+
+def _inside(side: str, how: str, inner: float) -> str:
+    return (
+        f"The train {how}, inside the absorbing layer at the {side} of the line, which begins at "
+        f"{inner:g} m: there waves are damped that run beside the pantograph."
+    )
+
+
+def _of_end(end: EndCondition) -> str:
+    if isinstance(end, AbsorbingLayer):
+        return (
+            f"{counted(end.n_spans, 'span')} that absorb waves (damping up to {end.damping:g} 1/s),"
+            " then fixed"
+        )
+    if isinstance(end, Periodic):
+        return "as if the line went on for ever like its last span, without slack droppers there"
+    return "fixed"
 
 
 class Traced(NamedTuple):
@@ -203,15 +248,13 @@ def _sentence(name: str, found: Arrivals) -> str:
     )
 
 
-def _meets_in_stretch(found: Arrivals, course: Course) -> bool:
-    return found.far_end is not None and found.far_end.at < course.stretch[1]
-
-
 def _reflections(scene: Scene, traced: Traced) -> list[str]:
     felt = [
         i
         for i, course in enumerate(traced.courses)
-        if _meets_in_stretch(traced.found[i], course) and reflection_felt(traced.line, course)
+        if (far := traced.found[i].far_end) is not None
+        and far.at < course.stretch[1]
+        and reflection_felt(traced.line, course)
     ]
     if not felt:
         return []

@@ -1,4 +1,4 @@
-"""Sentences on irregularities and defects for plan, result file, summary and report."""
+"""Sentences on irregularities, defects and incidents for plan, result file, summary and report."""
 
 from __future__ import annotations
 
@@ -16,6 +16,12 @@ from catenary.cases.scene.line.imperfections import (
     WrongTensionTable,
     place_of,
     stretch_of,
+)
+from catenary.cases.scene.run.incidents import (
+    DropperBreakTable,
+    Incident,
+    TensionLossTable,
+    at_step,
 )
 from catenary.cases.scene.scene import Scene
 from catenary.meshgen.line import Line
@@ -117,3 +123,44 @@ def _defect(table: Defect, line: Line) -> dict[str, Any]:
             where = f"of the {_named(table.wire)} at {table.at_m:g} m"
             place = {"at_m": table.at_m, "wire": table.wire}
             return {**place, "says": f"kink of {table.angle_deg:g} degrees {where}"}
+
+
+def incident_facts(scene: Scene, problem: Problem) -> list[dict[str, Any]]:
+    """Type, time [s] and a sentence of each incident that is simulated, in order of time; of a
+    dropper its place [m].
+
+    Not collective.
+    """
+    dt = problem.numerics.dt
+    found = [
+        {
+            "type": table.type,
+            "time_s": at_step(table.at_s, dt),
+            **_place(table, problem.line),
+            "says": _sentence(table, problem.line),
+        }
+        for table in scene.incidents
+        if table.type in problem.effects
+    ]
+    return sorted(found, key=lambda fact: float(str(fact["time_s"])))
+
+
+def _place(table: Incident, line: Line) -> dict[str, float]:
+    if not isinstance(table, DropperBreakTable):
+        return {}
+    return {"at_m": place_of(line, table.span, table.dropper)}
+
+
+def _sentence(table: Incident, line: Line) -> str:
+    if isinstance(table, DropperBreakTable):
+        x = place_of(line, table.span, table.dropper)
+        return f"dropper {table.dropper} of span {table.span}, at {x:g} m, breaks"
+    if isinstance(table, TensionLossTable):
+        left = table.share * line.wire(table.wire).tension / 1e3
+        name = table.wire.replace("_", " ")
+        return f"the tension of the {name} falls to {left:.4g} kN, {table.share:g} of what it was"
+    return (
+        f"pantograph {table.pantograph} is lowered: its static force goes over to "
+        f"{table.force_N:g} N within {table.within_s:g} s; its head is caught {table.drop_m:g} m "
+        "lower"
+    )

@@ -111,15 +111,12 @@ def reflection_felt(line: WaveLine, course: Course) -> bool:
     return met is not None and met.at < course.stretch[1] and far_share(line, course) >= FELT
 
 
-def from_far_end(line: WaveLine, course: Course, speed: float | None = None) -> Meeting | None:
-    """The first wave that returns from the far end: c t = 2 L - x_leader - x - v t.
-
-    ``speed`` stands for that of both wires together [m/s]; None if the train is as fast.
-    """
-    c = line.speed if speed is None else speed
-    if course.speed >= c:
+def from_far_end(line: WaveLine, course: Course) -> Meeting | None:
+    """The first wave that returns from the far end: c t = 2 L - x_leader - x - v t; None if the
+    train is as fast."""
+    if course.speed >= line.speed:
         return None
-    time = (2.0 * line.end - course.leader - course.start) / (c + course.speed)
+    time = (2.0 * line.end - course.leader - course.start) / (line.speed + course.speed)
     return Meeting(course.start + course.speed * time, time)
 
 
@@ -153,14 +150,14 @@ def start_share(line: WaveLine, speed: float, run_in: float) -> float:
     return min(1.0, START_SHARE * line.span / run_in * math.exp(-line.decay * run_in / speed))
 
 
-def run_in_for(line: WaveLine, speed: float, share: float = SHORT_RUN_IN) -> float:
-    """Run-in after which the start leaves ``share`` of the standard deviation [m]."""
+def run_in_for(line: WaveLine, speed: float) -> float:
+    """Run-in after which the start leaves ``SHORT_RUN_IN`` of the standard deviation [m]."""
     from scipy import optimize  # not loaded for runs that are long enough
 
     def more(run_in: float) -> float:
-        return start_share(line, speed, run_in) - share
+        return start_share(line, speed, run_in) - SHORT_RUN_IN
 
-    longest = START_SHARE * line.span / share
+    longest = START_SHARE * line.span / SHORT_RUN_IN
     if more(longest) >= 0.0:  # nothing damps, or nothing that round-off leaves
         return longest
     return float(optimize.brentq(more, 0.0, longest))

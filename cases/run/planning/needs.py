@@ -127,17 +127,13 @@ def needs_of(
     return Needs(
         n_steps=n_steps,
         memory=estimate_memory(n_dofs, n_steps, problem.window.moves and not by_motion),
-        march=_slower(slow_path, n_substeps)
+        # Substeps are counted by themselves.
+        march=(1.0 if slow_path is None or n_substeps else slow_path.factor)
         * estimate_march(n_moving, n_steps, scheme, n_substeps, stations, gusts),
         files=estimate_files(scene, problem, recording, n_dofs, flush_every),
         recording=recording,
         slow_path=slow_path,
     )
-
-
-def _slower(slow_path: SlowPath | None, n_substeps: int) -> float:
-    """By how much a slow path lengthens the march; substeps are counted by themselves."""
-    return 1.0 if slow_path is None or n_substeps else slow_path.factor
 
 
 def simulated_time(problem: Problem) -> float:

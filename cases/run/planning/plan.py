@@ -6,10 +6,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 from catenary.cases.result_folder.output_folder import volume
-from catenary.cases.run.describe.arrivals import arrival_facts
-from catenary.cases.run.describe.defects import defect_facts
-from catenary.cases.run.describe.ends import end_sentences
-from catenary.cases.run.describe.incidents import incident_facts
+from catenary.cases.run.describe.arrivals import arrival_facts, end_sentences
+from catenary.cases.run.describe.defects import defect_facts, incident_facts
 from catenary.cases.run.describe.pantographs import kind_lines
 from catenary.cases.run.planning.file_sizes import FileSizes
 from catenary.cases.run.planning.needs import Needs, needs_with_mesh, simulated_time

@@ -290,11 +290,10 @@ def _limits_read(books: Iterable[RuleBook]) -> set[str]:
 
 
 def _mesh_file(scene: Scene) -> Iterator[Fault]:
-    path = scene.mesh_file()
-    if path is None:
+    if scene.mesh.file is None:
         return
     try:
-        found = Path(path).is_file()
+        found = Path(scene.mesh.file).is_file()
     except (OSError, ValueError):
         found = False
     if not found:

@@ -67,8 +67,4 @@ def find_case(case: str) -> Path:
         raise InputError(f"{case} is no case file and no folder that holds a {CASE_FILE}")
     near = difflib.get_close_matches(case, known, n=1)
     hint = f"did you mean {near[0]}?" if near else f"shipped cases are {', '.join(known)}"
-    raise InputError(f"there is no case or file named {_printable(case)}; {hint}")
-
-
-def _printable(text: str) -> str:
-    return plain(text, 200)
+    raise InputError(f"there is no case or file named {plain(case, 200)}; {hint}")

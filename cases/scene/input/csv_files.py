@@ -106,7 +106,8 @@ def _places(raw: dict[str, Any]) -> Iterator[tuple[str, Any, str, str, _Read]]:
     links = below(line, "links")
     hung = [("line.dropper", below(line, "dropper"))]
     hung += [("line.auxiliary_wire.dropper", below(below(line, "auxiliary_wire"), "dropper"))]
-    hung += [(f"line.links.{i}", one) for i, one in enumerate(links if _is_list(links) else ())]
+    links = links if isinstance(links, list) else ()
+    hung += [(f"line.links.{i}", one) for i, one in enumerate(links)]
     for where, table in hung:
         yield where, table, "curve_file", "curve", _pairs
         yield where, table, "patterns_file", "patterns", _patterns
@@ -126,10 +127,6 @@ def _book(path: Path, where: str, raw: dict[str, Any]) -> dict[str, Any]:
     table = read_toml(path)
     book_of(table, f"{where}, which")
     return table
-
-
-def _is_list(value: Any) -> bool:
-    return isinstance(value, list)
 
 
 def span_table(path: Path, where: str = "") -> list[float]:

@@ -72,10 +72,6 @@ _WANTED: dict[str, Callable[[dict[str, Any]], str]] = {
 }
 
 
-def _something_else(limits: dict[str, Any]) -> str:
-    return "must be something else"
-
-
 _OF_A_NUMBER = (
     "greater_than",
     "greater_than_equal",
@@ -119,7 +115,9 @@ def _sentence(
     if kind == "missing":
         meaning = field.description if field is not None else ""
         return f"{key}{f' ({meaning})' if meaning else ''} is missing {where}"
-    wanted = _WANTED.get(kind, _something_else)(fault.get("ctx") or {})
+    wanted = "must be something else"
+    if kind in _WANTED:
+        wanted = _WANTED[kind](fault.get("ctx") or {})
     value = fault["input"]
     if isinstance(value, dict | BaseModel):
         return f"{key} {where} {wanted}"

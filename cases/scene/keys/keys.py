@@ -55,7 +55,7 @@ def _known_keys(
             for table in inner:
                 keys = _known_keys(table, below, registered)
                 found |= {f"{prefix}.{key}": None for key in keys}
-        elif _is_free(field.annotation):
+        elif typing.get_origin(field.annotation) is dict:
             found[f"{name}.{ANY}"] = None
     return tuple(found)
 
@@ -137,10 +137,6 @@ def without_kinds(
         here, named = tables_in(field.annotation) if field is not None else ((), False)
         choosing = len(here) > 1
     return parts, field
-
-
-def _is_free(annotation: Any) -> bool:
-    return typing.get_origin(annotation) is dict
 
 
 def is_known(key: str, known: list[str]) -> bool:

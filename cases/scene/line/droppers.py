@@ -63,7 +63,7 @@ class DropperPattern(Table):
         exactly_one(self, "span_m", "spans")
         ascending(self.spans or [], "spans")
         ascending(self.positions_m, "positions_m")
-        _one_pre_sag_each(self.pre_sag_mm, len(self.positions_m))
+        one_pre_sag_each(self.pre_sag_mm, len(self.positions_m))
         return self
 
 
@@ -163,13 +163,14 @@ class DropperTable(HangingTable):
             if mixed and self.pre_sag_mid_mm is not None:
                 raise ValueError("takes pre_sag_mm in the patterns or pre_sag_mid_mm, not both")
         if self.positions_m is not None:
-            _one_pre_sag_each(self.pre_sag_mm, len(self.positions_m))
+            one_pre_sag_each(self.pre_sag_mm, len(self.positions_m))
         if self.count is not None:
-            _one_pre_sag_each(self.pre_sag_mm, self.count)
+            one_pre_sag_each(self.pre_sag_mm, self.count)
         return self
 
 
-def _one_pre_sag_each(pre_sag: list[float] | None, n_droppers: int) -> None:
+def one_pre_sag_each(pre_sag: list[float] | None, n_droppers: int) -> None:
+    """That a list of pre-sags has one per dropper; ValueError if not, with a predicate."""
     if pre_sag is not None and len(pre_sag) != n_droppers:
         raise ValueError(
             f"must give one pre_sag_mm per dropper, but there are {len(pre_sag)} values "
@@ -232,20 +233,19 @@ def hung_in(
     for number, span in spans.items():
         pattern = by_number.get(number)
         if pattern is not None:
-            found[number] = _hung(kind, pattern, tuple(pattern.positions_m))
+            places = tuple(pattern.positions_m)
+            found[number] = Hung(places, _pre_sag(kind, pattern, places))
             continue
         if span not in by_length:
-            pattern = next((p for p in kind.patterns or () if _is_of(p, span)), None)
-            places = _positions(kind, pattern, span)
-            if places is None:
+            of_length = {p.span_m: p for p in kind.patterns or () if p.span_m is not None}
+            near = (p for length, p in of_length.items() if abs(length - span) < _SAME_SPAN)
+            pattern = next(near, None)
+            own = _positions(kind, pattern, span)
+            if own is None:
                 raise InputError(_no_entry(origin, f"{key}.patterns", kind, number, span))
-            by_length[span] = _hung(kind, pattern, places)
+            by_length[span] = Hung(own, _pre_sag(kind, pattern, own))
         found[number] = by_length[span]
     return found
-
-
-def _is_of(pattern: DropperPattern, span: float) -> bool:
-    return pattern.span_m is not None and abs(pattern.span_m - span) < _SAME_SPAN
 
 
 def _no_entry(origin: Origin, key: str, kind: HangingTable, number: int, span: float) -> str:
@@ -270,11 +270,6 @@ def _positions(
     assert kind.count is not None and kind.spacing_m is not None
     margin = 0.5 * (span - (kind.count - 1) * kind.spacing_m)
     return tuple(margin + i * kind.spacing_m for i in range(kind.count))
-
-
-def _hung(kind: HangingTable, pattern: DropperPattern | None, positions: tuple[float, ...]) -> Hung:
-    """Droppers at positions of a span [m] with the pre-sag that they give."""
-    return Hung(positions, _pre_sag(kind, pattern, positions))
 
 
 def _pre_sag(

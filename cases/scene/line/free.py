@@ -8,7 +8,7 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import AfterValidator, Field, model_validator
 
 from catenary.cases.scene.keys.table import OneOrMore, Table, WireName, ascending, either
-from catenary.cases.scene.line.droppers import DropperTable
+from catenary.cases.scene.line.droppers import DropperTable, one_pre_sag_each
 from catenary.cases.scene.line.hardware import SteadyArmTable, SupportTable
 from catenary.cases.scene.line.wires import WireTable
 
@@ -130,11 +130,7 @@ class FreeDroppersTable(DropperTable):
                 raise ValueError("takes spans with places in a span, not with at_m")
             if self.pre_sag_mid_mm is not None:
                 raise ValueError("takes pre_sag_mid_mm with places in a span, not with at_m")
-            if self.pre_sag_mm is not None and len(self.pre_sag_mm) != len(self.at_m):
-                raise ValueError(
-                    f"must give one pre_sag_mm per dropper, but there are {len(self.pre_sag_mm)} "
-                    f"values for {len(self.at_m)} droppers"
-                )
+            one_pre_sag_each(self.pre_sag_mm, len(self.at_m))
         ascending(self.spans or [], "spans")
         return self
 

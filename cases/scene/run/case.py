@@ -121,7 +121,6 @@ def chosen_books(table: EvaluationTable) -> list[RuleBook]:
 
 # Channels of the line, which may be recorded in part.
 _RECORDED = line_channels()
-_FIELDS = FIELDS
 
 
 _Spans = Annotated[list[Annotated[int, Field(ge=1, le=10**6)]], Field(min_length=2, max_length=2)]
@@ -143,11 +142,11 @@ class OutputTable(Table):
     field_every_m: float | None = Field(
         None, gt=0, le=1e4, description="the same as a distance that the train travels"
     )
-    fields: list[Literal[_FIELDS]] | None = Field(  # type: ignore[valid-type]
+    fields: list[Literal[FIELDS]] | None = Field(  # type: ignore[valid-type]
         None,
         min_length=1,
-        max_length=len(_FIELDS),
-        description=f"fields of the snapshots, of {' and '.join(_FIELDS)}; "
+        max_length=len(FIELDS),
+        description=f"fields of the snapshots, of {' and '.join(FIELDS)}; "
         f"{' and '.join(USUAL_FIELDS)} if absent",
     )
     field_parts: list[Annotated[str, Field(min_length=1, max_length=100)]] | None = Field(

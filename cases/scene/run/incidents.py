@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from pydantic import Field
 
 from catenary.cases.scene.keys.table import Table, WireName
+from catenary.cases.scene.line.imperfections import place_of
 from catenary.meshgen.line import Line
 from catenary.solver.problem.incidents import DropperBreak, LineIncident, TensionLoss
 
@@ -79,7 +80,7 @@ def line_incidents(
     for table in tables:
         time = at_step(table.at_s, dt)
         if isinstance(table, DropperBreakTable):
-            found.append(DropperBreak(time, dropper_place(table, line)))
+            found.append(DropperBreak(time, place_of(line, table.span, table.dropper)))
         elif isinstance(table, TensionLossTable):
             found.append(TensionLoss(time, table.wire, table.share))
     return tuple(found)
@@ -93,11 +94,6 @@ def lowering_of(tables: Sequence[IncidentTable], number: int, dt: float) -> Lowe
 
             return Lowering(at_step(table.at_s, dt), table.force_N, table.within_s, table.drop_m)
     return None
-
-
-def dropper_place(table: DropperBreakTable, line: Line) -> float:
-    """Where a dropper of the line stands [m]."""
-    return float(line.droppers_of_span(table.span - 1)[table.dropper - 1])
 
 
 def at_step(time: float, dt: float) -> float:

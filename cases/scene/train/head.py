@@ -19,16 +19,13 @@ _PITCH = ("pitch_inertia_kg_m2", "pitch_spring_distance_m")
 LEAST_MASS, LEAST_INERTIA = 1e-3, 1e-6
 
 
-def _no_less_mass(mass: float) -> float:
-    if mass < LEAST_MASS:
-        raise ValueError(f"must be at least {LEAST_MASS:g} kg")
-    return mass
+def _no_less(least: float, unit: str) -> AfterValidator:
+    def check(value: float) -> float:
+        if value < least:
+            raise ValueError(f"must be at least {least:g} {unit}")
+        return value
 
-
-def _no_less_inertia(inertia: float) -> float:
-    if inertia < LEAST_INERTIA:
-        raise ValueError(f"must be at least {LEAST_INERTIA:g} kg m2")
-    return inertia
+    return AfterValidator(check)
 
 
 def _no_switch(value: Any) -> Any:
@@ -37,8 +34,8 @@ def _no_switch(value: Any) -> Any:
     return value
 
 
-SomeMass = AfterValidator(_no_less_mass)
-SomeInertia = AfterValidator(_no_less_inertia)
+SomeMass = _no_less(LEAST_MASS, "kg")
+SomeInertia = _no_less(LEAST_INERTIA, "kg m2")
 
 
 class FlexureTable(Table):

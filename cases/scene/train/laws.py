@@ -7,14 +7,13 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
-from catenary.cases.scene.keys.table import Table, ascending, exactly_one
+from catenary.cases.scene.keys.table import PAIR, Table, ascending, exactly_one
 from catenary.cases.scene.keys.units import speed_from_km_h
 from catenary.mbs.air import Polynomial, Uplift
 from catenary.mbs.air import Table as SpeedTable
 from catenary.mbs.control import Regulation
 from catenary.mbs.head.laws import Law
 
-_PAIR = Annotated[list[Annotated[float, Field(ge=-1e6, le=1e6)]], Field(min_length=2, max_length=2)]
 # Straight lines through more would make a law as stiff as the stiffest of its parts.
 _STIFFEST = 1e8
 
@@ -42,7 +41,7 @@ def _pushing(pairs: list[list[float]]) -> list[list[float]]:
     return pairs
 
 
-Rising = Annotated[list[_PAIR], Field(min_length=2, max_length=100), AfterValidator(_rising)]
+Rising = Annotated[list[PAIR], Field(min_length=2, max_length=100), AfterValidator(_rising)]
 Braking = Annotated[Rising, AfterValidator(_braking)]
 Pushing = Annotated[Rising, AfterValidator(_pushing)]
 

@@ -23,7 +23,7 @@ from catenary.cases.studies.accuracy.analysis import (
 )
 from catenary.cases.studies.accuracy.axes import AXES, DISCRETISATION, Axis
 from catenary.cases.studies.accuracy.runs import Measured, PlannedAxis
-from catenary.postproc.evaluate.wording import counted
+from catenary.postproc.evaluate.wording import capital, counted
 from catenary.postproc.report.pictures import figures
 from catenary.postproc.report.study_table import (
     Column,
@@ -143,23 +143,19 @@ def page(found: Measured, sentences: Sequence[str], picture: str) -> str:
     parts.append("\n".join(f"- {sentence}" for sentence in sentences))
     for planned in found.plan.axes:
         axis, rows = planned.axis, found.rows_of(planned.axis.name)
-        parts.append(f"## {_capital(axis.title)}")
+        parts.append(f"## {capital(axis.title)}")
         if axis.kind == DISCRETISATION:
             doubt = uncertainty_text(planned, found.uncertainty[axis.name])
-            parts.append(f"Reference: {run_in_words(planned.reference)}. {_capital(doubt)}.")
+            parts.append(f"Reference: {run_in_words(planned.reference)}. {capital(doubt)}.")
         else:
             parts.append("Differences from the case as it is: of models, not errors.")
         parts.append(table_of(rows, axis).markdown())
-        parts += [f"{_capital(line)}." for line in order_lines(axis, rows)]
+        parts += [f"{capital(line)}." for line in order_lines(axis, rows)]
     told = remark_lines(runs_with_remarks(found))
     if told:
         parts.append("## Remarks")
         parts.append("\n".join(f"- {line.split(maxsplit=1)[1]}" for line in told))
     return "\n\n".join(parts) + "\n"
-
-
-def _capital(text: str) -> str:
-    return text[:1].upper() + text[1:]
 
 
 def _command(found: Measured) -> str:

@@ -80,7 +80,7 @@ def advice(found: Costs, row: Measured) -> str:
         if row.switch.on:
             return f"it {_price(row.cost)}; without it {what}: keep it."
         return f"it {_price(row.cost)}, and with it {what}: switch it on if its data are sound."
-    within = f"{_percent(found.wish.tolerance)}"
+    within = f"{100 * found.wish.tolerance:g} %"
     if not row.switch.on:
         return f"it {_price(row.cost)}; with it {what}: leave it out for figures within {within}."
     if row.cost <= 1.0 + _SAME_COST:
@@ -105,10 +105,6 @@ def _words(found: Costs, change: Change, on: bool) -> str:
     percent = 100 * change.share
     number = f"{percent:+.0f}" if abs(percent) >= 10 else f"{percent:+.2g}"
     return f"{what} changes by {number} %{of}, most of all"
-
-
-def _percent(share: float) -> str:
-    return f"{100 * share:g} %"
 
 
 def width_text(size: Size) -> str:

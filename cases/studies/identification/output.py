@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from catenary.cases.studies.identification.measurement import UNITS
-from catenary.cases.studies.identification.residuals import RARE, Judged
+from catenary.cases.studies.identification.posterior import RARE, Judged
 from catenary.cases.studies.identification.study import Identification
 from catenary.postproc.report.study_table import Column, Content, StudyTable
 

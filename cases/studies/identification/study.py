@@ -24,8 +24,13 @@ from catenary.cases.scene.problem import problem_of
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.identification.fitted_march import FittedMarch
 from catenary.cases.studies.identification.measurement import UNITS, Measurement, Signal
-from catenary.cases.studies.identification.posterior import Posterior, posterior_of
-from catenary.cases.studies.identification.residuals import Judged, innovations_of, judge
+from catenary.cases.studies.identification.posterior import (
+    Judged,
+    Posterior,
+    innovations_of,
+    judge,
+    posterior_of,
+)
 from catenary.cases.studies.identification.task import Task
 from catenary.cases.studies.measured.table_file import read_table
 from catenary.cases.studies.sensitivity.parameters import ChangedScenes, Parameter

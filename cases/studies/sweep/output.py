@@ -49,11 +49,14 @@ def table_of(ended: Sequence[Ended]) -> StudyTable:
         head |= {key: _typed(key, one.variant.varied.get(key)) for key in keys}
         failed = failed_criteria(one.summary)
         head |= {"passed": one.summary.get("passed"), "failed": failed, "remarks": one.remarks}
-        head |= {"judged": judged_criteria(one.summary)}
-        head |= {"not_judged": unjudged_criteria(one.summary)}
-        rules = [*one.summary.get("acceptance", []), *one.summary.get("not_judged", [])]
+        head |= {"judged": _criteria(one.summary, (False, True))}
+        unjudged = one.summary.get("not_judged", [])
+        head["not_judged"] = list(dict.fromkeys(labelled(row, several=True) for row in unjudged))
+        rules = [*one.summary.get("acceptance", []), *unjudged]
         head["rules"] = list(dict.fromkeys(row["book"] for row in rules if row.get("book")))
-        head |= {"wall_s": one.wall, "accepted": _verdict(one.summary.get("passed"), failed)}
+        verdict = "passed" if head["passed"] else "not judged"
+        head["accepted"] = f"FAILED {', '.join(failed)}" if failed else verdict
+        head["wall_s"] = one.wall
         for pantograph in one.summary.get("pantographs", [{}]):
             row: dict[str, Any] = {**head, "pantograph": pantograph.get("name", "")}
             row |= {column.name: pantograph.get(column.name) for column in OF_PANTOGRAPH}
@@ -86,27 +89,11 @@ def failed_criteria(summary: Mapping[str, Any]) -> list[str]:
     return _criteria(summary, (False,))
 
 
-def judged_criteria(summary: Mapping[str, Any]) -> list[str]:
-    """Names of the acceptance criteria that were judged in a run, each once."""
-    return _criteria(summary, (False, True))
-
-
 def _criteria(summary: Mapping[str, Any], verdicts: Sequence[bool]) -> list[str]:
+    """Names of the criteria of a run with one of some verdicts, each once."""
     rows = summary.get("acceptance", [])
     several = len({row.get("book") for row in rows}) > 1
     return list(dict.fromkeys(labelled(row, several) for row in rows if row["passed"] in verdicts))
-
-
-def unjudged_criteria(summary: Mapping[str, Any]) -> list[str]:
-    """Names of the criteria for which a run has no data, each once."""
-    rows = summary.get("not_judged", [])
-    return list(dict.fromkeys(labelled(row, several=True) for row in rows))
-
-
-def _verdict(passed: bool | None, failed: Sequence[str]) -> str:
-    if failed:
-        return f"FAILED {', '.join(failed)}"
-    return "passed" if passed else "not judged"
 
 
 def _of_line(summary: dict[str, Any]) -> dict[str, Any]:

@@ -130,6 +130,7 @@ class Plan:
     task: ToleranceTask
     scenes: SceneSet
     groups: Sequence[Group]
+    warnings: Sequence[str] = ()
 
 
 def make_plan(draft: Draft, task: ToleranceTask) -> Plan:

@@ -51,10 +51,6 @@ class Uncertainty:
     remarks: list[Row]
     notes: list[str]
 
-    def as_table(self) -> dict[str, Any]:
-        """All of it for JSON."""
-        return dict(vars(self))
-
 
 def evaluate(table: RunTable) -> Uncertainty:
     """Estimates from a table of runs. Not collective.

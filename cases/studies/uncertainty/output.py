@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -13,15 +12,19 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
+from catenary.cases.studies.sampling.tables import SamplingTable
 from catenary.cases.studies.sweep.jobs import STATISTICS
 from catenary.cases.studies.sweep.output import PLOTTED, key_in_words
 from catenary.cases.studies.uncertainty.estimates import quantile, student
-from catenary.cases.studies.uncertainty.evaluation import Row, Uncertainty, independent_runs
-from catenary.cases.studies.uncertainty.run_table import (
-    SAMPLING,
-    RunTable,
+from catenary.cases.studies.uncertainty.evaluation import (
+    Row,
+    Uncertainty,
+    evaluate,
+    independent_runs,
 )
+from catenary.cases.studies.uncertainty.run_table import SAMPLING, RunTable, run_table
 from catenary.cases.studies.uncertainty.sensitivity import ranked_inputs
+from catenary.postproc.evaluate.wording import capital
 from catenary.postproc.report.pictures import figures
 from catenary.postproc.report.study_table import Column, Content, StudyTable, write_files
 
@@ -202,12 +205,21 @@ def write(
     found : their evaluation
     plotted : statistics that are drawn; the usual ones if there are none
     """
-    content: dict[str, Content] = {RECORD: found.as_table()}
+    content: dict[str, Content] = {RECORD: vars(found)}
     if table.sampling is not None:
         content[SAMPLING] = table.sampling.model_dump(exclude_none=True)
     for name, draw in PICTURES.items():
         content[name] = partial(draw, table, plotted)
     return write_files(out, content)
+
+
+def write_evaluated(
+    out: Path, rows: Sequence[Row], sampling: SamplingTable, plotted: Sequence[str] = ()
+) -> tuple[Uncertainty, list[Path]]:
+    """Evaluate rows of a sweep of samples, and write that as ``write``. Not collective."""
+    table = run_table(rows, sampling)
+    found = evaluate(table)
+    return found, write(out, table, found, plotted)
 
 
 def as_text(found: Uncertainty) -> str:
@@ -222,7 +234,7 @@ def as_text(found: Uncertainty) -> str:
         )
     shown = [row for row in found.sensitivity if "with" not in row and _is_shown(row)]
     if shown:
-        parts.append(_first_letter(found.method) + "\n" + _indices(shown).text())
+        parts.append(capital(found.method) + "\n" + _indices(shown).text())
     told = found.remarks[:_MOST_REMARKS]
     lines = [f"REMARK      {one['n']} of {found.n_runs} runs: {one['remark']}" for one in told]
     lines += [f"NOTE        {note}" for note in found.notes]
@@ -289,20 +301,12 @@ def _indices(shown: list[Row]) -> StudyTable:
         *([Column("ST", "ST", ".2f"), Column("ST_conf", "+-", ".2f")] if total else []),
         *([] if total else [Column("rank_correlation", "rank corr.", ".2f")]),
     ]
-    rows = [{name: _known(value) for name, value in row.items()} for row in shown]
+    # None where a value is no number.
+    rows = [{n: None if value != value else value for n, value in row.items()} for row in shown]
     return StudyTable(columns, rows)
-
-
-def _known(value: Any) -> Any:
-    """A cell's value, None where it is no number."""
-    return None if value != value else value
 
 
 def _bounds(row: Row, name: str) -> str:
     """Bounds of an estimate; a dash stands for one that too few samples leave open."""
     low, high = (row[f"{name}_{end}"] for end in ("low", "high"))
     return " to ".join("-" if one != one else f"{one:.4g}" for one in (low, high))
-
-
-def _first_letter(text: str) -> str:
-    return text[:1].upper() + text[1:]

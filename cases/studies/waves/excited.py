@@ -11,9 +11,8 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from mpi4py import MPI
 
-from catenary.base.errors import InputError, RunBroken
+from catenary.base.errors import InputError
 from catenary.cases.studies.waves.seen import NodeMotion
 from catenary.mbs.lumped_data import LumpedData
 from catenary.meshgen.slowest_wave import slowest_wave_of
@@ -22,8 +21,6 @@ from catenary.solver.effects.all_effects import move_together
 from catenary.solver.problem.contact_laws import LinearLaw
 from catenary.solver.problem.problem import Placement, Problem, Train
 from catenary.solver.problem.window import BOUNDED
-from catenary.solver.statics.line_at_rest import LineAtRest
-from catenary.solver.time_loop.march import March
 from catenary.solver.time_loop.views.observers import NEVER, Observer, Stage, StepView
 from catenary.solver.waves.excitation import (
     FORCE,
@@ -34,7 +31,6 @@ from catenary.solver.waves.excitation import (
     MovingForce,
     hammer,
 )
-from catenary.solver.waves.excitation_load import load_of
 
 # A whole (1 - cosine) / 2 of 0.1 s has most of its waves below 20 Hz, half a sine of 0.02 s below
 # 75 Hz [s].
@@ -205,21 +201,3 @@ class Watch(Observer):
             uplift[self._nodes] = view.node_uplift()
             for one in self._seen:
                 one.add(view.time, uplift)
-
-
-def march(
-    rest: LineAtRest, excitation: Excitation, every: float, seen: Sequence[NodeMotion]
-) -> None:
-    """March to the end and show the motion each ``every`` seconds. Serial.
-
-    Raises
-    ------
-    RunBroken
-        If the march breaks.
-    """
-    dt = rest.problem.numerics.dt
-    rest.model.loads.append(load_of(excitation, rest.model, dt))
-    with March(MPI.COMM_SELF, *rest) as run:
-        outcome = run.run([Watch(max(1, round(every / dt)), seen)])
-    if outcome.outcome != "done":
-        raise RunBroken(outcome.outcome)

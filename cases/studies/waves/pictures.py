@@ -41,7 +41,8 @@ def space_time(
                 linestyle=_DASHES[number], color="black", linewidth=1.0,
                 label=label if end == seen.x[-1] else None,
             )  # fmt: skip
-    _supports(axes, supports)
+    for x in supports.tolist():
+        axes.axvline(x, color=figures.LIGHT, linewidth=0.6, zorder=1)
     axes.set_xlim(seen.x[0], seen.x[-1])
     axes.set_ylim(seen.time[0], seen.time[-1])
     figures.tidy(axes, "place along the track [m]", "time [s]")
@@ -183,8 +184,3 @@ def _velocity(
         shading="nearest", rasterized=True,
     )  # fmt: skip
     figure.colorbar(image, ax=axes, label="velocity of the contact wire [m/s]")
-
-
-def _supports(axes: Axes, supports: np.ndarray) -> None:
-    for x in supports.tolist():
-        axes.axvline(x, color=figures.LIGHT, linewidth=0.6, zorder=1)

@@ -18,7 +18,7 @@ from catenary.cases.scene.input.faults import Origin
 from catenary.cases.scene.load import scene_from
 from catenary.cases.scene.problem import problem_of
 from catenary.cases.scene.scene import Scene
-from catenary.cases.studies.waves import ends, obstacles, pictures
+from catenary.cases.studies.waves import obstacles, pictures
 from catenary.cases.studies.waves.excited import Asked, Watch, excitation_of, without_train
 from catenary.cases.studies.waves.measured import measured_rows, transmitted
 from catenary.cases.studies.waves.seen import (
@@ -30,7 +30,15 @@ from catenary.cases.studies.waves.seen import (
     places_of,
     waves_seen,
 )
-from catenary.cases.studies.waves.theory import WaveTheory, row_of, wave_theory
+from catenary.cases.studies.waves.theory import (
+    WaveTheory,
+    curve_rows,
+    draw_reflections,
+    reflection_rows,
+    reflections_of,
+    row_of,
+    wave_theory,
+)
 from catenary.postproc.evaluate.error_indicators import indicate
 from catenary.postproc.evaluate.remarks import all_remarks
 from catenary.postproc.film.film_data import FilmData, film_data
@@ -176,9 +184,9 @@ def _write(
 ) -> Studied:
     """Pictures and tables of what is seen and what theory says."""
     moving, origin = ("pantographs", "first pantograph") if what == "train" else (what, what)
-    reflections, spectra = ends.reflections_of(rest), transmitted(theory, seen)
+    reflections, spectra = reflections_of(rest), transmitted(theory, seen)
     measured = [
-        *measured_rows(theory, seen, spectra), *ends.reflection_rows(reflections, theory.speed)
+        *measured_rows(theory, seen, spectra), *reflection_rows(reflections, theory.speed)
     ]  # fmt: skip
     content: dict[str, Content] = {
         "energy.csv": energy_rows(energy, seen),
@@ -190,8 +198,8 @@ def _write(
     }
     if reflections:
         both = rest.problem.ends
-        content["end_reflection.png"] = lambda: ends.picture(reflections, both, theory.speed)
-        content["end_reflection.csv"] = ends.curve_rows(reflections)
+        content["end_reflection.png"] = lambda: draw_reflections(reflections, both, theory.speed)
+        content["end_reflection.csv"] = curve_rows(reflections)
     if spectra is not None:
         content["transmission.png"] = lambda: pictures.transmission(spectra)
     if seen.position.shape[1]:

@@ -1,0 +1,179 @@
+"""The verbs ``pantograph``, ``sensitivity`` and ``identify``: parameters and what they change."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from catenary.cases.cli import completion
+from catenary.cases.cli.app import (
+    Assignments,
+    Case,
+    Force,
+    MoreAssignments,
+    Out,
+    SceneWords,
+    Shortened,
+    folder_option,
+    serial_verb,
+)
+from catenary.cases.terminal import console
+
+
+@serial_verb(
+    "pantograph",
+    help="Print static force, equivalent masses, natural frequencies and frequency response of a "
+    "case's pantograph, and a lumped model fitted to it; with -o also write them as files.",
+    epilog="Example: catenary pantograph ambrosio2012 --fit 2 -o results/pantograph",
+)
+def pantograph(
+    words: SceneWords,
+    kind: Annotated[
+        str | None,
+        typer.Option(
+            "--kind",
+            metavar="NAME",
+            help="Which table of [pantographs]; the leading one's if absent.",
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None, folder_option("Folder for receptance.csv, receptance.png and lumped.toml.")
+    ] = None,
+    masses: Annotated[
+        int | None,
+        typer.Option(
+            "--fit",
+            metavar="N",
+            help="Masses of the lumped model, 1 to 3; two if absent, a lumped pantograph's own.",
+        ),
+    ] = None,
+    low: Annotated[float, typer.Option("--from", metavar="HZ", help="Lowest frequency.")] = 0.1,
+    high: Annotated[float, typer.Option("--to", metavar="HZ", help="Highest frequency.")] = 25.0,
+    points: Annotated[
+        int, typer.Option("--points", metavar="N", help="Frequencies between them, geometric.")
+    ] = 250,
+    fit_low: Annotated[
+        float,
+        typer.Option(
+            "--fit-from",
+            metavar="HZ",
+            help="Fit above this frequency: below it the raising decides, which no spring need be.",
+        ),
+    ] = 0.5,
+    force: Force = False,
+) -> None:
+    """Serial."""
+    from catenary.cases.studies.pantograph_response import (
+        Range,
+        new_files,
+        study,
+        study_text,
+        write_study,
+    )
+
+    over = Range(low, high, points, fit_low).checked()
+    if out is not None:
+        new_files(out, force)
+    found = study(words.load(), kind, masses, over)
+    console.say(study_text(found))
+    if out is not None:
+        console.say("\n" + "\n".join(str(path) for path in write_study(found, out)))
+
+
+SENSITIVITIES = "sensitivity.csv"
+
+
+@serial_verb(
+    "sensitivity",
+    help="Differentiate the contact-force statistics and the largest uplift of a case by its "
+    "parameters, in one march, and rank them: what a millimetre, a kilonewton of tension, a "
+    "kilogram or a per cent changes.",
+    epilog="Example: catenary sensitivity en50318_2002 -p line.contact_wire.tension_N "
+    "-p pantographs.reference.masses_kg.0",
+)
+def sensitivity(
+    words: SceneWords,
+    keys: Annotated[
+        list[str] | None,
+        typer.Option(
+            "-p",
+            "--parameter",
+            metavar="KEY",
+            autocompletion=completion.keys,
+            help="Key of a number, or of a list whose entries change together, with .0, .1 ... "
+            "for one of its entries; repeatable. Those of pantographs, contact, wires, droppers "
+            "and damping if absent.",
+        ),
+    ] = None,
+    droppers: Annotated[
+        bool,
+        typer.Option(
+            "--droppers",
+            help="The length of each dropper in the evaluated stretch, besides what -p names.",
+        ),
+    ] = False,
+    out: Annotated[
+        Path | None, folder_option(f"Folder for {SENSITIVITIES}; without it nothing is written.")
+    ] = None,
+    force: Force = False,
+) -> int:
+    """Serial."""
+    from catenary.cases.result_folder.output_folder import refuse_table
+
+    scene = words.load()
+    if out is not None:
+        refuse_table(out / SENSITIVITIES, force)
+    from catenary.cases.studies.sensitivity.output import as_text, table_of
+    from catenary.cases.studies.sensitivity.study import sensitivity_of
+    from catenary.postproc.report.study_table import write_files
+
+    found = sensitivity_of(scene, keys or [], console.alone(), droppers=droppers)
+    console.say(as_text(found))
+    if out is not None:
+        console.say(f"\n{write_files(out, {SENSITIVITIES: table_of(found)})[0]}")
+    return console.DONE
+
+
+@serial_verb(
+    "identify",
+    help="Find parameters of a case, such as errors of dropper lengths, tensions, damping and "
+    "masses, from a measured contact force or head height: most probable values, their "
+    "uncertainty, what the data do not tell, and whether the model fits.",
+    epilog="Example: catenary identify ac_simple measured.csv task.toml -o results/identified",
+)
+def identify(
+    case: Case,
+    measured: Annotated[
+        Path, typer.Argument(help="CSV file of a passage: places or times, forces, head heights.")
+    ],
+    task: Annotated[
+        Path,
+        typer.Argument(
+            help="TOML file: columns, units and noise of the measurement, parameters that are "
+            "looked for and their priors."
+        ),
+    ],
+    out: Out,
+    extras: MoreAssignments = None,
+    assignments: Assignments = None,
+    shortened: Shortened = False,
+    force: Force = False,
+) -> int:
+    """Serial."""
+    from catenary.cases.result_folder.output_folder import refuse_table
+    from catenary.cases.studies.identification.task import Task
+    from catenary.cases.studies.task_files import read_task
+
+    wanted = read_task(task, Task)
+    scene = SceneWords(case, extras, assignments, shortened).load()
+    from catenary.cases.studies.identification.output import PARAMETERS, as_text, files_of
+    from catenary.cases.studies.identification.study import identify as identified
+    from catenary.postproc.report.study_table import write_files
+
+    refuse_table(out / PARAMETERS, force)
+    found = identified(scene, measured, wanted, console.alone())
+    console.say(as_text(found))
+    console.say("\n".join(map(str, write_files(out, files_of(found)))))
+    return console.DONE
