@@ -20,7 +20,7 @@ from catenary.mbs.frame import SPACE
 from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.mechanism.pantograph_data import HOLDER, MultibodyData, stand
 from catenary.mbs.rigid.bodies import Motion, rotation_matrix
-from catenary.mbs.rigid.joints import PrescribedPoint, constant
+from catenary.mbs.rigid.joints import Constant, PrescribedPoint
 from catenary.mbs.rigid.statics import equilibrium
 
 # What a line belongs to.
@@ -202,7 +202,7 @@ def _table(data: MultibodyData) -> tuple[np.ndarray, list[Motion]]:
         motion = standing.motion
         for step in np.arange(_SPACING, _REACH + 0.5 * _SPACING, _SPACING):
             height = standing.working_height + way * float(step)
-            held = standing.system.with_joints(PrescribedPoint(HOLDER, data.arm, constant(height)))
+            held = standing.system.with_joints(PrescribedPoint(HOLDER, data.arm, Constant(height)))
             try:
                 motion = equilibrium(held, motion).motion
             except InputError:

@@ -31,6 +31,7 @@ class SteppedHead(ABC):
     ----------
     head : HeadParts
     n : number of all coordinates; those that are not the head's are heights
+    raise_time : time over which the lift grows from zero [s]
     dt, beta, gamma : Newmark step [s] and parameters, those of the line
     lateral : where the wire crosses the strips, None if the head is not to roll
     """
@@ -41,6 +42,7 @@ class SteppedHead(ABC):
         self,
         head: HeadParts,
         n: int,
+        raise_time: float,
         dt: float,
         beta: float,
         gamma: float,
@@ -50,6 +52,7 @@ class SteppedHead(ABC):
         self.strip_offsets = head.offsets
         # Where the wire crosses the strips of a head that cannot roll makes no difference.
         moves = head.roll >= 0 or head.bending is not None
+        self._part: Callable[[float], float] = Raising(raise_time)
         self._n, self._lateral = n, lateral if moves else None
         self._level = np.ones(n)
         self._level[: head.n] = head.level
@@ -104,6 +107,10 @@ class SteppedHead(ABC):
             self.stepped.regulate(self._control)
         elif regulator is not None:
             self._controller = regulator()
+
+    def follow(self, part: Callable[[float], float]) -> None:
+        """Let the part ``part(time)`` of the lift act."""
+        self._part = part
 
     @property
     def tie(self) -> tuple[float, float]:

@@ -22,7 +22,7 @@ from catenary.mbs.mechanism.pantograph_data import MultibodyData, stand
 from catenary.mbs.rigid.arrays import ORIGIN, body_products
 from catenary.mbs.rigid.bodies import SPACE, Motion
 from catenary.mbs.rigid.forces import Force, Gravity, OffLine, PointForce
-from catenary.mbs.rigid.joints import PrescribedPoint, constant, steady
+from catenary.mbs.rigid.joints import Constant, PrescribedPoint, steady
 from catenary.mbs.rigid.kinematics import point
 from catenary.mbs.rigid.spin_locks import without_spins
 from catenary.mbs.rigid.statics import equilibrium, held_force
@@ -54,10 +54,6 @@ class _HoldDown(OffLine):
         left = self.force * (1.0 - self.part(time))
         return -left * point(motion, self.arm, ORIGIN).jacobian[2]
 
-    def energy(self, motion: Motion) -> float:
-        """Stores none."""
-        return 0.0
-
 
 @dataclass(frozen=True)
 class _Carried(OffLine):
@@ -74,10 +70,6 @@ class _Carried(OffLine):
         forces[:, 2] = self.base.vertical(time).acceleration
         return -(np.array(self.masses)[:, None] * forces).ravel()
 
-    def energy(self, motion: Motion) -> float:
-        """Stores none."""
-        return 0.0
-
 
 @dataclass(frozen=True)
 class _Blown(OffLine):
@@ -91,10 +83,6 @@ class _Blown(OffLine):
     def generalised(self, motion: Motion, time: float) -> np.ndarray:
         """Generalised forces (6 n,)."""
         return float(self.air.now(time)[self.column]) * self.force.generalised(motion, time)
-
-    def energy(self, motion: Motion) -> float:
-        """Counts as work from outside."""
-        return 0.0
 
 
 def _blown(data: MultibodyData, air: AirForces | None) -> tuple[_Blown, ...]:
@@ -228,7 +216,7 @@ class FullPantograph:
             wanted, velocity = wanted - vertical.place, velocity - vertical.velocity
         arm = wanted - stand(data).head.offset
         for _ in range(20):
-            holder = PrescribedPoint(ARM, data.arm, constant(arm))
+            holder = PrescribedPoint(ARM, data.arm, Constant(arm))
             motion = equilibrium(self._still.with_joints(holder), motion).motion
             off = wanted - float(motion.position[number, 2])
             arm += off

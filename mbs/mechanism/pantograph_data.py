@@ -22,7 +22,7 @@ from catenary.mbs.mechanism.reduction import Places, ReducedMechanism, reduce_me
 from catenary.mbs.rigid.arrays import Joint
 from catenary.mbs.rigid.bodies import Motion
 from catenary.mbs.rigid.forces import Force, Gravity, PointForce, SpringDamper
-from catenary.mbs.rigid.joints import PrescribedPoint, constant
+from catenary.mbs.rigid.joints import Constant, PrescribedPoint
 from catenary.mbs.rigid.statics import (
     Calibration,
     calibrate_actuator,
@@ -147,7 +147,7 @@ def stand(data: MultibodyData) -> Standing:
     """
     mechanism = _mechanism(_bodies_of(data))
     height, system = mechanism.height, data.system
-    holder = PrescribedPoint(HOLDER, data.arm, constant(height))
+    holder = PrescribedPoint(HOLDER, data.arm, Constant(height))
     push = None
     if data.actuator is not None and data.static_force is not None:
         found = calibrate_actuator(
@@ -205,7 +205,7 @@ def _mechanism(data: MultibodyData) -> _Mechanism:
     _judge_head(data)
     missed = _judge_positions(data)
     system = data.system
-    motion = system.assemble(system.start()).motion
+    motion = system.assemble(system.start())
     repeated = system.redundant(motion)
     if repeated:
         raise InputError(
@@ -215,10 +215,10 @@ def _mechanism(data: MultibodyData) -> _Mechanism:
     height = data.working_height
     if height is None:
         height = float(motion.position[motion.numbers[data.arm], 2])
-    holder = PrescribedPoint(HOLDER, data.arm, constant(height))
+    holder = PrescribedPoint(HOLDER, data.arm, Constant(height))
     _judge_raising(data, motion)
     try:
-        motion = system.with_joints(holder).assemble(motion).motion
+        motion = system.with_joints(holder).assemble(motion)
     except InputError as error:
         raise InputError(
             f"its arm {data.arm!r} does not reach its working height of {height:g} m: {error}"
@@ -432,7 +432,7 @@ def _judge_raising(data: MultibodyData, motion: Motion) -> None:
     frame = without_head(data, data.system)
     there = _part(motion, frame)
     height = float(there.position[there.numbers[data.arm], 2])
-    holder = PrescribedPoint(HOLDER, data.arm, constant(height))
+    holder = PrescribedPoint(HOLDER, data.arm, Constant(height))
     held = frame.with_joints(holder)
     if held.n_degrees_of_freedom(there) == frame.n_degrees_of_freedom(there):
         raise InputError(

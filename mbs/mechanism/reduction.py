@@ -101,15 +101,6 @@ class ReducedMechanism:
             "numerics.dt_s or a mechanism that reaches"
         )
 
-    def acceleration(self, height: float, speed: float, push: float = 0.0) -> float:
-        """Acceleration upward [m/s^2] at a height [m] and speed upward [m/s].
-
-        ``push`` [N] is a further force on the point, upward. Raises RunBroken as ``at`` does.
-        """
-        (mass, lift, damping), (mass_slope, _, _) = self.at(height)
-        force = lift - damping * speed - 0.5 * mass_slope * speed**2 + push
-        return float(force / mass)
-
 
 def reduce_mechanism(
     system: System,
@@ -151,7 +142,7 @@ def reduce_mechanism(
         raise InputError(f"A mechanism is reduced for at least four growing heights, not {table}.")
     # Heights are visited from the one that is nearest to the start, each from its neighbour.
     raised, more = (places or Places(None)).of(system, body, at)
-    motion = system.assemble(system.start() if start is None else start).motion
+    motion = system.assemble(system.start() if start is None else start)
     first = int(np.argmin(np.abs(table - point(motion, body, at).value[2])))
     found = [raised.to(table[first], motion)]
     for way in (table[first + 1 :], table[:first][::-1]):

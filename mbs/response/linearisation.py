@@ -95,10 +95,6 @@ class LinearModel:
         """
         return self.amplitudes(frequencies) @ self.push
 
-    def static_stiffness(self) -> float:
-        """Force upward that it takes to hold the point a metre higher, per metre [N/m]."""
-        return float(1.0 / (self.push @ linalg.solve(self.stiffness, self.push)))
-
     def modes(self) -> tuple[Mode, ...]:
         """Free motions by growing frequency."""
         k = len(self.push)
@@ -228,7 +224,7 @@ def _stiffness(system: System, rest: Motion, ways: np.ndarray, time: float) -> n
 
 def _force_on(system: System, motion: Motion, ways: np.ndarray, time: float) -> np.ndarray:
     """Force on motions ``ways`` (6 n, k), as the joints allow them at a place near by, (k,)."""
-    there = system.assemble(motion, time).motion
+    there = system.assemble(motion, time)
     jacobian = system.constraints(there, time).jacobian
     # The least change that makes them allowed: smooth, unlike another null space.
     basis = ways

@@ -9,14 +9,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy import linalg
 
 from catenary.base.errors import InputError, RunBroken
-from catenary.mbs.rigid.arrays import ORIGIN, Joint
-from catenary.mbs.rigid.bodies import Motion, Vector
+from catenary.mbs.rigid.arrays import Joint
+from catenary.mbs.rigid.bodies import Motion
 from catenary.mbs.rigid.forces import Actuator
-from catenary.mbs.rigid.joints import unit
-from catenary.mbs.rigid.kinematics import point
 from catenary.mbs.rigid.least_squares import least_squares, null_space
 from catenary.mbs.rigid.system import System
 
@@ -71,7 +68,7 @@ def at_rest(
 ) -> tuple[Motion, float]:
     """Place and N^T g of ``equilibrium``, without the multipliers."""
     resting = start.with_velocities(np.zeros(6 * start.n_bodies))
-    motion = system.assemble(resting, time).motion
+    motion = system.assemble(resting, time)
     size = float(np.abs(system.generalised_forces(motion, time)).max())
     left = np.inf
     for _ in range(max_iterations):
@@ -92,7 +89,7 @@ def at_rest(
         if longest == 0.0:
             break  # nothing resists what is left over
         step *= min(1.0, LONGEST / longest)
-        motion = system.assemble(motion.moved(step), time).motion
+        motion = system.assemble(motion.moved(step), time)
     raise RunBroken(
         f"The multibody system finds no equilibrium near its start: {left:.3g} N are left over; "
         "start closer to it, or check springs and actuators."
@@ -103,7 +100,7 @@ def _unbalanced(
     system: System, motion: Motion, free: np.ndarray, displacement: np.ndarray, time: float
 ) -> np.ndarray:
     """Force on the free motions ``free`` (6 n, k) after a displacement, shape (k,)."""
-    there = system.assemble(motion.moved(displacement), time).motion
+    there = system.assemble(motion.moved(displacement), time)
     jacobian = system.constraints(there, time).jacobian
     # The same motions as the joints allow them there: a smooth basis, unlike a new null space.
     basis = free - least_squares(jacobian, jacobian @ free, 1e-8)
@@ -202,25 +199,3 @@ def calibrate_actuator(
         f"Actuator {actuator!r} would need {push:.3g} N for a static force of {static_force:g} N, "
         "which is beyond calculation: check its points, springs and stops."
     )
-
-
-def equivalent_mass(
-    system: System,
-    motion: Motion,
-    body: str,
-    at: Vector = ORIGIN,
-    along: Vector = (0.0, 0.0, 1.0),
-    time: float = 0.0,
-) -> float:
-    """Mass [kg] that a suddenly growing force on a point feels along a direction in space.
-
-    Bodies behind springs that the joints do not move along stand still and do not count.
-    """
-    jacobian = system.constraints(motion, time).jacobian
-    free = null_space(jacobian)
-    # Velocities of the point per velocity of each free motion.
-    way = unit(along) @ point(motion, body, at).jacobian @ free
-    if np.abs(way).max(initial=0.0) < 1e-9:
-        raise InputError(f"The joints do not let body {body!r} move along {tuple(along)}.")
-    mass = free.T @ (system.mass[:, None] * free)
-    return float(1.0 / (way @ linalg.solve(mass, way, assume_a="pos")))

@@ -120,7 +120,7 @@ class Stepper:
     def begin(self, motion: Motion, time: float, forces: np.ndarray | None = None) -> None:
         """Start from a motion, joints closed by projection, under ``forces`` (s,) [N]."""
         system = self.system
-        motion = system.assemble(motion, time).motion
+        motion = system.assemble(motion, time)
         self.motion, self.time = system.project_velocities(motion, time), time
         ways = self._ways(self.motion)
         self.forces = np.zeros(ways.shape[1]) if forces is None else np.array(forces, dtype=float)

@@ -268,13 +268,13 @@ def _standing(scene: Scene, name: str, table: MultibodyTable) -> tuple[Multibody
 def _reaches(data: MultibodyData, arm: float) -> bool:
     """Whether a mechanism can have its arm at a height above its base [m]."""
     from catenary.mbs.mechanism.pantograph_data import HOLDER, reduced, stand
-    from catenary.mbs.rigid.joints import PrescribedPoint, constant
+    from catenary.mbs.rigid.joints import Constant, PrescribedPoint
 
     if data.all_bodies is None:
         heights = reduced(data).heights
         return bool(heights[0] <= arm <= heights[-1])
     standing = stand(data)
-    holder = PrescribedPoint(HOLDER, data.arm, constant(arm))
+    holder = PrescribedPoint(HOLDER, data.arm, Constant(arm))
     try:
         standing.system.with_joints(holder).assemble(standing.motion)
     except InputError:
