@@ -39,7 +39,8 @@ class Law:
 
     def force(self, x: float) -> float:
         """At an extension [m] or a rate [m/s]."""
-        i = self._segment(x)
+        i = int(np.searchsorted(self.points, x, side="right")) - 1
+        i = min(max(i, 0), len(self.points) - 2)
         slope = (self.forces[i + 1] - self.forces[i]) / (self.points[i + 1] - self.points[i])
         return self.forces[i] + slope * (x - self.points[i])
 
@@ -49,10 +50,6 @@ class Law:
         ends = np.array(sorted([0.0, x, *inner]))
         forces = np.array([self.force(float(end)) for end in ends])
         return float(np.sign(x) * np.sum(0.5 * (forces[1:] + forces[:-1]) * np.diff(ends)))
-
-    def _segment(self, x: float) -> int:
-        i = int(np.searchsorted(self.points, x, side="right")) - 1
-        return min(max(i, 0), len(self.points) - 2)
 
 
 class LawArrays(NamedTuple):

@@ -153,7 +153,9 @@ class FullPantograph:
             masses = tuple(body.mass for body in system.bodies)
             system = system.with_forces(_Carried("carried by the base", masses, base))
         self._rest = standing.motion
-        self._zero = nominal_height - self._head_under(pressing)
+        # Heights of the head above the base, with the arm at its working height.
+        alone = float(standing.motion.position[standing.motion.numbers[data.head], 2])
+        self._zero = nominal_height - (alone - pressing / standing.head.stiffness)
         still = without_spins(standing.system, standing.motion)
         self._still = still.with_forces(*_blown(data, air))
         s, space = len(data.strips.contact_offsets), self._rest.numbers[SPACE]
@@ -164,7 +166,9 @@ class FullPantograph:
         self._heights["between"] = True
         self._points = self._heights["at_end"]
         self._points[:, 0] = data.strips.contact_offsets
-        self._stepper = Stepper(system, dt, handling, self._pushed_down, substeps, beta, gamma)
+        # Generalised forces (6 n, s) of unit contact forces, downward.
+        pushed = lambda motion: -self._touching(motion)[1].T  # noqa: E731
+        self._stepper = Stepper(system, dt, handling, pushed, substeps, beta, gamma)
         self._stepper.begin(standing.motion, 0.0)
         self._early = np.zeros((2, s))
         self._head = HeadState(s)
@@ -322,11 +326,6 @@ class FullPantograph:
             f"{head_height:.4g} m: {head_height - self._zero:.4g} m above its base."
         )
 
-    def _head_under(self, pressing: float) -> float:
-        """Height of the head above the base, arm at its working height, pressed on it [m]."""
-        height = float(self._rest.position[self._rest.numbers[self._data.head], 2])
-        return height - pressing / stand(self._data).head.stiffness
-
     def _aim(self, time: float) -> None:
         """Let the strips touch where the wire is at ``time`` [s]."""
         if self._lateral is not None:
@@ -337,10 +336,6 @@ class FullPantograph:
         """Heights (s,) above the base where the wire is on the strips, and gradients (s, 6 n)."""
         found = body_products(motion, self._heights)
         return found.value, found.jacobian
-
-    def _pushed_down(self, motion: Motion) -> np.ndarray:
-        """Generalised forces (6 n, s) of unit contact forces, downward."""
-        return -self._touching(motion)[1].T
 
     def _add_base(
         self, time: float, height: np.ndarray, velocity: np.ndarray, motion: Motion

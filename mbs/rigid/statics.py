@@ -56,7 +56,10 @@ def equilibrium(
         There is no equilibrium near by.
     """
     motion, left = at_rest(system, start, time, tolerance, max_iterations)
-    return Rest(motion, _multipliers(system, motion, time), left)
+    # Of redundant rows the smallest multipliers.
+    jacobian = system.constraints(motion, time).jacobian
+    force = system.generalised_forces(motion, time)
+    return Rest(motion, least_squares(jacobian.T, force, 1e-8), left)
 
 
 def at_rest(
@@ -105,13 +108,6 @@ def _unbalanced(
     # The same motions as the joints allow them there: a smooth basis, unlike a new null space.
     basis = free - least_squares(jacobian, jacobian @ free, 1e-8)
     return basis.T @ system.generalised_forces(there, time)
-
-
-def _multipliers(system: System, motion: Motion, time: float) -> np.ndarray:
-    """Multipliers that balance the forces, shape (m,), the smallest of redundant rows."""
-    jacobian = system.constraints(motion, time).jacobian
-    force = system.generalised_forces(motion, time)
-    return least_squares(jacobian.T, force, 1e-8)
 
 
 def unheld_force(system: System, motion: Motion, time: float = 0.0) -> float:

@@ -316,10 +316,6 @@ class Places(NamedTuple):
         )
         return cls(dofs, weights, x, half, first, last, low - ownership.first, high - low)
 
-    def of_numbers(self, which: np.ndarray) -> Places:
-        """Some of them."""
-        return Places(*(part[which] for part in self))
-
 
 def _stretches(x: np.ndarray, chosen: np.ndarray) -> list[np.ndarray]:
     """Numbers of the ``chosen`` places by stretches of the line, each of them short."""

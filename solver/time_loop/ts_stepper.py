@@ -70,7 +70,9 @@ class Stepper:
             else:
                 self._take(self._blocks, ts)
         except RunBroken as error:
-            self._end_loop(ts, str(error))
+            self.broken = str(error)
+            # Not a reason of failure, for which PETSc would raise an error of its own.
+            ts.setConvergedReason(PETSc.TS.ConvergedReason.CONVERGED_USER)
             return
         ts.setTime(self.step_number * self._dt)
         if not goes_on:
@@ -138,12 +140,6 @@ class Stepper:
         scheme.counters.unconverged_steps += isinstance(error, NotConverged)
         time, place = (self.step_number + 1) * self._dt, float(scheme.pantographs.position[0])
         return RunBroken(f"the step to t = {time:.4f} s with the train at {place:.1f} m: {error}")
-
-    def _end_loop(self, ts: PETSc.TS, why: str) -> None:
-        """End the time loop because of an error that the march reports."""
-        self.broken = why
-        # Not a reason of failure, for which PETSc would raise an error of its own.
-        ts.setConvergedReason(PETSc.TS.ConvergedReason.CONVERGED_USER)
 
 
 def ts_of(comm: Any, stepper: Stepper, dt: float, steps: tuple[int, int], n_steps: int) -> PETSc.TS:

@@ -77,12 +77,7 @@ class FieldsFile:
         self._layout: list[Slots] = []
         self._text: GrowingXdmf | None = None
         self._handle = -1
-        self._published = False
-
-    @property
-    def is_published(self) -> bool:
-        """Whether it has its name, in place of an earlier one."""
-        return self._published
+        self.is_published = False
 
     def make(self, numbers: np.ndarray) -> None:
         """Write a file without a snapshot, under another name until ``publish``.
@@ -153,7 +148,7 @@ class FieldsFile:
             self._written = []
             return False
         self._handle = os.open(self.path, os.O_RDWR)
-        self._published = True
+        self.is_published = True
         self._describe()
         return True
 
@@ -174,10 +169,10 @@ class FieldsFile:
 
     def publish(self) -> None:
         """Give a new file its name, in place of an earlier one; OSError if that fails."""
-        if self._handle < 0 or self._published:
+        if self._handle < 0 or self.is_published:
             return
         os.replace(self._made_as, self.path)
-        self._published = True
+        self.is_published = True
         self._describe()
 
     def append(self, times: list[float], known: Gathered) -> None:
@@ -192,7 +187,7 @@ class FieldsFile:
         write_at(self._handle, self._places_at + 8 * first * self._n_numbers, pantographs)
         write_at(self._handle, self._times_at + 8 * first, np.array(times, dtype="<f8"))
         self._written += times
-        if self._published:
+        if self.is_published:
             check_in_place(self.path, self._handle)
             self._describe()
 
@@ -204,7 +199,7 @@ class FieldsFile:
         self._handle = -1
         if self._text is not None:
             self._text.close()
-        if not self._published:
+        if not self.is_published:
             with contextlib.suppress(OSError):
                 self._made_as.unlink(missing_ok=True)
 

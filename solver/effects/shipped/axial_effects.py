@@ -16,7 +16,6 @@ from catenary.solver.model.links import PULLS, PUSHES, Direction, law, slips
 from catenary.solver.model.model import Block
 from catenary.solver.model.unknowns.stations import SAME_STATION
 from catenary.solver.problem.problem import Problem
-from catenary.solver.problem.simulated import Simulated
 
 if TYPE_CHECKING:
     from catenary.solver.model.builder import ModelBuilder
@@ -143,10 +142,6 @@ def _add_friction(builder: ModelBuilder, ends: list[wire_ends.WireEnd]) -> None:
         builder.add_links(name, Direction(unknowns, sign * outwards), laws, of_shape=True)
 
 
-def _with_tensioner(laws: Simulated, problem: Problem) -> Simulated:
-    return replace(laws, tensioner=problem.along.tensioner)
-
-
 def _has_tensioner(problem: Problem) -> bool:
     along, masts = problem.along, problem.line.support_positions[[0, -1]]
     line_ends = float(masts[0]), float(masts[1])
@@ -186,7 +181,7 @@ register(
         applies=_has_tensioner,
         data="line.ends or line.overlap with along = tensioner, and effects.axial_motion",
         build=_tensioners,
-        law=_with_tensioner,
+        law=lambda laws, p: replace(laws, tensioner=p.along.tensioner),
     )
 )
 register(

@@ -45,7 +45,10 @@ def _pendulums(builder: ModelBuilder) -> None:
     direction, stiffness = sideways_of_droppers(builder.model)
     for number, group in enumerate(builder.problem.line.droppers):
         mine = builder.mesh.dropper_group == number
-        _add_stiffness(builder, group.name, direction, mine, stiffness)
+        unknowns, weights = direction.unknowns[mine], direction.weights[mine]
+        springs = stiffness[mine, None, None] * weights[:, :, None] * weights[:, None, :]
+        kind = np.arange(len(unknowns))
+        builder.add_block(Block(group.name, unknowns, kind, None, springs, of_shape=True))
 
 
 def _bars(builder: ModelBuilder, arms: SteadyArms, mine: np.ndarray) -> None:
@@ -70,20 +73,6 @@ def _bars(builder: ModelBuilder, arms: SteadyArms, mine: np.ndarray) -> None:
     if swings and not slewed:
         along, values = model.dofs(nodes, "u")[:, None], (tension / length)[:, None, None]
         builder.add_block(Block(name, along, kind, None, values, of_shape=True))
-
-
-def _add_stiffness(
-    builder: ModelBuilder,
-    component: str,
-    direction: Direction,
-    which: np.ndarray,
-    stiffness: np.ndarray,
-) -> None:
-    """Springs along some of the directions, which are never cut [N/m]."""
-    unknowns, weights = direction.unknowns[which], direction.weights[which]
-    matrices = stiffness[which, None, None] * weights[:, :, None] * weights[:, None, :]
-    kind = np.arange(len(unknowns))
-    builder.add_block(Block(component, unknowns, kind, None, matrices, of_shape=True))
 
 
 register(

@@ -177,7 +177,9 @@ def number_unknowns(
         If such a wire has not its nodes, and what hangs there, beside those of the other one.
     """
     groups = list(groups)
-    group_names = [_names_of(group) for group in groups]
+    group_names = [
+        tuple(dict.fromkeys(name for own in group.values() for name in own)) for group in groups
+    ]
     names = tuple(name for own in group_names for name in own)
     most_nodes = max(2, _WIDEST_GROUP // max(map(len, group_names)))
     stations = stations_of(mesh, most_nodes, together)
@@ -216,10 +218,6 @@ def number_unknowns(
     return Unknowns(
         names, numbers, station, starts, planes, station_types, station_type, in_stations, low, high
     )
-
-
-def _names_of(group: Group) -> tuple[str, ...]:
-    return tuple(dict.fromkeys(name for own in group.values() for name in own))
 
 
 def _station_types(stations: Stations, padded: bool) -> tuple[np.ndarray, np.ndarray]:

@@ -129,7 +129,10 @@ class RestNearby:
         load = self._load.copy()
         for end in self._ends:
             if end.pull is None:
-                moved[end.unknown] = end.end.outwards * end.held_at - self._already(end)
+                # Where the known rest has it, along the track since the installation [m].
+                known = self._potential.known
+                already = float(known.along[end.end.node]) if known.along.size else 0.0
+                moved[end.unknown] = end.end.outwards * end.held_at - already
             else:
                 tension = model.problem.line.wire(end.end.wire).tension
                 load[end.unknown] += end.end.outwards * (end.pull - tension)
@@ -167,11 +170,6 @@ class RestNearby:
             f"the line finds no rest{where(model)}: it still moves by {change:.2g} m after "
             f"{_MOST_STEPS} steps of Newton's method; its wires may be slack there"
         )
-
-    def _already(self, end: TensionedEnd) -> float:
-        """Where the known rest has an end, along the track since the installation [m]."""
-        known = self._potential.known
-        return float(known.along[end.end.node]) if known.along.size else 0.0
 
     def _softening(self, about: Model, form: Equilibrium, slack: np.ndarray) -> np.ndarray:
         """What droppers in a shape are softer by than the model has them, (n_droppers,) [N/m]."""
