@@ -126,7 +126,7 @@ class LumpedPantograph(SteppedHead):
 
     @property
     def tie(self) -> tuple[float, float]:
-        """Those between the last mass and the base."""
+        """Stiffness [N/m] and damping [N s/m] between the last mass and the base."""
         return self._base_stiffness, self._base_damping
 
     def lift(self, time: float) -> float:

@@ -23,7 +23,7 @@ from catenary.mbs.rigid.bodies import Motion, rotation_matrix
 from catenary.mbs.rigid.joints import Constant, PrescribedPoint
 from catenary.mbs.rigid.statics import equilibrium
 
-# What a line belongs to.
+# Parts that a line belongs to.
 BODY, HEAD, SPRING = 0, 1, 2
 # Half the length of strips that have none [m], and how far a head reaches beyond its strips.
 _HALF_STRIP, _BEYOND = 0.8, 0.15
@@ -62,9 +62,12 @@ class Shape(Protocol):
 
         Parameters
         ----------
-        places, base : what `Pantograph.places` and `Pantograph.base` returned
-        head : height of the head [m]
-        wire : height of the wire at rest where the pantograph is [m]
+        places, base : ndarray
+            What `Pantograph.places` and `Pantograph.base` returned.
+        head : float
+            Height of the head [m].
+        wire : float
+            Height of the wire at rest where the pantograph is [m].
         """
 
 
@@ -115,7 +118,7 @@ class LumpedShape:
 
 
 def schematic() -> Shape:
-    """The shape of a pantograph of which nothing but the height of the head is known."""
+    """Schematic shape of a pantograph whose head's height alone is known."""
     return LumpedShape(LumpedData((1.0,), (1.0,), (0.0,)))
 
 

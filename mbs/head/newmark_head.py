@@ -1,4 +1,4 @@
-"""What all pantographs share that step by Newmark's method: their state, their strips, contact."""
+"""Base of all pantographs that step by Newmark's method: their state, their strips, contact."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ class SteppedHead(ABC):
         self._level[: head.n] = head.level
         self._touch = np.zeros((2, s, n))
         self._touch[0, :, : head.n] = head.touch
-        # What a force on the middle of the strips does to each coordinate.
+        # Share of a force on the middle of the strips in the force on each coordinate.
         self._push = np.zeros(n)
         self._push[: head.n] = head.touch.mean(axis=0)
         self._newmark = NewmarkFactors(
@@ -69,7 +69,7 @@ class SteppedHead(ABC):
         self.head = HeadState(s)
         roll = -1 if self._lateral is None else head.roll
         self._arrays = HeadArrays(self._touch, self._state, self.head.numbers, self._newmark, roll)
-        # What the coming step depends on, and those of its numbers that have names.
+        # Inputs of the coming step, and the numbers of these that have names.
         self.row = np.zeros(drive_width(s))
         self._now = named(self.row)
         self._laws: LawsInPlace = in_place((), (), n, ())
@@ -120,7 +120,7 @@ class SteppedHead(ABC):
 
     @property
     def added_force(self) -> float:
-        """What regulates the lift adds to the static force now [N]."""
+        """Force that the regulation of the lift adds to the static force now [N]."""
         return self.stepped.added_force
 
     def _put_laws(self, laws: LawsInPlace) -> None:

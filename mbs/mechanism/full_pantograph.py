@@ -39,7 +39,7 @@ PLACED = 1e-10
 
 @dataclass
 class _HoldDown(OffLine):
-    """What holds the arm down until the pantograph is raised: ``force`` [N] less and less.
+    """Hold-down of the arm until the pantograph is raised: ``force`` [N] less and less.
 
     ``part(time)`` of the lift is let act; where it is negative, the arm is pulled down.
     """
@@ -57,7 +57,7 @@ class _HoldDown(OffLine):
 
 @dataclass(frozen=True)
 class _Carried(OffLine):
-    """What bodies feel of a base that is accelerated up and sideways."""
+    """Inertia forces on bodies over a base that is accelerated up and sideways."""
 
     name: str
     masses: tuple[float, ...]
@@ -340,7 +340,7 @@ class FullPantograph:
     def _add_base(
         self, time: float, height: np.ndarray, velocity: np.ndarray, motion: Motion
     ) -> None:
-        """What the base's motion and the wire's way along the strips add, in place."""
+        """Add the base's motion and the wire's way along the strips, in place."""
         if self._lateral is not None:
             tilt = motion.rotation[motion.numbers[self._data.head]][2, 1]
             velocity += tilt * self._lateral.rate

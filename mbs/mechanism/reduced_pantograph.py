@@ -113,7 +113,7 @@ class RaisingPantograph(SteppedHead):
         """
         self._aim(time)
         self._move_base(time)
-        # What is not a number is left to those who couple.
+        # NaN is left to the coupling, which refuses it.
         if not self._raised.step(self.row):
             raise self._data.frame.left(self._raised.height, time)
         return self.head

@@ -1,4 +1,4 @@
-"""What a pantograph is like at its head under the static force: response, masses, stiffness."""
+"""Frequency response, equivalent masses and stiffness of a pantograph at its head."""
 
 from __future__ import annotations
 

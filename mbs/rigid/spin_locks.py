@@ -1,4 +1,4 @@
-"""Links that may spin between two balls, kept from doing so.
+"""Constraints that remove the idle rotation of links between two balls.
 
 Nothing drives such a spin and little resists it; a link whose mass lies above the line between its
 balls tips over by itself, which no real link with its bolts does. Reduced mechanisms leave spins
@@ -27,7 +27,10 @@ def without_spins(system: System, motion: Motion) -> System:
 
     Parameters
     ----------
-    motion : assembled; spins are kept as they are there
+    system : System
+        Bodies with their joints and forces.
+    motion : Motion
+        Assembled motion, whose spins are kept.
     """
     holders = [
         holder for body in system.bodies if (holder := _holder(system, body, motion)) is not None

@@ -188,9 +188,9 @@ class System:
         """Which rows belong to which joint."""
         return self._rows.ranges
 
-    def redundant(self, motion: Motion, time: float = 0.0) -> tuple[str, ...]:
+    def redundant(self, motion: Motion) -> tuple[str, ...]:
         """Names of joints with rows that joints before them imply, with how many: 'hinge (3)'."""
-        jacobian = self.constraints(motion, time).jacobian
+        jacobian = self.constraints(motion, 0.0).jacobian
         kept = set(independent_rows(jacobian))
         counts = {
             name: sum(row not in kept for row in range(rows.start, rows.stop))
@@ -198,9 +198,9 @@ class System:
         }
         return tuple(f"{name} ({count})" for name, count in counts.items() if count)
 
-    def n_degrees_of_freedom(self, motion: Motion, time: float = 0.0) -> int:
-        """6 n without as many as there are independent rows."""
-        return 6 * motion.n_bodies - len(independent_rows(self.constraints(motion, time).jacobian))
+    def n_degrees_of_freedom(self, motion: Motion) -> int:
+        """6 n less the rank of the joints' Jacobian."""
+        return 6 * motion.n_bodies - len(independent_rows(self.constraints(motion, 0.0).jacobian))
 
     def misses(self, motion: Motion, time: float = 0.0) -> tuple[Miss, ...]:
         """By how much each joint is open."""
@@ -224,8 +224,16 @@ class System:
 
         Parameters
         ----------
-        tolerance : largest error of a row afterwards [m, cosine], relative to the largest distance
-            of a body from the origin where that is above 1 m (what round-off allows)
+        motion : Motion
+            Places to start from, and velocities that are kept.
+        time : float, optional
+            Time of prescribed motions [s].
+        tolerance : float, optional
+            Largest error of a row afterwards [m, cosine], relative to the largest
+            distance of a body from the origin where that is above 1 m (what round-off
+            allows).
+        max_iterations : int, optional
+            Most iterations of Newton's method.
 
         Raises
         ------

@@ -210,7 +210,7 @@ class Stepper:
         rows, ways = system.constraints(there, end), self._ways(there)
         length, rate, gradient = system.lines.geometry(there)
         stiffness, damping = system.lines.slopes(length, rate, end)
-        # What pulls less the longer it gets is left to the prediction, so that A stays positive.
+        # Negative slopes are left to the prediction, so that A stays positive.
         stiffness, damping = np.maximum(stiffness, 0.0), np.maximum(damping, 0.0)
         mass = system.mass
         operator = (gradient.T * (gamma * h * damping + beta * h**2 * stiffness)) @ gradient

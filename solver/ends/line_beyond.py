@@ -31,7 +31,7 @@ SIDES = ("start", "end")
 
 
 class LineBeyond(NamedTuple):
-    """What goes on beyond an end.
+    """Half line beyond an end.
 
     Attributes
     ----------
@@ -48,11 +48,16 @@ class LineBeyond(NamedTuple):
 
 
 def line_beyond(model: Model, side: int, held: np.ndarray) -> LineBeyond:
-    """The line that goes on beyond the ``START`` or ``END`` of a model. Not collective.
+    """Periodic half line beyond the ``START`` or ``END`` of a model. Not collective.
 
     Parameters
     ----------
-    held : (n,) unknowns that are held between the ends; of the ends themselves none are left out
+    model : Model
+        Discrete line.
+    side : int
+        ``START`` or ``END``.
+    held : ndarray, shape (n,)
+        Unknowns that are held between the ends; of the ends themselves none are left out.
 
     Raises
     ------
@@ -113,7 +118,10 @@ def span_between(model: Model, mast: float, following: float) -> tuple[np.ndarra
 
     Parameters
     ----------
-    mast, following : places of both masts along the track [m]
+    model : Model
+        Discrete line.
+    mast, following : float
+        Places of both masts along the track [m].
 
     Raises
     ------

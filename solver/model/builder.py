@@ -148,7 +148,7 @@ class ModelBuilder:
         model.droppers = Links(DROPPERS, dropper_directions(model), laws, of_shape=True)
         model.links.append(model.droppers)
         matrices = model.droppers.stiffness_matrices
-        # Of what is slack at rest K holds only what it keeps of its stiffness.
+        # Of links that are slack at rest K holds the stiffness that they keep.
         slack = model.dropper_gap > 0.0
         matrices[slack] *= model.simulated.kept_ratio
         for number, group in enumerate(self.problem.line.droppers):
@@ -221,7 +221,5 @@ class ModelBuilder:
         dofs: np.ndarray,
         mass: np.ndarray | None,
         stiffness: np.ndarray | None,
-        kind: np.ndarray | None = None,
     ) -> None:
-        kind = np.arange(dofs.shape[0]) if kind is None else kind
-        self.add_block(Block(component, dofs, kind, mass, stiffness))
+        self.add_block(Block(component, dofs, np.arange(dofs.shape[0]), mass, stiffness))

@@ -147,9 +147,16 @@ def ts_of(comm: Any, stepper: Stepper, dt: float, steps: tuple[int, int], n_step
 
     Parameters
     ----------
-    dt : time step [s]
-    steps : number of the step from which it goes on, and of its last one
-    n_steps : of the whole run, which options of PETSc see
+    comm : mpi4py communicator
+        Communicator of the ranks.
+    stepper : Stepper
+        Stepper whose steps are taken.
+    dt : float
+        Time step [s].
+    steps : tuple of int
+        Numbers of the step from which the loop goes on and of its last one.
+    n_steps : int
+        Number of steps of the whole run, which options of PETSc see.
 
     Raises
     ------

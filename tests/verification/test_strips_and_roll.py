@@ -22,7 +22,6 @@ from catenary.mbs.mechanism.reduced_pantograph import RaisingPantograph
 from catenary.mbs.rigid.forces import PointForce
 from catenary.mbs.rigid.joints import Constant, PrescribedPoint
 from catenary.mbs.rigid.statics import equilibrium
-from catenary.mbs.roll import roll_of
 from catenary.solver.problem.contact_laws import ContactLaw, KinematicLaw, LinearLaw
 
 EPS = np.finfo(float).eps
@@ -156,7 +155,7 @@ def test_the_paper_s_head_rolls_as_its_bodies_at_rest() -> None:
     system = standing.system.with_forces(pushed).with_joints(holder)
     motion = equilibrium(system, standing.motion).motion
     angle = float(np.arcsin(motion.rotation[motion.numbers[data.head]][2, 1]))
-    roll = roll_of(data)
+    roll = data.roll
     assert roll is not None
     # Table 4: two springs of 3000 N/m at 0.335 m; Table 2: 6.62 kg m2, 7.8 kg 0.07 m above joint 8.
     check("stiffness [N m/rad]", roll.stiffness, 6000.0 * 0.335**2, within=0.1)

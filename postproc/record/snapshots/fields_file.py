@@ -84,7 +84,8 @@ class FieldsFile:
 
         Parameters
         ----------
-        numbers : of the snapshots to come, counted from the start of the run
+        numbers : ndarray
+            Numbers of the snapshots to come, counted from the start of the run.
 
         Raises
         ------
@@ -108,7 +109,10 @@ class FieldsFile:
 
         Parameters
         ----------
-        numbers : of the snapshots to come, counted from the start of the run
+        numbers : ndarray
+            Numbers of the snapshots to come, counted from the start of the run.
+        start_time : float
+            Time from which on snapshots are replaced [s].
 
         Raises
         ------
@@ -153,7 +157,7 @@ class FieldsFile:
         return True
 
     def _lengthen(self, numbers: np.ndarray) -> None:
-        """Replace the file by one with room for more snapshots, and copy those that there are."""
+        """Replace the file by one with room for more snapshots, and copy its snapshots."""
         self.make(numbers)
         with opened(self.path, "r") as old, opened(self._made_as, "r+") as new:
             new["times"][: len(self._written)] = self._written
@@ -192,7 +196,7 @@ class FieldsFile:
             self._describe()
 
     def close(self) -> None:
-        """Close the files, remove those that were never published."""
+        """Close the files, and remove files that were never published."""
         if self._handle < 0:
             return
         os.close(self._handle)
@@ -249,10 +253,7 @@ class FieldsFile:
     def _refuse_other(self, known: FieldTables, times: np.ndarray) -> None:
         """Raise ValueError if a file that is to be continued is not of this run and these places.
 
-        Parameters
-        ----------
-        known : what it holds
-        times : of the snapshots that are kept [s]
+        ``known`` are the tables that it holds, ``times`` (n,) those of the kept snapshots [s].
         """
         apart = np.diff(times) - self._every
         if not (np.abs(apart) <= 0.01 * self._every).all():

@@ -67,7 +67,7 @@ def _add_bars(builder: ModelBuilder, name: str) -> None:
 
 
 def _add_pendulums(builder: ModelBuilder) -> None:
-    """What hangs swings along the track: droppers by their force, arms by their radial force."""
+    """Droppers swing along the track against their force, arms against their radial force."""
     model, mesh, line = builder.model, builder.mesh, builder.problem.line
     (unknowns, weights), stiffness = across_droppers(model)
     matrices = stiffness[:, None, None] * weights[:, :, None] * weights[:, None, :]

@@ -41,7 +41,7 @@ def _lateral(builder: ModelBuilder) -> None:
 
 
 def _pendulums(builder: ModelBuilder) -> None:
-    """What droppers' forces do across them, N/l of a pendulum."""
+    """Lateral stiffness of droppers under their force N: N / l, as of a pendulum."""
     direction, stiffness = sideways_of_droppers(builder.model)
     for number, group in enumerate(builder.problem.line.droppers):
         mine = builder.mesh.dropper_group == number

@@ -48,8 +48,7 @@ class LikeStations:
         held = np.zeros(high - low, dtype=np.int64)
         constrained = model.constrained_between(low, high) - low
         held[constrained] = 1
-        # What tells unknowns of a station from each other: their place in it, and whether one is
-        # held.
+        # Unknowns of a station differ by their place in it and by whether they are held.
         name = (2 * (np.arange(low, high) - starts[station]) + held).astype(np.uint64)
         self.marks = _mixed(numbering.station_type[first:last].astype(np.uint64))
         self.marks += _sums(station[constrained], _mixed(name[constrained]), n)
@@ -102,8 +101,8 @@ def _elements_between(block: Block, low: int, high: int) -> tuple[np.ndarray, ..
 
 
 def _rounded(table: np.ndarray) -> np.ndarray:
-    """Rows of numbers without the bits that rounding takes; what is nothing beside the largest of a
-    row is zero."""
+    """Rows of numbers without the bits that rounding takes; numbers far below the largest of a row
+    become zero."""
     least = np.ldexp(np.abs(table).max(axis=1, initial=0.0), -_EQUAL_BITS)[:, None]
     mantissa, exponent = np.frexp(np.where(np.abs(table) < least, 0.0, table))
     return np.ldexp(np.rint(np.ldexp(mantissa, _EQUAL_BITS)), exponent - _EQUAL_BITS)
