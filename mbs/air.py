@@ -61,7 +61,8 @@ class Airflow:
 
         Parameters
         ----------
-        times : (n,) [s]
+        times : ndarray, shape (n,)
+            Times, ascending [s].
         """
         speed, factor = np.full(times.size, self.speed), np.ones(times.size)
         if self.steady:

@@ -19,7 +19,6 @@ from catenary.mbs.interface import Pantograph
 from catenary.mbs.lowering import LoweredPantograph, Lowering
 from catenary.mbs.lumped import LumpedPantograph
 from catenary.mbs.lumped_data import LumpedData
-from catenary.mbs.roll import roll_of
 from catenary.mbs.vehicle.base_motion import BaseMotion
 
 if TYPE_CHECKING:
@@ -27,7 +26,7 @@ if TYPE_CHECKING:
     from catenary.mbs.mechanism.pantograph_data import MultibodyData
     from catenary.mbs.mechanism.reduced_pantograph import RaisingData, RaisingPantograph
 
-# What a pantograph can be described by.
+# Data that describe a pantograph.
 PantographData: TypeAlias = "LumpedData | MultibodyData"
 
 
@@ -92,7 +91,7 @@ def _model(
         return LumpedPantograph(data, force, height, *moved, steady_air=on_frame)
     pressing = force + on_frame
     if data.all_bodies is not None:
-        # Its methods are imported for those that are simulated with it.
+        # Its methods are imported for pantographs that are simulated with it.
         from catenary.mbs.mechanism.full_pantograph import FullPantograph
 
         way = data.all_bodies
@@ -150,8 +149,13 @@ def raising_data(data: MultibodyData, pressing: float, nominal_height: float) ->
     Its arm is at the working height when the head, at ``nominal_height`` [m], is pressed down on
     the arm by ``pressing`` [N]: the static force, and what the air lifts the arm with.
     """
-    from catenary.mbs.mechanism.head_rotation import PITCH, head_turning
-    from catenary.mbs.mechanism.pantograph_data import head_lift, reduced, stand
+    from catenary.mbs.mechanism.pantograph_data import (
+        PITCH,
+        head_lift,
+        head_turning,
+        reduced,
+        stand,
+    )
     from catenary.mbs.mechanism.reduced_pantograph import RaisingData
 
     standing = stand(data)
@@ -170,7 +174,7 @@ def raising_data(data: MultibodyData, pressing: float, nominal_height: float) ->
         head_offset=head.offset,
         base_height=arm - standing.working_height,
         strips=strips,
-        roll=roll_of(data),
+        roll=data.roll,
         blown_head=head_lift(data),
         laws=data.laws,
         rest=(nominal_height + strips.compression(pressing), nominal_height + pressed),

@@ -34,12 +34,12 @@ class ControlArrays(NamedTuple):
 
     @property
     def memory(self) -> np.ndarray:
-        """What has names of what is remembered, (1,) ``native.REGULATION_MEMORY``."""
+        """Named part of the memory, (1,) ``native.REGULATION_MEMORY``."""
         return self.numbers[:_N_MEMORY].view(native.REGULATION_MEMORY)
 
     @property
     def waiting(self) -> np.ndarray:
-        """Forces that wait [N]."""
+        """Forces that wait [N]; kernels read it."""
         return self.numbers[_N_MEMORY:]
 
 
@@ -113,7 +113,7 @@ class Controller(Protocol):
     """
 
     def added_force(self, time: float, contact_force: float, head_height: float) -> float:
-        """What is added to the static force after ``time`` [s], the end of a step [N].
+        """Force that is added to the static force after ``time`` [s], the end of a step [N].
 
         Called once a step, with the sum of the contact forces [N] and the mean height of the
         strips [m].
@@ -126,5 +126,5 @@ class Controller(Protocol):
         """Continue from what ``state`` returned."""
 
 
-# What a pantograph may be regulated by: data, or what makes a controller for a run.
+# Regulation of a pantograph: data, or a function that makes a controller for a run.
 Regulator = Regulation | Callable[[], Controller]

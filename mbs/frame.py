@@ -2,5 +2,5 @@
 
 from __future__ import annotations
 
-# What bodies can be joined to besides each other: the frame at rest.
+# Name of the frame at rest, to which bodies can be joined as well.
 SPACE = "space"

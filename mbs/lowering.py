@@ -153,7 +153,7 @@ class LoweredPantograph:
         return self.model.base(time)
 
     def energy(self) -> float:
-        """That of the model [J]; what is caught has none."""
+        """Energy of the model [J]; zero once it is caught."""
         return 0.0 if self.is_caught else self.model.energy()
 
     def _base_at(self, time: float) -> tuple[float, float]:

@@ -5,7 +5,7 @@ Source: EN 50318, annex (two masses); the benchmark of ten codes of 2015 (three 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from scipy import linalg
@@ -13,7 +13,7 @@ from scipy import linalg
 from catenary.mbs.air import ON_FRAME, ON_HEAD, AirForces
 from catenary.mbs.head.head_arrays import LinearStep, SprungMasses, named
 from catenary.mbs.head.laws import LawsInPlace, in_place
-from catenary.mbs.head.newmark_head import Raising, SteppedHead, parts_of
+from catenary.mbs.head.newmark_head import SteppedHead, parts_of
 from catenary.mbs.head.wire_crossing import CrossingPath
 from catenary.mbs.interface import HeadState
 from catenary.mbs.lumped_data import LumpedData, chain_matrix
@@ -64,9 +64,8 @@ class LumpedPantograph(SteppedHead):
     ) -> None:
         head = data.head(rolls=lateral is not None)
         n = head.n + data.n_masses - 1
-        super().__init__(head, n, dt, beta, gamma, lateral)
+        super().__init__(head, n, raise_time, dt, beta, gamma, lateral)
         self._lift_full = static_force
-        self._part: Callable[[float], float] = Raising(raise_time)
         self._base, self._air = base, air
         # The lift acts on the last mass, which is the head itself if there is no other.
         self._carrier = n - 1 if data.n_masses > 1 else int(np.flatnonzero(head.level)[-1])
@@ -127,7 +126,7 @@ class LumpedPantograph(SteppedHead):
 
     @property
     def tie(self) -> tuple[float, float]:
-        """Those between the last mass and the base."""
+        """Stiffness [N/m] and damping [N s/m] between the last mass and the base."""
         return self._base_stiffness, self._base_damping
 
     def lift(self, time: float) -> float:
@@ -139,10 +138,6 @@ class LumpedPantograph(SteppedHead):
         `SteppedHead`. A base that rises starts there."""
         self._started_at = head_height
         super().place(head_height, velocity)
-
-    def follow(self, part: Callable[[float], float]) -> None:
-        """Let the part ``part(time)`` of the lift act."""
-        self._part = part
 
     def predict(self, time: float) -> HeadState:
         """Strips at ``time`` [s] as affine functions of the contact forces in the coming step."""

@@ -20,10 +20,10 @@ from catenary.mbs.frame import SPACE
 from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.mechanism.pantograph_data import HOLDER, MultibodyData, stand
 from catenary.mbs.rigid.bodies import Motion, rotation_matrix
-from catenary.mbs.rigid.joints import PrescribedPoint, constant
+from catenary.mbs.rigid.joints import Constant, PrescribedPoint
 from catenary.mbs.rigid.statics import equilibrium
 
-# What a line belongs to.
+# Parts that a line belongs to.
 BODY, HEAD, SPRING = 0, 1, 2
 # Half the length of strips that have none [m], and how far a head reaches beyond its strips.
 _HALF_STRIP, _BEYOND = 0.8, 0.15
@@ -62,9 +62,12 @@ class Shape(Protocol):
 
         Parameters
         ----------
-        places, base : what `Pantograph.places` and `Pantograph.base` returned
-        head : height of the head [m]
-        wire : height of the wire at rest where the pantograph is [m]
+        places, base : ndarray
+            What `Pantograph.places` and `Pantograph.base` returned.
+        head : float
+            Height of the head [m].
+        wire : float
+            Height of the wire at rest where the pantograph is [m].
         """
 
 
@@ -115,7 +118,7 @@ class LumpedShape:
 
 
 def schematic() -> Shape:
-    """The shape of a pantograph of which nothing but the height of the head is known."""
+    """Schematic shape of a pantograph whose head's height alone is known."""
     return LumpedShape(LumpedData((1.0,), (1.0,), (0.0,)))
 
 
@@ -202,7 +205,7 @@ def _table(data: MultibodyData) -> tuple[np.ndarray, list[Motion]]:
         motion = standing.motion
         for step in np.arange(_SPACING, _REACH + 0.5 * _SPACING, _SPACING):
             height = standing.working_height + way * float(step)
-            held = standing.system.with_joints(PrescribedPoint(HOLDER, data.arm, constant(height)))
+            held = standing.system.with_joints(PrescribedPoint(HOLDER, data.arm, Constant(height)))
             try:
                 motion = equilibrium(held, motion).motion
             except InputError:

@@ -27,9 +27,13 @@ def make_mesh(
     Parameters
     ----------
     line : Line
-    elements_per_gap : elements between neighbouring cuts (masts, droppers) of a wire
-    path : where the mesh file is to stay; None for none
-    support_refinement : factor on the number of elements in the gaps next to a mast
+        Line to be meshed.
+    elements_per_gap : int
+        Elements between neighbouring cuts (masts, droppers) of a wire.
+    path : Path, optional
+        Path of the mesh file to be kept; None to keep none.
+    support_refinement : int, optional
+        Factor on the number of elements in the gaps next to a mast.
 
     Raises
     ------
@@ -79,7 +83,7 @@ def use_mesh(line: Line, path: Path) -> LineMesh:
 
 
 def _places(line: Line, mesh: LineMesh) -> Iterator[tuple[str, np.ndarray, np.ndarray]]:
-    """What is where along the track [m]: its name, places in the mesh and in the line."""
+    """Hardware along the track: its name, places in the mesh and in the line [m]."""
     for wire in line.wires:
         pairs = mesh.elements(wire.name)
         starts = np.setdiff1d(pairs[:, 0], pairs[:, 1])

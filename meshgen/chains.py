@@ -80,7 +80,7 @@ def names_of(line: Line) -> Names:
 
 @dataclass(frozen=True)
 class Groups:
-    """What a mesh file holds.
+    """Contents of a mesh file.
 
     Attributes
     ----------
@@ -99,8 +99,12 @@ def assemble(groups: Groups, names: Names, source: str) -> LineMesh:
 
     Parameters
     ----------
-    groups, names : what the file holds, and what the groups are
-    source : name of the file, for messages
+    groups : Groups
+        Physical groups that the file holds.
+    names : Names
+        Names of the groups.
+    source : str
+        Name of the file, for messages.
 
     Raises
     ------

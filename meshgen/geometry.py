@@ -128,7 +128,12 @@ def divide(line: Line, cuts: Cuts, divisions: np.ndarray) -> Groups:
 
     Parameters
     ----------
-    divisions : elements between neighbouring cuts, see ``divisions_of``
+    line : Line
+        The line.
+    cuts : Cuts
+        Places at which each wire is cut.
+    divisions : ndarray
+        Elements between neighbouring cuts, see ``divisions_of``.
     """
     parts: list[np.ndarray] = []
     elements: dict[str, list[np.ndarray]] = {wire.name: [] for wire in line.wires}

@@ -29,9 +29,13 @@ def write_mesh(
     Parameters
     ----------
     line : Line
-    elements_per_gap : elements between neighbouring cuts of a wire
-    path : file to write, its name ends in ``.msh``
-    support_refinement : factor on the number of elements in the gaps next to a mast
+        Line to be meshed.
+    elements_per_gap : int
+        Elements between neighbouring cuts of a wire.
+    path : Path
+        File to write, its name ends in ``.msh``.
+    support_refinement : int, optional
+        Factor on the number of elements in the gaps next to a mast.
 
     Raises
     ------

@@ -13,7 +13,7 @@ from catenary.meshgen.wires import Wire
 
 @dataclass(frozen=True)
 class DropperKind:
-    """What all droppers of a group share.
+    """Data that all droppers of a group share.
 
     Exactly one of ``stiffness`` [N/m], ``axial_stiffness`` EA [N] and ``curve`` is given; with EA
     the stiffness of each dropper is EA over its own length, and the points of a curve, strain [-]
@@ -228,7 +228,7 @@ class Slopes(NamedTuple):
         return np.asarray(on.force + on.slope * (stretch - on.begin))
 
     def energy_under(self, force: np.ndarray) -> np.ndarray:
-        """What springs store under forces (n,) [N] [J]."""
+        """Energy of springs under forces (n,) [N], [J]."""
         piece = self.piece_under(force)
         mean = 0.5 * (self.force[:, 1:] + self.force[:, :-1])
         work = np.cumsum(mean * np.diff(self.begin, axis=1), axis=1)

@@ -89,8 +89,12 @@ def reduced(mesh: LineMesh, places: np.ndarray, within: float) -> LineMesh:
 
     Parameters
     ----------
-    places : (n,) further places that keep their nodes [m]
-    within : distance below which places are one [m]
+    mesh : LineMesh
+        Mesh whose nodes are thinned out.
+    places : ndarray, shape (n,)
+        Further places that keep their nodes [m].
+    within : float
+        Distance below which places are one [m].
 
     Returns
     -------
@@ -146,8 +150,10 @@ def elements_of(nodes: np.ndarray, breaks: np.ndarray = _NONE) -> np.ndarray:
 
     Parameters
     ----------
-    nodes : (n,) of the wire in order of x
-    breaks : places in ``nodes`` of the first nodes of all pieces but the first one
+    nodes : ndarray, shape (n,)
+        Nodes of the wire in order of x.
+    breaks : ndarray, optional
+        Numbers, in ``nodes``, of the first nodes of all pieces but the first one.
     """
     pairs = np.stack([nodes[:-1], nodes[1:]], axis=1)
     return np.delete(pairs, breaks - 1, axis=0) if breaks.size else pairs

@@ -31,11 +31,13 @@ def read_mesh(path: Path, names: Names = SIMPLE) -> LineMesh:
 
     Parameters
     ----------
-    path : file with the physical groups of ``names``: lines for wires and droppers, points for
-        hardware and ``anchors``. Droppers, arms and supports may have no members, but must be
-        named.
-    names : the groups; by default those of a simple catenary, which are ``contact_wire``,
-        ``messenger_wire``, ``droppers``, ``steady_arms``, ``supports``
+    path : Path
+        File with the physical groups of ``names``: lines for wires and droppers, points for
+        hardware and ``anchors``. Droppers, arms and supports may have no members, but must
+        be named.
+    names : Names, optional
+        The groups; by default those of a simple catenary, which are ``contact_wire``,
+        ``messenger_wire``, ``droppers``, ``steady_arms``, ``supports``.
 
     Raises
     ------

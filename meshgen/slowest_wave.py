@@ -36,8 +36,10 @@ def slowest_wave(line: Line, shares: Mapping[str, float] | None = None) -> float
 
     Parameters
     ----------
-    line : the wires and their supports
-    shares : name of a wire -> share of its tension that it has, 1 for those left out [-]
+    line : Line
+        The wires and their supports.
+    shares : mapping, optional
+        Share of its tension that each wire has, by name; 1 for others [-].
     """
     of = shares or {}
     wires = line.wires_of(Role.CONTACT)
@@ -83,9 +85,12 @@ def supported_wave(
 
     Parameters
     ----------
-    tension, bending_stiffness, mass_per_length : of the wire [N], [N m2], [kg/m]
-    span : between supports [m]
-    stiffness, mass : of each support [N/m], [kg]
+    tension, bending_stiffness, mass_per_length : float
+        Tension, bending stiffness and mass per length of the wire [N], [N m2], [kg/m].
+    span : float
+        Span between supports [m].
+    stiffness, mass : float
+        Stiffness and mass of each support [N/m], [kg].
     """
     q = np.linspace(0.0, np.pi, _PHASES)
     orders = np.arange(-_ORDERS, _ORDERS + 1)
@@ -108,9 +113,12 @@ def slowest_phase_speed(phase: np.ndarray, omega: np.ndarray, span: float) -> fl
 
     Parameters
     ----------
-    phase : (p,) ascending from 0 to pi [rad a span]
-    omega : (p,) angular frequencies of the branch [rad/s]
-    span : [m]
+    phase : ndarray, shape (p,)
+        Phases, ascending from 0 to pi [rad a span].
+    omega : ndarray, shape (p,)
+        Angular frequencies of the branch [rad/s].
+    span : float
+        Span between supports [m].
     """
     k = np.concatenate([phase[1:], 2 * np.pi - phase[-2::-1]]) / span
     speed = np.concatenate([omega[1:], omega[-2::-1]]) / k
@@ -133,8 +141,10 @@ def wave_of_two_spans(
 
     Parameters
     ----------
-    tension, bending_stiffness, mass_per_length : of the wire [N], [N m2], [kg/m]
-    span : between supports [m]
+    tension, bending_stiffness, mass_per_length : float
+        Tension, bending stiffness and mass per length of the wire [N], [N m2], [kg/m].
+    span : float
+        Span between supports [m].
     """
     bending = bending_stiffness * (np.pi / span) ** 2
     phase = float(np.sqrt((tension + bending) / mass_per_length))

@@ -75,6 +75,6 @@ class Curve:
         return self.curvature * self.share(x)
 
     def sideways_pull_at(self, x: np.ndarray) -> np.ndarray:
-        """What of a weight pulls sideways across the canted track at places ``x`` [m], > 0 to the
-        left, shape as ``x`` [-]."""
+        """Share of a weight that pulls sideways across the canted track at places ``x`` [m], > 0 to
+        the left, shape as ``x`` [-]."""
         return np.sign(self.curvature) * np.tan(self.tilt * self.share(x))

@@ -16,7 +16,7 @@ _SAME_PLACE = 1e-6
 
 
 class Role(StrEnum):
-    """What a wire is there for."""
+    """Role of a wire."""
 
     CONTACT = "contact"
     MESSENGER = "messenger"
@@ -231,7 +231,8 @@ class Wire(Conductor):
 
         Parameters
         ----------
-        x : (n,) places along the track [m]
+        x : ndarray, shape (n,)
+            Places along the track [m].
 
         Returns
         -------

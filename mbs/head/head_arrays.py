@@ -20,7 +20,7 @@ class NewmarkFactors(NamedTuple):
 
 
 class HeadArrays(NamedTuple):
-    """What all heads have, with n coordinates and s strips."""
+    """Arrays of any head with n coordinates and s strips."""
 
     touch: np.ndarray
     state: np.ndarray

@@ -39,20 +39,17 @@ class Law:
 
     def force(self, x: float) -> float:
         """At an extension [m] or a rate [m/s]."""
-        i = self._segment(x)
+        i = int(np.searchsorted(self.points, x, side="right")) - 1
+        i = min(max(i, 0), len(self.points) - 2)
         slope = (self.forces[i + 1] - self.forces[i]) / (self.points[i + 1] - self.points[i])
         return self.forces[i] + slope * (x - self.points[i])
 
     def work(self, x: float) -> float:
-        """What a spring stores from an extension of zero to one of ``x`` [J]."""
+        """Energy that a spring stores from an extension of zero to one of ``x`` [J]."""
         inner = [p for p in self.points if min(0.0, x) < p < max(0.0, x)]
         ends = np.array(sorted([0.0, x, *inner]))
         forces = np.array([self.force(float(end)) for end in ends])
         return float(np.sign(x) * np.sum(0.5 * (forces[1:] + forces[:-1]) * np.diff(ends)))
-
-    def _segment(self, x: float) -> int:
-        i = int(np.searchsorted(self.points, x, side="right")) - 1
-        return min(max(i, 0), len(self.points) - 2)
 
 
 class LawArrays(NamedTuple):
@@ -115,7 +112,7 @@ class LawsInPlace:
         return total
 
     def energy(self, position: np.ndarray, base: float) -> float:
-        """What the laws over extensions store [J]."""
+        """Energy that the laws over extensions store [J]."""
         return sum(
             law.work(_extension(way, position, part, base, zero))
             for law, way, part, zero in self._each
@@ -134,10 +131,14 @@ def in_place(
 
     Parameters
     ----------
-    laws : of the pantograph
-    numbers : coordinates of its masses
-    n : number of all coordinates
-    rest : heights of the masses at rest under the static force, at the nominal height [m]
+    laws : sequence of Law
+        Laws of the pantograph.
+    numbers : sequence of int
+        Coordinates of its masses.
+    n : int
+        Number of all coordinates.
+    rest : sequence of float
+        Heights of the masses at rest under the static force, at the nominal height [m].
     """
     ways, by_base, zero = np.zeros((len(laws), n)), np.zeros(len(laws)), np.zeros(len(laws))
     heights = [*rest, 0.0]

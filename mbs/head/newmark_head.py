@@ -1,4 +1,4 @@
-"""What all pantographs share that step by Newmark's method: their state, their strips, contact."""
+"""Base of all pantographs that step by Newmark's method: their state, their strips, contact."""
 
 from __future__ import annotations
 
@@ -31,6 +31,7 @@ class SteppedHead(ABC):
     ----------
     head : HeadParts
     n : number of all coordinates; those that are not the head's are heights
+    raise_time : time over which the lift grows from zero [s]
     dt, beta, gamma : Newmark step [s] and parameters, those of the line
     lateral : where the wire crosses the strips, None if the head is not to roll
     """
@@ -41,6 +42,7 @@ class SteppedHead(ABC):
         self,
         head: HeadParts,
         n: int,
+        raise_time: float,
         dt: float,
         beta: float,
         gamma: float,
@@ -50,12 +52,13 @@ class SteppedHead(ABC):
         self.strip_offsets = head.offsets
         # Where the wire crosses the strips of a head that cannot roll makes no difference.
         moves = head.roll >= 0 or head.bending is not None
+        self._part: Callable[[float], float] = Raising(raise_time)
         self._n, self._lateral = n, lateral if moves else None
         self._level = np.ones(n)
         self._level[: head.n] = head.level
         self._touch = np.zeros((2, s, n))
         self._touch[0, :, : head.n] = head.touch
-        # What a force on the middle of the strips does to each coordinate.
+        # Share of a force on the middle of the strips in the force on each coordinate.
         self._push = np.zeros(n)
         self._push[: head.n] = head.touch.mean(axis=0)
         self._newmark = NewmarkFactors(
@@ -66,7 +69,7 @@ class SteppedHead(ABC):
         self.head = HeadState(s)
         roll = -1 if self._lateral is None else head.roll
         self._arrays = HeadArrays(self._touch, self._state, self.head.numbers, self._newmark, roll)
-        # What the coming step depends on, and those of its numbers that have names.
+        # Inputs of the coming step, and the numbers of these that have names.
         self.row = np.zeros(drive_width(s))
         self._now = named(self.row)
         self._laws: LawsInPlace = in_place((), (), n, ())
@@ -105,6 +108,10 @@ class SteppedHead(ABC):
         elif regulator is not None:
             self._controller = regulator()
 
+    def follow(self, part: Callable[[float], float]) -> None:
+        """Let the part ``part(time)`` of the lift act."""
+        self._part = part
+
     @property
     def tie(self) -> tuple[float, float]:
         """Spring [N/m] and damper [N s/m] by which rows of ``fill_drives`` turn the motion of the
@@ -113,7 +120,7 @@ class SteppedHead(ABC):
 
     @property
     def added_force(self) -> float:
-        """What regulates the lift adds to the static force now [N]."""
+        """Force that the regulation of the lift adds to the static force now [N]."""
         return self.stepped.added_force
 
     def _put_laws(self, laws: LawsInPlace) -> None:

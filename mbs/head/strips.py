@@ -30,7 +30,7 @@ class Turning:
 
 @dataclass(frozen=True)
 class Suspension:
-    """What a strip stands on: ``mass`` [kg] of the strip, ``stiffness`` [N/m] and ``damping``
+    """Suspension of a strip: ``mass`` [kg] of the strip, ``stiffness`` [N/m] and ``damping``
     [N s/m] between it and the head."""
 
     mass: float

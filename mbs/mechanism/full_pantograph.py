@@ -22,7 +22,7 @@ from catenary.mbs.mechanism.pantograph_data import MultibodyData, stand
 from catenary.mbs.rigid.arrays import ORIGIN, body_products
 from catenary.mbs.rigid.bodies import SPACE, Motion
 from catenary.mbs.rigid.forces import Force, Gravity, OffLine, PointForce
-from catenary.mbs.rigid.joints import PrescribedPoint, constant, steady
+from catenary.mbs.rigid.joints import Constant, PrescribedPoint, steady
 from catenary.mbs.rigid.kinematics import point
 from catenary.mbs.rigid.spin_locks import without_spins
 from catenary.mbs.rigid.statics import equilibrium, held_force
@@ -39,7 +39,7 @@ PLACED = 1e-10
 
 @dataclass
 class _HoldDown(OffLine):
-    """What holds the arm down until the pantograph is raised: ``force`` [N] less and less.
+    """Hold-down of the arm until the pantograph is raised: ``force`` [N] less and less.
 
     ``part(time)`` of the lift is let act; where it is negative, the arm is pulled down.
     """
@@ -54,14 +54,10 @@ class _HoldDown(OffLine):
         left = self.force * (1.0 - self.part(time))
         return -left * point(motion, self.arm, ORIGIN).jacobian[2]
 
-    def energy(self, motion: Motion) -> float:
-        """Stores none."""
-        return 0.0
-
 
 @dataclass(frozen=True)
 class _Carried(OffLine):
-    """What bodies feel of a base that is accelerated up and sideways."""
+    """Inertia forces on bodies over a base that is accelerated up and sideways."""
 
     name: str
     masses: tuple[float, ...]
@@ -73,10 +69,6 @@ class _Carried(OffLine):
         forces[:, 1] = self.base.lateral(time).acceleration
         forces[:, 2] = self.base.vertical(time).acceleration
         return -(np.array(self.masses)[:, None] * forces).ravel()
-
-    def energy(self, motion: Motion) -> float:
-        """Stores none."""
-        return 0.0
 
 
 @dataclass(frozen=True)
@@ -91,10 +83,6 @@ class _Blown(OffLine):
     def generalised(self, motion: Motion, time: float) -> np.ndarray:
         """Generalised forces (6 n,)."""
         return float(self.air.now(time)[self.column]) * self.force.generalised(motion, time)
-
-    def energy(self, motion: Motion) -> float:
-        """Counts as work from outside."""
-        return 0.0
 
 
 def _blown(data: MultibodyData, air: AirForces | None) -> tuple[_Blown, ...]:
@@ -165,7 +153,9 @@ class FullPantograph:
             masses = tuple(body.mass for body in system.bodies)
             system = system.with_forces(_Carried("carried by the base", masses, base))
         self._rest = standing.motion
-        self._zero = nominal_height - self._head_under(pressing)
+        # Heights of the head above the base, with the arm at its working height.
+        alone = float(standing.motion.position[standing.motion.numbers[data.head], 2])
+        self._zero = nominal_height - (alone - pressing / standing.head.stiffness)
         still = without_spins(standing.system, standing.motion)
         self._still = still.with_forces(*_blown(data, air))
         s, space = len(data.strips.contact_offsets), self._rest.numbers[SPACE]
@@ -176,7 +166,9 @@ class FullPantograph:
         self._heights["between"] = True
         self._points = self._heights["at_end"]
         self._points[:, 0] = data.strips.contact_offsets
-        self._stepper = Stepper(system, dt, handling, self._pushed_down, substeps, beta, gamma)
+        # Generalised forces (6 n, s) of unit contact forces, downward.
+        pushed = lambda motion: -self._touching(motion)[1].T  # noqa: E731
+        self._stepper = Stepper(system, dt, handling, pushed, substeps, beta, gamma)
         self._stepper.begin(standing.motion, 0.0)
         self._early = np.zeros((2, s))
         self._head = HeadState(s)
@@ -228,7 +220,7 @@ class FullPantograph:
             wanted, velocity = wanted - vertical.place, velocity - vertical.velocity
         arm = wanted - stand(data).head.offset
         for _ in range(20):
-            holder = PrescribedPoint(ARM, data.arm, constant(arm))
+            holder = PrescribedPoint(ARM, data.arm, Constant(arm))
             motion = equilibrium(self._still.with_joints(holder), motion).motion
             off = wanted - float(motion.position[number, 2])
             arm += off
@@ -334,11 +326,6 @@ class FullPantograph:
             f"{head_height:.4g} m: {head_height - self._zero:.4g} m above its base."
         )
 
-    def _head_under(self, pressing: float) -> float:
-        """Height of the head above the base, arm at its working height, pressed on it [m]."""
-        height = float(self._rest.position[self._rest.numbers[self._data.head], 2])
-        return height - pressing / stand(self._data).head.stiffness
-
     def _aim(self, time: float) -> None:
         """Let the strips touch where the wire is at ``time`` [s]."""
         if self._lateral is not None:
@@ -350,14 +337,10 @@ class FullPantograph:
         found = body_products(motion, self._heights)
         return found.value, found.jacobian
 
-    def _pushed_down(self, motion: Motion) -> np.ndarray:
-        """Generalised forces (6 n, s) of unit contact forces, downward."""
-        return -self._touching(motion)[1].T
-
     def _add_base(
         self, time: float, height: np.ndarray, velocity: np.ndarray, motion: Motion
     ) -> None:
-        """What the base's motion and the wire's way along the strips add, in place."""
+        """Add the base's motion and the wire's way along the strips, in place."""
         if self._lateral is not None:
             tilt = motion.rotation[motion.numbers[self._data.head]][2, 1]
             velocity += tilt * self._lateral.rate

@@ -17,12 +17,13 @@ import numpy as np
 from catenary.base.errors import InputError, RunBroken
 from catenary.mbs.air import Uplift
 from catenary.mbs.head.laws import Law
-from catenary.mbs.head.strips import ONE_STRIP, Strips
+from catenary.mbs.head.strips import ONE_STRIP, Strips, Turning
 from catenary.mbs.mechanism.reduction import Places, ReducedMechanism, reduce_mechanism
 from catenary.mbs.rigid.arrays import Joint
 from catenary.mbs.rigid.bodies import Motion
-from catenary.mbs.rigid.forces import Force, Gravity, PointForce, SpringDamper
-from catenary.mbs.rigid.joints import PrescribedPoint, constant
+from catenary.mbs.rigid.forces import Characteristic, Force, Gravity, PointForce, SpringDamper
+from catenary.mbs.rigid.joints import Constant, PrescribedPoint
+from catenary.mbs.rigid.least_squares import least_squares
 from catenary.mbs.rigid.statics import (
     Calibration,
     calibrate_actuator,
@@ -48,6 +49,12 @@ ADRIFT = 0.01
 MOST_FORCE = 1e7
 # The joint that holds the arm in what is computed here.
 HOLDER = "height of the arm"
+# Travel [m] and speed [m/s] over which characteristics are measured.
+_TRAVEL, _SPEED = 1e-3, 1e-3
+# Part of a unit turn that joints may miss where they allow it.
+_MISSED = 1e-6
+# About the track and across it.
+ROLL, PITCH = 0, 1
 
 
 @dataclass(frozen=True)
@@ -93,6 +100,11 @@ class MultibodyData:
     def meets_air(self) -> bool:
         """Whether the air has forces on it."""
         return self.uplift is not None or bool(self.wind)
+
+    @property
+    def roll(self) -> Turning | None:
+        """How the head turns about the track as its joints allow it, None if they do not."""
+        return head_turning(self, ROLL)
 
     @property
     def strip_offsets(self) -> tuple[float, ...]:
@@ -147,7 +159,7 @@ def stand(data: MultibodyData) -> Standing:
     """
     mechanism = _mechanism(_bodies_of(data))
     height, system = mechanism.height, data.system
-    holder = PrescribedPoint(HOLDER, data.arm, constant(height))
+    holder = PrescribedPoint(HOLDER, data.arm, Constant(height))
     push = None
     if data.actuator is not None and data.static_force is not None:
         found = calibrate_actuator(
@@ -205,7 +217,7 @@ def _mechanism(data: MultibodyData) -> _Mechanism:
     _judge_head(data)
     missed = _judge_positions(data)
     system = data.system
-    motion = system.assemble(system.start()).motion
+    motion = system.assemble(system.start())
     repeated = system.redundant(motion)
     if repeated:
         raise InputError(
@@ -215,10 +227,10 @@ def _mechanism(data: MultibodyData) -> _Mechanism:
     height = data.working_height
     if height is None:
         height = float(motion.position[motion.numbers[data.arm], 2])
-    holder = PrescribedPoint(HOLDER, data.arm, constant(height))
+    holder = PrescribedPoint(HOLDER, data.arm, Constant(height))
     _judge_raising(data, motion)
     try:
-        motion = system.with_joints(holder).assemble(motion).motion
+        motion = system.with_joints(holder).assemble(motion)
     except InputError as error:
         raise InputError(
             f"its arm {data.arm!r} does not reach its working height of {height:g} m: {error}"
@@ -266,12 +278,12 @@ def reduced(data: MultibodyData) -> ReducedMechanism:
 
 
 def head_lift(data: MultibodyData) -> float:
-    """What ``wind`` lifts the head by [N]."""
+    """Lift of ``wind`` on the head [N]."""
     return float(sum(_vector(force)[2] for force in data.wind if force.body == data.head))
 
 
 def arm_lift(data: MultibodyData) -> float:
-    """What ``wind`` on the mechanism lifts its arm by, at the working height [N]."""
+    """Lift of ``wind`` on the mechanism at its arm, at the working height [N]."""
     return reduced(data).blown_at(stand(data).working_height) if data.wind else 0.0
 
 
@@ -298,7 +310,7 @@ def _vector(force: PointForce) -> np.ndarray:
 
 
 def describe(data: MultibodyData) -> str:
-    """What a pantograph is, for people: bodies, freedoms, actuator, joints' misses."""
+    """Description of a pantograph, for people: bodies, freedoms, actuator, joints' misses."""
     standing, system = stand(data), data.system
     text = (
         f"multibody: {len(system.bodies)} bodies, {len(system.joints)} joints, 1 of "
@@ -361,7 +373,7 @@ def _head(data: MultibodyData, held: System, motion: Motion) -> Head:
             f"its head {data.head!r} cannot move up and down on its arm {data.arm!r}: {error}"
         ) from error
     stiffness = -float(np.polyfit(around - rest, tables.lifts, 1)[0])
-    # What acts on the head alone: its weight, and forces at its points.
+    # Forces on the head alone: its weight, and forces at its points.
     own = [force for force in held.forces if data.arm not in _joined(force)]
     pull = float(np.sum([f.generalised(motion, 0.0)[6 * number + 2] for f in own]))
     return Head(
@@ -414,7 +426,7 @@ def _judge_head(data: MultibodyData) -> None:
 
 
 def _judge_positions(data: MultibodyData) -> tuple[Miss, ...]:
-    """What joints miss in the given positions; raises ``InputError`` if one misses too much."""
+    """Errors of the joints in the given positions; raises ``InputError`` if one misses too much."""
     missed = data.system.misses(data.system.start())
     worst = max(missed, key=lambda miss: max(miss.gap, miss.tilt))
     limit = data.assembly_tolerance
@@ -432,7 +444,7 @@ def _judge_raising(data: MultibodyData, motion: Motion) -> None:
     frame = without_head(data, data.system)
     there = _part(motion, frame)
     height = float(there.position[there.numbers[data.arm], 2])
-    holder = PrescribedPoint(HOLDER, data.arm, constant(height))
+    holder = PrescribedPoint(HOLDER, data.arm, Constant(height))
     held = frame.with_joints(holder)
     if held.n_degrees_of_freedom(there) == frame.n_degrees_of_freedom(there):
         raise InputError(
@@ -459,3 +471,38 @@ def _log(data: MultibodyData, standing: Standing) -> None:
             standing.static_force,
             standing.force_before,
         )
+
+
+@lru_cache(maxsize=64)
+def head_turning(data: MultibodyData, about: int) -> Turning | None:
+    """The head's roll or pitch, None if its joints do not allow it. Not collective.
+
+    Of all motions of the head with a unit turn that with the least kinetic energy is taken.
+    Springs are linear; what weight and tension in them do to the turn is left out.
+    """
+    standing = stand(data)
+    system, motion = standing.system, standing.motion
+    own = slice(6 * motion.numbers[data.head], 6 * motion.numbers[data.head] + 6)
+    turn = np.zeros((1, 6))
+    # Turns are counted in the head's axes.
+    turn[0, 3:] = motion.rotation[motion.numbers[data.head]][about]
+    jacobian = np.vstack([system.constraints(motion, 0.0).jacobian[:, own], turn])
+    root = np.sqrt(system.inverse_mass[own])
+    wanted = np.append(np.zeros(len(jacobian) - 1), 1.0)
+    way = root * least_squares(jacobian * root, wanted, 1e-8)
+    if np.abs(jacobian @ way - wanted).max() > _MISSED:
+        return None
+    stiffness = damping = 0.0
+    for force in system.forces:
+        if isinstance(force, SpringDamper) and data.head in (force.i, force.j):
+            stretch = float(force.line(motion).gradient[own] @ way)
+            stiffness += _slope(force.stiffness, _TRAVEL) * stretch**2
+            damping += _slope(force.damping, _SPEED) * stretch**2
+    return Turning(float(system.mass[own] @ way**2), stiffness, damping)
+
+
+def _slope(characteristic: Characteristic, step: float) -> float:
+    """Slope of a spring's or damper's characteristic around zero."""
+    if not callable(characteristic):
+        return characteristic
+    return (characteristic(step) - characteristic(-step)) / (2.0 * step)

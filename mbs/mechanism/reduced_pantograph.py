@@ -15,7 +15,7 @@ head, on the arm, and on bodies of the mechanism, whose lift is a column of the 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,7 +24,7 @@ from catenary.base.errors import RunBroken
 from catenary.mbs.air import SQUARE, AirForces
 from catenary.mbs.head.head_arrays import MechanismArrays, SprungMasses, named
 from catenary.mbs.head.laws import Law, in_place
-from catenary.mbs.head.newmark_head import Raising, SteppedHead, parts_of
+from catenary.mbs.head.newmark_head import SteppedHead, parts_of
 from catenary.mbs.head.strips import ONE_STRIP, Strips, Turning, head_parts
 from catenary.mbs.head.wire_crossing import CrossingPath
 from catenary.mbs.interface import HeadState
@@ -89,9 +89,8 @@ class RaisingPantograph(SteppedHead):
     ) -> None:
         values = data.head_mass, data.head_stiffness, data.head_damping
         head = head_parts(*values, data.strips, data.roll if lateral is not None else None)
-        super().__init__(head, head.n + 1, dt, beta, gamma, lateral)
+        super().__init__(head, head.n + 1, raise_time, dt, beta, gamma, lateral)
         self._data = data
-        self._part: Callable[[float], float] = Raising(raise_time)
         self._base, self._air = base, air
         self._zero = data.head_offset + data.base_height
         self._masses = np.append(head.masses, 0.0)
@@ -114,7 +113,7 @@ class RaisingPantograph(SteppedHead):
         """
         self._aim(time)
         self._move_base(time)
-        # What is not a number is left to those who couple.
+        # NaN is left to the coupling, which refuses it.
         if not self._raised.step(self.row):
             raise self._data.frame.left(self._raised.height, time)
         return self.head
@@ -172,10 +171,6 @@ class RaisingPantograph(SteppedHead):
         """Height of the base at ``time`` [s], in the line's heights [m]."""
         moved = 0.0 if self._base is None else float(self._base.vertical(time).place)
         return self._data.base_height + moved
-
-    def follow(self, part: Callable[[float], float]) -> None:
-        """Let the part ``part(time)`` of the lift act."""
-        self._part = part
 
     def _frame_at(self, z: float) -> tuple[np.ndarray, np.ndarray]:
         """Mass, lift, damping and their slopes for a height z [m] over a base at rest."""

@@ -101,15 +101,6 @@ class ReducedMechanism:
             "numerics.dt_s or a mechanism that reaches"
         )
 
-    def acceleration(self, height: float, speed: float, push: float = 0.0) -> float:
-        """Acceleration upward [m/s^2] at a height [m] and speed upward [m/s].
-
-        ``push`` [N] is a further force on the point, upward. Raises RunBroken as ``at`` does.
-        """
-        (mass, lift, damping), (mass_slope, _, _) = self.at(height)
-        force = lift - damping * speed - 0.5 * mass_slope * speed**2 + push
-        return float(force / mass)
-
 
 def reduce_mechanism(
     system: System,
@@ -130,16 +121,29 @@ def reduce_mechanism(
 
     Parameters
     ----------
-    heights : shape (n,) [m], growing, n >= 4
-    start : a motion near by to assemble from, that of the system's data if None
-    as_far_as_it_goes : leave out the heights beyond the first one, above and below the start,
-        that the mechanism does not reach or where it nearly locks
-    tolerance : of the lift between heights [N]; where it is missed further ones are put in, down
-        to half a millimetre; None for the given heights alone
-    name : of the pantograph, for messages
-    blowing : forces of the air, of which the tables have a column of their own
-    places : those of earlier calls with this system but for the force of an actuator, and with the
-        same ``body`` and ``at``; they are found once
+    system : System
+        Bodies with their joints and forces.
+    body : str
+        Name of the body that carries the point.
+    heights : array_like, shape (n,)
+        Heights [m], growing, n >= 4.
+    at : array_like, shape (3,), optional
+        The point in the axes of the body [m].
+    start : Motion, optional
+        A motion near by to assemble from, that of the system's data if None.
+    as_far_as_it_goes : bool, optional
+        Leave out the heights beyond the first one, above and below the start, that the
+        mechanism does not reach or where it nearly locks.
+    tolerance : float, optional
+        Tolerance of the lift between heights [N]; where it is missed further ones are put
+        in, down to half a millimetre; None for the given heights alone.
+    name : str, optional
+        Name of the pantograph, for messages.
+    blowing : sequence of Force, optional
+        Forces of the air, of which the tables have a column of their own.
+    places : Places, optional
+        Places that earlier calls have found for the same ``body`` and ``at`` and a system
+        that differs in the force of an actuator alone.
 
     Raises
     ------
@@ -151,7 +155,7 @@ def reduce_mechanism(
         raise InputError(f"A mechanism is reduced for at least four growing heights, not {table}.")
     # Heights are visited from the one that is nearest to the start, each from its neighbour.
     raised, more = (places or Places(None)).of(system, body, at)
-    motion = system.assemble(system.start() if start is None else start).motion
+    motion = system.assemble(system.start() if start is None else start)
     first = int(np.argmin(np.abs(table - point(motion, body, at).value[2])))
     found = [raised.to(table[first], motion)]
     for way in (table[first + 1 :], table[:first][::-1]):

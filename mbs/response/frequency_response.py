@@ -1,4 +1,4 @@
-"""What a pantograph is like at its head under the static force: response, masses, stiffness."""
+"""Frequency response, equivalent masses and stiffness of a pantograph at its head."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from catenary.mbs.mechanism.pantograph_data import MultibodyData, reduced, stand
 from catenary.mbs.response.linearisation import LinearModel, linearise, of_chain, with_strips
 from catenary.mbs.rigid.bodies import Motion, Vector
 from catenary.mbs.rigid.forces import PointForce
-from catenary.mbs.rigid.joints import PrescribedPoint, constant
+from catenary.mbs.rigid.joints import Constant, PrescribedPoint
 from catenary.mbs.rigid.statics import equilibrium
 from catenary.mbs.rigid.system import System
 
@@ -83,7 +83,7 @@ def pressed_at_rest(data: MultibodyData) -> tuple[System, Motion, float]:
     The force is the static one but for what head and arm being beside each other makes of it.
     """
     standing = stand(data)
-    holder = PrescribedPoint(HELD, data.arm, constant(standing.working_height))
+    holder = PrescribedPoint(HELD, data.arm, Constant(standing.working_height))
     force, motion, left = standing.static_force, standing.motion, np.inf
     for _ in range(20):
         system = standing.system.with_forces(PointForce(WIRE, data.head, (0.0, 0.0, -force)))

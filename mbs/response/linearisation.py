@@ -95,10 +95,6 @@ class LinearModel:
         """
         return self.amplitudes(frequencies) @ self.push
 
-    def static_stiffness(self) -> float:
-        """Force upward that it takes to hold the point a metre higher, per metre [N/m]."""
-        return float(1.0 / (self.push @ linalg.solve(self.stiffness, self.push)))
-
     def modes(self) -> tuple[Mode, ...]:
         """Free motions by growing frequency."""
         k = len(self.push)
@@ -169,7 +165,6 @@ def linearise(
     body: str,
     at: Vector = ORIGIN,
     along: Vector = (0.0, 0.0, 1.0),
-    time: float = 0.0,
 ) -> LinearModel:
     """Small motions of a system at rest, loaded at a point of a body along a direction in space.
 
@@ -177,7 +172,16 @@ def linearise(
 
     Parameters
     ----------
-    motion : the system at rest, forces that are always there (the wire's) included in it
+    system : System
+        Bodies with their joints and forces.
+    motion : Motion
+        The system at rest, forces that are always there (the wire's) included in it.
+    body : str
+        Name of the body that is loaded.
+    at : array_like, shape (3,), optional
+        Loaded point in the axes of the body [m].
+    along : array_like, shape (3,), optional
+        Direction of the load in space [-].
 
     Raises
     ------
@@ -185,11 +189,11 @@ def linearise(
         The system is not at rest there, or its joints do not let the point move that way.
     """
     rest = motion.with_velocities(np.zeros(6 * motion.n_bodies))
-    free = null_space(system.constraints(rest, time).jacobian)
+    free = null_space(system.constraints(rest, 0.0).jacobian)
     push = unit(along) @ point(rest, body, at).jacobian @ free
     if np.abs(push).max(initial=0.0) < 1e-9:
         raise InputError(f"The joints do not let body {body!r} move along {tuple(along)}.")
-    forces = system.generalised_forces(rest, time)
+    forces = system.generalised_forces(rest, 0.0)
     unbalanced = np.abs(free.T @ forces).max()
     if unbalanced > UNBALANCED * (1.0 + np.abs(forces).max()):
         raise InputError(
@@ -200,8 +204,8 @@ def linearise(
     lower = linalg.cholesky(free.T @ (system.mass[:, None] * free), lower=True)
     ways = linalg.solve_triangular(lower, free.T, lower=True).T
     push = linalg.solve_triangular(lower, push, lower=True)
-    stiffness = _stiffness(system, rest, ways, time)
-    damping = _damping(system, rest, ways, time)
+    stiffness = _stiffness(system, rest, ways)
+    damping = _damping(system, rest, ways)
     kept, dropped = _separated(stiffness, damping, push)
     return LinearModel(
         np.eye(kept.shape[1]),
@@ -214,36 +218,36 @@ def linearise(
     )
 
 
-def _stiffness(system: System, rest: Motion, ways: np.ndarray, time: float) -> np.ndarray:
+def _stiffness(system: System, rest: Motion, ways: np.ndarray) -> np.ndarray:
     """-d (N^T g) / dx by central differences with the joints kept closed (k, k)."""
     result = np.empty((ways.shape[1],) * 2)
     for k, way in enumerate(ways.T):
         step = STEP / float(np.abs(way).max())
         ahead, behind = (
-            _force_on(system, rest.moved(sign * step * way), ways, time) for sign in (1.0, -1.0)
+            _force_on(system, rest.moved(sign * step * way), ways) for sign in (1.0, -1.0)
         )
         result[:, k] = (behind - ahead) / (2.0 * step)
     return result
 
 
-def _force_on(system: System, motion: Motion, ways: np.ndarray, time: float) -> np.ndarray:
+def _force_on(system: System, motion: Motion, ways: np.ndarray) -> np.ndarray:
     """Force on motions ``ways`` (6 n, k), as the joints allow them at a place near by, (k,)."""
-    there = system.assemble(motion, time).motion
-    jacobian = system.constraints(there, time).jacobian
+    there = system.assemble(motion)
+    jacobian = system.constraints(there, 0.0).jacobian
     # The least change that makes them allowed: smooth, unlike another null space.
     basis = ways
     if len(jacobian):
         basis = ways - least_squares(jacobian, jacobian @ ways, 1e-8)
-    return basis.T @ system.generalised_forces(there, time)
+    return basis.T @ system.generalised_forces(there, 0.0)
 
 
-def _damping(system: System, rest: Motion, ways: np.ndarray, time: float) -> np.ndarray:
+def _damping(system: System, rest: Motion, ways: np.ndarray) -> np.ndarray:
     """-d (N^T g) / dx' by central differences (k, k); gyroscopic moments cancel out at rest."""
     result = np.empty((ways.shape[1],) * 2)
     for k, way in enumerate(ways.T):
         speed = SPEED / float(np.abs(way).max())
         ahead, behind = (
-            ways.T @ system.generalised_forces(rest.with_velocities(sign * speed * way), time)
+            ways.T @ system.generalised_forces(rest.with_velocities(sign * speed * way), 0.0)
             for sign in (1.0, -1.0)
         )
         result[:, k] = (behind - ahead) / (2.0 * speed)
@@ -253,7 +257,7 @@ def _damping(system: System, rest: Motion, ways: np.ndarray, time: float) -> np.
 def _separated(
     stiffness: np.ndarray, damping: np.ndarray, push: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Bases (k, .) of the motions that something acts on, and of those that nothing does.
+    """Bases (k, .) of the motions that forces act on, and of the motions without forces.
 
     With M = 1 the two are not coupled.
     """

@@ -51,8 +51,12 @@ def fit_chain(frequencies: Vector, receptance: np.ndarray, n_masses: int) -> Cha
 
     Parameters
     ----------
-    frequencies : shape (n,) [Hz], positive
-    receptance : shape (n,), complex [m/N], upward per upward force
+    frequencies : array_like, shape (n,)
+        Frequencies [Hz], positive.
+    receptance : ndarray, shape (n,)
+        Complex displacement per force, both upward [m/N].
+    n_masses : int
+        Number of masses, 1 to 3.
 
     Raises
     ------

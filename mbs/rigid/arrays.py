@@ -167,7 +167,7 @@ class LineForce(Protocol):
 
 
 class FlatLines:
-    """Those of several forces that act along lines, evaluated together.
+    """Forces that act along lines, evaluated together.
 
     ``names`` (m,) of them in their order. Raises InputError where a force names a body that there
     is not.

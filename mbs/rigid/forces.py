@@ -217,10 +217,14 @@ class BumpStop(_BetweenPoints):
 
 
 class OffLine:
-    """A force that does not act along a line between two points."""
+    """A force that does not act along a line between two points, and stores no energy."""
 
     def on_line(self) -> None:
         """None."""
+
+    def energy(self, motion: Motion) -> float:
+        """Zero [J]: it does work from outside."""
+        return 0.0
 
 
 @dataclass(frozen=True)
@@ -239,10 +243,6 @@ class PointForce(OffLine):
         """Generalised forces (6 n,)."""
         force = self.force(time) if callable(self.force) else self.force
         return np.asarray(force, dtype=float) @ point(motion, self.body, self.at).jacobian
-
-    def energy(self, motion: Motion) -> float:
-        """Counts as work from outside, not as energy stored."""
-        return 0.0
 
 
 @dataclass(frozen=True)

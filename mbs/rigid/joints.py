@@ -73,20 +73,9 @@ class Constant:
         return Law(self.number, 0.0, 0.0)
 
 
-def constant(value: float) -> TimeLaw:
-    """A prescribed number that stays as it is."""
-    return Constant(value)
-
-
 def steady(start: float, speed: float) -> TimeLaw:
     """A prescribed number that grows with constant speed from its value at time zero."""
     return lambda time: Law(start + speed * time, speed, 0.0)
-
-
-def tabulated(times: Vector, values: Vector) -> TimeLaw:
-    """A prescribed number from a table, by a cubic spline with free ends."""
-    spline = CubicSpline(times, values, bc_type="natural")
-    return lambda time: Law(*(float(spline(time, k)) for k in range(3)))
 
 
 def same_point(i: str, at_i: Vector, j: str, at_j: Vector) -> list[Product]:

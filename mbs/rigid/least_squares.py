@@ -20,15 +20,15 @@ def least_squares(matrix: np.ndarray, right: np.ndarray, cond: float) -> np.ndar
     return np.asarray(linalg.lstsq(matrix, right, cond=cond, lapack_driver="gelsy")[0])
 
 
-def null_space(matrix: np.ndarray, cond: float = 1e-8) -> np.ndarray:
-    """Orthonormal columns (n, k) that ``matrix`` (m, n) turns into nothing.
+def null_space(matrix: np.ndarray) -> np.ndarray:
+    """Orthonormal basis (n, k) of the null space of ``matrix`` (m, n).
 
-    That is, into less than ``cond`` of its largest row, by QR of its rows with pivoting: a third of
-    the time of singular values.
+    Products with it are below 1e-8 of the largest row of the matrix. By QR of the rows with
+    pivoting: a third of the time of singular values.
     """
     if not matrix.size:
         return np.eye(matrix.shape[1])
     columns, triangle, _ = linalg.qr(matrix.T, pivoting=True, check_finite=False)
     sizes = np.abs(np.diagonal(triangle))
-    rank = int((sizes > cond * sizes.max(initial=0.0)).sum())
+    rank = int((sizes > 1e-8 * sizes.max(initial=0.0)).sum())
     return np.asarray(columns[:, rank:])

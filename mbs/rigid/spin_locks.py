@@ -1,4 +1,4 @@
-"""Links that may spin between two balls, kept from doing so.
+"""Constraints that remove the idle rotation of links between two balls.
 
 Nothing drives such a spin and little resists it; a link whose mass lies above the line between its
 balls tips over by itself, which no real link with its bolts does. Reduced mechanisms leave spins
@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from catenary.mbs.rigid.bodies import SPACE, Body, Motion
-from catenary.mbs.rigid.joints import PrescribedAngle, Spherical, constant
+from catenary.mbs.rigid.joints import Constant, PrescribedAngle, Spherical
 from catenary.mbs.rigid.system import System
 
 _ACROSS, _ALONG = np.array([0.0, 1.0, 0.0]), np.array([1.0, 0.0, 0.0])
@@ -27,7 +27,10 @@ def without_spins(system: System, motion: Motion) -> System:
 
     Parameters
     ----------
-    motion : assembled; spins are kept as they are there
+    system : System
+        Bodies with their joints and forces.
+    motion : Motion
+        Assembled motion, whose spins are kept.
     """
     holders = [
         holder for body in system.bodies if (holder := _holder(system, body, motion)) is not None
@@ -66,7 +69,7 @@ def _holder(system: System, body: Body, motion: Motion) -> PrescribedAngle | Non
         f"no spin of {body.name}",
         SPACE,
         body.name,
-        constant(0.0),
+        Constant(0.0),
         axis_i=tuple(axis),
         normal_i=tuple(normal),
         normal_j=tuple(rotation.T @ side),

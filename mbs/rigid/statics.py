@@ -9,14 +9,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy import linalg
 
 from catenary.base.errors import InputError, RunBroken
-from catenary.mbs.rigid.arrays import ORIGIN, Joint
-from catenary.mbs.rigid.bodies import Motion, Vector
+from catenary.mbs.rigid.arrays import Joint
+from catenary.mbs.rigid.bodies import Motion
 from catenary.mbs.rigid.forces import Actuator
-from catenary.mbs.rigid.joints import unit
-from catenary.mbs.rigid.kinematics import point
 from catenary.mbs.rigid.least_squares import least_squares, null_space
 from catenary.mbs.rigid.system import System
 
@@ -26,6 +23,7 @@ STEP = 1e-5
 NEUTRAL = 1e-9
 # Largest displacement in one iteration [m or rad].
 LONGEST = 0.1
+_MOST_ITERATIONS = 60
 
 
 class Rest(NamedTuple):
@@ -36,20 +34,19 @@ class Rest(NamedTuple):
     unbalanced: float
 
 
-def equilibrium(
-    system: System,
-    start: Motion,
-    time: float = 0.0,
-    tolerance: float = 1e-9,
-    max_iterations: int = 60,
-) -> Rest:
+def equilibrium(system: System, start: Motion, tolerance: float = 1e-9) -> Rest:
     """The equilibrium near ``start``, stable or not, by Newton's method on the free motions.
 
     Motions that no force resists (a link turning about its own axis) stay where they are.
 
     Parameters
     ----------
-    tolerance : largest force or moment left on a free motion, relative to the largest one applied
+    system : System
+        Bodies with their joints and forces.
+    start : Motion
+        Motion near the equilibrium.
+    tolerance : float, optional
+        Largest force or moment left on a free motion, relative to the largest one applied.
 
     Raises
     ------
@@ -58,33 +55,29 @@ def equilibrium(
     RunBroken
         There is no equilibrium near by.
     """
-    motion, left = at_rest(system, start, time, tolerance, max_iterations)
-    return Rest(motion, _multipliers(system, motion, time), left)
+    motion, left = at_rest(system, start, tolerance)
+    # Of redundant rows the smallest multipliers.
+    jacobian = system.constraints(motion, 0.0).jacobian
+    force = system.generalised_forces(motion, 0.0)
+    return Rest(motion, least_squares(jacobian.T, force, 1e-8), left)
 
 
-def at_rest(
-    system: System,
-    start: Motion,
-    time: float = 0.0,
-    tolerance: float = 1e-9,
-    max_iterations: int = 60,
-) -> tuple[Motion, float]:
+def at_rest(system: System, start: Motion, tolerance: float = 1e-9) -> tuple[Motion, float]:
     """Place and N^T g of ``equilibrium``, without the multipliers."""
     resting = start.with_velocities(np.zeros(6 * start.n_bodies))
-    motion = system.assemble(resting, time).motion
-    size = float(np.abs(system.generalised_forces(motion, time)).max())
+    motion = system.assemble(resting)
+    size = float(np.abs(system.generalised_forces(motion, 0.0)).max())
     left = np.inf
-    for _ in range(max_iterations):
-        free = null_space(system.constraints(motion, time).jacobian)
-        unbalanced = free.T @ system.generalised_forces(motion, time)
+    for _ in range(_MOST_ITERATIONS):
+        free = null_space(system.constraints(motion, 0.0).jacobian)
+        unbalanced = free.T @ system.generalised_forces(motion, 0.0)
         left = float(np.abs(unbalanced).max(initial=0.0))
         if left <= tolerance * size:
             return motion, left
         tangent = np.empty((free.shape[1],) * 2)
         for k in range(free.shape[1]):
             ahead, behind = (
-                _unbalanced(system, motion, free, sign * STEP * free[:, k], time)
-                for sign in (1.0, -1.0)
+                _unbalanced(system, motion, free, sign * STEP * free[:, k]) for sign in (1.0, -1.0)
             )
             tangent[:, k] = (ahead - behind) / (2.0 * STEP)
         step = free @ least_squares(tangent, -unbalanced, NEUTRAL)
@@ -92,7 +85,7 @@ def at_rest(
         if longest == 0.0:
             break  # nothing resists what is left over
         step *= min(1.0, LONGEST / longest)
-        motion = system.assemble(motion.moved(step), time).motion
+        motion = system.assemble(motion.moved(step))
     raise RunBroken(
         f"The multibody system finds no equilibrium near its start: {left:.3g} N are left over; "
         "start closer to it, or check springs and actuators."
@@ -100,42 +93,34 @@ def at_rest(
 
 
 def _unbalanced(
-    system: System, motion: Motion, free: np.ndarray, displacement: np.ndarray, time: float
+    system: System, motion: Motion, free: np.ndarray, displacement: np.ndarray
 ) -> np.ndarray:
     """Force on the free motions ``free`` (6 n, k) after a displacement, shape (k,)."""
-    there = system.assemble(motion.moved(displacement), time).motion
-    jacobian = system.constraints(there, time).jacobian
+    there = system.assemble(motion.moved(displacement))
+    jacobian = system.constraints(there, 0.0).jacobian
     # The same motions as the joints allow them there: a smooth basis, unlike a new null space.
     basis = free - least_squares(jacobian, jacobian @ free, 1e-8)
-    return basis.T @ system.generalised_forces(there, time)
+    return basis.T @ system.generalised_forces(there, 0.0)
 
 
-def _multipliers(system: System, motion: Motion, time: float) -> np.ndarray:
-    """Multipliers that balance the forces, shape (m,), the smallest of redundant rows."""
-    jacobian = system.constraints(motion, time).jacobian
-    force = system.generalised_forces(motion, time)
-    return least_squares(jacobian.T, force, 1e-8)
-
-
-def unheld_force(system: System, motion: Motion, time: float = 0.0) -> float:
+def unheld_force(system: System, motion: Motion) -> float:
     """Size of the forces on all free motions together [N], zero where a system is at rest."""
-    jacobian = system.constraints(motion, time).jacobian
-    free = null_space(jacobian)
-    return float(np.linalg.norm(free.T @ system.generalised_forces(motion, time)))
+    free = null_space(system.constraints(motion, 0.0).jacobian)
+    return float(np.linalg.norm(free.T @ system.generalised_forces(motion, 0.0)))
 
 
-def held_force(system: System, holder: Joint, start: Motion, time: float = 0.0) -> float:
+def held_force(system: System, holder: Joint, start: Motion) -> float:
     """Force with which a system at rest presses on what holds it by one row [N].
 
     ``holder``, for instance a `PrescribedPoint`, is added to the joints; the force is positive
     in the direction in which the held coordinate grows.
     """
-    return _pressed(system, holder, start, time)[0]
+    return _pressed(system, holder, start)[0]
 
 
-def _pressed(system: System, holder: Joint, start: Motion, time: float) -> tuple[float, Motion]:
+def _pressed(system: System, holder: Joint, start: Motion) -> tuple[float, Motion]:
     """The force of ``held_force``, and the place at rest."""
-    rest = equilibrium(system.with_joints(holder), start, time)
+    rest = equilibrium(system.with_joints(holder), start)
     return float(rest.multipliers[-1]), rest.motion
 
 
@@ -166,7 +151,18 @@ def calibrate_actuator(
 
     Parameters
     ----------
-    near : what was found for another static force of the same system [N], to begin with
+    system : System
+        Bodies with their joints and forces.
+    actuator : str
+        Name of the actuator, whose force is constant.
+    holder : Joint
+        Joint of one row that holds the system.
+    start : Motion
+        Motion near the equilibrium.
+    static_force : float
+        Force on the holder to be reached [N].
+    near : Calibration, optional
+        Calibration of the same system for another static force, to begin with.
 
     Raises
     ------
@@ -178,7 +174,7 @@ def calibrate_actuator(
         raise InputError(f"Force {actuator!r} is no actuator with a constant force.")
 
     def pressed(push: float, start: Motion) -> tuple[float, Motion]:
-        return _pressed(system.with_force_changed(actuator, force=push), holder, start, 0.0)
+        return _pressed(system.with_force_changed(actuator, force=push), holder, start)
 
     if near is None:
         push = before.force
@@ -202,25 +198,3 @@ def calibrate_actuator(
         f"Actuator {actuator!r} would need {push:.3g} N for a static force of {static_force:g} N, "
         "which is beyond calculation: check its points, springs and stops."
     )
-
-
-def equivalent_mass(
-    system: System,
-    motion: Motion,
-    body: str,
-    at: Vector = ORIGIN,
-    along: Vector = (0.0, 0.0, 1.0),
-    time: float = 0.0,
-) -> float:
-    """Mass [kg] that a suddenly growing force on a point feels along a direction in space.
-
-    Bodies behind springs that the joints do not move along stand still and do not count.
-    """
-    jacobian = system.constraints(motion, time).jacobian
-    free = null_space(jacobian)
-    # Velocities of the point per velocity of each free motion.
-    way = unit(along) @ point(motion, body, at).jacobian @ free
-    if np.abs(way).max(initial=0.0) < 1e-9:
-        raise InputError(f"The joints do not let body {body!r} move along {tuple(along)}.")
-    mass = free.T @ (system.mass[:, None] * free)
-    return float(1.0 / (way @ linalg.solve(mass, way, assume_a="pos")))

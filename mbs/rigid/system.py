@@ -39,26 +39,11 @@ class Miss(NamedTuple):
     tilt: float
 
 
-class Assembly(NamedTuple):
-    """Result of a position projection."""
-
-    motion: Motion
-    n_iterations: int
-
-
 class Accelerations(NamedTuple):
     """``acceleration`` (6 n,) [m/s^2, rad/s^2]; ``multipliers`` (m,), zero for redundant rows."""
 
     acceleration: np.ndarray
     multipliers: np.ndarray
-
-
-class Reaction(NamedTuple):
-    """Force of a joint on a body, in space axes (3,) [N], and moment about the body's centre of
-    mass, in body axes (3,) [N m]."""
-
-    force: np.ndarray
-    moment: np.ndarray
 
 
 def independent_rows(jacobian: np.ndarray) -> np.ndarray:
@@ -203,18 +188,9 @@ class System:
         """Which rows belong to which joint."""
         return self._rows.ranges
 
-    def reaction(
-        self, joint: str, body: str, motion: Motion, time: float, multipliers: np.ndarray
-    ) -> Reaction:
-        """What a joint does to a body, of multipliers (m,) of all joints."""
-        rows = self.row_ranges[joint]
-        jacobian = self.constraints(motion, time).jacobian[rows]
-        force = -(jacobian.T @ multipliers[rows]).reshape(-1, 6)[motion.numbers[body]]
-        return Reaction(force[:3], force[3:])
-
-    def redundant(self, motion: Motion, time: float = 0.0) -> tuple[str, ...]:
+    def redundant(self, motion: Motion) -> tuple[str, ...]:
         """Names of joints with rows that joints before them imply, with how many: 'hinge (3)'."""
-        jacobian = self.constraints(motion, time).jacobian
+        jacobian = self.constraints(motion, 0.0).jacobian
         kept = set(independent_rows(jacobian))
         counts = {
             name: sum(row not in kept for row in range(rows.start, rows.stop))
@@ -222,9 +198,9 @@ class System:
         }
         return tuple(f"{name} ({count})" for name, count in counts.items() if count)
 
-    def n_degrees_of_freedom(self, motion: Motion, time: float = 0.0) -> int:
-        """6 n without as many as there are independent rows."""
-        return 6 * motion.n_bodies - len(independent_rows(self.constraints(motion, time).jacobian))
+    def n_degrees_of_freedom(self, motion: Motion) -> int:
+        """6 n less the rank of the joints' Jacobian."""
+        return 6 * motion.n_bodies - len(independent_rows(self.constraints(motion, 0.0).jacobian))
 
     def misses(self, motion: Motion, time: float = 0.0) -> tuple[Miss, ...]:
         """By how much each joint is open."""
@@ -241,15 +217,23 @@ class System:
         time: float = 0.0,
         tolerance: float = 1e-12,
         max_iterations: int = 30,
-    ) -> Assembly:
+    ) -> Motion:
         """Close all joints by the smallest displacements (position projection).
 
         Newton's method; redundant rows do no harm. Velocities stay as they are.
 
         Parameters
         ----------
-        tolerance : largest error of a row afterwards [m, cosine], relative to the largest distance
-            of a body from the origin where that is above 1 m (what round-off allows)
+        motion : Motion
+            Places to start from, and velocities that are kept.
+        time : float, optional
+            Time of prescribed motions [s].
+        tolerance : float, optional
+            Largest error of a row afterwards [m, cosine], relative to the largest
+            distance of a body from the origin where that is above 1 m (what round-off
+            allows).
+        max_iterations : int, optional
+            Most iterations of Newton's method.
 
         Raises
         ------
@@ -257,12 +241,12 @@ class System:
             The joints cannot be closed from there; it names the one that misses most.
         """
         if not self.joints:
-            return Assembly(motion, 0)
+            return motion
         limit = tolerance * max(1.0, float(np.abs(motion.position).max()))
-        for number in range(max_iterations + 1):
+        for _ in range(max_iterations + 1):
             rows = self.constraints(motion, time)
             if np.abs(rows.value).max() <= limit:
-                return Assembly(motion, number)
+                return motion
             step = least_squares(rows.jacobian, -rows.value, DEPENDENT)
             # Newton's method must not turn bodies around on its way.
             motion = motion.moved(step / max(1.0, float(np.abs(step).max())))

@@ -120,7 +120,7 @@ class Stepper:
     def begin(self, motion: Motion, time: float, forces: np.ndarray | None = None) -> None:
         """Start from a motion, joints closed by projection, under ``forces`` (s,) [N]."""
         system = self.system
-        motion = system.assemble(motion, time).motion
+        motion = system.assemble(motion, time)
         self.motion, self.time = system.project_velocities(motion, time), time
         ways = self._ways(self.motion)
         self.forces = np.zeros(ways.shape[1]) if forces is None else np.array(forces, dtype=float)
@@ -210,7 +210,7 @@ class Stepper:
         rows, ways = system.constraints(there, end), self._ways(there)
         length, rate, gradient = system.lines.geometry(there)
         stiffness, damping = system.lines.slopes(length, rate, end)
-        # What pulls less the longer it gets is left to the prediction, so that A stays positive.
+        # Negative slopes are left to the prediction, so that A stays positive.
         stiffness, damping = np.maximum(stiffness, 0.0), np.maximum(damping, 0.0)
         mass = system.mass
         operator = (gradient.T * (gamma * h * damping + beta * h**2 * stiffness)) @ gradient

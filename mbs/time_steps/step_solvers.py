@@ -46,7 +46,7 @@ class StepSolver(Protocol):
         """Changes d (6 n, k) for right sides (6 n, k) and (m, k)."""
 
     def removal(self, errors: np.ndarray) -> np.ndarray:
-        """What (6 n,) removes errors (m,) of rows with the J prepared for."""
+        """Displacement (6 n,) that removes errors (m,) of rows with the J prepared for."""
 
 
 class Partitioned:

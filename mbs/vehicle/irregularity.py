@@ -13,6 +13,7 @@ Oc = 0.8246 rad/m, Or = 0.0206 rad/m.
 from __future__ import annotations
 
 import zlib
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -79,15 +80,41 @@ class Irregularity:
     seed: int
 
     def waves(self, direction: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Amplitudes [m], wave numbers [rad/m] and phases [rad] of the sines, shape (N_WAVES,).
+        """Amplitudes [m], wave numbers [rad/m] and phases [rad] of the sines, see ``sines``."""
+        spectrum = SPECTRA[self.spectrum]
 
-        Each has the power of its part of the spectrum (M. Shinozuka, C.-M. Jan, Digital simulation
-        of random processes, J. Sound Vib. 25, 1972). Wave numbers grow by a constant factor: no
-        two have a common multiple nearby, so that the track does not repeat itself.
-        """
-        lowest, highest = 2.0 * np.pi / self.longest, 2.0 * np.pi / self.shortest
-        edges = np.geomspace(lowest, highest, N_WAVES + 1)
-        power = SPECTRA[self.spectrum].variance(direction, edges[:-1], edges[1:])
-        random = np.random.default_rng([self.seed, zlib.crc32(direction.encode())])
-        phases = random.uniform(0.0, 2.0 * np.pi, N_WAVES)
-        return np.sqrt(2.0 * power), np.sqrt(edges[:-1] * edges[1:]), phases
+        def variance(lowest: np.ndarray, highest: np.ndarray) -> np.ndarray:
+            return spectrum.variance(direction, lowest, highest)
+
+        return sines(variance, (self.shortest, self.longest), self.seed, direction)
+
+
+def sines(
+    variance: Callable[[np.ndarray, np.ndarray], np.ndarray],
+    wavelengths: tuple[float, float],
+    seed: int,
+    name: str,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Amplitudes [m], wave numbers [rad/m] and phases [rad] of sines, shape (N_WAVES,).
+
+    Each has the power of its part of the spectrum (M. Shinozuka, C.-M. Jan, Digital simulation of
+    random processes, J. Sound Vib. 25, 1972). Wave numbers grow by a constant factor: no two have a
+    common multiple nearby, so that the sum does not repeat itself.
+
+    Parameters
+    ----------
+    variance : callable
+        Integral of the spectrum between lowest and highest wave numbers, (n,) each [m^2].
+    wavelengths : tuple of float
+        Shortest and longest wavelength [m].
+    seed : int
+        Seed of the phases.
+    name : str
+        Name of what the sum is of; others have other phases.
+    """
+    shortest, longest = wavelengths
+    edges = np.geomspace(2.0 * np.pi / longest, 2.0 * np.pi / shortest, N_WAVES + 1)
+    power = variance(edges[:-1], edges[1:])
+    random = np.random.default_rng([seed, zlib.crc32(name.encode())])
+    phases = random.uniform(0.0, 2.0 * np.pi, N_WAVES)
+    return np.sqrt(2.0 * power), np.sqrt(edges[:-1] * edges[1:]), phases

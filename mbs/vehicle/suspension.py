@@ -135,8 +135,14 @@ def roof_course(
 
     Parameters
     ----------
-    points, values : of the track, joined by straight lines [m]
-    speed : of the train [m/s]
+    vehicle : Vehicle
+        Car body on its suspension.
+    direction : str
+        "vertical" or "lateral".
+    points, values : ndarray
+        Points and values of the track, joined by straight lines [m].
+    speed : float
+        Speed of the train [m/s].
 
     Returns
     -------
@@ -225,6 +231,6 @@ def _sideways(vehicle: Vehicle, side: Sideways) -> Matrices:
     stiffness[2, 2] += 2.0 * vehicle.stiffness * square
     stiffness[2, 2] -= vehicle.mass * GRAVITY * side.centre_above
     damping[2, 2] += 2.0 * vehicle.damping * square
-    # What is above the centre of mass goes to the right where the left side is lifted.
+    # Points above the centre of mass go to the right where the left side is lifted.
     roof = np.array([1.0, vehicle.pantograph_ahead, -side.roof_above])
     return Matrices(masses, damping, stiffness, by_place, by_rate, roof)

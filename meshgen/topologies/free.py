@@ -38,10 +38,16 @@ def line_of(
 
     Parameters
     ----------
-    data : masts, and the rise of transition spans
-    topology : its name
-    wires, links : of the line
-    twins : pairs of names of wires, as of a ``Line``
+    data : LineData
+        Masts, and the rise of transition spans.
+    topology : str
+        Name of the topology.
+    wires : tuple of FreeWire
+        Wires of the line, contact wires first.
+    links : tuple of FreeLink
+        Groups of droppers, clamps, steady arms and supports.
+    twins : tuple of tuple, optional
+        Pairs of names of wires, as of a ``Line``.
 
     Raises
     ------
@@ -223,7 +229,14 @@ def sag_between(x: np.ndarray, held: np.ndarray, loads: Loads, wire: Conductor) 
 
     Parameters
     ----------
-    x : (n,) places between the first and the last of ``held`` [m]
+    x : ndarray, shape (n,)
+        Places between the first and the last of ``held`` [m].
+    held : ndarray, shape (m,)
+        Places at which the string is held, ascending [m].
+    loads : Loads
+        Loads per length and single loads.
+    wire : Conductor
+        Conductor, whose tension counts.
     """
     at, mass = loads.sorted
     inside = (at > held[0]) & (at < held[-1])
@@ -246,7 +259,7 @@ def sag_between(x: np.ndarray, held: np.ndarray, loads: Loads, wire: Conductor) 
 
 
 def _wire(data: LineData, free: FreeWire, made: dict[str, Wire], loads: Loads) -> Wire:
-    """A wire with its pieces; those that it is clamped to are ``made``."""
+    """A wire with its pieces; the wires that it is clamped to are ``made``."""
     profile = _profile(data, free) if free.name in hung(data) else None
     held, ends = carriers(data, free), np.array(free.stretches).reshape(-1, 2)
     clamps = [made[name] if name else None for name in free.clamped_to]

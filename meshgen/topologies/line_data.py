@@ -1,4 +1,4 @@
-"""What a scene says of a line, in SI units: all that a topology makes its wires and links from."""
+"""Data of a line in SI units, from which a topology makes its wires and links."""
 
 from __future__ import annotations
 
@@ -143,7 +143,7 @@ class Overlaps:
 
 @dataclass(frozen=True)
 class LineData(Spans):
-    """What a scene says of a line.
+    """Data of a line, as a scene has them.
 
     Attributes
     ----------

@@ -69,7 +69,7 @@ def with_overlaps(line: Line, overlaps: Overlaps) -> Line:
 
 
 class _Sections:
-    """What of a line is in some of its sections, shifted sideways, under other names.
+    """Parts of a line in some of its sections, shifted sideways, under other names.
 
     Parameters
     ----------
@@ -178,7 +178,7 @@ class _Sections:
         ]
 
     def _at_wire(self, group: _AtWire) -> _AtWire:
-        """What of a group at one wire stands inside the sections, with its names."""
+        """Part of a group at one wire that stands inside the sections, with its names."""
         x = np.array(group.x)
         places = tuple(x[self._inside(x, x)].tolist())
         return replace(group, name=self._name(group.name), wire=self._name(group.wire), x=places)
@@ -229,7 +229,7 @@ class _Sections:
         return (piece.x[0] < high - _SAME_PLACE) & (piece.x[-1] > low + _SAME_PLACE)
 
     def _parts(self, piece: Piece) -> list[Piece]:
-        """What the sections have of a piece."""
+        """Part of a piece inside the sections."""
         masts, at = self._line.support_positions, piece.course[0]
         if piece.ends[0] is End.CLAMPED:
             sections = np.array([[at[0], at[-1]]])[: int(self._keeps(piece))]

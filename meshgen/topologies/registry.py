@@ -12,7 +12,7 @@ Make = Callable[[LineData], Line]
 
 
 class Topology(NamedTuple):
-    """What makes lines of a topology, and the parts of ``LineData`` that only some of them have.
+    """A topology: the function that makes its lines, and parts of ``LineData`` that some have.
 
     ``parts`` must be given for this topology, ``may`` may be; further ones must not.
     """

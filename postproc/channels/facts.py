@@ -33,7 +33,7 @@ NONE = float("nan")
 
 
 class Derivation(NamedTuple):
-    """What facts are derived from: the problem, its mesh, and the droppers' lengths (n,) [m]."""
+    """Sources of facts: the problem, its mesh, and the droppers' lengths (n,) [m]."""
 
     problem: Problem
     mesh: LineMesh
@@ -67,7 +67,12 @@ def facts_of(problem: Problem, mesh: LineMesh, dropper_length: np.ndarray) -> di
 
     Parameters
     ----------
-    dropper_length : (n_droppers,) at rest [m]
+    problem : Problem
+        Problem of the run.
+    mesh : LineMesh
+        Mesh of the line.
+    dropper_length : ndarray, shape (n_droppers,)
+        Length of droppers at rest [m].
     """
     source = Derivation(problem, mesh, dropper_length)
     return {name: np.asarray(fact.of(source), dtype=float) for name, fact in FACTS.items()}
@@ -98,7 +103,7 @@ def _contacts(source: Derivation) -> tuple[Wire, ...]:
 
 
 def _of_contacts(of: Callable[[Derivation, Wire], float]) -> Callable[[Derivation], list[float]]:
-    """What a fact of each contact wire is derived by."""
+    """Derivation of a fact of each contact wire."""
     return lambda source: [of(source, wire) for wire in _contacts(source)]
 
 

@@ -1,4 +1,4 @@
-"""What is known before the first step: the head of a result file."""
+"""Head of a result file: facts that are known before the first step."""
 
 from __future__ import annotations
 
@@ -68,7 +68,12 @@ def line_datasets(
 
     Parameters
     ----------
-    evaluation : from and to of the stretch whose statistics are judged [m]
+    line : Line
+        The line.
+    mesh : LineMesh
+        Mesh of the line.
+    evaluation : tuple of float
+        Stretch whose statistics are judged, from and to [m].
     """
     masts = line.support_positions
     dropper_x = mesh.x(mesh.droppers[:, 1])
@@ -106,7 +111,16 @@ def static_datasets(
 
     Parameters
     ----------
-    lengths : (n_droppers,) to which droppers are cut, which no mesh changes [m]
+    line : Line
+        The line.
+    mesh : LineMesh
+        Mesh of the line.
+    equilibrium : Equilibrium
+        The line at rest.
+    elasticity : Elasticity
+        Elasticity of the line at rest.
+    lengths : ndarray, shape (n_droppers,)
+        Lengths to which droppers are cut, which no mesh changes [m].
     """
     contact = np.concatenate([mesh.wires[wire.name] for wire in line.wires_of(Role.CONTACT)])
     return {
@@ -122,7 +136,7 @@ def static_datasets(
 
 
 def _registration(line: Line, mesh: LineMesh, form: Equilibrium) -> dict[str, np.ndarray]:
-    """What steady arms do at rest, and lateral places of the contact wires where they move so.
+    """Forces of steady arms at rest, and lateral places of the contact wires where they move so.
 
     Without lateral motion arms carry the radial force of the stagger; nothing for straight wires.
     """

@@ -17,7 +17,7 @@ GZIP_LEVEL = 1
 
 @dataclass(frozen=True)
 class LineRecord:
-    """What is recorded of the channels that have a column for each arm, dropper or wire end.
+    """Recorded part of the channels with a column for each arm, dropper or wire end.
 
     Attributes
     ----------
@@ -64,7 +64,8 @@ class LineRecord:
 
         Parameters
         ----------
-        position : (rows, n_pantographs) along the track [m]
+        position : ndarray, shape (rows, n_pantographs)
+            Places of the pantographs along the track [m].
         """
         if self.window is None:
             return None
@@ -97,7 +98,7 @@ def from_table(table: Mapping[str, Any]) -> LineRecord:
 
 
 def says(record: LineRecord, dt: float) -> str:
-    """What is recorded, in words, at a time step of ``dt`` [s]."""
+    """Recorded part, in words, at a time step of ``dt`` [s]."""
     if not record.names:
         return "not recorded; extremes are kept of every step"
     if record.whole:

@@ -46,8 +46,10 @@ def compare(*runs: Path | str, records: Sequence[Records | None] | None = None) 
 
     Parameters
     ----------
-    runs : result folders or files
-    records : what ``guard.examined`` found in each, None to check it here
+    *runs : Path or str
+        Result folders or files.
+    records : sequence of Records or None, optional
+        Findings of ``guard.examined`` in each run, None to examine it here.
 
     Raises
     ------

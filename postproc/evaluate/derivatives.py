@@ -43,12 +43,18 @@ def of_force(
 
     Parameters
     ----------
-    force : (n,) of all records [N]
-    by_force : (n, m) its derivatives by m parameters
-    within : (n,) bool, records in the evaluated stretch
-    dt : time between two records [s]
-    by_place : (n, m) derivatives of the pantograph's position over the train's speed [s], where
-        parameters change either: the stretch stays, so that records are compared at equal places
+    force : ndarray, shape (n,)
+        Force of all records [N].
+    by_force : ndarray, shape (n, m)
+        Its derivatives by m parameters.
+    within : ndarray, shape (n,), dtype bool
+        Records in the evaluated stretch.
+    dt : float
+        Time between two records [s].
+    by_place : ndarray, shape (n, m), optional
+        Derivatives of the pantograph's position over the train's speed [s], where
+        parameters change either: the stretch stays, so that records are compared at equal
+        places.
 
     Raises
     ------

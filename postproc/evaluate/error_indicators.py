@@ -80,7 +80,7 @@ class Indicators:
 
 
 class Method(NamedTuple):
-    """What the time indicator needs of a run: proportional damping of the contact wire, C = alpha K
+    """Inputs of the time indicator: proportional damping of the contact wire, C = alpha K
     + beta M ([s], [1/s]), and the parameters of its integration."""
 
     alpha: float
@@ -129,11 +129,15 @@ def step_error(force: np.ndarray, dt: float, method: Method) -> float:
 
     Parameters
     ----------
-    force : (n,) filtered contact force in the evaluation stretch [N]
-    dt : time step [s]
+    force : ndarray, shape (n,)
+        Filtered contact force in the evaluation stretch [N].
+    dt : float
+        Time step [s].
+    method : Method
+        Time integration of the run.
     """
     deviation = float(force.std())
-    # What is filtered needs few samples; a long record has more than a spectrum has use for.
+    # A filtered record needs few samples; a long one has more than a spectrum can use.
     every = max(1, min(force.size // _SPECTRUM, int(1.0 / (_SAMPLED_HZ * dt))))
     omega, power = _spectrum(force[::every], every * dt)
     if deviation == 0.0 or power.sum() == 0.0:
@@ -168,7 +172,12 @@ def memory(omega: np.ndarray, alpha: float, beta: float) -> np.ndarray:
 
     Parameters
     ----------
-    omega : (n,) angular frequencies above zero [rad/s]
+    omega : ndarray, shape (n,)
+        Angular frequencies above zero [rad/s].
+    alpha : float
+        Stiffness-proportional damping [s].
+    beta : float
+        Mass-proportional damping [1/s].
     """
     number = omega * np.sqrt((1.0 - 1j * beta / omega) / (1.0 + 1j * alpha * omega))
     slope = number * (
@@ -180,7 +189,7 @@ def memory(omega: np.ndarray, alpha: float, beta: float) -> np.ndarray:
 
 
 def required_frequency(felt: float, speed: float, alpha: float) -> float:
-    """Frequency of the undamped wave that is as long as those which run ahead of the train [Hz].
+    """Frequency of the undamped wave of equal length to those that run ahead of the train [Hz].
 
     A pantograph that moves with v and feels w_0 excites, ahead of itself, w = w_0 + v Re k; on a
     string with C = alpha K the wave number is k = (w / c) / sqrt(1 + i alpha w). Without damping
@@ -189,9 +198,13 @@ def required_frequency(felt: float, speed: float, alpha: float) -> float:
 
     Parameters
     ----------
-    felt : highest frequency that is felt at the pantograph [Hz]
-    speed : of the train over that of the waves [-]; at 1 and above there is no such wave: infinite
-    alpha : damping on stiffness of the contact wire [s]
+    felt : float
+        Highest frequency that is felt at the pantograph [Hz].
+    speed : float
+        Speed of the train over that of the waves [-]; at 1 and above there is no such wave:
+        infinite.
+    alpha : float
+        Damping on stiffness of the contact wire [s].
     """
     if speed >= 1.0:
         return float("inf")
@@ -218,9 +231,12 @@ def required_by_bending(
 
     Parameters
     ----------
-    felt : highest frequency that is felt at the pantograph [Hz]
-    speed : of the train [m/s]
-    tension, bending_stiffness, mass_per_length : of the wire [N], [N m2], [kg/m]
+    felt : float
+        Highest frequency that is felt at the pantograph [Hz].
+    speed : float
+        Speed of the train [m/s].
+    tension, bending_stiffness, mass_per_length : float
+        Tension, bending stiffness and mass per length of the wire [N], [N m2], [kg/m].
     """
     own = 2.0 * np.pi * felt
     roots = np.roots(
@@ -250,8 +266,10 @@ def resolved_frequency(
 
     Parameters
     ----------
-    length : of an element [m]
-    tension, bending_stiffness, mass_per_length : of the wire [N], [N m2], [kg/m]
+    length : float
+        Length of an element [m].
+    tension, bending_stiffness, mass_per_length : float
+        Tension, bending stiffness and mass per length of the wire [N], [N m2], [kg/m].
     """
     h = np.array([length])
     stiffness = beam.stiffness(h, bending_stiffness, tension)[0]

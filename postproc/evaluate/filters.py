@@ -47,9 +47,12 @@ def low_pass(values: np.ndarray, dt: float, cut_off: float = CUT_OFF) -> np.ndar
 
     Parameters
     ----------
-    values : (n,) or (n, columns), equidistant in time, the whole record
-    dt : time between two records [s]
-    cut_off : where the gain is 1/2 [Hz]
+    values : ndarray, shape (n,) or (n, columns)
+        Whole record, equidistant in time.
+    dt : float
+        Time between two records [s].
+    cut_off : float, optional
+        Frequency at which the gain is 1/2 [Hz].
 
     Raises
     ------
@@ -83,8 +86,10 @@ def power_kept(cut_off: float, dt: float | None) -> tuple[np.ndarray, np.ndarray
 
     Parameters
     ----------
-    cut_off : where the gain is 1/2 [Hz]
-    dt : time between the samples that are filtered [s]; None if they are very dense
+    cut_off : float
+        Frequency at which the gain is 1/2 [Hz].
+    dt : float or None
+        Time between the samples that are filtered [s]; None if they are very dense.
     """
     most = _UP_TO * cut_off if dt is None else min(_UP_TO * cut_off, 0.5 / dt * (1.0 - 1e-9))
     frequency = np.linspace(0.0, most, _UP_TO * _INTERVALS + 1)

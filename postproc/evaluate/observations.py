@@ -259,10 +259,14 @@ def bending_strain(
 
     Parameters
     ----------
-    force : P [N], all of it at one point
-    speed : v of the force, below that of waves [m/s]
-    tension, mass : F [N] and m [kg/m] of the wire
-    bending_stiffness, axial_stiffness : EI [N m2] and EA [N] of the wire
+    force : float
+        Force P, all of it at one point [N].
+    speed : float
+        Speed V of the force, below that of waves [m/s].
+    tension, mass : float
+        Tension F [N] and mass m [kg/m] of the wire.
+    bending_stiffness, axial_stiffness : float
+        EI [N m2] and EA [N] of the wire.
     """
     curvature = force / (2.0 * math.sqrt(bending_stiffness * (tension - mass * speed**2)))
     return curvature * 2.0 * math.sqrt(bending_stiffness / axial_stiffness)

@@ -46,7 +46,10 @@ def all_remarks(results: Results, indicators: Indicators) -> list[str]:
 
     Parameters
     ----------
-    indicators : estimated errors of the run
+    results : Results
+        Results of the run.
+    indicators : Indicators
+        Estimated errors of the run.
     """
     watched: list[str] = results.attributes.get("watched", {}).get("remarks", [])
     arms = results.registration()

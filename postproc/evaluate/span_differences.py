@@ -59,8 +59,10 @@ def differences(first: SpanSums, second: SpanSums, paired: bool) -> Sequence[Dif
 
     Parameters
     ----------
-    first, second : of a run each
-    paired : whether both are of the same spans of a line, whose common part then drops out
+    first, second : SpanSums
+        Sums over the spans of each run.
+    paired : bool
+        Whether both are of the same spans of a line, whose common part then drops out.
     """
     n, m = first.samples.size, second.samples.size
     if min(n, m) < _LEAST_SPANS or (paired and n != m):

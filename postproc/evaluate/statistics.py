@@ -130,8 +130,10 @@ def covers(position: np.ndarray, evaluation: tuple[float, float]) -> bool:
 
     Parameters
     ----------
-    position : (n,) ascending [m]
-    evaluation : from and to [m]
+    position : ndarray, shape (n,)
+        Places of the pantograph, ascending [m].
+    evaluation : tuple of float
+        Stretch whose statistics are judged, from and to [m].
     """
     if position.size < 2:
         return False
@@ -151,11 +153,18 @@ def contact_statistics(
 
     Parameters
     ----------
-    position : (n,) along the track [m]
-    force : (n,) unfiltered contact force [N]
-    wire_height : (n,) of the contact wire at the pan head [m]
-    dt : time step [s]
-    evaluation : from and to [m]
+    name : str
+        Name of the pantograph.
+    position : ndarray, shape (n,)
+        Places of the pantograph along the track [m].
+    force : ndarray, shape (n,)
+        Unfiltered contact force [N].
+    wire_height : ndarray, shape (n,)
+        Height of the contact wire at the pan head [m].
+    dt : float
+        Time step [s].
+    evaluation : tuple of float
+        Stretch whose statistics are judged, from and to [m].
 
     Raises
     ------
@@ -171,7 +180,7 @@ def contact_statistics(
 
 
 def _of_force(force: np.ndarray, within: np.ndarray, dt: float) -> dict[str, Any]:
-    """What the force of a pantograph gives; at no time more than a few records are in memory."""
+    """Statistics of the force of a pantograph; at no time more than a few records are in memory."""
     filtered = filters.low_pass(force, dt)[within]
     mean, std = float(filtered.mean()), float(filtered.std())
     edges, percent = histogram(filtered)
@@ -198,14 +207,14 @@ def _range(wire_height: np.ndarray, within: np.ndarray, dt: float) -> float:
     return float(np.ptp(filters.low_pass(wire_height, dt)[within]))
 
 
-def without_short_losses(lost: np.ndarray, dt: float, shortest: float = SHORTEST_ARC) -> np.ndarray:
-    """``lost`` with the intervals shorter than ``shortest`` [s] set to contact, (n,) bool."""
+def without_short_losses(lost: np.ndarray, dt: float) -> np.ndarray:
+    """``lost`` with the intervals shorter than ``SHORTEST_ARC`` set to contact, (n,) bool."""
     padded = np.concatenate([[0], lost.astype(np.int8), [0]])
     change = np.diff(padded)
     starts, ends = np.flatnonzero(change == 1), np.flatnonzero(change == -1)
     kept = np.zeros_like(lost)
     for start, end in zip(starts, ends, strict=True):
-        if (end - start) * dt >= shortest * (1.0 - 1e-9):  # exactly the shortest counts
+        if (end - start) * dt >= SHORTEST_ARC * (1.0 - 1e-9):  # exactly the shortest counts
             kept[start:end] = True
     return kept
 
@@ -317,3 +326,20 @@ def _inside(x: np.ndarray, evaluation: tuple[float, float]) -> np.ndarray:
 
 def _of(values: np.ndarray, which: Callable[..., Any]) -> float:
     return float(which(values)) if values.size else _NAN
+
+
+def slack_times(results: Results) -> np.ndarray:
+    """Time for which the force of each dropper was zero, (n_droppers,) [s]. Not collective.
+
+    From the records of the line, each of which stands for the time up to the next one: a dropper
+    that is recorded at no time has NaN, and one that cannot slacken zero.
+    """
+    n_droppers = results.line("dropper_x").size
+    if not slackens_at_all(results):
+        return np.zeros(n_droppers)
+    times = np.full(n_droppers, np.nan)
+    times[results.recorded_columns("dropper_force")] = 0.0
+    interval = results.line_record.every * results.dt
+    for _, force in results.blocks("dropper_force"):
+        times += interval * np.count_nonzero(force <= 0.0, axis=0)
+    return times

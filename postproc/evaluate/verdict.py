@@ -63,10 +63,16 @@ def judge(
 
     Parameters
     ----------
-    observations : of all quantities of the books, as ``quantities_of`` names them
-    conditions : speed [km/h], supply, stops
-    limits : keys of ``evaluation.limits`` that the scene has, in their units
-    pantographs : names in the order of tables
+    books : sequence of RuleBook
+        Rule books.
+    observations : mapping
+        Observations of all quantities of the books, as ``quantities_of`` names them.
+    conditions : Conditions
+        Speed [km/h], supply, stops.
+    limits : mapping
+        Limits of the scene by keys of ``evaluation.limits``, in their units.
+    pantographs : sequence of str
+        Names of the pantographs in the order of tables.
     """
     found: list[Criterion] = []
     for book in books:
@@ -103,7 +109,10 @@ def verdict_sentence(criteria: Sequence[Criterion], supply: str) -> str:
 
     Parameters
     ----------
-    supply : key of ``SYSTEMS``
+    criteria : sequence of Criterion
+        Judged criteria.
+    supply : str
+        Supply, a key of ``SYSTEMS``.
     """
     titles = list(dict.fromkeys(c.title for c in criteria))
     judged = [c for c in criteria if c.passed is not None]

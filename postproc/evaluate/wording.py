@@ -20,9 +20,9 @@ def capital(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
-def counted(number: int, noun: str, plural: str = "") -> str:
-    """``1 rank``, ``2 ranks``; ``plural`` where an s at the end does not make it."""
-    return f"{number} {noun if number == 1 else plural or f'{noun}s'}"
+def counted(number: int, noun: str) -> str:
+    """``1 rank``, ``2 ranks``: a number with a noun whose plural ends in s."""
+    return f"{number} {noun if number == 1 else f'{noun}s'}"
 
 
 # Further digits after which two numbers are printed in full.
@@ -34,8 +34,10 @@ def decimals_that_tell(value: float | None, limit: float | None, fewest: int) ->
 
     Parameters
     ----------
-    value, limit : numbers in one unit; NaN and None are printed with ``fewest``
-    fewest : decimals where the two differ by enough [-]
+    value, limit : float or None
+        Numbers in one unit; NaN and None are printed with ``fewest``.
+    fewest : int
+        Decimals where the two differ by enough [-].
     """
     if value is None or limit is None or not math.isfinite(value) or not math.isfinite(limit):
         return fewest

@@ -49,9 +49,11 @@ def describe(file: h5py.File, places: dict[str, np.ndarray]) -> None:
 
     Parameters
     ----------
-    file : a new result file
-    places : what a column of a recorded channel of the line stands for -> where these are along
-        the track, (recorded,) [m]
+    file : h5py.File
+        New result file.
+    places : dict
+        Places along the track of the recorded columns, (recorded,), by what a column stands
+        for [m].
     """
     time = file["time"]
     h5ds.set_scale(time.id, b"time")

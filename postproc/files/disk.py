@@ -21,7 +21,7 @@ from catenary.postproc.files.hdf5.checked import FORMAT_BOUNDS
 from catenary.postproc.files.hdf5.self_contained import open_own
 from catenary.postproc.files.own_files import new_part
 
-# What a file system without locks says to flock.
+# Errors of flock on a file system without locks.
 _NO_LOCKS = (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP)
 # Room for HDF5's own tables and for the last words of a run that has filled the disk [bytes].
 MARGIN = 128 * 1024
@@ -74,8 +74,12 @@ def reserve(handle: int, start: int, n_bytes: int) -> None:
 
     Parameters
     ----------
-    handle : descriptor of the file, open for writing; its path may name another file by now
-    start : end of the file [bytes]
+    handle : int
+        Descriptor of the file, open for writing; its path may name another file by now.
+    start : int
+        End of the file [bytes].
+    n_bytes : int
+        Size to claim [bytes].
 
     Raises
     ------
@@ -148,7 +152,12 @@ def open_to_write(path: Path, mode: str, **how: Any) -> h5py.File:
 
     Parameters
     ----------
-    path, mode, how : as of ``h5py.File``
+    path : Path
+        Path of the file.
+    mode : str
+        Mode of ``h5py.File``.
+    **how : object
+        Further arguments of ``h5py.File``.
 
     Raises
     ------

@@ -78,7 +78,10 @@ def filtered_in(file: Any, shape: tuple[int, int]) -> tuple[np.ndarray, dict[str
 
     Parameters
     ----------
-    shape : that it has if it is of all steps
+    file : object
+        Result file, or the tables of a march.
+    shape : tuple of int
+        Shape of the force of all steps.
     """
     if PATH not in file:
         return None

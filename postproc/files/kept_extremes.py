@@ -24,7 +24,12 @@ def store_extremes(file: h5py.File, n_rows: int, extremes: Mapping[str, np.ndarr
 
     Parameters
     ----------
-    extremes : name of a channel -> (2, columns), smallest and largest
+    file : h5py.File
+        Result file, open for writing.
+    n_rows : int
+        Number of steps that the extremes cover.
+    extremes : mapping
+        Smallest and largest values, (2, columns), by channel.
     """
     group = file.require_group(GROUP)
     counts = [_rows_of(group[slot]) if slot in group else -1 for slot in _SLOTS]

@@ -30,9 +30,9 @@ from catenary.postproc.files.run_schema import INTERRUPTED
 
 # Steps of the run as it was begun: what is recorded follows from them.
 BEGUN_FOR = "n_steps_begun_for"
-# What a later end leaves: who wrote the rows that are there, how, and whose choice effects were.
+# Attributes that a later end leaves: who wrote the rows that are there, how, and who chose effects.
 _KEPT = ("versions", "petsc_options", "effects_on", "effects_off")
-# What it changes beside attributes and facts.
+# Tables that it changes beside attributes and facts.
 CHANGED = ("line/evaluation_range",)
 
 
@@ -41,7 +41,12 @@ def let_go_on(path: Path, header: Header, n_steps: int) -> None:
 
     Parameters
     ----------
-    header : of the run with its later end
+    path : Path
+        Path of the result file.
+    header : Header
+        Header of the run with its later end.
+    n_steps : int
+        Number of steps up to the later end.
 
     Raises
     ------

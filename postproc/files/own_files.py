@@ -39,7 +39,7 @@ REPORT_FILES = (
         if (channel.values or channel.energy) and not channel.own_picture
     ),
 )
-# What a sweep leaves beside a run's files.
+# File that a sweep leaves beside a run's files.
 VARIANT_FILE = "variant.json"
 OWN_FILES = (RUN_FILE, *FIELD_FILES, *REPORT_FILES, VARIANT_FILE)
 

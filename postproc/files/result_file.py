@@ -181,9 +181,12 @@ class ResultFile:
 
         Parameters
         ----------
-        blocks : path in the file -> (rows, ...) array
-        line : rows of the line's channels
-        state : what ``checkpoint`` is to hold, None to leave it
+        blocks : mapping
+            Arrays (rows, ...) by path in the file.
+        line : LineRows
+            Rows of the line's channels.
+        state : mapping or None
+            Contents of ``checkpoint``, None to leave it.
 
         Raises
         ------
@@ -429,7 +432,10 @@ def fault_to_continue(path: Path, time: float) -> str:
 
     Parameters
     ----------
-    time : from which on it goes on [s]
+    path : Path
+        Path of the result file.
+    time : float
+        Time from which on it goes on [s].
 
     Raises
     ------

@@ -316,8 +316,10 @@ def constant_tables(wires: Iterable[str], breaks: Iterable[str]) -> dict[str, Ta
 
     Parameters
     ----------
-    wires : names of the wires
-    breaks : names of those of several pieces
+    wires : iterable of str
+        Names of the wires.
+    breaks : iterable of str
+        Names of the wires of several pieces.
     """
     tables = dict(CONSTANTS)
     for name in wires:
@@ -354,8 +356,10 @@ def growing_tables(
 
     Parameters
     ----------
-    record : which of the line's channels are recorded
-    train : whose channels are recorded, None for all that there are
+    record : LineRecord
+        Which of the line's channels are recorded.
+    train : channels.Train, optional
+        Train whose channels are recorded, None for all channels.
     """
     of_train = {f"channels/{c.name}": c for c in channels.train_channels(train)}
     of_line = {f"line_channels/{name}": channels.CHANNELS[name] for name in record.names}

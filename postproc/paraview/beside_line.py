@@ -25,9 +25,12 @@ def write(scenery: Scenery, snapshots: Snapshots, folder: Path) -> dict[str, Pat
 
     Parameters
     ----------
-    scenery : of the run
-    snapshots : of the line
-    folder : where the files go, which exists
+    scenery : Scenery
+        Scenery of the run.
+    snapshots : Snapshots
+        Snapshots of the line.
+    folder : Path
+        Existing folder to which the files go.
 
     Returns
     -------

@@ -40,10 +40,16 @@ def write_script(
 
     Parameters
     ----------
-    records : what ``guard.examined`` found in the result file
-    motion : factor by which motions are drawn larger, None for one that fits
-    shapes : of the pantographs, None for schematics
-    look : where it is looked at from; None for what shows the line best
+    folder : Path
+        Folder of the run.
+    records : Records or None
+        Findings of ``guard.examined`` in the result file.
+    motion : float, optional
+        Factor by which motions are drawn larger, None for one that fits.
+    shapes : sequence of Shape, optional
+        Shapes of the pantographs, None for schematics.
+    look : View, optional
+        Point of view; None for the one that shows the line best.
 
     Raises
     ------

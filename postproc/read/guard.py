@@ -18,7 +18,7 @@ from catenary.postproc.read.records import Records
 from catenary.postproc.read.validated_file import ValidatedFile
 
 RESULT_FILE = "run.h5"
-# What reading a file may take: so long, and a second for each part of this size [s], [B].
+# Time limit of reading a file: so long, and a second for each part of this size [s], [B].
 LIMIT, PER_SECOND = 30.0, 10e6
 # The process is to be no rank of a run, with its launcher's variables.
 _OF_LAUNCHERS = ("OMPI_", "PMIX_", "PMI_")
@@ -42,8 +42,11 @@ def examined(path: Path, limit: float | None = None) -> Records | None:
 
     Parameters
     ----------
-    path : the result file or the folder that holds it as ``run.h5``
-    limit : after how long the file counts as damaged [s], None for one that follows from its size
+    path : Path
+        Result file, or the folder that holds it as ``run.h5``.
+    limit : float, optional
+        Time after which the file counts as damaged [s], None for one that follows from its
+        size.
 
     Raises
     ------
@@ -92,10 +95,10 @@ def _child(words: list[str], limit: float) -> subprocess.CompletedProcess[bytes]
     )
 
 
-def survives(path: Path, limit: float = LIMIT) -> bool:
-    """Whether HDF5 opens every dataset of a file, without a crash and within ``limit`` [s]."""
+def survives(path: Path) -> bool:
+    """Whether HDF5 opens every dataset of a file, without a crash and within ``LIMIT``."""
     try:
-        done = _child(["-c", _WALK, str(path)], limit)
+        done = _child(["-c", _WALK, str(path)], LIMIT)
     except subprocess.TimeoutExpired:
         return False
     return done.returncode == 0

@@ -29,7 +29,7 @@ class _Table:
 
 
 class MarchedFile:
-    """What `Results` reads, from memory. Not collective.
+    """Tables of a march in memory, which `Results` reads. Not collective.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ class MarchedFile:
         return found
 
     def extremes(self, _: int) -> dict[str, np.ndarray]:
-        """Those of the line's channels."""
+        """Extremes of the line's channels."""
         return self._extremes
 
     def state(self) -> tuple[None, list[str]]:

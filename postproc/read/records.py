@@ -52,9 +52,14 @@ def table_faults(
 
     Parameters
     ----------
-    record : which of the line's channels are there
-    sizes : of dimensions by name; those of the columns are added
-    most : rows that the run plans
+    file : h5py.File
+        Open result file.
+    record : LineRecord
+        Which of the line's channels are recorded.
+    sizes : dict
+        Sizes of dimensions by name; those of the columns are added.
+    most : int
+        Number of rows that the run plans.
     """
     faults: dict[str, str] = {}
     steps, energies, line = growing_tables(record)
@@ -100,11 +105,18 @@ def scan(
 
     Parameters
     ----------
-    about : valid root attributes
-    record : which of the line's channels are there
-    dt : time between two records [s]
-    faults : from ``table_faults``
-    complete : what ``committed_rows`` found earlier, None to find it now
+    file : h5py.File
+        Open result file.
+    about : dict
+        Valid root attributes.
+    record : LineRecord
+        Which of the line's channels are recorded.
+    dt : float
+        Time between two records [s].
+    faults : dict
+        Faults from ``table_faults``.
+    complete : tuple, optional
+        Counts that ``committed_rows`` found earlier, None to find them now.
     """
     n_complete, fault = committed_rows(file) if complete is None else complete
     told = [f"{path} {clause}" for path, clause in faults.items()] + ([fault] if fault else [])

@@ -40,7 +40,7 @@ from catenary.solver.time_loop.views import channels
 _ESSENTIAL_FACTS = ("time_step", "speed", "wave_speed")
 
 
-# What says by which rules a run is judged: one of these, without which there is no report.
+# Attributes that name the rules by which a run is judged; a report needs one of them.
 _RULES = ('its attribute "rules"', 'its attribute "edition"')
 
 

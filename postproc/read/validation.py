@@ -118,7 +118,14 @@ def table_values(
 
     Parameters
     ----------
-    sizes : of dimensions by name; those of the table are added
+    file : h5py.File
+        Open result file.
+    path : str
+        Path of the table in the file.
+    declared : Table
+        Declaration of the table.
+    sizes : dict
+        Sizes of dimensions by name; those of the table are added.
     """
     try:
         values = np.asarray(file[path][()])

@@ -58,10 +58,11 @@ class ColumnGather:
 
         Parameters
         ----------
-        block : (rows, n_owned) float64, C-contiguous, the same number of rows on all ranks; with
-            ``among`` the rank's columns of these alone
-        among : (n_columns,) bool, which columns are gathered, the same on all ranks; what the
-            others hold means nothing. None for all
+        block : ndarray
+            Rows (rows, n_owned) of the rank's columns, float64 and C-contiguous, the
+            same number on all ranks; with ``among`` of these columns alone.
+        among : ndarray, shape (n_columns,), dtype bool, optional
+            Mask of the columns that are gathered, the same on all ranks; None for all.
 
         Returns
         -------

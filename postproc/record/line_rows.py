@@ -136,10 +136,14 @@ class LineGather:
 
         Parameters
         ----------
-        first_step : number of the first one
-        rows : (steps, n) contiguous, of all channels
-        parts : name of a channel -> where in a row its owned columns are
-        all_move : whether any column may have changed; those of ``stage.moving`` if not
+        first_step : int
+            Number of the first step.
+        rows : ndarray, shape (steps, n)
+            Rows of all channels, contiguous.
+        parts : mapping
+            Where in a row the owned columns of a channel are, by its name.
+        all_move : bool
+            Whether any column may have changed; those of ``stage.moving`` if not.
         """
         every, position = self._record.every, rows[:, parts["contact_position"]]
         start, n_steps = -first_step % every, len(position)

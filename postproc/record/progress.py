@@ -1,4 +1,4 @@
-"""What a run shows of itself while it works: its phases, and how far the march has come.
+"""Progress of a run on the terminal: its phases, and how far the march has come.
 
 On a terminal that is a line or a bar which the next one replaces. Elsewhere, as in the log of a
 batch job, it is a plain line for a phase that took long, and one every so often while the line

@@ -172,8 +172,9 @@ class Recorder(Observer):
 
         Parameters
         ----------
-        performance : for instance ``phase_wall_s``, ``march_wall_s``, ``inner_iterations``;
-            needed on rank 0 only
+        performance : mapping, optional
+            Figures such as ``phase_wall_s``, ``march_wall_s`` and ``inner_iterations``,
+            which rank 0 alone needs.
         """
         if not self._broken:
             self._guarded(lambda: self._close(performance or {}))

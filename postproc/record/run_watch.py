@@ -76,7 +76,7 @@ class Watched:
 
 
 def watched(at_rest: LineAtRest, has_train: bool = True) -> Watched:
-    """What the watch of a run on a line at rest needs; without a train contacts are none. Not
+    """Inputs of the watch of a run on a line at rest; without a train contacts are none. Not
     collective."""
     problem, model = at_rest.problem, at_rest.model
     numerics, train = problem.numerics, problem.train

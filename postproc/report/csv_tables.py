@@ -7,7 +7,7 @@ from typing import NamedTuple, TextIO
 
 import numpy as np
 
-from catenary.postproc.evaluate.slack_times import slack_times
+from catenary.postproc.evaluate.statistics import slack_times
 from catenary.postproc.evaluate.wording import fixed
 from catenary.postproc.files.csv_text import csv_text
 from catenary.postproc.read.results import Results

@@ -40,7 +40,7 @@ class _Part(BaseModel):
 
 
 class Conditions(NamedTuple):
-    """What decides which row of a limit holds: speed [km/h], supply, stops above steady arms."""
+    """Conditions that choose the row of a limit: speed [km/h], supply, stops above steady arms."""
 
     speed: float
     supply: str
@@ -231,7 +231,7 @@ class RuleBook(_Part):
 
     @property
     def key(self) -> str:
-        """What chooses it in a scene."""
+        """Name that chooses the book in a scene."""
         return f"{self.name}:{self.edition}" if self.edition else self.name
 
     def is_compared(self, rule: Rule) -> bool:
@@ -277,7 +277,10 @@ def book_of(table: Any, where: str) -> RuleBook:
 
     Parameters
     ----------
-    where : begins sentences about it, such as the name of its file
+    table : object
+        Contents of the TOML file.
+    where : str
+        Name of the source, with which sentences about it begin.
 
     Raises
     ------

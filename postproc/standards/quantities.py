@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-# What a quantity has a value for.
+# Parts of a run that a quantity has a value for.
 RUN, PANTOGRAPH = "run", "pantograph"
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ctypes
 import gc
 
-# Unknowns from which a line's arrays are worth a search for those that only refer to each other.
+# Unknowns from which it pays to search a line's arrays for cycles of references.
 _LONG = 200_000
 
 

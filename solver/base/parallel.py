@@ -35,9 +35,12 @@ def on_root(comm: Any, work: Callable[[], T], *, takes_long: bool = False) -> T:
     Parameters
     ----------
     comm : mpi4py communicator
-    work : callable without arguments, its result must be picklable
-    takes_long : whether it takes far more than milliseconds: the other ranks then sleep until it is
-        done, where MPI would keep their cores busy
+        Communicator of the ranks.
+    work : callable
+        Function without arguments, whose result can be pickled.
+    takes_long : bool, optional
+        Whether the work takes far more than milliseconds: the other ranks then sleep until
+        it is done, where MPI would keep their cores busy.
 
     Raises
     ------

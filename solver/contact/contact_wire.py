@@ -40,7 +40,7 @@ def surface_samples(model: Model) -> tuple[np.ndarray, np.ndarray]:
 
 
 class WireShapes(NamedTuple):
-    """What there is of contact wires: ``nodes`` (n,) of ``NODE`` wire by wire, and samples of their
+    """Shapes of contact wires: ``nodes`` (n,) of ``NODE`` wire by wire, and samples of their
     running ``surface`` (m,) of ``SAMPLE``, ascending in each wire, none of a wire that has none."""
 
     nodes: np.ndarray

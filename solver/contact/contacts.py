@@ -50,7 +50,7 @@ class Answers(NamedTuple):
 
 
 class Gains(NamedTuple):
-    """What answers are worth within a step: of an acceleration ``position`` [s2] and ``velocity``
+    """Gains of answers within a step: of an acceleration ``position`` [s2] and ``velocity``
     [s]; the ``train_speed`` [m/s] of the convective part of rates; how far off links answer to a
     force, ``reach`` [m]."""
 

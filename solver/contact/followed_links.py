@@ -125,9 +125,10 @@ class FollowedLinks:
         return np.concatenate([own, -carries * across])
 
     def energy_of_switching(self, displacement: np.ndarray, begin: int, end: int) -> float:
-        """What elastic energy of the line lacks where owned links have switched, were they springs:
-        slack droppers hold less than K makes of them, and closed stops more than nothing [J].
+        """Elastic energy that owned links add to that of K where they have switched [J].
 
+        It is negative of slack droppers, which hold less than K makes of them, and positive of
+        closed stops; dampers store none.
         ``displacement`` (n_local,) of the line [m]; of the links from ``begin`` to ``end``.
         """
         links = self.links, self.dependents

@@ -222,7 +222,9 @@ class ForcesOnLine:
         self._heights(height, rate)
 
     def responder(self, response: LineResponse) -> Callable[[], None]:
-        """What fills in this rank's share of the inner problem, after ``place`` and the free solve.
+        """Function that fills in this rank's share of the inner problem.
+
+        It is called after ``place`` and the free solve.
 
         The line must then hold the end of the step without contact forces and compensations, and
         the links their reserve there, as a free step leaves them. Links are included if they may

@@ -11,7 +11,7 @@ import numpy as np
 
 from catenary.solver.kernels.native import FLAGS
 
-# What adds up over ranks besides answers.
+# Numbers that add up over ranks besides answers.
 N_FLAGS = FLAGS.itemsize // 8
 
 
@@ -69,7 +69,7 @@ class Bounds(NamedTuple):
 
 
 class Coupled(NamedTuple):
-    """What the small problem needs of all links of the line, by their numbers.
+    """Coupling of all links of the line in the small problem, by their numbers.
 
     ``band`` (n_links, 2 half + 1): ``band[e, d - e + half]`` is by how much a unit compensation of
     link e takes off the reserve of link d; ``released`` (n_links,) share of what is beyond its

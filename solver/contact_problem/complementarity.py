@@ -37,7 +37,7 @@ from catenary.solver.kernels import native
 
 # Mostly one or two rounds are needed; a set that cycles shows within a few.
 _MAX_ROUNDS = 30
-# What there is to say of a step that holds something that is no number.
+# Message of a step that holds NaN or infinity.
 NOT_FINITE = "it has no finite solution; try a smaller numerics.dt_s"
 _NO_SOLUTION = (
     "contacts and slack droppers of this step have no common solution; take a smaller "
@@ -70,7 +70,7 @@ class Depths(NamedTuple):
 
 
 class SmallProblem(NamedTuple):
-    """What kernels solve; see ``small_problem.hpp``.
+    """Small problem as kernels solve it; see ``small_problem.hpp``.
 
     Attributes
     ----------
@@ -96,7 +96,7 @@ class SmallProblem(NamedTuple):
 
 
 class InnerSolution(NamedTuple):
-    """What a step's forces are; the arrays are overwritten by the next step.
+    """Forces of a step; the arrays are overwritten by the next step.
 
     ``contact_force`` (n,) [N]; ``compensation`` (m,) [N] of the links with a row; ``depth`` (n,)
     [m] and its ``rate`` (n,) [m/s] at the contacts; ``rounds`` of all iterations; ``pivoted``
@@ -263,7 +263,7 @@ class InnerProblem:
         return InnerSolution(*found, rounds, self.pivoted, complete)
 
     def problem(self, heads: Affine, line: LineResponse) -> SmallProblem:
-        """What kernels solve; ``unknowns`` are others when more links need room."""
+        """Small problem as kernels solve it; ``unknowns`` are others when more links need room."""
         return SmallProblem(
             heads=heads,
             share=line.share,

@@ -48,7 +48,7 @@ class Coupling(Protocol):
         """
 
     def state(self) -> np.ndarray:
-        """What is remembered from step to step, as one array."""
+        """Memory from step to step, as one array."""
 
     def restore(self, state: np.ndarray) -> None:
         """Continue from what ``state`` returned."""
@@ -60,7 +60,7 @@ class _RemembersLaw:
     law: LawInSteps
 
     def state(self) -> np.ndarray:
-        """What the law remembers."""
+        """Memory of the law."""
         return self.law.state()
 
     def restore(self, state: np.ndarray) -> None:

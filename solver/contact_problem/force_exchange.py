@@ -23,7 +23,7 @@ _NO_NUMBERS, _NO_FORCES = np.zeros(0, dtype=np.int64), np.zeros(0)
 
 
 class Verdict(IntEnum):
-    """What rank 0 tells the others after the inner problem."""
+    """Message of rank 0 to the others after the inner problem."""
 
     ADVANCE = 0
     ADVANCE_AND_STOP = 1

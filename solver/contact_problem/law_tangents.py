@@ -85,7 +85,7 @@ class LawInSteps(Protocol):
         """
 
     def reported(self, force: np.ndarray) -> np.ndarray:
-        """What of the forces (n,) of the latest step is to be recorded [N]."""
+        """Recorded part of the forces (n,) of the latest step [N]."""
 
     def in_loop(self) -> StepLaw:
         """The same for a loop of kernels."""
@@ -98,7 +98,7 @@ class LawInSteps(Protocol):
 
 
 class _Tangents:
-    """What is common to laws that remember nothing."""
+    """Base of laws that remember nothing."""
 
     is_linear = True
 
@@ -182,7 +182,7 @@ class HertzInSteps(_Tangents):
         return super().in_loop()._replace(marched=self)
 
     def state(self) -> np.ndarray:
-        """Speeds of impact of those that touch, or of the next impact."""
+        """Speeds of impact of touching contacts, or of the next impact."""
         return self.speed.copy()
 
     def restore(self, state: np.ndarray) -> None:

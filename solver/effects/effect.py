@@ -29,7 +29,7 @@ class Limit(Enum):
 
 
 class NamedWire(Protocol):
-    """What an effect sees of a wire, such as ``meshgen.wires.Wire``."""
+    """Interface of a wire to effects, such as ``meshgen.wires.Wire``."""
 
     @property
     def name(self) -> str: ...

@@ -67,9 +67,14 @@ def span_matrices(
 
     Parameters
     ----------
-    own, joined : (3, n, n) of its unknowns, and rows of these with columns of the next span's
-    shared : (m,) which of them it shares with the one before
-    most_wide : unknowns that an element may join
+    own : ndarray, shape (3, n, n)
+        Matrices of the span's unknowns.
+    joined : ndarray, shape (3, n, n)
+        Rows of these with columns of the next span's.
+    shared : ndarray, shape (m,)
+        Unknowns that the span shares with the one before.
+    most_wide : int
+        Most unknowns that an element joins.
 
     Raises
     ------

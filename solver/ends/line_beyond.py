@@ -31,7 +31,7 @@ SIDES = ("start", "end")
 
 
 class LineBeyond(NamedTuple):
-    """What goes on beyond an end.
+    """Half line beyond an end.
 
     Attributes
     ----------
@@ -48,11 +48,16 @@ class LineBeyond(NamedTuple):
 
 
 def line_beyond(model: Model, side: int, held: np.ndarray) -> LineBeyond:
-    """The line that goes on beyond the ``START`` or ``END`` of a model. Not collective.
+    """Periodic half line beyond the ``START`` or ``END`` of a model. Not collective.
 
     Parameters
     ----------
-    held : (n,) unknowns that are held between the ends; of the ends themselves none are left out
+    model : Model
+        Discrete line.
+    side : int
+        ``START`` or ``END``.
+    held : ndarray, shape (n,)
+        Unknowns that are held between the ends; of the ends themselves none are left out.
 
     Raises
     ------
@@ -97,7 +102,7 @@ def line_beyond(model: Model, side: int, held: np.ndarray) -> LineBeyond:
                 joined = joined * signs
         span = span_matrices(own, joined, shared, _MOST_WIDE)
         unknowns, everything = at_end + shared, at_end + joins
-        if everything[-1] >= last or not _same_places(model, everything, start + joins):
+        if everything[-1] >= last or (_places(model, everything) != _places(model, start + joins)):
             raise InputError("wires end elsewhere than at its masts")
     except InputError as error:
         raise InputError(f"{where}: {error}") from None
@@ -113,7 +118,10 @@ def span_between(model: Model, mast: float, following: float) -> tuple[np.ndarra
 
     Parameters
     ----------
-    mast, following : places of both masts along the track [m]
+    model : Model
+        Discrete line.
+    mast, following : float
+        Places of both masts along the track [m].
 
     Raises
     ------
@@ -181,11 +189,6 @@ def _difference(one: np.ndarray, other: np.ndarray) -> float:
     """Largest difference of two matrices over the largest entry of the first."""
     largest = float(np.abs(one).max())
     return float(np.abs(one - other).max()) / largest if largest else float((other != 0.0).any())
-
-
-def _same_places(model: Model, unknowns: np.ndarray, others: np.ndarray) -> bool:
-    """Whether unknowns are those of the same wires by the same names."""
-    return _places(model, unknowns) == _places(model, others)
 
 
 def _places(model: Model, unknowns: np.ndarray) -> list[tuple[int, str]]:

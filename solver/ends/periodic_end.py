@@ -32,7 +32,7 @@ _AT_ONCE = 1024
 
 @dataclass(frozen=True)
 class StepSums:
-    """What velocity and displacement are made of in steps of ``dt`` [s]."""
+    """Recursion of velocity and displacement in steps of ``dt`` [s]."""
 
     dt: float
     integration: Integration

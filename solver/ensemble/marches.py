@@ -37,7 +37,7 @@ _MOST_STEPS = 4096
 
 
 class SceneHistory(NamedTuple):
-    """What is kept of a scene's march.
+    """Record of a scene's march.
 
     Attributes
     ----------
@@ -84,8 +84,11 @@ def march_side_by_side(
 
     Parameters
     ----------
-    shared : the line of all scenes
-    scenes : their numbers, problems and lines at rest, which have the matrices of the shared one
+    shared : SharedLine
+        The line of all scenes.
+    scenes : iterable of tuple
+        Numbers, problems and lines at rest of the scenes, which have the matrices of the
+        shared line.
     """
     left = iter(scenes)
     marches: list[_OnItsWay | None] = [None] * N_LANES
@@ -203,7 +206,7 @@ def _steps(
 
 
 def _nothing_of_line(motion: Motion) -> Shown:
-    """What rows show of the line."""
+    """Parts of the rows with values of the line."""
     no_dependents = Dependents(NO_LINKS, np.zeros(1, dtype=np.int64))
     ends = np.array([0, 1])
     columns = Columns(ends, ends, *np.zeros((2, 2, 3), dtype=np.int32))
@@ -215,7 +218,7 @@ def _nothing_of_line(motion: Motion) -> Shown:
 def _ended(
     shared: SharedLine, lane: int, march: _OnItsWay, taken: int, is_left: bool
 ) -> SceneHistory:
-    """What is kept of a scene that is at its end, or left."""
+    """Record of a scene that is at its end, or left."""
     n, rows = march.n, march.rows[: taken + 1]
     extremes = shared.extremes
     position, force, head, wire = (rows[:, k * n : (k + 1) * n] for k in range(4))

@@ -96,7 +96,7 @@ class GeneralizedAlphaLine(LineIntegrator):
     def _ahead(self) -> tuple[AlphaAhead, AlphaSteps] | None:
         by = self._by
         known = by.known_of_balanced + by.known_of_own * by.ratio, by.known_of_own
-        # What b and p before a step do to displacement and velocity until its end.
+        # Effect of b and p before a step on displacement and velocity at its end.
         shares = tuple(zip((by.ratio, 1.0), known, strict=True))
         position = [by.position_of_own * a + by.position_of_known * p for a, p in shares]
         velocity = [by.velocity_of_own * a + by.velocity_of_known * p for a, p in shares]
@@ -116,7 +116,7 @@ class GeneralizedAlphaLine(LineIntegrator):
         )
         operators, (shown, rate, _) = self.operators, self.motion.read[:3]
         total = aligned_arrays.zeros(shown.size, 5)
-        # What products with C read, if there are any.
+        # Input of products with C, if there are any.
         predicted = rate[:0] if self._proportional else operators.rate
         motion = AlphaAhead(operators.factor, rate, total, self._known, shown, steps, predicted)
         return motion, steps

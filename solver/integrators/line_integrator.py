@@ -31,7 +31,7 @@ from catenary.solver.model.partition import Ownership
 from catenary.solver.model.switching_links import NO_LINKS, LinkArrays
 from catenary.solver.window.moving_window import MovingWindow
 
-# What every state of a line has.
+# Arrays of every state of a line.
 MOTION = ("displacement", "velocity", "acceleration")
 
 
@@ -91,9 +91,9 @@ class LineIntegrator(ABC):
         like = self.operators.like
         self.responses = UnitResponses(comm, model, ownership, coefficients, self.windows, like)
         self._proportional = model.damping_is_proportional
-        # What is folded into the product with K, and what is left to do after the solve.
+        # Parts that are folded into the product with K, and parts left for after the solve.
         self._alpha_share = self._beta_share = 0.0
-        # What M and K are in A, if damping leaves it their sum.
+        # Factors of M and K in A, if damping leaves it their sum.
         self._shares: tuple[float, float] | None = None
         if self._proportional:
             alpha, beta_damping = (
@@ -122,7 +122,7 @@ class LineIntegrator(ABC):
 
     @property
     def passes(self) -> StationPasses | None:
-        """What takes free steps in compiled code, None if these are taken in parts."""
+        """Free steps in compiled code, None if these are taken in parts."""
         return self._passes
 
     def load_at(self, time: float) -> None:
@@ -230,7 +230,7 @@ class LineIntegrator(ABC):
         return {name: part() for name, part in self._parts_of_state().items()}
 
     def _parts_of_state(self) -> Mapping[str, Callable[[], np.ndarray]]:
-        """What gives each array of ``state``."""
+        """Functions that give each array of ``state``."""
         return {name: partial(getattr, self, name) for name in MOTION}
 
     def kept(self) -> tuple[np.ndarray, ...]:
@@ -239,8 +239,8 @@ class LineIntegrator(ABC):
         return self.motion.read[:3]
 
     def exact_state(self) -> Mapping[str, Callable[[], np.ndarray]]:
-        """What gives each array of ``state``, and of all that steps like these need to go on as if
-        nothing had happened; to be called before the next step, one after the other."""
+        """Functions that give each array of ``state``, and of all that steps like these need to go
+        on as if nothing had happened; to be called before the next step, one after the other."""
         kept = {name: partial(np.asarray, array) for name, array in self.motion.carried().items()}
         return {**self._parts_of_state(), **kept}
 
@@ -337,7 +337,7 @@ class LineIntegrator(ABC):
         return kinetic, elastic
 
     def energy_parts(self, displacement: np.ndarray, velocity: np.ndarray) -> np.ndarray:
-        """What this rank adds to each of ``energies`` in a motion (n_local,) [J], shape (2,).
+        """This rank's share of each of ``energies`` in a motion (n_local,) [J], shape (2,).
 
         Collective.
         """
@@ -356,7 +356,7 @@ class LineIntegrator(ABC):
         return self.loads is not None and self.loads.memories is not None
 
     def past(self) -> np.ndarray | None:
-        """What ends that go on remember, see ``EndMemories.past``; None if there are none.
+        """Memory of the ends that go on, see ``EndMemories.past``; None if there are none.
         Collective."""
         memories = None if self.loads is None else self.loads.memories
         return None if memories is None else memories.past()

@@ -32,7 +32,7 @@ class Motion(NamedTuple):
 
 
 class Steps(NamedTuple):
-    """What a step of Newmark's method is made of: dt [s]; what an acceleration before the step adds
+    """Factors of a step of Newmark's method: dt [s]; what an acceleration before the step adds
     to the predictions of displacement [s2] and velocity [s]; what of the velocity products with K
     read [s]; what the acceleration after it adds to both; and the part of damping on mass that the
     acceleration lacks [1/s]."""
@@ -99,7 +99,7 @@ class LineState:
         x[:], y[:], z[:] = displacement, velocity, acceleration
 
     def carried(self) -> Mapping[str, np.ndarray]:
-        """What of a state is kept otherwise than as it is, by name: the arrays themselves."""
+        """Arrays of a state that are kept in another form, by name; no copies."""
         return {}
 
     def take(self, state: Mapping[str, np.ndarray]) -> None:
@@ -172,7 +172,7 @@ class PredictedLineState(LineState):
 
 
 class AlphaSteps(NamedTuple):
-    """What a step of the generalized-alpha method is made of, from one state ahead to the next.
+    """Factors of a step of the generalized-alpha method, from one state ahead to the next.
 
     With b the acceleration that balances the forces, p the known one and a = p + r b: shares of b
     and of p before a step in what is ``known`` in it, and in what ``velocity`` and ``balance``,

@@ -70,8 +70,18 @@ def make_line(
 
     Parameters
     ----------
-    only_free : whether its steps will all be free ones, not taken in parts
-    wanted : which part of the line they need at a time, None if all of it
+    comm : mpi4py communicator
+        Communicator of the ranks.
+    model : Model
+        Discrete line.
+    ownership : Ownership
+        Which unknowns this rank owns.
+    numerics : Numerics
+        Time step and integrator of the run.
+    only_free : bool, optional
+        Whether all steps are free ones, not taken in parts.
+    wanted : WantedPieces, optional
+        Part of the line that steps need at a time, None if all of it.
     """
     if numerics.integrator == NEWMARK:
         line: LineIntegrator = NewmarkLine(comm, model, ownership, numerics, wanted)

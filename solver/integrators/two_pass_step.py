@@ -70,7 +70,7 @@ class Changes(NamedTuple):
 
 
 class PassParts(NamedTuple):
-    """What passes are made of besides layouts; ``station_types`` as in ``Sections``."""
+    """Inputs of passes besides layouts; ``station_types`` as in ``Sections``."""
 
     station_types: Sequence[Sequence[int]]
     rows: ProductArrays
@@ -146,7 +146,7 @@ class StationPasses:
         self.native.track(self.tracked(links, reserve))
 
     def tracked(self, links: LinkArrays, reserve: np.ndarray) -> TrackedLinks:
-        """What kernels need for that."""
+        """Arguments of the kernels for that."""
         n_pairs = max(0, self._starts.size - 2) // 2
         n_stretches = -(-n_pairs // self._stretch)
         ranges = np.zeros((1 + max(1, n_stretches), 2), dtype=np.int64)

@@ -67,7 +67,7 @@ class LineProducts:
         self._products: dict[str, StationProduct | None] = {}
 
     def prepare(self) -> None:
-        """Make those that no step, and no energy, is to wait for."""
+        """Make the products that steps and energies need, before the first of them."""
         for name in ("stiffness", "mass"):
             self.by_stations(name)
         self._stiffness = None

@@ -112,7 +112,7 @@ class LineOperators:
         self._block, self._pad = model.numbering.block, model.numbering.width
         self._product_event, self._solve_event = event("LineProduct"), event("LineSolve")
         if in_pieces is not None:
-            # What is solved for is verified piece by piece.
+            # Solutions are verified piece by piece.
             self._solve_apart(windows)
             self._products.prepare()
             return
@@ -144,7 +144,7 @@ class LineOperators:
     def by_stations(
         self, damped: bool, shares: tuple[float, float] | None = None
     ) -> ByStations | None:
-        """What a step in two passes works on, None unless all goes by stations. Not collective.
+        """Operators of a step in two passes, None unless all goes by stations. Not collective.
 
         The operator is then factored and multiplied by stations, and solved for in one application.
         ``damped`` steps need a product with C, of ``rate``, too. If A is a sum of M and K, the

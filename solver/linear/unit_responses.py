@@ -15,14 +15,14 @@ from scipy import linalg
 
 from catenary.base.errors import RunBroken
 from catenary.solver.kernels import native
-from catenary.solver.linear.operator_bands import OperatorBands
 from catenary.solver.linear.stations.like_stations import LikeStations
 from catenary.solver.model.alike import kinds_of
+from catenary.solver.model.entries import iterate_entries
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import Ownership
 from catenary.solver.model.unknowns.registry import Unknowns
 
-# What may stand outside the windows, relative to the peak: round-off of one solve.
+# Allowed part outside the windows, relative to the peak: round-off of one solve.
 _LEAK = 1e-13
 # How much further than windows a stretch reaches, of the reach, to see whether columns leak.
 _SEEN = 0.25
@@ -32,18 +32,66 @@ STRETCH = 60.0
 # columns are looked at first: what forces on heights are felt at is mostly narrower.
 _LONG = 100.0
 _PROBES = 12
-# What may stand outside of windows that are made narrower, and how much wider they are than seen.
+# Allowed part outside of windows that are made narrower, and how much wider they are than seen.
 # A column that is cut there acts like a force of this share beside its own: 1e-10 N.
 _FELT, _MARGIN = 1e-12, 1.1
-# What may stand outside of windows that cannot be made wider any more: a force of 1e-7 N beside its
+# Allowed part outside of windows that cannot be made wider any more: a force of 1e-7 N beside its
 # own. Columns fade with the way, so that this bears them half as wide again as those tried.
 FELT_AT_MOST = 1e-9
 # By how much that reach grows where some column is felt further.
 _MORE = 1.5
 
 
+# Unknowns whose bands are put together at once, some ninety spans of two wires: entries of a
+# hundred elements take nearly as long as those of a thousand.
+_AT_ONCE = 2**14
+
+
+class OperatorBands:
+    """Lower bands of A, as LAPACK takes them. Not collective.
+
+    Parameters
+    ----------
+    model : Model
+    coefficients : of M, K and C in A
+    end : unknown beyond which none are asked for
+    """
+
+    def __init__(self, model: Model, coefficients: tuple[float, float, float], end: int) -> None:
+        self._model, self._coefficients, self._end = model, coefficients, end
+        self._first = self._last = 0
+        self._numbers = np.zeros((1, 0))
+
+    def between(self, first: int, last: int) -> np.ndarray:
+        """Bands of the unknowns from ``first`` to before ``last``, alone; (k, last - first).
+
+        Number j of band i is the entry of A in row ``first`` + j + i and column ``first`` + j. What
+        is in rows from ``last`` on is not to be read.
+        """
+        if first < self._first or last > self._last:
+            self._put_together(first, max(last, min(first + _AT_ONCE, self._end)))
+        numbers = self._numbers[:, first - self._first : last - self._first]
+        bands = max(1, min(len(numbers), last - first))
+        while bands > 1 and not numbers[bands - 1, : last - first + 1 - bands].any():
+            bands -= 1
+        return numbers[:bands]
+
+    def _put_together(self, first: int, last: int) -> None:
+        parts = list(iterate_entries(self._model, first, last, *self._coefficients))
+        held = self._model.constrained_between(first, last)
+        parts.append((held, held, np.ones(held.size)))
+        rows, columns, values = (np.concatenate(part) for part in zip(*parts, strict=True))
+        lower = (columns <= rows) & (columns >= first)
+        rows, columns, values = rows[lower], columns[lower], values[lower]
+        apart, n = rows - columns, last - first
+        bands = int(apart.max(initial=0)) + 1
+        flat = np.bincount(n * apart + columns - first, weights=values, minlength=n * bands)
+        self._first, self._last = first, last
+        self._numbers = np.asarray(flat, dtype=float).reshape(bands, n)
+
+
 class FeltFurther(RunBroken):
-    """A column reaches further than those that were tried; raised on all ranks."""
+    """A column reaches further than all columns that were tried; raised on all ranks."""
 
 
 class Windows(NamedTuple):
@@ -125,8 +173,14 @@ class UnitResponses:
 
         Parameters
         ----------
-        x : (n,) where each place is [m]
-        half_length : (n,) how far its unknowns reach to both sides of it [m], zero if left out
+        dofs : ndarray, shape (n, k, m)
+            Unknowns of k forces at each of n places.
+        weights : ndarray, shape (n, k, m)
+            Weights on these.
+        x : ndarray, shape (n,)
+            Places [m].
+        half_length : ndarray, shape (n,), optional
+            Reach of the unknowns of a place to both sides of it [m], zero if left out.
 
         Raises
         ------
@@ -140,7 +194,7 @@ class UnitResponses:
                 at, data = self.solve(places, like, reach)
                 return ShortColumns(places.begin, at, places.width, data, reach)
             except FeltFurther:
-                # What was tried for the reach were some of the columns.
+                # Some of the columns were tried for the reach.
                 reach = min(self.windows.reach, _MORE * reach)
                 windows = self.windows._replace(reach=reach)
                 places = Places.of(windows, self._ownership, dofs, weights, x, places.half)
@@ -315,10 +369,6 @@ class Places(NamedTuple):
             for station in (first, last)
         )
         return cls(dofs, weights, x, half, first, last, low - ownership.first, high - low)
-
-    def of_numbers(self, which: np.ndarray) -> Places:
-        """Some of them."""
-        return Places(*(part[which] for part in self))
 
 
 def _stretches(x: np.ndarray, chosen: np.ndarray) -> list[np.ndarray]:

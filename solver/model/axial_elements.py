@@ -59,7 +59,7 @@ def curve_rows(model: Model, wire: str) -> np.ndarray:
 
 
 def rows_in_curve(curve: Curve | None, x: np.ndarray) -> np.ndarray:
-    """That of elements with ends at ``x`` (n, 2) [m], zero on straight track."""
+    """Curvature of elements with ends at ``x`` (n, 2) [m], zero on straight track."""
     if curve is None:
         return np.zeros((len(x), 4))
     length = np.diff(x, axis=1)

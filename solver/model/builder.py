@@ -138,7 +138,7 @@ class ModelBuilder:
         model.droppers = Links(DROPPERS, dropper_directions(model), laws, of_shape=True)
         model.links.append(model.droppers)
         matrices = model.droppers.stiffness_matrices
-        # Of what is slack at rest K holds only what it keeps of its stiffness.
+        # Of links that are slack at rest K holds the stiffness that they keep.
         slack = model.dropper_gap > 0.0
         matrices[slack] *= model.simulated.kept_ratio
         for number, group in enumerate(self.problem.line.droppers):

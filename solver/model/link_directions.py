@@ -13,9 +13,9 @@ if TYPE_CHECKING:
     from catenary.solver.model.model import Model
 
 
-def at_nodes(model: Model, nodes: np.ndarray, unknown: str = "w") -> Direction:
-    """Stretch that is the displacement of a node each, ``nodes`` (n,): links to the ground."""
-    unknowns = model.dofs(nodes, unknown)[:, None]
+def at_nodes(model: Model, nodes: np.ndarray) -> Direction:
+    """Vertical displacement of a node each, ``nodes`` (n,), as stretch: links to the ground."""
+    unknowns = model.dofs(nodes, "w")[:, None]
     return Direction(unknowns, np.ones(unknowns.shape))
 
 

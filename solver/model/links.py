@@ -80,7 +80,7 @@ class Links:
 
     @property
     def stiffness_matrices(self) -> np.ndarray:
-        """k L L^T of each, shape (n, m, m) [N/m]; zero of those that stand open."""
+        """k L L^T of each, shape (n, m, m) [N/m]; zero of open links."""
         weights = self.direction.weights
         stiffness = np.where(self.law["open"], 0.0, self.law["stiffness"])
         return np.asarray(stiffness[:, None, None] * weights[:, :, None] * weights[:, None, :])
@@ -98,13 +98,19 @@ def law(
 
     Parameters
     ----------
-    place : (n,) along the track [m]
-    stiffness : [N/m], > 0
-    rest : force at rest [N], > 0 in tension, which the rest shape is found with
-    acts : ``BOTH``, ``PULLS`` or ``PUSHES``
-    damping : [N s/m] of open links; those of K have that of their component only
-    gap : stretch [m] by which an open link of one sign is away from acting at rest, >= 0; None for
-        links of K
+    place : ndarray, shape (n,)
+        Places along the track [m].
+    stiffness : float or ndarray
+        Stiffness [N/m], > 0.
+    rest : float or ndarray, optional
+        Force at rest [N], > 0 in tension, which the rest shape is found with.
+    acts : int, optional
+        ``BOTH``, ``PULLS`` or ``PUSHES``.
+    damping : float or ndarray, optional
+        Damping [N s/m] of open links; those of K have that of their component only.
+    gap : float or ndarray, optional
+        Stretch [m] by which an open link of one sign is away from acting at rest, >= 0;
+        None for links of K.
 
     Raises
     ------

@@ -30,7 +30,7 @@ _TOGETHER = 16
 
 @dataclass(frozen=True)
 class Block:
-    """Equal-sized element matrices of one component, those that are alike stored once.
+    """Equal-sized element matrices of one component; like matrices are stored once.
 
     Attributes
     ----------

@@ -29,7 +29,7 @@ from catenary.solver.model.links import BOTH, NO_BENDS, PUSHES, Bends, Links
 from catenary.solver.model.model import Model
 
 _SIDES: tuple[Literal["left"], Literal["right"]] = ("left", "right")
-# What a link's reserve is made of, and what it does beyond; see `kernels/motion/links.hpp`.
+# Parts of a link's reserve, and its law beyond; see `kernels/motion/links.hpp`.
 RESERVE = native.RESERVE
 
 
@@ -47,8 +47,8 @@ class LinkArrays(NamedTuple):
 
 
 class Dependents(NamedTuple):
-    """What goes with links that switch: ``links`` of m dependents, of which those from
-    ``begin[d]`` to ``begin[d + 1]`` go with link d, ``begin`` (n + 1,)."""
+    """Dependents of n links that switch: ``links`` (m,), of link d the numbers from ``begin[d]`` to
+    before ``begin[d + 1]``; ``begin`` (n + 1,)."""
 
     links: LinkArrays
     begin: np.ndarray
@@ -97,7 +97,7 @@ class LinkTable:
 
     @property
     def slackens(self) -> np.ndarray:
-        """(n,) whether each is a link of K that slackens, and no open one that closes."""
+        """(n,) mask of the links of K, which slacken; open links close instead."""
         return np.asarray(self.arrays.law["carried"] > 0.0)
 
     def bends_of(self, numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -146,7 +146,7 @@ def switching_links(model: Model, dropper_force: np.ndarray) -> LinkTable:
     for links, first in zip(model.links, firsts, strict=True):
         bends, slack = links.bends, np.zeros(links.bends.link.size, dtype=bool)
         alpha = np.full(links.law.size, model.damping_of(links.component)[0])
-        # Those that push are followed turned.
+        # Links that push are followed turned.
         given, turned = links.law["acts"] != BOTH, links.law["acts"] == PUSHES
         numbers = np.where(given, first + np.cumsum(given) - 1, -1)
         if links is model.droppers:
@@ -259,7 +259,7 @@ def _bends(links: Links, bends: Bends, alpha: np.ndarray, sign: np.ndarray) -> L
 
 
 def _dependents(model: Model) -> list[tuple[LinkArrays, np.ndarray]]:
-    """What goes with droppers that may slacken, and numbers of these."""
+    """Dependents of droppers that may slacken, and the numbers of these droppers."""
     found: list[tuple[LinkArrays, np.ndarray]] = []
     if model.droppers is None:
         return found
@@ -277,7 +277,7 @@ def _dependents(model: Model) -> list[tuple[LinkArrays, np.ndarray]]:
 
 
 def _one_sign(model: Model, links: Links) -> LinkArrays:
-    """Those of a set that act one way, turned so that they pull."""
+    """Links of a set that act one way, turned so that they pull."""
     given = links.law["acts"] != BOTH
     own = links.law[given]
     turned = np.where(own["acts"] == PUSHES, -1.0, 1.0)

@@ -25,7 +25,7 @@ class WireEnd(NamedTuple):
 
 
 def ends_of(model: Model) -> list[WireEnd]:
-    """Ends of all wires but those that clamps carry, wire by wire in order of x."""
+    """Ends of all wires, without ends that clamps carry, wire by wire in order of x."""
     mesh, along = model.mesh, model.problem.along
     masts = model.problem.line.support_positions
     line_ends = float(masts[0]), float(masts[-1])

@@ -1,4 +1,4 @@
-"""What holds wires along the track, and how warm they are: data only."""
+"""Tensioners, mid-point anchors and temperature of wires along the track: data only."""
 
 from __future__ import annotations
 

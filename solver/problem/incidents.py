@@ -1,4 +1,4 @@
-"""What may happen to a line during a run: droppers that break, wires that lose tension.
+"""Incidents of a line during a run: droppers that break, wires that lose tension.
 
 Data only; `after_incidents` changes the line, `march` decides when. What may happen to a
 pantograph stands with its placement (`mbs.lowering`).
@@ -42,7 +42,7 @@ class Happened:
 
 
 def in_steps(incidents: Sequence[LineIncident], dt: float) -> list[Happened]:
-    """What has happened after each step in which something happens, by ascending step.
+    """Incidents up to the end of each step in which one happens, by ascending step.
 
     Times are rounded to the nearest end of a step of ``dt`` [s].
     """

@@ -8,18 +8,17 @@ spectrum of contact wires with its constants is known to us, so that all of them
 
 from __future__ import annotations
 
-import zlib
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from catenary.mbs.vehicle.irregularity import sines
+
 if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline
 
-# Waves of a sum: over a factor of 33 in wavelength each stands for 3 % of it.
-N_WAVES = 120
 # How close to a bend the slopes of its two sides are taken [m].
 _BESIDE = 1e-6
 
@@ -51,17 +50,8 @@ class HeightSpectrum:
         return np.asarray(self.deviation**2 * part / whole)
 
     def waves(self, wire: str) -> Waves:
-        """The sines of a wire; wires have phases of their own.
-
-        Each has the power of its part of the spectrum (M. Shinozuka, C.-M. Jan, Digital simulation
-        of random processes, J. Sound Vib. 25, 1972).
-        """
-        lowest, highest = 2 * np.pi / self.longest, 2 * np.pi / self.shortest
-        edges = np.geomspace(lowest, highest, N_WAVES + 1)
-        power = self.variance(edges[:-1], edges[1:])
-        random = np.random.default_rng([self.seed, zlib.crc32(wire.encode())])
-        phase = random.uniform(0.0, 2 * np.pi, N_WAVES)
-        return Waves(np.sqrt(2.0 * power), np.sqrt(edges[:-1] * edges[1:]), phase)
+        """The sines of a wire; wires have phases of their own."""
+        return Waves(*sines(self.variance, (self.shortest, self.longest), self.seed, wire))
 
     def _primitive(self, number: np.ndarray | float) -> np.ndarray:
         power = 1.0 - self.exponent
@@ -136,7 +126,7 @@ class Heights:
         return np.unique(np.concatenate(found))
 
     def _window(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """What random heights are multiplied by, and its slope."""
+        """Factor of random heights, and its slope."""
         assert self.spectrum is not None
         start, end = self.stretch
         fade = min(self.spectrum.longest, 0.5 * (end - start))

@@ -2,7 +2,7 @@
 
 # Component of the stops above steady arms, one for each of these.
 UPLIFT_STOPS = "arm_stops"
-# What a gauge shows, in the order of its tables.
+# Values of a gauge, in the order of its tables.
 TENSION, TRAVEL, WEIGHT = "wire_end_tension", "wire_end_travel", "tensioner_weight"
 LOW_STOP, HIGH_STOP = "tensioner_low_stop", "tensioner_high_stop"
 GAUGES = (TENSION, TRAVEL, WEIGHT, LOW_STOP, HIGH_STOP)

@@ -47,7 +47,7 @@ class Parts:
 
 @dataclass(frozen=True)
 class SchemeFactory:
-    """What parts are made of, whatever has happened to the line. ``make`` is collective.
+    """Inputs of parts, whatever has happened to the line. ``make`` is collective.
 
     Parameters
     ----------

@@ -84,7 +84,7 @@ class WholeSystem:
             0.0 if flow is None else steady_forces(kind, flow.speed).on_frame
             for flow, kind in zip(flows, data, strict=True)
         ]
-        # What the base spring pushes where masses are at that level: it carries nothing when the
+        # Push of the base spring where masses are at that level: it carries nothing when the
         # head presses with the static force at its nominal height.
         self._base = np.array(
             [

@@ -120,7 +120,7 @@ class OneSolve:
             self.pantographs.advance(force, self.coupling.law.reported(force), found.depth)
 
     def state(self) -> np.ndarray:
-        """What coupling and law remember, as one array."""
+        """Memory of coupling and law, as one array."""
         return self.coupling.state()
 
     def restore(self, state: np.ndarray) -> None:
@@ -179,7 +179,7 @@ class OneSolve:
                 return reply
 
     def _heads(self, time: float) -> Heads | None:
-        """What rank 0 predicts of the heads, None if a pantograph cannot go on."""
+        """Prediction of the heads on rank 0, None if a pantograph cannot go on."""
         try:
             heads = self.pantographs.predict(time)
             if self.coupling.extrapolates:
@@ -199,7 +199,7 @@ class OneSolve:
         return why
 
     def _answer(self, time: float, response: LineResponse, heads: Heads | None) -> Reply:
-        """What rank 0 makes of all shares."""
+        """Solution of the inner problem on rank 0 from the shares of all ranks."""
         self._found = None
         if heads is None:
             return Reply(Verdict.BROKEN, self._none)

@@ -1,4 +1,4 @@
-"""What a scheme is: a way through a time step for line and pantographs."""
+"""Interface of a scheme: a way through a time step for line and pantographs."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def find_crossings(interaction: ForcesOnLine, pantographs: Pantographs, time: fl
 
 @dataclass
 class Counters:
-    """What the steps of a run needed.
+    """Counts of the work of a run's steps.
 
     ``repeated_steps``: bounds of what may slacken were too small; ``pivoted_steps``: the active
     set of contacts and slack droppers cycled, and pivoting found it; ``unconverged_steps``:
@@ -96,7 +96,7 @@ class Scheme(Protocol):
         they are not counted."""
 
     def state(self) -> np.ndarray:
-        """What has to be known of contacts to continue, as one array."""
+        """State of the contacts from which a run continues, as one array."""
 
     def restore(self, state: np.ndarray) -> None:
         """Continue from what ``state`` returned."""

@@ -72,9 +72,12 @@ class StepError:
 
         Parameters
         ----------
-        time : end of the step [s]
-        depth, force, stiffness : (n,) found there [m], [N], [N/m], the latter of the law's tangent
-        compliance : (n,) D, what a force takes off the depth within the step [m/N]
+        time : float
+            End of the step [s].
+        depth, force, stiffness : ndarray, shape (n,)
+            Depths, forces and tangent stiffnesses of the contacts [m], [N], [N/m].
+        compliance : ndarray, shape (n,)
+            D, depth that a unit force takes off within the step [m/N].
         """
         if self._known < _PAST:
             return None

@@ -56,8 +56,10 @@ class Elasticity:
 
         Parameters
         ----------
-        height : (n, w) of the wires at rest [m]
-        force : [N]
+        height : ndarray, shape (n, w)
+            Heights of the wires at rest [m].
+        force : float
+            Static force [N].
         """
         if height.shape[1] == 1:
             return np.asarray(height[:, 0] + force * self.compliance[:, 0, 0])
@@ -175,7 +177,7 @@ def _seen_from(model: Model, x_from: float, x_to: float) -> sparse.csc_matrix:
         matrix = part_of(model, near, near, stiffness, 1.0, numbering.block).tocsc()
         matrix.eliminate_zeros()
         condensed, motion = _condensed(matrix, first - low, last - low)
-        # What moves at the ends of what was looked at, wherever the line goes on there.
+        # Motion at the ends of the examined stretch, wherever the line goes on there.
         ends = [motion[:width]] if low > 0 else []
         ends += [motion[-width:]] if high < numbering.size else []
         most = _STILL * np.abs(motion).max(initial=0.0)

@@ -90,9 +90,12 @@ def line_at_rest_on_all(
 
     Parameters
     ----------
-    problem, mesh : the same on all ranks
+    problem, mesh : Problem
+        Problem and mesh of the line, the same on all ranks.
     comm : mpi4py communicator
-    alone : wraps the work of rank 0, e.g. to end it in good order at a signal
+        Communicator of the ranks.
+    alone : callable, optional
+        Function that wraps the work of rank 0, e.g. to end it in good order at a signal.
 
     Raises
     ------

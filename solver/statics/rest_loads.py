@@ -13,8 +13,8 @@ _LEVEL = ("v", "theta_z")
 
 
 def dead_loads(model: Model) -> np.ndarray:
-    """What no shape changes, (n_dofs,) [N], [N m]: weights, their part sideways on a canted track,
-    the mean wind, and what links have that do not follow the shape at rest."""
+    """Loads that no shape changes, (n_dofs,) [N], [N m]: weights, their part sideways on a canted
+    track, the mean wind, and forces of links that do not follow the shape at rest."""
     weight = model.weight
     load = weight.copy()
     for links in model.links:
@@ -41,7 +41,7 @@ def dead_loads(model: Model) -> np.ndarray:
 
 
 def curve_load(model: Model) -> np.ndarray:
-    """What the tension of the installation pulls towards the centre of a curve, (n_dofs,) [N],
+    """Pull of the tension of the installation towards the centre of a curve, (n_dofs,) [N],
     [N m]. A course y across a track of curvature c has the curvature y'' + c in plan."""
     load = np.zeros(model.n_dofs)
     for wire in model.problem.line.wires if model.problem.line.curve is not None else ():
@@ -53,7 +53,7 @@ def curve_load(model: Model) -> np.ndarray:
 
 
 def exact_moments(model: Model) -> np.ndarray:
-    """What exact elements add to ``dead_loads`` and ``curve_load`` of a line in still air,
+    """Moments that exact elements add to ``dead_loads`` and ``curve_load`` of a line in still air,
     (n_dofs,) [N m]: under a uniform load their ends carry smaller moments. Droppers have no part in
     it."""
     load, line = np.zeros(model.n_dofs), model.problem.line

@@ -73,7 +73,7 @@ def _place_of(model: Model, unknown: int) -> float:
 
 
 def _pushed_near(model: Model, x: float) -> str:
-    """What is pushed near a place, in words."""
+    """Name of the arm or wire that is pushed near a place [m], in words."""
     form, mesh = model.form, model.mesh
     if form is not None and form.lateral is not None:
         tension, places = form.lateral.arm_tension, mesh.x(mesh.steady_arms)

@@ -46,7 +46,7 @@ class WireAtRest:
 
     @property
     def along(self) -> float:
-        """What the tension changes by along the wire, as a share, tensioners aside."""
+        """Change of the tension along the wire, as a share, tensioners aside."""
         return float(np.ptp(self.change))
 
     @property

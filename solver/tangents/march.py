@@ -63,9 +63,12 @@ def march_with_tangents(comm: Any, at_rest: LineAtRest, changes: Sequence[Change
 
     Parameters
     ----------
-    comm : mpi4py communicator of this process alone
-    at_rest : the line
-    changes : derivatives of its set-up by each parameter
+    comm : mpi4py communicator
+        Communicator of this process alone.
+    at_rest : LineAtRest
+        Line at rest.
+    changes : sequence of Change
+        Derivatives of its set-up by each parameter.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What a march is made of, as numbers, and their derivatives by a parameter.
+"""Set-up of a march as numbers, and its derivatives by a parameter.
 
 A march depends on a parameter through its set-up only: matrices and links of the line, the wires'
 shape at rest, heads, contact law, train. These are differentiated here by central differences of
@@ -123,14 +123,18 @@ def set_up_of(
     n_steps: int | None = None,
     same_line: SetUp | None = None,
 ) -> SetUp:
-    """What a march from a line at rest is made of. Not collective: one process.
+    """Set-up of a march from a line at rest. Not collective: one process.
 
     Parameters
     ----------
-    comm : mpi4py communicator of this process alone
-    at_rest : the line
-    n_steps : whose drives are wanted; those of the march if not given
-    same_line : of a march of the same line at rest, whose matrices are taken over
+    comm : mpi4py communicator
+        Communicator of this process alone.
+    at_rest : LineAtRest
+        Line at rest.
+    n_steps : int, optional
+        Number of steps whose drives are wanted; of all steps if not given.
+    same_line : SetUp, optional
+        Set-up of another march of the same line at rest, whose matrices are taken over.
 
     Raises
     ------
@@ -208,10 +212,14 @@ def differentiate(set_up: Callable[[float], SetUp], now: SetUp, step: float, wha
 
     Parameters
     ----------
-    set_up : the set-up where the parameter is changed by its argument
-    now : the set-up of the march
-    step : by how much it is changed, of which set-ups at one and two are taken to either side
-    what : the parameter, for sentences
+    set_up : callable
+        Function that gives the set-up with the parameter changed by its argument.
+    now : SetUp
+        The set-up of the march.
+    step : float
+        Change of the parameter; set-ups are taken one and two changes to either side.
+    what : str
+        Name of the parameter, for messages.
 
     Raises
     ------
@@ -252,9 +260,6 @@ def differentiate(set_up: Callable[[float], SetUp], now: SetUp, step: float, wha
             return StepChange(_NO_STEP, (), step)
         return StepChange(LinearStep(*map(np.ascontiguousarray, parts)), (), step)
 
-    def of_state(number: int) -> np.ndarray:
-        return of(lambda one: one.states[number])
-
     pantographs = range(len(now.heads))
     start, speed = or_none(of(lambda one: one.start)), float(of(lambda one: one.speed))
     if (start.size or speed) and now.follows_surface:
@@ -273,7 +278,7 @@ def differentiate(set_up: Callable[[float], SetUp], now: SetUp, step: float, wha
         links=or_none(of(lambda one: one.links)),
         weights=or_none(of(lambda one: one.weights)),
         heads=[of_head(number) for number in pantographs],
-        states=[of_state(number) for number in pantographs],
+        states=[of(lambda one, n=number: one.states[n]) for number in pantographs],
         drives=or_none(of(lambda one: one.drives)),
         law=or_none(of(lambda one: one.law)),
         hertz=or_none(of(lambda one: one.hertz)),

@@ -120,7 +120,11 @@ class TangentSteps(CompiledSteps):
                 _tangent(change, motion, n, results)
                 for change, motion, results in zip(changes, motions, self._by_tangent, strict=True)
             ],
-            [_without_chains(heads) for heads in zip(*others, strict=True)],
+            [
+                # A linear chain has none.
+                [head.stepped for head in heads if isinstance(head, SteppedHead)]
+                for heads in zip(*others, strict=True)
+            ],
             scheme.interaction.links.local,
             first,
             self.switches,
@@ -150,6 +154,8 @@ class TangentSteps(CompiledSteps):
 
 def _tangent(change: Change, motion: FurtherMotion, n: int, results: np.ndarray) -> Tangent:
     """A tangent at the start of a march with n contacts."""
+    # Derivatives of the speeds of impact that a Hertzian law starts with [m/s].
+    least_speeds = np.full(n, change.hertz[3] if change.hertz.size else 0.0)
     return Tangent(
         motion.free,
         motion.loads,
@@ -163,18 +169,8 @@ def _tangent(change: Change, motion: FurtherMotion, n: int, results: np.ndarray)
             for head, state in zip(change.heads, change.states, strict=True)
         ],
         change.drives,
-        LawChange(change.law, change.hertz, _least_speeds(change, n), np.zeros(n)),
+        LawChange(change.law, change.hertz, least_speeds, np.zeros(n)),
         change.start,
         change.speed,
         results,
     )
-
-
-def _without_chains(heads: Sequence[LinearStep | SteppedHead]) -> list[native.Head]:
-    """Of a pantograph in several set-ups what steps it, none of a linear chain."""
-    return [head.stepped for head in heads if isinstance(head, SteppedHead)]
-
-
-def _least_speeds(change: Change, n: int) -> np.ndarray:
-    """Derivatives of the speeds of impact that a Hertzian law starts with (n,) [m/s]."""
-    return np.full(n, change.hertz[3] if change.hertz.size else 0.0)

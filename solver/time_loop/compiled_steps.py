@@ -29,7 +29,7 @@ from catenary.solver.time_loop.views.step_views import Showing, Shown
 from catenary.solver.window.moving_columns import MovedStations
 from catenary.solver.window.moving_window import MOST_STEPS
 
-# What rows of a block may take, so that it stays in the caches [B], and the most of them.
+# Size of the rows of a block, so that it stays in the caches [B], and the most of them.
 _BLOCK_BYTES, _MOST_ROWS = 2**19, MOST_STEPS
 # Rows of a block at least, if what moves is a part of the line only.
 _ROWS_OF_PART = 64
@@ -39,7 +39,7 @@ _MOTION_BYTES, _MOST_MOTIONS = 2**21, 16
 
 
 class KeptMotions(NamedTuple):
-    """What is kept of steps that the line goes on from, see ``ShownMotion``.
+    """Motions that are kept of steps before the last of a block, see ``ShownMotion``.
 
     Attributes
     ----------
@@ -63,7 +63,7 @@ class KeptMotions(NamedTuple):
 
 
 class StepParts(NamedTuple):
-    """What steps are made of; see `kernels/steps/steps.hpp`. ``free`` is None where others take
+    """Arguments of native steps; see `kernels/steps/steps.hpp`. ``free`` is None where others take
     free steps."""
 
     speed: float
@@ -84,7 +84,7 @@ class StepParts(NamedTuple):
 
 
 class Block(NamedTuple):
-    """What a block of steps is told, and what it fills in; see `kernels/steps/steps.hpp`."""
+    """Inputs and outputs of a block of steps; see `kernels/steps/steps.hpp`."""
 
     times: np.ndarray
     drives: np.ndarray
@@ -123,7 +123,7 @@ class CompiledSteps:
         self.times = np.zeros(self.most)
         self._moved = MovedStations(len(self.rows), showing.shown.columns)
         self.taken, self._block = 0, slice(0, 0)
-        # The step before those that are prepared, and of these how many there are, and are taken.
+        # The step before the prepared ones, and how many of these there are, and are taken.
         self._first, self._ready, self._done = -1, 0, 0
         n_numbers = 2 * scheme.interaction.line.ownership.n_local
         most = _MOST_MOTIONS
@@ -244,11 +244,9 @@ class CompiledSteps:
             motion = (begin, end), room.numbers[first:last]
             seen = at + 1
             upto = step + seen, times[:seen], rows[:seen]
-            yield showing.view_of_kept(*upto, motion, room.kept_places[number])
-        if not broke:
-            yield showing.view_of(step + self.taken, times, rows)
-        elif seen < self.taken:
-            yield showing.view_of_rows(step + self.taken, times, rows)
+            yield showing.view_of(*upto, (motion, room.kept_places[number]))
+        if not broke or seen < self.taken:
+            yield showing.view_of(step + self.taken, times, rows, broke=broke)
 
     def _keep_motion(self, number: int) -> bool:
         """Keep the motion of a step as that of a number, none if below 0; whether there is room."""
@@ -288,7 +286,7 @@ class CompiledSteps:
         return taken.begun, taken.is_full
 
     def steps(self) -> native.Steps:
-        """What takes steps on the arrays that the scheme has now."""
+        """Native steps on the arrays that the scheme has now."""
         coupling = self.scheme.coupling
         assert isinstance(coupling, Implicit)
         share, unknowns = self.scheme.share, coupling.inner.unknowns
@@ -296,11 +294,21 @@ class CompiledSteps:
         if self._made_of[0] is not share or self._made_of[1] is not unknowns:
             self._made_of = share, unknowns
             problem = coupling.inner.problem(self._at_contacts, share)
-            self._steps = self._made(self._parts(problem), self._block_of_steps())
+            moved = self._moved
+            block = Block(
+                times=self.times,
+                drives=self._drives,
+                rows=self.rows,
+                now=moved.now,
+                behind=moved.behind,
+                kept=self._kept,
+                counts=self._counts,
+            )
+            self._steps = self._made(self._parts(problem), block)
         return self._steps
 
     def _made(self, parts: StepParts, block: Block) -> Any:
-        """What takes steps that are made of these."""
+        """Native steps of these parts."""
         return native.Steps(parts, block)
 
     def _parts(self, problem: SmallProblem) -> StepParts:
@@ -323,23 +331,11 @@ class CompiledSteps:
             channels=self._showing.layout.copied,
         )
 
-    def _block_of_steps(self) -> Block:
-        moved = self._moved
-        return Block(
-            times=self.times,
-            drives=self._drives,
-            rows=self.rows,
-            now=moved.now,
-            behind=moved.behind,
-            kept=self._kept,
-            counts=self._counts,
-        )
-
 
 def compiled_steps(
     scheme: Scheme, showing: Showing, dt: float, shows: bool
 ) -> CompiledSteps | None:
-    """What takes steps of a scheme in one loop, None if there is no such loop. Not collective."""
+    """Compiled loop over the steps of a scheme, None if it has none. Not collective."""
     if not isinstance(scheme, OneSolve) or scheme.comm.size > 1 or scheme.judge is not None:
         return None
     line = scheme.interaction.line

@@ -126,7 +126,7 @@ class March:
         self._pantographs = Pantographs(comm, problem, effects, self._wire, height)
         self._moving = MovingColumns()
         self._set_ups = SchemeFactory(comm, form, self.ownership, self._nominal_height)
-        # Of a long line they are so large that the first parts take those that there are.
+        # Those of a long line are large, so that the first parts take these.
         self._set_up(unchanged(model, form), self._wire)
         self._set_off(model)
         self._showing.cross(0.0)
@@ -183,7 +183,7 @@ class March:
         return StepLevels(self._comm, problem.numerics, whole, finer)
 
     def _happening(self) -> list[Happened]:
-        """What happens to the line, as far as it is simulated, in order of time."""
+        """Simulated incidents of the line, in order of time."""
         return in_steps(self._first.simulated.incidents, self._problem.numerics.dt)
 
     def _happen(self, happened: Happened) -> None:
@@ -194,7 +194,7 @@ class March:
         jump = acceleration_jump(self._comm, self.ownership, before, after, moving)
         try:
             self._set_up(after)
-            # What the method keeps besides the state moves with the acceleration.
+            # The memory of the method besides the state moves with the acceleration.
             nothing = np.zeros_like(jump)
             self._line.start(nothing, nothing, jump)
             moved = line.state()

@@ -25,7 +25,7 @@ _MOST_LINKS = 512
 
 
 class Ahead(NamedTuple):
-    """What steps to come depend on; see `kernels/simulation/simulation.hpp`."""
+    """Inputs of the steps to come; see `kernels/simulation/simulation.hpp`."""
 
     dt: float
     n_done: int
@@ -40,9 +40,14 @@ def write_line(path: Path, blocks: CompiledSteps, dt: float, steps: tuple[int, i
 
     Parameters
     ----------
-    blocks : takes steps of the line
-    dt : time step [s]
-    steps : number of the latest step, and of the last one to come
+    path : Path
+        File to be written.
+    blocks : CompiledSteps
+        Loop that takes the steps of the line.
+    dt : float
+        Time step [s].
+    steps : tuple of int
+        Numbers of the latest step and of the last one to come.
 
     Raises
     ------
@@ -92,7 +97,7 @@ def make_room(scheme: OneSolve) -> None:
 
 
 def stepped_by_kernels(model: Pantograph) -> SteppedHead:
-    """What kernels step of a pantograph.
+    """Data of a pantograph that kernels step.
 
     Raises
     ------

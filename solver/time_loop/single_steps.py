@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class _Stepped(NamedTuple):
-    """What is stepped; the layout of its rows is not known before the march."""
+    """Parts of a march that are stepped; the layout of its rows is not known before the march."""
 
     problem: Problem
     laws: Simulated

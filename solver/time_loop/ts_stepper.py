@@ -70,7 +70,9 @@ class Stepper:
             else:
                 self._take(self._blocks, ts)
         except RunBroken as error:
-            self._end_loop(ts, str(error))
+            self.broken = str(error)
+            # Not a reason of failure, for which PETSc would raise an error of its own.
+            ts.setConvergedReason(PETSc.TS.ConvergedReason.CONVERGED_USER)
             return
         ts.setTime(self.step_number * self._dt)
         if not goes_on:
@@ -139,21 +141,22 @@ class Stepper:
         time, place = (self.step_number + 1) * self._dt, float(scheme.pantographs.position[0])
         return RunBroken(f"the step to t = {time:.4f} s with the train at {place:.1f} m: {error}")
 
-    def _end_loop(self, ts: PETSc.TS, why: str) -> None:
-        """End the time loop because of an error that the march reports."""
-        self.broken = why
-        # Not a reason of failure, for which PETSc would raise an error of its own.
-        ts.setConvergedReason(PETSc.TS.ConvergedReason.CONVERGED_USER)
-
 
 def ts_of(comm: Any, stepper: Stepper, dt: float, steps: tuple[int, int], n_steps: int) -> PETSc.TS:
     """A time loop that takes the steps of a stepper. Collective.
 
     Parameters
     ----------
-    dt : time step [s]
-    steps : number of the step from which it goes on, and of its last one
-    n_steps : of the whole run, which options of PETSc see
+    comm : mpi4py communicator
+        Communicator of the ranks.
+    stepper : Stepper
+        Stepper whose steps are taken.
+    dt : float
+        Time step [s].
+    steps : tuple of int
+        Numbers of the step from which the loop goes on and of its last one.
+    n_steps : int
+        Number of steps of the whole run, which options of PETSc see.
 
     Raises
     ------

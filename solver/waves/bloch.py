@@ -184,7 +184,7 @@ def bloch_waves(period: Period, highest: float, n_phases: int = N_PHASES) -> Blo
 
     Branches that begin below ``highest`` are whole.
     """
-    # What nodes lack or effects hold has no mass, and is no part of a wave.
+    # Missing and held unknowns have no mass, and are no part of a wave.
     free = np.flatnonzero(np.diag(period.mass) > 0.0)
     pick = np.ix_(free, free)
     spans = _Spans(

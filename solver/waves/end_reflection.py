@@ -1,4 +1,4 @@
-"""What the end of a line sends back of the waves of the periodic line before it.
+"""Reflection of waves of a periodic line by the end of the line.
 
 At s = i omega + epsilon a wave of the periodic line grows with time and fades as it travels, by
 exp(-epsilon L / v) a span of length L for the group velocity v. That divides waves that come from
@@ -27,7 +27,7 @@ _GROWTH, _SLOWEST, _LEFT = 1e-3, 2.0, 0.01
 
 @dataclass(frozen=True)
 class EndReflection:
-    """What an end sends back, f frequencies and m waves that may come at each.
+    """Reflection by an end, f frequencies and m waves that may come at each.
 
     Attributes
     ----------
@@ -42,7 +42,7 @@ class EndReflection:
 
     def of_faster(self, speed: float) -> tuple[float, float]:
         """Largest and rms reflection of waves that outrun a train [m/s]; NaN if none does."""
-        found = self._of_faster(speed)
+        found = self.reflected[self.group_velocity > speed]
         if not found.size:
             return np.nan, np.nan
         return float(found.max()), float(np.sqrt((found**2).mean()))
@@ -53,19 +53,11 @@ class EndReflection:
         largest, rms = self.of_faster(speed)
         return largest**2, rms**2
 
-    def share_below(self, amplitude: float, speed: float) -> float:
-        """Of how many of the waves that outrun a train [m/s] less than an amplitude comes back."""
-        found = self._of_faster(speed)
-        return float((found < amplitude).mean()) if found.size else np.nan
-
-    def _of_faster(self, speed: float) -> np.ndarray:
-        return np.asarray(self.reflected[self.group_velocity > speed])
-
 
 def end_reflection(
     model: Model, side: int, frequency: np.ndarray, own_damping: bool = False
 ) -> EndReflection:
-    """What the ``START`` or ``END`` of a model sends back at frequencies (f,) [Hz]. Not collective.
+    """Reflection by the ``START`` or ``END`` of a model at frequencies (f,) [Hz]. Not collective.
 
     The line before the end is taken to repeat its span next to that. ``own_damping`` is whether
     both have the damping of the line, alpha and beta of the whole; it counts from where the end

@@ -1,4 +1,4 @@
-"""What sets a contact wire into motion in place of a train: a force that moves, a pulse, a hammer.
+"""Excitations of a contact wire in place of a train: a force that moves, a pulse, a hammer.
 
 Data only, and what result files say of it; ``excitation_load`` makes loads of it.
 """

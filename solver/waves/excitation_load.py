@@ -22,8 +22,13 @@ def load_of(excitation: Excitation, model: Model, interval: float) -> Load:
 
     Parameters
     ----------
-    interval : between times at which a force that moves is found; linear between them. Time steps
-        are best [s]
+    excitation : Excitation
+        Force on the wire over time and place.
+    model : Model
+        Discrete line.
+    interval : float
+        Time between the instants at which a force that moves is found, linear in between;
+        the time step is best [s].
     """
     nodes = model.contact_nodes
     x = model.mesh.x(nodes)
@@ -52,10 +57,15 @@ def spread(
 
     Parameters
     ----------
-    x : (n,) nodes of a wire, ascending [m]
-    places, forces : (m,) [m], [N]; what lies beyond the ends is left out
-    first : number of the unknown that the first column stands for: w and theta of each node in turn
-    loads : (m, k) a row for each force [N], [N m]
+    x : ndarray, shape (n,)
+        Places of the nodes of a wire, ascending [m].
+    places, forces : ndarray, shape (m,)
+        Places and forces [m], [N]; what lies beyond the ends is left out.
+    first : int
+        Number of the unknown that the first column stands for: w and theta of each node in
+        turn.
+    loads : ndarray, shape (m, k)
+        Loads, a row for each force [N], [N m].
     """
     row = np.flatnonzero((places >= x[0]) & (places <= x[-1]))
     element = np.clip(np.searchsorted(x, places[row], side="right") - 1, 0, x.size - 2)

@@ -1,4 +1,4 @@
-"""What single obstacles on tensioned wires send back and let through: closed forms.
+"""Reflection and transmission by single obstacles on tensioned wires: closed forms.
 
 A wire is a beam of bending stiffness EI under the tension T, of mass m a length. Waves are
 exp(i (w t - k x)), with EI k^4 + T k^2 = m w^2; beside them there is what falls off as exp(-q |x|),
@@ -25,7 +25,7 @@ from catenary.meshgen.wires import Conductor
 
 
 class Answer(NamedTuple):
-    """What a unit force at one place of a wire makes, at f frequencies.
+    """Waves that a unit force at one place of a wire makes, at f frequencies.
 
     Attributes
     ----------
@@ -64,10 +64,12 @@ def scattered(
 
     Parameters
     ----------
-    wires : the n wires that it joins
-    omega : (f,) angular frequencies [1/s]
-    resistance : D (f, n, n), forces of the obstacle on the wires at unit deflections, against them
-        [N/m]
+    wires : tuple of Conductor
+        Wires that the obstacle joins.
+    omega : ndarray, shape (f,)
+        Angular frequencies [1/s].
+    resistance : ndarray, shape (f, n, n)
+        Matrices D, forces of the obstacle against unit deflections of the wires [N/m].
 
     Returns
     -------

@@ -17,7 +17,7 @@ from catenary.solver.effects import all_effects as effects
 from catenary.solver.problem.problem import Problem
 from catenary.solver.problem.window import BOUNDED, EXACT, ROUND_OFF, WindowChoice
 
-# What the error was measured with: en50318_2002 at 250 km/h, its rate of fading at 2 Hz [1/s].
+# Case by which the error was measured: en50318_2002 at 250 km/h, its rate of fading at 2 Hz [1/s].
 _OMEGA = 2.0 * math.pi * 2.0
 _RATE, _SPEED_RATIO = 0.0141, 0.57
 # Spans ahead there, and error of the force history below 20 Hz [% of sigma].
@@ -79,7 +79,7 @@ def window_sentence(problem: Problem) -> str:
 def spans_of_window(
     problem: Problem, ahead: float | None = None, behind: float | None = None
 ) -> WindowChoice:
-    """A window of so many spans, by default of those that damping and speed ask for."""
+    """A window of so many spans, by default as many as damping and speed need."""
     fades = _fading_rate(problem) < _SLOW
     if ahead is None or behind is None:
         wanted = _WANTED if fades else _WANTED_WITHOUT

@@ -80,7 +80,12 @@ class MovingColumns:
 
         Parameters
         ----------
-        names : of the first tables of ``columns``
+        columns : Columns
+            Columns by stations.
+        names : sequence of str
+            Names of the first tables of ``columns``.
+        stations : ndarray, shape (2,)
+            First station that has moved and the one after the last.
         """
         begin, end = stations.tolist()
         firsts, lasts = columns.first[begin].tolist(), columns.last[end].tolist()

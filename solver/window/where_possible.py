@@ -26,8 +26,12 @@ def refuse_window(problem: Problem, n_ranks: int, by_stations: bool) -> None:
 
     Parameters
     ----------
-    n_ranks : how many ranks step the line
-    by_stations : whether steps are taken in two passes over stations
+    problem : Problem
+        Problem of the run.
+    n_ranks : int
+        Number of ranks that step the line.
+    by_stations : bool
+        Whether steps are taken in two passes over stations.
     """
     why = why_no_window(problem)
     if not why and n_ranks > 1:

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
+from body_mechanics import place_rates
 from scipy import linalg
 
 from catenary.base.errors import InputError, RunBroken
@@ -33,7 +34,7 @@ class ConstraintHandling(Protocol):
 
 def project(system: System, motion: Motion, time: float) -> Motion:
     """Positions and velocities nearest to a motion that satisfy the joints."""
-    return system.project_velocities(system.assemble(motion, time).motion, time)
+    return system.project_velocities(system.assemble(motion, time), time)
 
 
 @dataclass
@@ -63,7 +64,7 @@ class Baumgarte:
         feedback = 2.0 * self.damping * rows.rate + self.frequency**2 * rows.value
         rows = rows._replace(drift=rows.drift + feedback)
         acceleration = system.accelerations(motion, time, rows).acceleration
-        return np.concatenate([motion.place_rates(), acceleration])
+        return np.concatenate([place_rates(motion), acceleration])
 
 
 @dataclass
@@ -115,7 +116,7 @@ class AugmentedLagrangian:
             acceleration += step
             change = float(np.abs(step).max())
             if change <= self.tolerance * max(1.0, float(np.abs(acceleration).max())):
-                return np.concatenate([motion.place_rates(), acceleration])
+                return np.concatenate([place_rates(motion), acceleration])
         raise RunBroken(
             f"The augmented Lagrangian does not converge at {time:g} s "
             f"(last change {change:.2g}): choose another penalty than {self.penalty:g}."
@@ -175,4 +176,4 @@ class CoordinatePartitioning:
         """Rates of the state (13 n,)."""
         motion, rows = self.correct(system, motion, time)
         acceleration = system.accelerations(motion, time, rows).acceleration
-        return np.concatenate([motion.place_rates(), acceleration])
+        return np.concatenate([place_rates(motion), acceleration])

@@ -9,13 +9,13 @@ import paper_pantograph as ambrosio
 
 from catenary.mbs.rigid.bodies import SPACE, Motion
 from catenary.mbs.rigid.forces import PointForce
-from catenary.mbs.rigid.joints import PrescribedAngle, PrescribedPoint, constant
+from catenary.mbs.rigid.joints import Constant, PrescribedAngle, PrescribedPoint
 from catenary.mbs.rigid.statics import calibrate_actuator, equilibrium
 from catenary.mbs.rigid.system import System
 
 ARM, HEAD = ambrosio.STABILISATION_ARM, ambrosio.HEAD
 STATIC_FORCE = 150.0
-HOLDER = PrescribedPoint("holder", ARM, constant(ambrosio.INITIAL_ARM_HEIGHT))
+HOLDER = PrescribedPoint("holder", ARM, Constant(ambrosio.INITIAL_ARM_HEIGHT))
 # The lower link is top-heavy between its two balls: its mass lies above the line through them, by
 # Table 4's -0.025 m, and it tips over with 2.7 1/s. What starts with round-off of 1e-12 m has
 # tipped over after some 12 s. This holds it upright where that is not what is looked at.
@@ -23,7 +23,7 @@ UPRIGHT = PrescribedAngle(
     "lower link upright",
     SPACE,
     ambrosio.LOWER_LINK,
-    constant(0.0),
+    Constant(0.0),
     axis_i=(1.0, 0.0, 0.0),
     normal_i=(0.0, 0.0, 1.0),
     normal_j=(0.0, 0.0, 1.0),
@@ -48,7 +48,7 @@ def pressed(system: System, load: Load | float = STATIC_FORCE) -> System:
 
 def at_rest(system: System) -> Motion:
     """True equilibrium of a pressed pantograph near the paper's height."""
-    held = system.with_joints(HOLDER).assemble(system.start()).motion
+    held = system.with_joints(HOLDER).assemble(system.start())
     return equilibrium(system, held).motion
 
 

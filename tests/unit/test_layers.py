@@ -36,7 +36,7 @@ ROOMS = {
     "mbs": (
         "frame", "interface", "rigid", "time_steps", "vehicle", "control", "head", "air",
         "lumped_data", "mechanism", "library", "response", "lumped", "called_model", "lowering",
-        "roll", "shape", "build",
+        "shape", "build",
     ),
     "solver": (
         "kernels", "problem", "model", "wind", "ends", "effects", "linear", "statics",

@@ -17,7 +17,7 @@ from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.mechanism.full_pantograph import FullPantograph
 from catenary.mbs.mechanism.pantograph_data import AllBodies, MultibodyData, reduced
 from catenary.mbs.mechanism.reduced_pantograph import RaisingPantograph
-from catenary.mbs.rigid.joints import PrescribedPoint, constant
+from catenary.mbs.rigid.joints import Constant, PrescribedPoint
 
 CASE, KIND = "ambrosio2012", "pantographs.seven_body"
 ALL = f"{KIND}.motion=all_bodies"
@@ -106,9 +106,9 @@ def test_bodies_go_where_their_loops_still_close_and_tables_where_they_end() -> 
         load(below)
     lowest = reduced(data(load())).heights[0]
     bodies = data(load()).system
-    arm = PrescribedPoint("arm low", "stabilisation_arm", constant(lowest - 0.05))
+    arm = PrescribedPoint("arm low", "stabilisation_arm", Constant(lowest - 0.05))
     held = bodies.with_joints(arm)
-    closed = held.assemble(bodies.start()).motion
+    closed = held.assemble(bodies.start())
     assert np.abs(held.constraints(closed, 0.0).value).max() < 1e-9
 
 

@@ -26,6 +26,7 @@ from catenary.mbs.mechanism.pantograph_data import MultibodyData, stand
 from catenary.mbs.rigid.bodies import SPACE, Body
 from catenary.mbs.rigid.forces import Actuator, BumpStop, Gravity, PointForce, SpringDamper, Table
 from catenary.mbs.rigid.joints import (
+    Constant,
     Fixed,
     PointOnCurve,
     PointOnLine,
@@ -35,7 +36,6 @@ from catenary.mbs.rigid.joints import (
     Revolute,
     RevolutePrismatic,
     Spherical,
-    constant,
 )
 
 TELESCOPE = Path(__file__).parents[1] / "support" / "telescope.toml"
@@ -62,11 +62,11 @@ JOINTS: dict[str, tuple[dict[str, Any], Any]] = {
     ),
     "prescribed_point": (
         {"body": "mast", "at_m": list(A), "along": list(X), "coordinate_m": 0.7},
-        PrescribedPoint("x", "mast", constant(0.7), A, X),
+        PrescribedPoint("x", "mast", Constant(0.7), A, X),
     ),
     "prescribed_angle": (
         {"j": "mast", "axis_i": list(X), "normal_i": list(Y), "normal_j": list(Z), "angle_deg": 90},
-        PrescribedAngle("x", SPACE, "mast", constant(np.pi / 2), X, Y, Z),
+        PrescribedAngle("x", SPACE, "mast", Constant(np.pi / 2), X, Y, Z),
     ),
 }
 FORCES: dict[str, tuple[str, dict[str, Any], Any]] = {

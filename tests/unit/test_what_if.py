@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 import catenary
 from catenary.cases.cli.main import app
 from catenary.cases.studies.questions.what_if import AS_IT_IS, CHANGED, _pairs
-from catenary.postproc.evaluate.slack_times import slack_times
+from catenary.postproc.evaluate.statistics import slack_times
 from catenary.postproc.read.results import Results
 
 CASE = "en50318_2002"

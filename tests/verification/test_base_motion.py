@@ -21,7 +21,7 @@ from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.mechanism.pantograph_data import stand
 from catenary.mbs.mechanism.reduced_pantograph import RaisingPantograph
 from catenary.mbs.rigid.forces import PointForce
-from catenary.mbs.rigid.joints import Fixed, PrescribedPoint, Prismatic, constant
+from catenary.mbs.rigid.joints import Constant, Fixed, PrescribedPoint, Prismatic
 from catenary.mbs.rigid.kinematics import Law
 from catenary.mbs.rigid.statics import equilibrium
 from catenary.mbs.vehicle.base_motion import BaseMotion, Harmonic, Table, VehicleMotion
@@ -89,12 +89,12 @@ def test_the_paper_s_pantograph_on_a_base_that_swings_moves_like_all_its_bodies(
         )
 
     ends, pushed = [], PointForce("wire", data.head, (0.0, 0.0, -force))
-    holder = PrescribedPoint("holder", data.arm, constant(standing.working_height))
+    holder = PrescribedPoint("holder", data.arm, Constant(standing.working_height))
     pressed = standing.system.with_forces(pushed)
     rest = equilibrium(pressed.with_joints(holder), standing.motion).motion
     number = rest.numbers[data.head]
     system = replace(standing.system, joints=joints).with_forces(pushed)
-    for law in (base, constant(0.0)):
+    for law in (base, Constant(0.0)):
         moved = system.with_joints(PrescribedPoint("base", joints[0].j, law))
         last = integrate(moved, Baumgarte(), rest, [0.0, end], rtol=1e-8).motions[-1]
         ends.append(last.position[number, 2])

@@ -22,7 +22,7 @@ from catenary.mbs.head.strips import Strips, Suspension
 from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.mechanism.reduced_pantograph import RaisingPantograph
 from catenary.mbs.response.frequency_response import head_response
-from catenary.mbs.response.linearisation import apparent_mass, linearise, of_chain
+from catenary.mbs.response.linearisation import LinearModel, apparent_mass, linearise, of_chain
 from catenary.mbs.rigid.bodies import SPACE, Body
 from catenary.mbs.rigid.forces import Gravity, PointForce, SpringDamper
 from catenary.mbs.rigid.joints import Prismatic, Revolute, Spherical
@@ -46,11 +46,16 @@ def test_one_mass_on_a_spring() -> None:
     check("frequency [Hz]", mode.frequency, np.sqrt(stiffness / mass) / (2 * np.pi), within=1e-12)
     ratio = damping / (2 * np.sqrt(stiffness * mass))
     check("damping ratio", mode.damping_ratio, ratio, within=1e-12)
-    check("static stiffness [N/m]", model.static_stiffness(), stiffness, within=1e-9)
+    check("static stiffness [N/m]", static_stiffness(model), stiffness, within=1e-9)
     # Far above resonance the spring hardly matters: k / (m w^2).
     masses = apparent_mass([1000.0], model.receptance([1000.0]))
     within = 2 * (stiffness / (2 * np.pi * 1000) ** 2 + damping / (2 * np.pi * 1000))
     check("apparent mass [kg]", masses.real, mass, within=within)
+
+
+def static_stiffness(model: LinearModel) -> float:
+    """Force upward that it takes to hold the loaded point a metre higher, per metre [N/m]."""
+    return float(1.0 / (model.push @ np.linalg.solve(model.stiffness, model.push)))
 
 
 def two_masses(roll: float = 0.0) -> System:
@@ -185,7 +190,7 @@ def test_seven_bodies_have_the_figures_of_the_mechanism() -> None:
     # 0.2 N s/m of the frame's damper on 26.
     check("its damping ratio", swinging.damping_ratio, ratio, within=0.01 * ratio)
     in_series = 240.0 * 6000.0 / 6240.0
-    check("static stiffness [N/m]", model.static_stiffness(), in_series, within=0.01 * in_series)
+    check("static stiffness [N/m]", static_stiffness(model), in_series, within=0.01 * in_series)
     high = apparent_mass([300.0], model.receptance([300.0]))
     check("apparent mass at 300 Hz [kg]", high.real, 7.8, within=6000 / (2 * np.pi * 300) ** 2)
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 import paper_pantograph as ambrosio
 import pytest
+from body_mechanics import equivalent_mass
 from constraint_handling import (
     AugmentedLagrangian,
     Baumgarte,
@@ -19,13 +20,13 @@ from variable_steps import integrate
 
 from catenary.base.errors import InputError
 from catenary.mbs.rigid.forces import PointForce
-from catenary.mbs.rigid.joints import PrescribedPoint, constant
+from catenary.mbs.rigid.joints import Constant, PrescribedPoint
 from catenary.mbs.rigid.kinematics import point
-from catenary.mbs.rigid.statics import calibrate_actuator, equilibrium, equivalent_mass, held_force
+from catenary.mbs.rigid.statics import calibrate_actuator, equilibrium, held_force
 from catenary.mbs.rigid.system import System
 
 ARM, HEAD = ambrosio.STABILISATION_ARM, ambrosio.HEAD
-HOLDER = PrescribedPoint("holder", ARM, constant(ambrosio.INITIAL_ARM_HEIGHT))
+HOLDER = PrescribedPoint("holder", ARM, Constant(ambrosio.INITIAL_ARM_HEIGHT))
 
 METHODS: list[ConstraintHandling] = [
     Baumgarte(),
@@ -71,12 +72,12 @@ def test_assembled_pantograph_has_its_arm_at_the_height_of_the_paper() -> None:
     assert system.redundant(system.start()) == ()
     # Raising, the head's sliding and rolling, and two links that may spin between two balls.
     assert system.n_degrees_of_freedom(system.start()) == 5
-    assembly = system.with_joints(HOLDER).assemble(system.start())
-    arm = point(assembly.motion, ARM, (0, 0, 0)).value
+    assembled = system.with_joints(HOLDER).assemble(system.start())
+    arm = point(assembled, ARM, (0, 0, 0)).value
     check("arm [m]", arm[2], 1.418, within=1e-11)
-    left = [miss.gap for miss in system.misses(assembly.motion)]
+    left = [miss.gap for miss in system.misses(assembled)]
     check("joints left open [m]", left, 0.0, within=1e-11)
-    moved = assembly.motion.position - system.start().position
+    moved = assembled.position - system.start().position
     print(f"bodies moved by {1e3 * np.abs(moved).max():.1f} mm at most")
     # No body moves further than the joints missed.
     assert np.linalg.norm(moved, axis=1).max() < 14e-3
@@ -99,7 +100,7 @@ def test_static_force_is_what_the_power_of_all_forces_says() -> None:
 
     def at(height: float) -> tuple[float, float]:
         """Energy [J] and length of the actuator [m] with the arm at a height, head at rest."""
-        holder = PrescribedPoint("holder", ARM, constant(height))
+        holder = PrescribedPoint("holder", ARM, Constant(height))
         rest = equilibrium(system.with_joints(holder), system.start()).motion
         actuator = system.force(ambrosio.ACTUATOR)
         return system.energy(rest), actuator.line(rest).length
@@ -116,10 +117,10 @@ def test_static_force_is_what_the_power_of_all_forces_says() -> None:
 def test_equivalent_mass_of_the_frame() -> None:
     """25.7 kg at the stabilisation arm; the head hangs on springs and hardly adds to it."""
     frame = ambrosio.frame()
-    motion = frame.with_joints(HOLDER).assemble(frame.start()).motion
+    motion = frame.with_joints(HOLDER).assemble(frame.start())
     check("frame [kg]", equivalent_mass(frame, motion, ARM), 25.7, within=0.257)
     system = ambrosio.pantograph()
-    motion = system.with_joints(HOLDER).assemble(system.start()).motion
+    motion = system.with_joints(HOLDER).assemble(system.start())
     # The head is carried along the track only, some tenths of a millimetre a millimetre.
     check("with head [kg]", equivalent_mass(system, motion, ARM), 25.7, within=0.257)
 
@@ -165,9 +166,9 @@ def test_pantograph_let_go_moves_like_two_masses(handling: ConstraintHandling) -
     frame = ambrosio.frame()
     masses, forces = [], []
     for height in (arm[0], arm[-1]):
-        holder = PrescribedPoint("holder", ARM, constant(height))
+        holder = PrescribedPoint("holder", ARM, Constant(height))
         masses.append(
-            equivalent_mass(frame, frame.with_joints(holder).assemble(frame.start()).motion, ARM)
+            equivalent_mass(frame, frame.with_joints(holder).assemble(frame.start()), ARM)
         )
         forces.append(held_force(system, holder, system.start()))
     large, small, k, c = masses[0], 7.8, 6000.0, 26.0

@@ -15,13 +15,13 @@ from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.mechanism.reduced_pantograph import RaisingData, RaisingPantograph
 from catenary.mbs.mechanism.reduction import ReducedMechanism, reduce_mechanism
 from catenary.mbs.rigid.forces import PointForce
-from catenary.mbs.rigid.joints import PrescribedPoint, constant
+from catenary.mbs.rigid.joints import Constant, PrescribedPoint
 from catenary.mbs.rigid.statics import calibrate_actuator, equilibrium
 from catenary.mbs.vehicle.base_motion import BaseMotion, Harmonic, VehicleMotion
 
 EPS = np.finfo(float).eps
 ARM, HEAD = ambrosio.STABILISATION_ARM, ambrosio.HEAD
-HOLDER = PrescribedPoint("holder", ARM, constant(ambrosio.INITIAL_ARM_HEIGHT))
+HOLDER = PrescribedPoint("holder", ARM, Constant(ambrosio.INITIAL_ARM_HEIGHT))
 WEIGHT, STIFFNESS = 7.8 * 9.81, 6000.0
 # The head stands on springs of free length 0.103 m, held 0.010 m above its own origin.
 OFFSET = 0.103 - 0.010 - WEIGHT / STIFFNESS

@@ -17,7 +17,7 @@ from catenary.mbs.interface import Pantograph
 from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.mechanism.pantograph_data import AllBodies, MultibodyData, reduced, stand
 from catenary.mbs.rigid.forces import PointForce
-from catenary.mbs.rigid.joints import PrescribedPoint, constant
+from catenary.mbs.rigid.joints import Constant, PrescribedPoint
 from catenary.mbs.rigid.kinematics import point
 from catenary.mbs.rigid.statics import equilibrium
 
@@ -75,7 +75,7 @@ def knee_drag_lift(data: MultibodyData, force: float) -> float:
     """Lift of the arm by a drag at the knee, F dx / dh from places of the mechanism nearby."""
     standing, places = stand(data), []
     for off in (-1e-4, 1e-4):
-        holder = PrescribedPoint("height", data.arm, constant(standing.working_height + off))
+        holder = PrescribedPoint("height", data.arm, Constant(standing.working_height + off))
         motion = equilibrium(standing.system.with_joints(holder), standing.motion).motion
         places.append(point(motion, "lower_arm", KNEE).value[0])
     return force * (places[1] - places[0]) / 2e-4

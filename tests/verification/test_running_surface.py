@@ -6,12 +6,12 @@ import numpy as np
 from measuring import check, march
 from small_lines import BARE, EN_CONTACT_WIRE, FREE_MASS, bare_wires, mesh_of, problem_of, train
 
+from catenary.mbs.vehicle.irregularity import N_WAVES
 from catenary.meshgen.mesh import CONTACT_WIRE
 from catenary.solver.contact.contact_wire import ContactWires
 from catenary.solver.model.partition import distribute
 from catenary.solver.problem.defects import Kink
 from catenary.solver.problem.irregularities import (
-    N_WAVES,
     BentWire,
     Heights,
     HeightSpectrum,

@@ -20,9 +20,8 @@ from catenary.mbs.mechanism.full_pantograph import FullPantograph
 from catenary.mbs.mechanism.pantograph_data import stand
 from catenary.mbs.mechanism.reduced_pantograph import RaisingPantograph
 from catenary.mbs.rigid.forces import PointForce
-from catenary.mbs.rigid.joints import PrescribedPoint, constant
+from catenary.mbs.rigid.joints import Constant, PrescribedPoint
 from catenary.mbs.rigid.statics import equilibrium
-from catenary.mbs.roll import roll_of
 from catenary.solver.problem.contact_laws import ContactLaw, KinematicLaw, LinearLaw
 
 EPS = np.finfo(float).eps
@@ -151,12 +150,12 @@ def test_the_paper_s_head_rolls_as_its_bodies_at_rest() -> None:
     """
     data, force, place = paper.data(), 150.0, 0.2
     standing = stand(data)
-    holder = PrescribedPoint("holder", data.arm, constant(standing.working_height))
+    holder = PrescribedPoint("holder", data.arm, Constant(standing.working_height))
     pushed = PointForce("wire", data.head, (0.0, 0.0, -force), (0.0, place, 0.0))
     system = standing.system.with_forces(pushed).with_joints(holder)
     motion = equilibrium(system, standing.motion).motion
     angle = float(np.arcsin(motion.rotation[motion.numbers[data.head]][2, 1]))
-    roll = roll_of(data)
+    roll = data.roll
     assert roll is not None
     # Table 4: two springs of 3000 N/m at 0.335 m; Table 2: 6.62 kg m2, 7.8 kg 0.07 m above joint 8.
     check("stiffness [N m/rad]", roll.stiffness, 6000.0 * 0.335**2, within=0.1)

@@ -17,7 +17,6 @@ from catenary.cases.scene.train.mechanism import ActuatorTable
 from catenary.cases.scene.train.pantograph import LumpedTable, MultibodyTable, wanted_force
 from catenary.cases.scene.train.train import MotionTable, vehicle_of
 from catenary.mbs.frame import SPACE
-from catenary.mbs.roll import roll_of
 from catenary.meshgen.topologies.line_data import LineData
 
 if TYPE_CHECKING:
@@ -68,9 +67,7 @@ def _roll_acts(scene: Scene) -> Iterator[Fault]:
             yield _idle(scene, f"pantographs.{name}.roll", "head_roll")
     if not on:
         return
-    rolling = [
-        name for name in names if roll_of(pantograph_of(name, scene.pantographs[name], speed))
-    ]
+    rolling = [name for name in names if pantograph_of(name, scene.pantographs[name], speed).roll]
     for name in rolling:
         if scene.pantographs[name].strips.length_m is None:
             why = (
@@ -268,13 +265,13 @@ def _standing(scene: Scene, name: str, table: MultibodyTable) -> tuple[Multibody
 def _reaches(data: MultibodyData, arm: float) -> bool:
     """Whether a mechanism can have its arm at a height above its base [m]."""
     from catenary.mbs.mechanism.pantograph_data import HOLDER, reduced, stand
-    from catenary.mbs.rigid.joints import PrescribedPoint, constant
+    from catenary.mbs.rigid.joints import Constant, PrescribedPoint
 
     if data.all_bodies is None:
         heights = reduced(data).heights
         return bool(heights[0] <= arm <= heights[-1])
     standing = stand(data)
-    holder = PrescribedPoint(HOLDER, data.arm, constant(arm))
+    holder = PrescribedPoint(HOLDER, data.arm, Constant(arm))
     try:
         standing.system.with_joints(holder).assemble(standing.motion)
     except InputError:

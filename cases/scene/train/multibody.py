@@ -27,6 +27,7 @@ from catenary.mbs.rigid.forces import (
     Table,
 )
 from catenary.mbs.rigid.joints import (
+    Constant,
     Fixed,
     PointOnCurve,
     PointOnLine,
@@ -36,7 +37,6 @@ from catenary.mbs.rigid.joints import (
     Revolute,
     RevolutePrismatic,
     Spherical,
-    constant,
 )
 from catenary.mbs.rigid.reversed_system import turned_round
 from catenary.mbs.rigid.system import System
@@ -91,10 +91,10 @@ def _joint(name: str, t: schema.JointTable) -> Joint:
         return PointOnCurve(name, t.body, x, y, z, tuple(t.at_m))
     if isinstance(t, schema.PrescribedPointTable):
         return PrescribedPoint(
-            name, t.body, constant(t.coordinate_m), tuple(t.at_m), tuple(t.along)
+            name, t.body, Constant(t.coordinate_m), tuple(t.at_m), tuple(t.along)
         )
     if isinstance(t, schema.PrescribedAngleTable):
-        law = constant(angle_from_deg(t.angle_deg))
+        law = Constant(angle_from_deg(t.angle_deg))
         normals = tuple(t.normal_i), tuple(t.normal_j)
         return PrescribedAngle(name, t.i, t.j, law, tuple(t.axis_i), *normals)
     at = tuple(t.at_i_m), tuple(t.at_j_m)

@@ -20,8 +20,7 @@ from catenary.cases.studies.sweep.run_jobs import run_jobs
 from catenary.cases.studies.sweep.variants import Variant, check_keys
 from catenary.postproc.evaluate import filters
 from catenary.postproc.evaluate import statistics as stats
-from catenary.postproc.evaluate.slack_times import slack_times
-from catenary.postproc.evaluate.statistics import RunStatistics
+from catenary.postproc.evaluate.statistics import RunStatistics, slack_times
 from catenary.postproc.read.results import Results
 from catenary.postproc.report.page import page
 from catenary.postproc.report.pictures import figures

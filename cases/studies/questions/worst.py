@@ -8,7 +8,7 @@ import numpy as np
 
 from catenary.postproc.evaluate import filters
 from catenary.postproc.evaluate import statistics as stats
-from catenary.postproc.evaluate.slack_times import slack_times
+from catenary.postproc.evaluate.statistics import slack_times
 from catenary.postproc.read.results import Results
 
 # A figure stands out if it exceeds the median of its likes by this many robust standard deviations

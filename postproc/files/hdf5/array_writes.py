@@ -44,8 +44,12 @@ def set_attribute(place: h5py.HLObject, name: str, value: Any) -> None:
 
     Parameters
     ----------
-    place : file, group or dataset
-    value : text or a number
+    place : h5py.HLObject
+        File, group or dataset.
+    name : str
+        Name of the attribute.
+    value : object
+        Text or a number.
     """
     if isinstance(value, str):
         text = value.encode()
@@ -66,7 +70,7 @@ def _space_of(array: np.ndarray) -> h5s.SpaceID:
     return h5s.create_simple(array.shape) if array.ndim else h5s.create(h5s.SCALAR)
 
 
-# What is made of the same few arguments again and again.
+# Objects that are made of the same few arguments again and again.
 
 
 @functools.cache

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import h5py
 import numpy as np
 
-# What a block of rows takes at most [B].
+# Largest size of a block of rows [B].
 BLOCK_BYTES = 16e6
 # Rows of a column that are read at once.
 _SLICE = 1 << 18
@@ -18,7 +18,12 @@ def row_blocks(n_rows: int, n_columns: int, step: int = 1) -> Iterator[slice]:
 
     Parameters
     ----------
-    n_columns : columns that are read, 8 bytes each
+    n_rows : int
+        Rows of the table.
+    n_columns : int
+        Columns that are read, 8 bytes each.
+    step : int, optional
+        Rows of a chunk.
     """
     rows = max(1, int(BLOCK_BYTES / (8 * max(n_columns, 1))))
     rows = max(step, rows - rows % step)

@@ -22,7 +22,7 @@ from catenary.postproc.files.hdf5.array_writes import put_array, set_attribute
 # The oldest format of HDF5 whose object headers, links and attributes carry checksums. The next
 # one marks a file as open for writing: after a kill nobody could open it.
 FORMAT_BOUNDS = ("v108", "v108")
-# What HDF5 and h5py raise at a damaged file.
+# Exceptions of HDF5 and h5py at a damaged file.
 HDF5_ERRORS = (OSError, RuntimeError, ValueError, KeyError, TypeError, AttributeError)
 # Attribute with the checksums of the other attributes, by name, as JSON.
 ATTRIBUTE_SUMS = "attribute_crc32"
@@ -57,7 +57,10 @@ def broken_seals(place: h5py.HLObject, values: Mapping[str, Any]) -> list[str]:
 
     Parameters
     ----------
-    values : name -> attribute of ``place``
+    place : h5py.HLObject
+        File, group or dataset with sealed attributes.
+    values : mapping
+        Name -> attribute of ``place``.
 
     Raises
     ------

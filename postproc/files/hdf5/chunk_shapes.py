@@ -34,8 +34,10 @@ def step_chunk(rows_per_flush: int, n_rows: int, n_columns: int) -> Chunk:
 
     Parameters
     ----------
-    rows_per_flush : rows that are appended at once
-    n_rows, n_columns : rows that the table is planned to have, and its columns
+    rows_per_flush : int
+        Rows that are appended at once.
+    n_rows, n_columns : int
+        Rows that the table is planned to have, and its columns.
     """
     rows = _rows(rows_per_flush, n_rows, _ROWS_OF_ONE)
     return Chunk(rows, 1 if rows >= _LEAST_OF_ONE else max(1, n_columns))
@@ -55,10 +57,14 @@ def chunks_of(
 
     Parameters
     ----------
-    table : path -> channel and columns
-    n_steps : steps that are planned after step 0
-    rows_per_flush : steps of a flush
-    every : steps between two rows of the line's channels
+    table : mapping
+        Path -> channel and columns.
+    n_steps : int
+        Steps that are planned after step 0.
+    rows_per_flush : int
+        Steps of a flush.
+    every : int
+        Steps between two rows of the line's channels.
     """
     line = max(1, rows_per_flush // every), n_steps // every + 1
     step = rows_per_flush, n_steps + 1
@@ -81,7 +87,7 @@ def room_of(
     rows: int,
     record: LineRecord,
 ) -> int:
-    """What an append of ``rows`` steps adds to a file at most, in whole chunks [B]."""
+    """Most bytes that an append of ``rows`` steps adds to a file, in whole chunks [B]."""
     total = 0
     for path, (channel, columns) in table.items():
         shape = chunks[path]

@@ -30,9 +30,12 @@ def open_own(path: Path, mode: str = "r", **options: Any) -> h5py.File:
 
     Parameters
     ----------
-    path : a regular file; a symbolic link is not followed, a pipe not waited for
-    mode : "r" or "r+"
-    options : further arguments of ``h5py.File``
+    path : Path
+        A regular file; a symbolic link is not followed, a pipe not waited for.
+    mode : str, optional
+        "r" or "r+".
+    **options : object
+        Further arguments of ``h5py.File``.
 
     Raises
     ------

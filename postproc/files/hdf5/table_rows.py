@@ -44,10 +44,17 @@ def write_window(
 
     Parameters
     ----------
-    values : the first of the columns that are given, and these (rows, columns); they reach over
-        the window of each row
-    x : (columns,) where the columns are [m]
-    edges : from and to of the window at each row, (rows,) each [m]
+    dataset : h5py.Dataset
+        Table with chunks.
+    start : int
+        First row to be written.
+    values : tuple
+        Number of the first column that is given, and the columns (rows, columns), which
+        reach over the window of each row.
+    x : ndarray, shape (columns,)
+        Places of the columns [m].
+    edges : tuple of ndarray
+        First and last place of the window at each row, (rows,) each [m].
     """
     rows, columns = dataset.chunks
     low, high = edges

@@ -116,7 +116,7 @@ KINDS: dict[str, FieldKind] = {
     )
 }
 
-# What a scene may choose: the state of droppers comes with their force.
+# Fields that a scene may choose: the state of droppers comes with their force.
 FIELDS = tuple(name for name in KINDS if name != "dropper_state")
 USUAL_FIELDS = ("uplift", "displacement")
 

@@ -14,7 +14,7 @@ import numpy as np
 from catenary.postproc.record.snapshots.blocks import FIXED, Block
 from catenary.postproc.record.snapshots.field_kinds import USUAL_FIELDS, FieldKind, kinds_of
 
-# What the file is, as its attribute ``format`` says.
+# Format of the file, its attribute ``format``.
 FORMAT = "catenary-fields-2"
 # Where the bases, masses and bodies of the pantographs are, and how many numbers each has of it.
 PLACES, SIZES = "pantograph_places", "pantograph_sizes"
@@ -78,14 +78,18 @@ class FieldRecord:
 
         Parameters
         ----------
-        blocks : that are recorded, see ``chosen``
-        times : of snapshots that follow one another, the first and the last are enough [s]
-        n_nodes : of the line
+        blocks : list of Block
+            Recorded blocks, see ``chosen``.
+        times : ndarray
+            Times of successive snapshots, of which the first and the last are enough
+            [s].
+        n_nodes : int
+            Number of nodes of the line.
         """
         needed = np.zeros(n_nodes, dtype=bool)
         for block in blocks:
             first, count = block.range_over(*self.edges(times))
-            # What is made of slopes takes the neighbours of a wire's point as well.
+            # Values from slopes take the neighbours of a wire's point as well.
             more = int(block.is_wire)
             begin = max(int(first.min()) - more, 0)
             nodes = block.nodes[begin : int((first + count).max()) + more]

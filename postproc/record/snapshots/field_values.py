@@ -148,9 +148,12 @@ def curvature(x: np.ndarray, w: np.ndarray, slope: np.ndarray, breaks: np.ndarra
 
     Parameters
     ----------
-    x : (n,) [m]
-    w, slope : (rows, n) [m], [-]
-    breaks : nodes at which further pieces begin
+    x : ndarray, shape (n,)
+        Places of the nodes [m].
+    w, slope : ndarray, shape (rows, n)
+        Deflections [m] and slopes [-].
+    breaks : ndarray
+        Nodes at which further pieces begin.
     """
     length = np.diff(x)
     joined = np.ones(length.size)

@@ -77,19 +77,15 @@ class FieldsFile:
         self._layout: list[Slots] = []
         self._text: GrowingXdmf | None = None
         self._handle = -1
-        self._published = False
-
-    @property
-    def is_published(self) -> bool:
-        """Whether it has its name, in place of an earlier one."""
-        return self._published
+        self.is_published = False
 
     def make(self, numbers: np.ndarray) -> None:
         """Write a file without a snapshot, under another name until ``publish``.
 
         Parameters
         ----------
-        numbers : of the snapshots to come, counted from the start of the run
+        numbers : ndarray
+            Numbers of the snapshots to come, counted from the start of the run.
 
         Raises
         ------
@@ -113,7 +109,10 @@ class FieldsFile:
 
         Parameters
         ----------
-        numbers : of the snapshots to come, counted from the start of the run
+        numbers : ndarray
+            Numbers of the snapshots to come, counted from the start of the run.
+        start_time : float
+            Time from which on snapshots are replaced [s].
 
         Raises
         ------
@@ -153,12 +152,12 @@ class FieldsFile:
             self._written = []
             return False
         self._handle = os.open(self.path, os.O_RDWR)
-        self._published = True
+        self.is_published = True
         self._describe()
         return True
 
     def _lengthen(self, numbers: np.ndarray) -> None:
-        """Replace the file by one with room for more snapshots, and copy those that there are."""
+        """Replace the file by one with room for more snapshots, and copy its snapshots."""
         self.make(numbers)
         with opened(self.path, "r") as old, opened(self._made_as, "r+") as new:
             new["times"][: len(self._written)] = self._written
@@ -174,10 +173,10 @@ class FieldsFile:
 
     def publish(self) -> None:
         """Give a new file its name, in place of an earlier one; OSError if that fails."""
-        if self._handle < 0 or self._published:
+        if self._handle < 0 or self.is_published:
             return
         os.replace(self._made_as, self.path)
-        self._published = True
+        self.is_published = True
         self._describe()
 
     def append(self, times: list[float], known: Gathered) -> None:
@@ -192,19 +191,19 @@ class FieldsFile:
         write_at(self._handle, self._places_at + 8 * first * self._n_numbers, pantographs)
         write_at(self._handle, self._times_at + 8 * first, np.array(times, dtype="<f8"))
         self._written += times
-        if self._published:
+        if self.is_published:
             check_in_place(self.path, self._handle)
             self._describe()
 
     def close(self) -> None:
-        """Close the files, remove those that were never published."""
+        """Close the files, and remove files that were never published."""
         if self._handle < 0:
             return
         os.close(self._handle)
         self._handle = -1
         if self._text is not None:
             self._text.close()
-        if not self._published:
+        if not self.is_published:
             with contextlib.suppress(OSError):
                 self._made_as.unlink(missing_ok=True)
 
@@ -254,10 +253,7 @@ class FieldsFile:
     def _refuse_other(self, known: FieldTables, times: np.ndarray) -> None:
         """Raise ValueError if a file that is to be continued is not of this run and these places.
 
-        Parameters
-        ----------
-        known : what it holds
-        times : of the snapshots that are kept [s]
+        ``known`` are the tables that it holds, ``times`` (n,) those of the kept snapshots [s].
         """
         apart = np.diff(times) - self._every
         if not (np.abs(apart) <= 0.01 * self._every).all():

@@ -110,10 +110,7 @@ def _table(
 ) -> h5py.Dataset:
     """A table, whose numbers stand one after another in the file.
 
-    Parameters
-    ----------
-    kind : type of its numbers, None for any
-    shape : number of its rows and columns, None for any
+    It must have numbers of this ``kind`` and this ``shape``, where None stands for any.
     """
     try:
         table = file[path]

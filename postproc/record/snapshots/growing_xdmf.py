@@ -101,8 +101,14 @@ def grids_of(
 
     Parameters
     ----------
-    h5_name : file of the numbers, relative to that of the text
-    offsets : name of a table of the block -> where it begins in that file [B]
+    slots : Slots
+        Layout of the block in the file.
+    times : list of float
+        Times of the snapshots [s].
+    h5_name : str
+        File of the numbers, relative to that of the text.
+    offsets : mapping
+        Place in that file at which each table of the block begins, by name [B].
     """
     # Grids differ in numbers only: one text for all, into which these are put.
     moves = bool(np.ptp(slots.first) or np.ptp(slots.count))

@@ -9,7 +9,7 @@ import numpy as np
 
 from catenary.base.errors import InputError
 from catenary.postproc.evaluate import filters
-from catenary.postproc.evaluate.slack_times import slack_times
+from catenary.postproc.evaluate.statistics import slack_times
 from catenary.postproc.read.results import Results
 from catenary.postproc.report import csv_tables
 from catenary.postproc.report.sections.section import (

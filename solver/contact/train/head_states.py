@@ -9,7 +9,7 @@ from catenary.solver.contact.line_response import Affine, affine
 
 
 class Heads(HeadState):
-    """What a head is over all n contacts of a train; pantographs fill their parts of it.
+    """Heads over all n contacts of a train; pantographs fill their parts of it.
 
     The compliances are zero between strips of different pantographs. ``early_height`` and
     ``early_velocity`` (n,) hold what an extrapolation of the motion says, if a coupling asks for

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
@@ -19,12 +20,10 @@ from catenary.mbs.head.wire_crossing import CrossingPath, FollowedPath, LateralP
 from catenary.mbs.interface import Pantograph
 from catenary.mbs.lowering import LoweredPantograph
 from catenary.mbs.lumped_data import LumpedData
-from catenary.mbs.roll import roll_of
 from catenary.mbs.vehicle.base_motion import BaseMotion
 from catenary.solver.contact.contact_wire import Candidates, ContactWires
 from catenary.solver.contact.contacts import no_work
 from catenary.solver.contact.train.head_states import Heads
-from catenary.solver.contact.train.raked_strips import Leads, leads_of
 from catenary.solver.kernels import native
 from catenary.solver.problem.contact_laws import ContactLaw, KinematicLaw
 from catenary.solver.problem.problem import Placement, Problem
@@ -34,6 +33,52 @@ from catenary.solver.wind.wind_at import airflow
 
 if TYPE_CHECKING:
     from catenary.mbs.mechanism.full_pantograph import FullPantograph
+
+
+class Leads(NamedTuple):
+    """How far contacts are ahead of the middle of their raked strips, as kernels take it.
+
+    Attributes
+    ----------
+    contact : (m,) int, numbers of the contacts of raked strips, none for a train without them
+    first : (m + 1,) int, where the points of each begin
+    middle : (k,) places of the strip's middle along the track [m], ascending for each contact
+    lead : (k,) how far the contact is ahead of it [m], straight in between
+    """
+
+    contact: np.ndarray
+    first: np.ndarray
+    middle: np.ndarray
+    lead: np.ndarray
+
+
+def leads_of(wires: ContactWires, wire: np.ndarray, rake: np.ndarray) -> Leads:
+    """The leads of contacts with wires at rest. Not collective.
+
+    A strip at the angle r to the cross-section meets the wire y(x) where x = middle + tan(r) y, the
+    place along the track of which is straight between the points of the wire's course. Sway of the
+    vehicle and lateral motion, which move the contact by tan(r) of theirs, are left out.
+
+    Parameters
+    ----------
+    wires : ContactWires
+        Contact wires at rest.
+    wire : ndarray, shape (n,)
+        Contact wire of each contact.
+    rake : ndarray, shape (n,)
+        Angle of its strip [rad], > 0 if the left end is ahead.
+    """
+    contact = np.flatnonzero(rake)
+    middles, leads, first = [np.zeros(0)], [np.zeros(0)], [0]
+    for number in contact.tolist():
+        x, y = wires.course(int(wire[number]))
+        lead = math.tan(rake[number]) * y
+        middle = x - lead
+        ascends = np.append(True, np.diff(np.maximum.accumulate(middle)) > 0.0)
+        middles.append(middle[ascends])
+        leads.append(lead[ascends])
+        first.append(first[-1] + int(ascends.sum()))
+    return Leads(contact, np.array(first), np.concatenate(middles), np.concatenate(leads))
 
 
 class StripEnds(NamedTuple):
@@ -362,7 +407,7 @@ def _base(problem: Problem, simulated: Simulated, placement: Placement) -> BaseM
 def _depends_on_place(placement: Placement, simulated: Simulated) -> bool:
     """Whether it matters where wires cross the strips: to a head that rolls or bends."""
     bends = simulated.flexible_strips and placement.data.strips.flexure is not None
-    return bends or (simulated.head_roll and roll_of(placement.data) is not None)
+    return bends or (simulated.head_roll and placement.data.roll is not None)
 
 
 def _lateral_path(

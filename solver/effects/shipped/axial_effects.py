@@ -17,7 +17,6 @@ from catenary.solver.model.links import PULLS, PUSHES, Direction, law, slips
 from catenary.solver.model.model import Block
 from catenary.solver.model.unknowns.stations import SAME_STATION
 from catenary.solver.problem.problem import Problem
-from catenary.solver.problem.simulated import Simulated
 
 if TYPE_CHECKING:
     from catenary.solver.model.builder import ModelBuilder
@@ -69,7 +68,7 @@ def _add_bars(builder: ModelBuilder, name: str) -> None:
 
 
 def _add_pendulums(builder: ModelBuilder) -> None:
-    """What hangs swings along the track: droppers by their force, arms by their radial force."""
+    """Droppers swing along the track against their force, arms against their radial force."""
     model, mesh, line = builder.model, builder.mesh, builder.problem.line
     (unknowns, weights), stiffness = across_droppers(model)
     matrices = stiffness[:, None, None] * weights[:, :, None] * weights[:, None, :]
@@ -141,10 +140,6 @@ def _add_friction(builder: ModelBuilder, ends: list[wire_ends.WireEnd]) -> None:
         builder.add_links(name, Direction(unknowns, sign * outwards), laws, of_shape=True)
 
 
-def _with_tensioner(laws: Simulated, problem: Problem) -> Simulated:
-    return replace(laws, tensioner=problem.along.tensioner)
-
-
 def _has_tensioner(problem: Problem) -> bool:
     along, masts = problem.along, problem.line.support_positions[[0, -1]]
     line_ends = float(masts[0]), float(masts[1])
@@ -184,7 +179,7 @@ register(
         applies=_has_tensioner,
         data="line.ends or line.overlap with along = tensioner, and effects.axial_motion",
         build=_tensioners,
-        law=_with_tensioner,
+        law=lambda laws, p: replace(laws, tensioner=p.along.tensioner),
     )
 )
 register(

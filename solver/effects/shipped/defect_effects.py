@@ -38,14 +38,6 @@ def _has(kind: type) -> Callable[[Problem], bool]:
     return lambda problem: any(True for _ in _those(problem, kind))
 
 
-def _missing(laws: Simulated, problem: Problem) -> Simulated:
-    return replace(laws, missing=tuple(defect.x for defect in _those(problem, MissingDropper)))
-
-
-def _loose(laws: Simulated, problem: Problem) -> Simulated:
-    return replace(laws, loose=tuple(defect.x for defect in _those(problem, LooseClamp)))
-
-
 def _worn(line: Line, problem: Problem) -> Line:
     worn = list(_those(problem, WornWire))
     wires = (
@@ -53,10 +45,6 @@ def _worn(line: Line, problem: Problem) -> Line:
         for wire in line.wires
     )
     return replace(line, wires=tuple(wires))
-
-
-def _pulled(line: Line, problem: Problem) -> Line:
-    return line.with_shares({d.wire: d.factor for d in _those(problem, WrongTension)})
 
 
 def _hard_spots(builder: ModelBuilder) -> None:
@@ -88,7 +76,9 @@ register(
         requires=("gravity",),
         data="defects of the type missing_dropper",
         applies=_has(MissingDropper),
-        law=_missing,
+        law=lambda laws, p: replace(
+            laws, missing=tuple(defect.x for defect in _those(p, MissingDropper))
+        ),
         after_cutting=True,
     )
 )
@@ -102,7 +92,9 @@ register(
         requires=("gravity",),
         data="defects of the type loose_clamp",
         applies=_has(LooseClamp),
-        law=_loose,
+        law=lambda laws, p: replace(
+            laws, loose=tuple(defect.x for defect in _those(p, LooseClamp))
+        ),
         after_cutting=True,
     )
 )
@@ -130,7 +122,9 @@ register(
         requires=("gravity",),
         data="defects of the type wrong_tension",
         applies=_has(WrongTension),
-        hangs=_pulled,
+        hangs=lambda line, p: line.with_shares(
+            {defect.wire: defect.factor for defect in _those(p, WrongTension)}
+        ),
         after_cutting=True,
     )
 )

@@ -40,11 +40,13 @@ def _lateral(builder: ModelBuilder) -> None:
 
 
 def _pendulums(builder: ModelBuilder) -> None:
-    """What droppers' forces do across them, N/l of a pendulum."""
+    """Lateral stiffness of droppers under their force N: N / l, as of a pendulum."""
     direction, stiffness = sideways_of_droppers(builder.model)
     for number, group in enumerate(builder.problem.line.droppers):
         mine = builder.mesh.dropper_group == number
-        _add_stiffness(builder, group.name, direction, mine, stiffness)
+        unknowns, weights = direction.unknowns[mine], direction.weights[mine]
+        springs = stiffness[mine, None, None] * weights[:, :, None] * weights[:, None, :]
+        builder.add_elements(group.name, unknowns, stiffness=springs, of_shape=True)
 
 
 def _bars(builder: ModelBuilder, arms: SteadyArms, mine: np.ndarray) -> None:
@@ -69,19 +71,6 @@ def _bars(builder: ModelBuilder, arms: SteadyArms, mine: np.ndarray) -> None:
     if swings and not slewed:
         along = model.dofs(nodes, "u")[:, None]
         builder.add_elements(name, along, stiffness=pull, of_shape=True)
-
-
-def _add_stiffness(
-    builder: ModelBuilder,
-    component: str,
-    direction: Direction,
-    which: np.ndarray,
-    stiffness: np.ndarray,
-) -> None:
-    """Springs along some of the directions, which are never cut [N/m]."""
-    unknowns, weights = direction.unknowns[which], direction.weights[which]
-    matrices = stiffness[which, None, None] * weights[:, :, None] * weights[:, None, :]
-    builder.add_elements(component, unknowns, stiffness=matrices, of_shape=True)
 
 
 register(

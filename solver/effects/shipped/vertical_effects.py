@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from catenary.mbs.roll import roll_of
 from catenary.meshgen.wires import Profile
 from catenary.solver.effects.effect import Effect, Limit, register
 from catenary.solver.model.link_directions import between_nodes
@@ -337,7 +336,7 @@ register(
         "a roll of each head, on which the contact force acts with the stagger as its lever",
         "rigid head on two springs beside each other",
         default=False,
-        applies=lambda p: any(roll_of(place.data) is not None for place in p.train.placements),
+        applies=lambda p: any(place.data.roll is not None for place in p.train.placements),
         law=lambda laws, p: replace(laws, head_roll=True),
         data="a head that can roll (pantographs.*.roll) under a wire with line.stagger_m",
     )

@@ -1,4 +1,4 @@
-"""What ends of a line remember: sums over all past accelerations there, at the cost of few.
+"""Memory of the ends of a line: sums over all past accelerations there, at the cost of few.
 
 A force -sum over j of Q_j b_(n-j) grows with each step if it is summed anew. Of the sum, lags below
 ``NEAR`` are summed as they are, and those of [L, 2 L), for L = ``NEAR`` and its doubles, once for
@@ -25,7 +25,7 @@ NEAR = native.NEAR
 
 
 class MemoryTables(NamedTuple):
-    """What all ends of a rank remember, one after another: where the parts of each begin is in
+    """Memory of all ends of a rank, one after another: where the parts of each begin is in
     ``ends``, see ``memories.hpp``."""
 
     ends: np.ndarray
@@ -235,5 +235,5 @@ def _none() -> Memories:
     return Memories(nowhere, nowhere, nothing, nothing, np.array([1.0, 0.0]), tables_of([]))
 
 
-# What a line without memories has for ``EndMemories.arguments``.
+# ``EndMemories.arguments`` of a line without memories.
 NO_MEMORIES = _none()

@@ -22,7 +22,7 @@ from catenary.solver.model.loads import (
     ShapeLoad,
 )
 
-# What samples of a load may take [B], and the most slices that are made at once.
+# Size of the samples of a load [B], and the most slices that are made at once.
 _BYTES, _MOST_SLICES = 2**24, 512
 
 
@@ -149,7 +149,7 @@ class _Sampled:
 
     Attributes
     ----------
-    places : (n,) among those that the rank solves for
+    places : (n,) among the unknowns that the rank solves for
     times : (most,) of slices [s]
     samples : (most, n) forces [N], [N m]
     held : (1,) how many of them are filled
@@ -202,7 +202,7 @@ class _Sampled:
         need = min(int(wanted[-1]) + 2 - low, most)
         held, first = int(self.held[0]), self._first
         if not first <= low or low + need > first + held:
-            # What is there already, and the rest up to the most.
+            # Slices that are there already, and the rest up to the most.
             kept = max(0, first + held - low) if first <= low else 0
             self.samples[:kept] = self.samples[held - kept : held].copy()
             field = np.empty((most - kept, self._points.stop - self._points.start))

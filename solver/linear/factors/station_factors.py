@@ -16,7 +16,6 @@ from scipy import sparse
 
 from catenary.base.petsc import PETSc
 from catenary.solver.kernels import native
-from catenary.solver.linear.factors.elimination import StationBlocks, eliminate_stations
 from catenary.solver.linear.factors.meeting_station import (
     MIDDLES,
     Turning,
@@ -29,8 +28,39 @@ from catenary.solver.linear.stations.station_products import kinds_by_type, of_p
 from catenary.solver.linear.stations.station_rows import StationRows, rows_of
 
 
+class StationBlocks(NamedTuple):
+    """Blocks (k, b, b) of each kind of station: to the station ``before``, its ``own``, and to the
+    station ``after``; see ``StationRows``."""
+
+    before: np.ndarray
+    own: np.ndarray
+    after: np.ndarray
+
+
+class Eliminated(NamedTuple):
+    """Stations after elimination from one end.
+
+    Attributes
+    ----------
+    factors : (m, 2, b, b) S^-1 and -S^-1 B of each factor; S is the diagonal block after
+        elimination, B joins it to the next station
+    kinds : (m,) kind of station that each factor is of
+    numbers : (n,) int32, the factor of each station
+    """
+
+    factors: np.ndarray
+    kinds: np.ndarray
+    numbers: np.ndarray
+
+
+def eliminate_stations(kinds: np.ndarray, blocks: StationBlocks, from_end: bool) -> Eliminated:
+    """Stations of ``kinds`` (n,) int32 eliminated one after the other, from the start of the line
+    or ``from_end``."""
+    return Eliminated(*native.eliminate(kinds, blocks, from_end))
+
+
 class FactorArrays(NamedTuple):
-    """What kernels read of ``StationFactors``."""
+    """Arrays of ``StationFactors`` as kernels read them."""
 
     kinds: np.ndarray
     blocks: np.ndarray

@@ -30,9 +30,15 @@ def columns_of(
 
     Parameters
     ----------
-    operators : of a line in pieces, whose these are; None if it is whole
-    places : arguments of ``UnitResponses.columns``
-    made : called with all columns and the numbers of the places that have theirs now
+    responses : UnitResponses
+        Solver of columns.
+    operators : OperatorPieces or None
+        Operators of the pieces, None if the line is whole.
+    places : tuple of ndarray
+        Arguments of ``UnitResponses.columns``.
+    made : Made
+        Function that is called with all columns and the numbers of the places that have
+        theirs now.
     """
     if operators is not None:
         return ColumnPieces(responses, operators, places, made).columns
@@ -84,7 +90,7 @@ class ColumnPieces:
             return
         columns, first = self.columns, piece.slot * self._room
         like = self._operators.like
-        places = self._places.of_numbers(which)
+        places = self._places._make(part[which] for part in self._places)
         try:
             # Room and reach are those of all pieces.
             at, data = self._responses.solve(places, like, columns.reach, FELT_AT_MOST)

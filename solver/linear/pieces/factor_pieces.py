@@ -19,7 +19,7 @@ from catenary.solver.linear.stations.sections import Sections
 from catenary.solver.linear.stations.station_layout import Layout
 from catenary.solver.linear.stations.station_rows import StationRows
 
-# Of stations that are joined otherwise than those that the layout was found for.
+# Message where stations are joined otherwise than the layout has it.
 JOINED_OTHERWISE = (
     "stations of the line are joined otherwise than those at its start, which a window cannot "
     "follow; set window.mode to off"

@@ -30,7 +30,7 @@ from catenary.solver.model.model import Model
 
 
 class WantedPieces(NamedTuple):
-    """What steps need of a line at a time.
+    """Part of a line that steps need at a time.
 
     Attributes
     ----------
@@ -145,7 +145,7 @@ class Stretch:
         self._rows = LikeRows(model, self.like, *self._ends)
 
     def operator(self, of: Coefficients) -> StationRows:
-        """Those of a sum of M, K and C with ones for held unknowns, cut off at the ends of the
+        """Rows of a sum of M, K and C with ones for held unknowns, cut off at the ends of the
         stretch."""
         return self.operator_and(of, [])[0]
 

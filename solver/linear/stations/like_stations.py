@@ -45,8 +45,7 @@ class LikeStations:
         held = np.zeros(high - low, dtype=np.int64)
         constrained = model.constrained_between(low, high) - low
         held[constrained] = 1
-        # What tells unknowns of a station from each other: their place in it, and whether one is
-        # held.
+        # Unknowns of a station differ by their place in it and by whether they are held.
         name = (2 * (np.arange(low, high) - starts[station]) + held).astype(np.uint64)
         self.marks = _mixed(numbering.station_type[first:last].astype(np.uint64))
         self.marks += _sums(station[constrained], _mixed(name[constrained]), n)

@@ -78,7 +78,7 @@ class Sections:
         return Sections(starts, self.station_type[first:last], self.station_types, self.width)
 
     def places(self) -> Places:
-        """What kernels read of them."""
+        """Places of the stations as kernels read them."""
         if not self.varies:
             return ALIKE
         return Places(self.starts[:-1].astype(np.int64), self.station_type.astype(np.uint8))

@@ -39,7 +39,7 @@ def layout_of(
 
 
 def of_pairs(size: int) -> np.ndarray:
-    """What the deflection and slope of each wire join (size, size), as M has it."""
+    """Mask (size, size) of the pairs of deflection and slope of each wire, which M joins."""
     wire = np.arange(size) // 2
     return wire[:, None] == wire
 
@@ -89,7 +89,7 @@ def kinds_by_type(
 
 
 class ProductArrays(NamedTuple):
-    """What kernels read of a ``StationProduct``."""
+    """Arrays of a ``StationProduct`` as kernels read them."""
 
     kinds: np.ndarray
     blocks: np.ndarray

@@ -1,4 +1,4 @@
-"""Rows of a line's matrices by stations, those that are alike assembled and stored once."""
+"""Rows of a line's matrices by stations; like rows are assembled and stored once."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ class LikeRows:
         self._stations = Sections.of(model.numbering, 0, model.numbering.size)
         self._first, last = model.numbering.stations_over(low, high)
         marks = like.marks[self._first - like.first : last - like.first].copy()
-        # What is beyond the ends may be cut off: the rows there are no others'.
+        # Rows at the ends may be cut off, so that they are kinds of their own.
         marks[:1] += np.uint64(1)
         marks[-1:] += np.uint64(2)
         _, first, kinds = np.unique(marks, return_index=True, return_inverse=True)

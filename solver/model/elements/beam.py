@@ -15,9 +15,12 @@ def stiffness(
 
     Parameters
     ----------
-    length : ndarray, shape (n,) [m]
-    bending_stiffness : EI [N m2], of all elements or (n,) of each
-    tension : F [N], positive in tension, of all elements or (n,) of each
+    length : ndarray, shape (n,)
+        Lengths of the elements [m].
+    bending_stiffness : float or ndarray
+        EI of all elements or (n,) of each [N m2].
+    tension : float or ndarray
+        Tension F, positive in tension, of all elements or (n,) of each [N].
 
     Returns
     -------

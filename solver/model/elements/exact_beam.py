@@ -26,9 +26,12 @@ def stiffness(length: np.ndarray, bending_stiffness: float, tension: np.ndarray)
 
     Parameters
     ----------
-    length : ndarray, shape (n,) [m]
-    bending_stiffness : EI [N m2]
-    tension : ndarray, shape (n,) [N], not negative
+    length : ndarray, shape (n,)
+        Lengths of the elements [m].
+    bending_stiffness : float
+        EI [N m2].
+    tension : ndarray, shape (n,)
+        Tension of each element, not negative [N].
 
     Returns
     -------

@@ -23,7 +23,7 @@ from catenary.solver.model.unknowns.stations import Stations, stations_of
 _WIDEST_GROUP = 12
 # Types of stations that a line may have, each with loops of its own; of more the rarer ones are
 # filled up to a whole cross-section.
-MOST_MAKE_UPS = 4
+MOST_STATION_TYPES = 4
 
 # Unknowns that are numbered together: those of each wire, by its name.
 Group = Mapping[str, tuple[str, ...]]
@@ -65,12 +65,12 @@ class Unknowns:
 
     @property
     def size(self) -> int:
-        """How many numbers there are, those that no node has included."""
+        """Number of unknowns, padding included."""
         return int(self.starts[-1])
 
     @cached_property
     def n_unknowns(self) -> int:
-        """How many unknowns all nodes have, those that nodes share counted once."""
+        """Number of unknowns of all nodes; shared unknowns count once."""
         return self.size - self.missing.size
 
     @property
@@ -130,10 +130,6 @@ class Unknowns:
         result[self.numbers[there]] = np.broadcast_to(by_node, there.shape)[there]
         return result
 
-    def station_of(self, nodes: np.ndarray) -> np.ndarray:
-        """Stations of mesh nodes, shape as ``nodes``."""
-        return self.station[nodes]
-
     def stations_over(self, low: int, high: int) -> tuple[int, int]:
         """Range of the stations that have any of the numbers [``low``, ``high``)."""
         first = int(np.searchsorted(self.starts, low, side="right")) - 1
@@ -168,8 +164,14 @@ def number_unknowns(
 
     Parameters
     ----------
-    padded : fills all stations up to a whole cross-section
-    together : wires that move with another one beside them, and share its unknowns, by name
+    mesh : LineMesh
+        Mesh of the line.
+    groups : iterable of Group
+        Names of the unknowns of each wire, by groups that matrices join.
+    padded : bool, optional
+        Whether all stations are filled up to a whole cross-section.
+    together : mapping, optional
+        Wires that move with another one beside them, and share its unknowns, by name.
 
     Raises
     ------
@@ -177,7 +179,9 @@ def number_unknowns(
         If such a wire has not its nodes, and what hangs there, beside those of the other one.
     """
     groups = list(groups)
-    group_names = [_names_of(group) for group in groups]
+    group_names = [
+        tuple(dict.fromkeys(name for own in group.values() for name in own)) for group in groups
+    ]
     names = tuple(name for own in group_names for name in own)
     most_nodes = max(2, _WIDEST_GROUP // max(map(len, group_names)))
     stations = stations_of(mesh, most_nodes, together)
@@ -218,10 +222,6 @@ def number_unknowns(
     )
 
 
-def _names_of(group: Group) -> tuple[str, ...]:
-    return tuple(dict.fromkeys(name for own in group.values() for name in own))
-
-
 def _station_types(stations: Stations, padded: bool) -> tuple[np.ndarray, np.ndarray]:
     """Slots of each station type, (n, n_slots), and station type of each station.
 
@@ -232,8 +232,8 @@ def _station_types(stations: Stations, padded: bool) -> tuple[np.ndarray, np.nda
     if present.all():
         return present[:1], np.zeros(len(present), dtype=np.int64)
     rows, station_type, counts = np.unique(present, axis=0, return_inverse=True, return_counts=True)
-    if stations.join_neighbours and counts.size > MOST_MAKE_UPS:
-        rare = np.argsort(-counts, kind="stable")[MOST_MAKE_UPS - 1 :]
+    if stations.join_neighbours and counts.size > MOST_STATION_TYPES:
+        rare = np.argsort(-counts, kind="stable")[MOST_STATION_TYPES - 1 :]
         present = present | np.isin(station_type, rare)[:, None]
         rows, station_type = np.unique(present, axis=0, return_inverse=True)
     order = np.argsort(rows.sum(axis=1), kind="stable")

@@ -51,8 +51,12 @@ def stations_of(
 
     Parameters
     ----------
-    most_nodes : how many there may be in a station with more nodes of a wire than one
-    together : wires that move with another one, whose slots their nodes have
+    mesh : LineMesh
+        Mesh of the line.
+    most_nodes : int
+        Most nodes in a station that has several of a wire.
+    together : mapping, optional
+        Wires that move with another one, whose slots their nodes have.
 
     Raises
     ------

@@ -187,11 +187,20 @@ def acceleration_jump(
     after: ChangedLine,
     state: tuple[np.ndarray, np.ndarray],
 ) -> np.ndarray:
-    """What the acceleration changes by when ``before`` becomes ``after``, owned part. Collective.
+    """Change of the acceleration from ``before`` to ``after``, owned part. Collective.
 
     Parameters
     ----------
-    state : owned displacement and velocity, (n_local,) each [m], [m/s]
+    comm : mpi4py communicator
+        Communicator of the ranks.
+    ownership : Ownership
+        Which unknowns this rank owns.
+    before : ChangedLine
+        The line before the incident.
+    after : ChangedLine
+        The line after it.
+    state : tuple of ndarray
+        Owned displacement and velocity, (n_local,) each [m], [m/s].
 
     Returns
     -------

@@ -28,7 +28,7 @@ _DROPPER, _ARM = ("u", "v", "w"), ("v", "w", "u")
 
 
 class Potential:
-    """What a line pulls at its unknowns in shapes near a known rest.
+    """Forces of a line on its unknowns in shapes near a known rest.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ class Potential:
         self._arms = _arms(model, known)
 
     def reserve(self, form: Equilibrium) -> np.ndarray:
-        """What droppers would carry if they could push, (n_droppers,) [N]."""
+        """Forces of droppers if they could push, (n_droppers,) [N]."""
         vectors = form.dropper_vectors(self.model.mesh.droppers)
         stretch = np.linalg.norm(vectors, axis=1) - self._cut
         return np.where(self.model.broken, 0.0, self.model.dropper_slopes.force_at(stretch))
@@ -89,9 +89,12 @@ class Potential:
 
         Parameters
         ----------
-        moved : displacement from the known rest (n_dofs,)
-        form : the shape after it
-        carried : (n_droppers,) tension of the droppers [N]
+        moved : ndarray, shape (n_dofs,)
+            Displacement from the known rest [m], [rad].
+        form : Equilibrium
+            Shape after the displacement.
+        carried : ndarray, shape (n_droppers,)
+            Tension of the droppers [N].
         """
         total = np.zeros(self.model.n_dofs)
         for block in self._springs:

@@ -23,9 +23,8 @@ from catenary.solver.effects import all_effects as effects
 from catenary.solver.effects.build_model import build
 from catenary.solver.model.model import Model
 from catenary.solver.model.rest_shape import Equilibrium
-from catenary.solver.model.wire_ends import tensioned_ends
+from catenary.solver.model.wire_ends import WireEnd, tensioned_ends
 from catenary.solver.statics.changed_line.potential import Potential
-from catenary.solver.statics.changed_line.tensioned_end import TensionedEnd
 
 # Displacements change by less than this where Newton's method ends [m].
 _SETTLED = 1e-9
@@ -38,6 +37,50 @@ _SWITCHING = 12
 _ALL_AT_ONCE = 40
 # Forces below this are none [N]: what a dropper of 1e6 N/m pulls when it stretches by 1e-13 m.
 _NO_FORCE = 1e-7
+
+
+# Forces that are one [N].
+_TINY = 1e-6
+
+
+class TensionedEnd:
+    """A tensioned end: whether its wheel stands, turns at an edge of its band, or is at a stop.
+
+    Attributes
+    ----------
+    end : WireEnd
+    unknown : number of its place along the track
+    pull : force that the tensioner has while it turns, None while the end is held [N]
+    held_at : place outwards at which it is held otherwise [m]
+    """
+
+    def __init__(self, model: Model, end: WireEnd) -> None:
+        tensioner, wire = model.simulated.tensioner, model.problem.line.wire(end.wire)
+        assert tensioner is not None
+        self.end, self._travel = end, tensioner.travel
+        self.unknown = int(model.dofs(np.array([end.node]), "u")[0])
+        self._low, self._high = tensioner.band(end.wire, wire, model.problem.gravity)
+        pairs = model.mesh.elements(end.wire)
+        self._element = int(np.flatnonzero((pairs == end.node).any(axis=1))[0])
+        self._installed = float(wire.tension_at(model.mesh.x(pairs[self._element]).mean()))
+        self.pull = wire.tension if tensioner.turns else None
+        self.held_at = 0.0
+
+    def changes(self, form: Equilibrium) -> bool:
+        """Go over to the state that follows at this rest; returns whether it is another one."""
+        before = self.pull, self.held_at
+        outwards = self.end.outwards * float(form.along[self.end.node])
+        tension = self._installed + form.gained_tension[self.end.wire][self._element]
+        if self.pull is None:
+            # A stop takes up what the weights pull more, and keeps what the wire pulls more.
+            if tension < self._low - _TINY and self.held_at <= 0.0:
+                self.pull = self._low
+            elif tension > self._high + _TINY and self.held_at >= 0.0:
+                self.pull = self._high
+        elif self._travel is not None and abs(outwards) > self._travel:
+            self.held_at = float(np.copysign(self._travel, outwards))
+            self.pull = None
+        return (self.pull, self.held_at) != before
 
 
 class Rest(NamedTuple):
@@ -129,7 +172,10 @@ class RestNearby:
         load = self._load.copy()
         for end in self._ends:
             if end.pull is None:
-                moved[end.unknown] = end.end.outwards * end.held_at - self._already(end)
+                # Where the known rest has it, along the track since the installation [m].
+                known = self._potential.known
+                already = float(known.along[end.end.node]) if known.along.size else 0.0
+                moved[end.unknown] = end.end.outwards * end.held_at - already
             else:
                 tension = model.problem.line.wire(end.end.wire).tension
                 load[end.unknown] += end.end.outwards * (end.pull - tension)
@@ -168,13 +214,8 @@ class RestNearby:
             f"{_MOST_STEPS} steps of Newton's method; its wires may be slack there"
         )
 
-    def _already(self, end: TensionedEnd) -> float:
-        """Where the known rest has an end, along the track since the installation [m]."""
-        known = self._potential.known
-        return float(known.along[end.end.node]) if known.along.size else 0.0
-
     def _softening(self, about: Model, form: Equilibrium, slack: np.ndarray) -> np.ndarray:
-        """What droppers in a shape are softer by than the model has them, (n_droppers,) [N/m]."""
+        """Stiffness that droppers in a shape lack of that in the model, (n_droppers,) [N/m]."""
         slopes = about.dropper_slopes
         now = slopes.at(slopes.piece_under(form.dropper_force)).slope
         lost = np.where(slack, self._lost * now, 0.0)

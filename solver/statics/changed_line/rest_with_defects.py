@@ -20,9 +20,12 @@ def hang(problem: Problem, cut: Model, form: Equilibrium) -> tuple[Model, Equili
 
     Parameters
     ----------
-    problem : whose line is the one that hangs, and whose effects are all that it has
-    cut : model of the line for which droppers were cut
-    form : its equilibrium; droppers that push there slacken, and others take their part
+    problem : Problem
+        Problem whose line is the one that hangs and whose effects are all that it has.
+    cut : Model
+        Model of the line for which droppers were cut.
+    form : Equilibrium
+        Its equilibrium; droppers that push there slacken, and others take their part.
 
     Raises
     ------

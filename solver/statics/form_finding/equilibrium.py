@@ -41,7 +41,7 @@ _LENGTH_TOLERANCE = 1e-10
 # Round-off of a dropper's force in terms of stiffness times height of the elements beside it.
 _ROUND_OFF = 100.0 * float(np.finfo(float).eps)
 _MAX_PASSES = 30
-# Of what steady arms lift, which follows from the lateral plane, in terms of the largest tension:
+# Tolerance of the lift of steady arms, which the lateral plane gives, over the largest tension:
 # some ten times what round-off leaves of vertical forces on lines of 20 kN.
 _FORCE_TOLERANCE = 2e-11
 
@@ -56,7 +56,12 @@ def find_form(
 
     Parameters
     ----------
-    sound : what ``sound_form`` gave for a problem that differs in errors of length alone
+    problem : Problem
+        Problem of the run.
+    mesh : LineMesh
+        Mesh of the line.
+    sound : tuple, optional
+        Result of ``sound_form`` for a problem that differs in errors of length alone.
 
     Raises
     ------
@@ -112,10 +117,8 @@ def _cut(
 
     Each wire hangs by itself here, also one that moves with another.
 
-    Parameters
-    ----------
-    pushing : whether droppers may push
-    exact : whether wires bend as tensioned beams do, or by Hermite's functions as in motion
+    With ``pushing`` droppers may push. With ``exact`` wires bend as tensioned beams do, else by
+    Hermite's functions as in motion.
     """
     length = mesh.points[mesh.droppers[:, 0], 2] - mesh.points[mesh.droppers[:, 1], 2]
     apart, stretched = length, np.zeros(length.size)

@@ -36,9 +36,13 @@ def lateral_shape(
 
     Parameters
     ----------
-    form : the line at rest in the vertical plane, whose forces of droppers are vertical ones
-    moments : ``exact_moments`` where elements bend as tensioned beams do, None where they do by
-        Hermite's functions as in motion
+    model : Model
+        Discrete line.
+    form : Equilibrium
+        The line at rest in the vertical plane, whose forces of droppers are vertical ones.
+    moments : ndarray, optional
+        ``exact_moments`` where elements bend as tensioned beams do, None where they do by
+        Hermite's functions as in motion.
 
     Raises
     ------

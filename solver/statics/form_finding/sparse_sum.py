@@ -13,7 +13,7 @@ from catenary.solver.model.model import Model
 
 
 class Part(NamedTuple):
-    """Elements of which those that are alike share a matrix.
+    """Elements; like elements share a matrix.
 
     Attributes
     ----------
@@ -36,8 +36,12 @@ def wire_parts(model: Model, at: np.ndarray, exact: bool = False) -> list[Part]:
 
     Parameters
     ----------
-    at : (n_nodes,) number of each node's deflection; that of its slope follows
-    exact : whether elements bend as tensioned beams do, or by Hermite's functions as in motion
+    model : Model
+        Discrete line.
+    at : ndarray, shape (n_nodes,)
+        Number of each node's deflection; that of its slope follows.
+    exact : bool, optional
+        Whether elements bend as tensioned beams do, or by Hermite's functions as in motion.
     """
     mesh, parts = model.mesh, []
     for wire in model.problem.line.wires:

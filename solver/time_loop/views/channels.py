@@ -39,7 +39,7 @@ RUN = "run"
 
 
 class Sources(NamedTuple):
-    """What channels take their values from, as it is for one part of a march.
+    """Sources of the values of channels in one part of a march.
 
     ``arm_uplift`` [m] and ``dropper_force`` [N] are those of this rank, as ``link_force`` [N] of
     further links of one sign, by component, and ``gauges``, by what they show; models of
@@ -56,7 +56,7 @@ class Sources(NamedTuple):
 
 
 class Energies(NamedTuple):
-    """What energies are taken from: ``kinetic`` and ``elastic`` energy of the line [J]."""
+    """Sources of energies: ``kinetic`` and ``elastic`` energy of the line [J]."""
 
     kinetic: float
     elastic: float
@@ -64,9 +64,9 @@ class Energies(NamedTuple):
 
 
 class Train(NamedTuple):
-    """What decides which channels a run has: strips of each pantograph in running order, whether a
-    pantograph has joints that may open, the number of contact wires, whether these move sideways,
-    whether steady arms have stops, and whether wires move along the track."""
+    """Train as far as it decides which channels a run has: strips of each pantograph in running
+    order, whether a pantograph has joints that may open, the number of contact wires, whether these
+    move sideways, whether steady arms have stops, and whether wires move along the track."""
 
     n_strips: tuple[int, ...]
     joints_in_loop: bool
@@ -329,12 +329,12 @@ def line_channels(train: Train | None = None) -> tuple[str, ...]:
 
 
 def line_channels_of_all() -> tuple[str, ...]:
-    """Names of those that every run has."""
+    """Names of the channels of the line that every run has."""
     return line_channels(Train((), joints_in_loop=False))
 
 
 def train_channels(train: Train | None = None) -> tuple[Channel, ...]:
-    """Channels of pantographs and strips: all, or those that a run with this train has."""
+    """Channels of pantographs and strips: all, or the channels of a run with this train."""
     own = (channel for channel in CHANNELS.values() if not channel.of_line)
     return tuple(channel for channel in own if train is None or channel.when(train))
 

@@ -56,7 +56,7 @@ class LineEnergy:
         return 0 if self._products is None else self._products[2]
 
     def parts(self, motion: ShownMotion) -> np.ndarray:
-        """What this rank adds to kinetic and elastic energy, the latter relative to rest without
+        """This rank's share of kinetic and elastic energy, the latter relative to rest without
         loads, links switched as they are [J], shape (2,)."""
         begin, end = motion.take_changes()
         displacement, velocity = motion.displacement, motion.velocity
@@ -64,7 +64,7 @@ class LineEnergy:
             parts = self._line.energy_parts(displacement, velocity)
         else:
             if begin < end:
-                # What joins two stations changes with either.
+                # Rows that join two stations change with either.
                 changed = max(0, begin - 1), min(int(self._edges[-1]), end + 1)
                 self._sum_stations(motion.padded, (displacement, velocity), *changed)
             parts = 0.5 * np.add.reduce(self._sums, axis=1)
@@ -105,7 +105,7 @@ class LineEnergy:
         assert self._products is not None and self._line.window is not None
         window = self._line.window
         if not window.has_rows(*self._rows[[first, last]].tolist()):
-            # Of what has not moved no rows are needed.
+            # Stations that have not moved need no rows.
             own = slice(*self._starts[[first, last]].tolist())
             self._sums[:, first:last] = 0.0
             moved = own.start + np.flatnonzero((motion[0][own] != 0) | (motion[1][own] != 0))

@@ -77,9 +77,12 @@ class ObserverList:
 
         Parameters
         ----------
-        first : number of the step before the block, which is shown
-        times, rows : of its steps (k,) [s] and (k, n)
-        views : one after another of steps whose motion is kept, then of the last step
+        first : int
+            Number of the step before the block, which is shown.
+        times, rows : ndarray
+            Times (k,) [s] and rows (k, n) of its steps.
+        views : iterable of StepView
+            Views of the steps whose motion is kept, then of the last step.
         """
         last = first + len(times)
         if last == first:

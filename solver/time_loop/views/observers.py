@@ -1,4 +1,4 @@
-"""What the time loop shows to those who watch it. Observers never change a run and never solve."""
+"""Views of a run for observers, which never change a run and never solve."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from catenary.solver.window.moving_columns import MovingColumns
 
 @dataclass(frozen=True)
 class Stage:
-    """What is fixed before the first step. All ranks hold the global arrays.
+    """Facts of a run that are fixed before the first step. All ranks hold the global arrays.
 
     Attributes
     ----------
@@ -74,7 +74,7 @@ class Stage:
 
     @property
     def train(self) -> Train:
-        """What decides which channels are recorded."""
+        """Train as far as it decides which channels are recorded."""
         strips = self.n_strips or (1,) * self.n_pantographs
         laws = self.lateral, self.uplift_stops, bool(self.wire_ends)
         return Train(strips, self.joints_in_loop, self.n_wires, *laws)

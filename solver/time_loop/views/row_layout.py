@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from catenary.solver.time_loop.views.channels import CHANNELS, Channel, Sources
+from catenary.solver.time_loop.views.channels import CHANNELS, Sources
 
 
 class RowLayout:
@@ -49,7 +49,11 @@ class RowLayout:
                 part = slice(self.width, self.width + array.size)
                 self.width = part.stop
                 if isinstance(values, np.ndarray):
-                    self.copied.append(_in_a_row(channel, array))
+                    if array.dtype != np.float64 or not array.flags.c_contiguous:
+                        raise ValueError(
+                            f"the values of channel {channel.name} are no contiguous doubles"
+                        )
+                    self.copied.append(array.reshape(-1))
                     self._copied.append((part, array))
                 else:
                     self._called.append((part, values))
@@ -62,13 +66,6 @@ class RowLayout:
             row[part] = array
         for part, values in self._called:
             row[part] = values()
-
-
-def _in_a_row(channel: Channel, array: np.ndarray) -> np.ndarray:
-    """The numbers of an array as they are in memory."""
-    if array.dtype != np.float64 or not array.flags.c_contiguous:
-        raise ValueError(f"the values of channel {channel.name} are no contiguous doubles")
-    return array.reshape(-1)
 
 
 def _part_of(shown: np.ndarray, sources: Sources, array: np.ndarray) -> slice | None:

@@ -50,8 +50,10 @@ class ShownMotion:
 
         Parameters
         ----------
-        stations : what had moved since the look before, see ``moved``
-        numbers : displacements, then velocities, of these stations' unknowns
+        stations : tuple of int
+            Stations that had moved since the look before, see ``moved``.
+        numbers : ndarray
+            Displacements, then velocities, of these stations' unknowns.
         """
         starts = self._columns.starts
         own = slice(int(starts[stations[0]]), int(starts[stations[1]]))

@@ -34,14 +34,14 @@ from catenary.solver.time_loop.views.row_layout import RowLayout
 from catenary.solver.time_loop.views.shown_motion import ShownMotion
 from catenary.solver.window.moving_columns import Columns, MovingColumns, columns_of
 
-# What can be seen of a step, more with each.
+# Parts of a step that can be seen, more with each.
 _ROW, _MOTION, _STATE = range(3)
 # Channels of the first tables of ``Shown.columns``.
 _OF_COLUMNS = ("arm_uplift", "dropper_force")
 
 
 class Shown(NamedTuple):
-    """What is shown of a rank's part of the line at the end of a step.
+    """Values of a rank's part of the line at the end of a step.
 
     Attributes
     ----------
@@ -123,10 +123,16 @@ class Showing:
         self._row, self._times = np.zeros(self.layout.width), np.zeros(1)
         self._view = self._new_view()
         links = droppers, others, dropper_bends, other_bends
-        self.shown = self._what_is_shown(*links, force)
+        window, n_local = self._line.window, self._line.ownership.n_local
+        # Which of a row's values of the line change with which stations.
+        columns = columns_of(
+            (self._arm_rows[:, None], droppers.unknowns, others.unknowns),
+            n_local,
+            None if window is None else window.stations,
+        )
+        self.shown = Shown(self._line.motion.read, self._arm_rows, *links, force, columns)
         stepped = slice(self._line.ownership.first, self._line.ownership.last)
         load = line.load[stepped] if self._unbalanced else np.zeros(0)
-        columns = self.shown.columns
         self._energy = LineEnergy(self._line, interaction.links, load, columns)
         self.motion = ShownMotion(self._line, columns, self._energy.pad)
         n = columns.n_stations
@@ -149,26 +155,8 @@ class Showing:
             state=self._state,
         )
 
-    def _what_is_shown(
-        self,
-        droppers: LinkArrays,
-        others: LinkArrays,
-        dropper_bends: Dependents,
-        other_bends: Dependents,
-        other_force: np.ndarray,
-    ) -> Shown:
-        """Where a row's values of the line come from, and which change with which stations."""
-        window = self._line.window
-        columns = columns_of(
-            (self._arm_rows[:, None], droppers.unknowns, others.unknowns),
-            self._line.ownership.n_local,
-            None if window is None else window.stations,
-        )
-        links = droppers, others, dropper_bends, other_bends
-        return Shown(self._line.motion.read, self._arm_rows, *links, other_force, columns)
-
     def stage(self, dt: float, start_time: float, n_steps: int) -> Stage:
-        """What stays the same for the whole run."""
+        """Description of the run, which its steps do not change."""
         mesh, model_laws = self._model.mesh, self._model.simulated
         points = mesh.points.copy()
         points[:, 2] = self._form.height
@@ -211,7 +199,9 @@ class Showing:
         row[: self._shown.size] = self._shown
         self.layout.fill(row)
         self._times[0] = time
-        return self._viewed(step, self._times, row[np.newaxis], _STATE)
+        self._seen = _STATE
+        self._view.move_to(step, self._times, row[np.newaxis])
+        return self._view
 
     def cross(self, time: float, *, found: bool = False) -> None:
         """Note where wires that move sideways cross the strips at ``time`` [s], if any do.
@@ -231,33 +221,38 @@ class Showing:
         if self._line.window is not None:
             self._moving.follow(self.shown.columns, _OF_COLUMNS, stations)
 
-    def view_of(self, step: int, times: np.ndarray, rows: np.ndarray) -> StepView:
-        """The state after steps that a compiled loop has taken up to ``step``, its latest one, with
-        their times (k,) [s] and rows (k, n)."""
-        self.motion.late(followed=True)
-        return self._viewed(step, times, rows, _STATE)
-
-    def view_of_rows(self, step: int, times: np.ndarray, rows: np.ndarray) -> StepView:
-        """The same where the loop has left the state amid the next step."""
-        return self._viewed(step, times, rows, _ROW)
-
-    def view_of_kept(
+    def view_of(
         self,
         step: int,
         times: np.ndarray,
         rows: np.ndarray,
-        motion: tuple[tuple[int, int], np.ndarray],
-        places: np.ndarray,
+        kept: tuple[tuple[tuple[int, int], np.ndarray], np.ndarray] | None = None,
+        *,
+        broke: bool = False,
     ) -> StepView:
-        """The same of steps that the loop went on from, with what is left of the ``motion``, see
-        ``ShownMotion.show``, and with ``places`` of the pantographs."""
-        self.motion.show(*motion)
-        self._kept_places = places
-        return self._viewed(step, times, rows, _MOTION)
+        """View after steps that a compiled loop has taken up to ``step``.
 
-    def _viewed(self, step: int, times: np.ndarray, rows: np.ndarray, seen: int) -> StepView:
-        self._seen = seen
-        # Of a long line rows are not to be copied.
+        Parameters
+        ----------
+        step : int
+            Number of the latest step.
+        times : ndarray, shape (k,)
+            Times of the steps [s].
+        rows : ndarray, shape (k, n)
+            Rows of the steps; of a long line they are not copied.
+        kept : tuple, optional
+            Of steps that the loop went on from what is left of their motion, the arguments of
+            ``ShownMotion.show``, and places of the pantographs.
+        broke : bool
+            Whether the loop has left the state amid the next step, so that rows alone are shown.
+        """
+        self._seen = _ROW if broke else _STATE
+        if kept is not None:
+            motion, self._kept_places = kept
+            self.motion.show(*motion)
+            self._seen = _MOTION
+        elif not broke:
+            self.motion.late(followed=True)
         self._view.move_to(step, times, rows)
         return self._view
 
@@ -298,7 +293,7 @@ class Showing:
 
     @cached_property
     def _gained(self) -> np.ndarray:
-        """What another temperature adds to that of the installation [N]."""
+        """Tension that another temperature adds to that of the installation [N]."""
         mesh, gained = self._model.mesh, np.zeros(self._model.mesh.n_nodes)
         for name, more in self._form.gained_tension.items():
             first, second = mesh.elements(name).T

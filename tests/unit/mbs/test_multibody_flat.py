@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from body_mechanics import tabulated
 from measuring import check
 from scipy.interpolate import CubicSpline
 
@@ -22,6 +23,7 @@ from catenary.mbs.rigid.forces import (
     Table,
 )
 from catenary.mbs.rigid.joints import (
+    Constant,
     Fixed,
     PointOnCurve,
     PointOnLine,
@@ -31,8 +33,6 @@ from catenary.mbs.rigid.joints import (
     Revolute,
     RevolutePrismatic,
     Spherical,
-    constant,
-    tabulated,
 )
 from catenary.mbs.rigid.kinematics import stacked
 from catenary.mbs.rigid.system import System, independent_rows
@@ -49,7 +49,7 @@ JOINTS: tuple[Joint, ...] = (
     Spherical("spherical", "a", "b", AT_I, AT_J),
     Revolute("on space", SPACE, "b", AT_I, AT_J, ALONG, ACROSS),
     PrescribedAngle("angle", "a", "b", TABLE, (0, 1, 0), (1, 0, 0), (0, 0, 1)),
-    PrescribedAngle("still", "b", "a", constant(0.4), (0, 1, 0), (1, 0, 0), (0, 0, 1)),
+    PrescribedAngle("still", "b", "a", Constant(0.4), (0, 1, 0), (1, 0, 0), (0, 0, 1)),
     PointOnLine("line", "a", "b", AT_I, AT_J, ALONG),
     Prismatic("prismatic", "a", "b", AT_I, AT_J, ALONG, ACROSS, (1.0, 0.0, 1.0), (2.0, 1.0, 0.6)),
     RevolutePrismatic("slide", "a", "b", AT_I, AT_J, ALONG, ACROSS, (1.0, 2.0, 0.0)),

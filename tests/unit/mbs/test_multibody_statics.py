@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from body_mechanics import equivalent_mass, reaction
 from measuring import check
 
 from catenary.base.errors import InputError, RunBroken
 from catenary.mbs.rigid.bodies import SPACE, Body
 from catenary.mbs.rigid.forces import Actuator, Gravity, PointForce, SpringDamper
 from catenary.mbs.rigid.joints import (
+    Constant,
     PrescribedPoint,
     Prismatic,
     Revolute,
     Spherical,
-    constant,
 )
-from catenary.mbs.rigid.statics import calibrate_actuator, equilibrium, equivalent_mass, held_force
+from catenary.mbs.rigid.statics import calibrate_actuator, equilibrium, held_force
 from catenary.mbs.rigid.system import System
 
 G = 9.81
@@ -64,13 +65,13 @@ def test_pendulum_comes_to_rest_below_its_hinge_while_it_may_spin_freely() -> No
     )
     rest = equilibrium(system, system.start())
     check("position [m]", rest.motion.position[0], (0, 0, -1), within=1e-8)
-    reaction = system.reaction("hook", "bob", rest.motion, 0.0, rest.multipliers)
-    check("hook carries [N]", reaction.force, (0, 0, G), within=1e-7)
+    found = reaction(system, "hook", "bob", rest.motion, rest.multipliers)
+    check("hook carries [N]", found.force, (0, 0, G), within=1e-7)
 
 
 def test_lever_presses_as_levers_do() -> None:
     """Held at its end: strut F at L / 4, weight at L / 2: F / 4 - m g / 2 upward."""
-    system, holder = lever(), PrescribedPoint("wire", "rod", constant(0.0), (1.0, 0, 0))
+    system, holder = lever(), PrescribedPoint("wire", "rod", Constant(0.0), (1.0, 0, 0))
     expected = 100.0 / 4 - 3.0 * G / 2
     check("pressed [N]", held_force(system, holder, system.start()), expected, within=1e-10)
     found = calibrate_actuator(system, "strut", holder, system.start(), 50.0)
@@ -94,7 +95,7 @@ def test_what_has_no_answer_is_said() -> None:
     system = System((Body("head", 2.0, (1, 1, 1)),), (UPWARD,), (Gravity((2.0,), G),))
     with pytest.raises(RunBroken, match="no equilibrium near its start: 19.6 N are left over"):
         equilibrium(system, system.start())
-    holder = PrescribedPoint("wire", "rod", constant(0.0), (1.0, 0, 0))
+    holder = PrescribedPoint("wire", "rod", Constant(0.0), (1.0, 0, 0))
     with pytest.raises(InputError, match="'gravity' is no actuator"):
         calibrate_actuator(lever(), "gravity", holder, lever().start(), 50.0)
     with pytest.raises(InputError, match="no force 'lift'"):

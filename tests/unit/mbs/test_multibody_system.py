@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from body_mechanics import reaction
 from measuring import check
 
 from catenary.base.errors import InputError
 from catenary.mbs.rigid.bodies import SPACE, Body, Motion
 from catenary.mbs.rigid.forces import Gravity, PointForce
 from catenary.mbs.rigid.joints import (
+    Constant,
     Fixed,
     PointOnLine,
     PrescribedPoint,
     Prismatic,
     Revolute,
     Spherical,
-    constant,
     steady,
 )
 from catenary.mbs.rigid.system import System, independent_rows
@@ -68,10 +69,10 @@ def test_held_rod_has_the_reactions_of_statics() -> None:
     motion = system.start()
     solution = system.accelerations(motion, 0.0)
     check("acceleration", solution.acceleration, 0.0, within=1e-12)
-    reaction = system.reaction("wall", "rod", motion, 0.0, solution.multipliers)
-    check("force [N]", reaction.force, (0, 0, mass * G + load), within=1e-12)
+    found = reaction(system, "wall", "rod", motion, solution.multipliers)
+    check("force [N]", found.force, (0, 0, mass * G + load), within=1e-12)
     # A load down at +x turns about +y; the joint turns back.
-    check("moment [N m]", reaction.moment, (0, -load * length / 2, 0), within=1e-12)
+    check("moment [N m]", found.moment, (0, -load * length / 2, 0), within=1e-12)
 
 
 def test_swinging_rod_let_go_level_falls_and_pulls_like_by_hand() -> None:
@@ -87,9 +88,9 @@ def test_swinging_rod_let_go_level_falls_and_pulls_like_by_hand() -> None:
     check("rate", system.constraints(motion, 0.0).rate, 0.0, within=4 * EPS)
     solution = system.accelerations(motion, 0.0)
     check("alpha [rad/s^2]", solution.acceleration[4], 1.5 * G / length, within=1e-12)
-    reaction = system.reaction("hinge", "rod", motion, 0.0, solution.multipliers)
+    found = reaction(system, "hinge", "rod", motion, solution.multipliers)
     expected = (-mass * spin**2 * length / 2, 0.0, mass * G / 4)
-    check("hinge force [N]", reaction.force, expected, within=1e-12)
+    check("hinge force [N]", found.force, expected, within=1e-12)
 
 
 def test_redundant_rows_of_a_plane_mechanism_are_named_and_do_no_harm() -> None:
@@ -100,7 +101,7 @@ def test_redundant_rows_of_a_plane_mechanism_are_named_and_do_no_harm() -> None:
     solution = system.accelerations(motion, 0.0)
     check("upright, at rest: accelerations", solution.acceleration, 0.0, within=1e-12)
     feet = sum(
-        system.reaction(name, body, motion, 0.0, solution.multipliers).force
+        reaction(system, name, body, motion, solution.multipliers).force
         for name, body in (("hinge left", "left"), ("hinge right", "right"))
     )
     check("carried by the hinges [N]", feet, (0.0, 0.0, 4 * G), within=1e-11)
@@ -112,14 +113,13 @@ def test_assembly_closes_joints_and_says_what_each_missed() -> None:
     off = np.zeros(18)
     off[12:15] = (0.03, 0.0, 0.04)  # the whole top, by 50 mm
     missed = {miss.joint: miss.gap for miss in system.misses(motion.moved(off))}
-    assembly = system.assemble(motion.moved(off))
+    assembled = system.assemble(motion.moved(off))
     expected = {"hinge left": 0, "hinge right": 0, "top left": 0.05, "top right": 0.05}
     check("missed [m]", list(missed.values()), list(expected.values()), within=1e-15)
     assert list(missed) == list(expected)
-    after = system.misses(assembly.motion)
+    after = system.misses(assembled)
     check("left open [m]", [m.gap for m in after], 0.0, within=2e-12)
     check("left open (cosine)", [m.tilt for m in after], 0.0, within=2e-12)
-    assert assembly.n_iterations < 10
 
 
 def test_joints_that_cannot_be_closed_are_named() -> None:
@@ -145,7 +145,7 @@ def test_velocity_projection_keeps_what_joints_allow() -> None:
     drive = PrescribedPoint("drive", "slider", steady(0.0, 5.0), along=(1, 0, 0))
     driven = rail.with_joints(drive).project_velocities(moving)
     check("driven", driven.velocities, (5, 0, 0, 0, 0, 0), within=1e-13)
-    against = PrescribedPoint("brake", "slider", constant(0.0), along=(1, 0, 0))
+    against = PrescribedPoint("brake", "slider", Constant(0.0), along=(1, 0, 0))
     with pytest.raises(InputError, match="contradict each other"):
         rail.with_joints(drive, against).project_velocities(moving)
 
@@ -164,7 +164,7 @@ def test_names_must_be_different_and_known() -> None:
 def test_system_without_joints_is_free() -> None:
     system = System((rod("rod", 2.0, 1.0, 0.0),), (), (Gravity((2.0,), G),))
     motion = system.start()
-    assert system.assemble(motion).motion is motion
+    assert system.assemble(motion) is motion
     assert system.project_velocities(motion) is motion
     check(
         "falls", system.accelerations(motion, 0.0).acceleration, (0, 0, -G, 0, 0, 0), within=1e-14

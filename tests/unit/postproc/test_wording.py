@@ -28,4 +28,3 @@ def test_zero_has_no_sign(value: float, digits: int, text: str) -> None:
 
 def test_one_is_singular() -> None:
     assert [counted(n, "rank") for n in (0, 1, 2)] == ["0 ranks", "1 rank", "2 ranks"]
-    assert counted(2, "mass", "masses") == "2 masses"

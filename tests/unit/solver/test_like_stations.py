@@ -9,11 +9,15 @@ import pytest
 from measuring import COMM, matrix_of
 from small_lines import HANGING, ac_simple_line, mesh_of, problem_of
 
-from catenary.solver.linear import operator_bands
+from catenary.solver.linear import unit_responses
 from catenary.solver.linear.decay_length import reach
-from catenary.solver.linear.operator_bands import OperatorBands
 from catenary.solver.linear.stations.like_stations import LikeStations
-from catenary.solver.linear.unit_responses import ShortColumns, UnitResponses, Windows
+from catenary.solver.linear.unit_responses import (
+    OperatorBands,
+    ShortColumns,
+    UnitResponses,
+    Windows,
+)
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import distribute
 from catenary.solver.problem.problem import Damping
@@ -129,7 +133,7 @@ def test_bands_of_a_stretch_are_those_of_its_own_matrix(
     long_line: Model, at_once: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Whether put together alone or with others: terms are added in one order."""
-    monkeypatch.setattr(operator_bands, "_AT_ONCE", at_once)
+    monkeypatch.setattr(unit_responses, "_AT_ONCE", at_once)
     starts, n = long_line.numbering.starts, long_line.n_dofs
     whole = matrix_of(long_line, *COEFFICIENTS).toarray()
     whole[np.diag_indices(n)] += np.isin(np.arange(n), long_line.constrained)

@@ -9,7 +9,12 @@ import pytest
 from small_lines import ac_simple_line, mesh_of
 
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE, LineMesh
-from catenary.solver.model.unknowns.registry import MOST_MAKE_UPS, Group, Unknowns, number_unknowns
+from catenary.solver.model.unknowns.registry import (
+    MOST_STATION_TYPES,
+    Group,
+    Unknowns,
+    number_unknowns,
+)
 
 VERTICAL, LATERAL = (
     {CONTACT_WIRE: names, MESSENGER_WIRE: names} for names in (("w", "theta_y"), ("v", "theta_z"))
@@ -78,9 +83,9 @@ def check(mesh: LineMesh, found: Unknowns) -> None:
     taken = np.sort(found.numbers[found.numbers >= 0])
     assert (np.diff(taken) > 0).all() and taken[-1] < found.size
     assert found.missing.size == found.size - taken.size
-    stations = found.station_of(joined(mesh))
+    stations = found.station[joined(mesh)]
     assert np.abs(np.diff(stations, axis=1)).max() <= 1
-    x, station = mesh.points[:, 0], found.station_of(np.arange(mesh.n_nodes))
+    x, station = mesh.points[:, 0], found.station
     for place in (0.0, 60.0, 61.7):
         low, high = found.within(place, place + 20.0)
         inside = (x >= place) & (x <= place + 20.0)
@@ -95,8 +100,8 @@ def test_nodes_of_one_place_are_a_station() -> None:
     assert found.width == 4 and found.in_stations and not found.missing.size
     check(mesh, found)
     contact, messenger = mesh.wires[CONTACT_WIRE], mesh.wires[MESSENGER_WIRE]
-    assert (found.station_of(contact) == np.arange(contact.size)).all()
-    assert (found.station_of(messenger) == np.arange(contact.size)).all()
+    assert (found.station[contact] == np.arange(contact.size)).all()
+    assert (found.station[messenger] == np.arange(contact.size)).all()
 
 
 def test_groups_of_unknowns_stand_together_in_a_station() -> None:
@@ -208,7 +213,7 @@ def test_rare_station_types_are_filled_up() -> None:
         mesh = with_wire(mesh, f"{STITCH}_{number}", first, last)
     found = number_unknowns(mesh, [vertical(mesh)], padded=False)
     check(mesh, found)
-    assert len(found.station_types) == MOST_MAKE_UPS and found.width == 12
+    assert len(found.station_types) == MOST_STATION_TYPES and found.width == 12
     assert max(map(len, found.station_types)) == 12
 
 

@@ -1,0 +1,97 @@
+"""What tests ask of multibody systems besides: reactions, masses, states as vectors, tables."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy import linalg
+from scipy.interpolate import CubicSpline
+
+from catenary.base.errors import InputError
+from catenary.mbs.mechanism.reduction import ReducedMechanism
+from catenary.mbs.rigid.arrays import ORIGIN, TimeLaw
+from catenary.mbs.rigid.bodies import Motion, Vector, normalised, quaternion_product
+from catenary.mbs.rigid.joints import unit
+from catenary.mbs.rigid.kinematics import Law, point
+from catenary.mbs.rigid.least_squares import null_space
+from catenary.mbs.rigid.system import System
+
+
+class Reaction(NamedTuple):
+    """Force of a joint on a body, in space axes (3,) [N], and moment about the body's centre of
+    mass, in body axes (3,) [N m]."""
+
+    force: np.ndarray
+    moment: np.ndarray
+
+
+def reaction(
+    system: System, joint: str, body: str, motion: Motion, multipliers: np.ndarray
+) -> Reaction:
+    """What a joint does to a body at time 0, of multipliers (m,) of all joints."""
+    rows = system.row_ranges[joint]
+    jacobian = system.constraints(motion, 0.0).jacobian[rows]
+    force = -(jacobian.T @ multipliers[rows]).reshape(-1, 6)[motion.numbers[body]]
+    return Reaction(force[:3], force[3:])
+
+
+def equivalent_mass(
+    system: System,
+    motion: Motion,
+    body: str,
+    at: Vector = ORIGIN,
+    along: Vector = (0.0, 0.0, 1.0),
+) -> float:
+    """Mass [kg] that a suddenly growing force on a point feels along a direction in space.
+
+    Bodies behind springs that the joints do not move along stand still and do not count.
+    """
+    free = null_space(system.constraints(motion, 0.0).jacobian)
+    # Velocities of the point per velocity of each free motion.
+    way = unit(along) @ point(motion, body, at).jacobian @ free
+    if np.abs(way).max(initial=0.0) < 1e-9:
+        raise InputError(f"The joints do not let body {body!r} move along {tuple(along)}.")
+    mass = free.T @ (system.mass[:, None] * free)
+    return float(1.0 / (way @ linalg.solve(mass, way, assume_a="pos")))
+
+
+def acceleration(
+    mechanism: ReducedMechanism, height: float, speed: float, push: float = 0.0
+) -> float:
+    """Acceleration upward [m/s^2] of a reduced mechanism at a height [m] and speed upward [m/s].
+
+    ``push`` [N] is a further force on the point, upward.
+    """
+    (mass, lift, damping), (mass_slope, _, _) = mechanism.at(height)
+    force = lift - damping * speed - 0.5 * mass_slope * speed**2 + push
+    return float(force / mass)
+
+
+def parameter_rates(parameters: np.ndarray, spin: np.ndarray) -> np.ndarray:
+    """dp/dt = 1/2 L^T omega' (..., 4) [1/s] of angular velocities in body axes (..., 3) [rad/s].
+
+    Keeps p^T p for any p: the norm changes by the errors of integration only.
+    """
+    as_quaternion = np.concatenate([np.zeros((*spin.shape[:-1], 1)), spin], axis=-1)
+    return 0.5 * quaternion_product(parameters, as_quaternion)
+
+
+def place_rates(motion: Motion) -> np.ndarray:
+    """Rates of positions and Euler parameters, shape (7 n,)."""
+    rates = parameter_rates(motion.parameters, motion.spin)
+    return np.hstack([motion.velocity, rates])[:-1].ravel()
+
+
+def from_vector(pattern: Motion, state: np.ndarray) -> Motion:
+    """The motion of an integrated ``state`` (13 n,), Euler parameters normalised."""
+    n = pattern.n_bodies
+    places = state[: 7 * n].reshape(n, 7).copy()
+    places[:, 3:] = normalised(places[:, 3:])
+    return pattern.restored(np.concatenate([places.ravel(), state[7 * n :]]))
+
+
+def tabulated(times: Vector, values: Vector) -> TimeLaw:
+    """A prescribed number from a table, by a cubic spline with free ends."""
+    spline = CubicSpline(times, values, bc_type="natural")
+    return lambda time: Law(*(float(spline(time, k)) for k in range(3)))
