@@ -85,7 +85,9 @@ def validation_text(found: Validation) -> str:
 
 
 def _said(step: Step) -> str:
-    return counts(step.rows) if step.rows else f"{NOT_JUDGED}: {step.why}."
+    return (
+        f"{counts(step.rows)} {step.told}".rstrip() if step.rows else f"{NOT_JUDGED}: {step.told}"
+    )
 
 
 def _closing(found: Validation) -> list[str]:
