@@ -71,7 +71,7 @@ def _filtered(results: Results) -> list[tuple[str, np.ndarray, np.ndarray]]:
     for p, place in enumerate(_places(results.n_pantographs)):
         position = results.column("contact_position", p)
         within = (position >= start) & (position <= end)
-        filtered = filters.low_pass(results.column("contact_force", p), results.dt)
+        filtered = filters.contact_force(results, p)
         found.append((place, position[within], filtered[within]))
     return found
 

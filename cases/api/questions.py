@@ -25,9 +25,10 @@ def highest_speeds(
     step: float = 10.0,
     within: float = 1.0,
     criteria: Sequence[str] = (),
+    direction: str | None = None,
     jobs: int = 1,
 ) -> pd.DataFrame:
-    """Highest speed at which the acceptance criteria hold, all of them and each by itself.
+    """Highest speed at which the acceptance criteria hold in both directions, all and each.
 
     Speeds ``step`` apart are marched side by side, then ends of stretches are bisected. One process
     does so, or ``jobs`` of them: not collective.
@@ -44,6 +45,8 @@ def highest_speeds(
         How closely ends of stretches are found [km/h].
     criteria : sequence of str
         Parts of names of criteria, all criteria if there are none.
+    direction : str
+        "forward" or "backward"; None for both, as far as the scene's line can be turned.
     jobs : int
         Processes that march, 0 for one on each core.
 
@@ -52,12 +55,14 @@ def highest_speeds(
     pandas.DataFrame
         A row for all criteria together, then one for each, with the columns of ``speed.csv``:
         ``holds_from_km_h``, ``highest_km_h``, and ``fails_at_km_h``, the first speed at which the
-        criterion fails going up from there, NaN at the end of the range.
+        criterion fails going up from there, NaN at the end of the range; ``direction`` is the one
+        that fails there, or "both".
 
     Raises
     ------
     InputError
-        If the range is none, if no speed can be run, or if no criterion has a wanted name.
+        If the range is none, if no speed can be run, if no criterion has a wanted name, or if the
+        line cannot be turned for the one ``direction``.
     KeyboardInterrupt
         If a signal ended it.
 
@@ -74,7 +79,7 @@ def highest_speeds(
 
     speeds = question.Speeds(float(slowest), float(fastest), float(step), float(within))
     with _marching(scene, jobs) as (marching, own):
-        found = question.find_speeds(marching, own.case.name, speeds, list(criteria))
+        found = question.find_speeds(marching, own, speeds, list(criteria), direction)
     return pd.DataFrame(question.table_of_criteria(found).records())
 
 

@@ -296,7 +296,7 @@ class Run:
         """Contact force of each pantograph below 20 Hz, (n_times, n_pantographs) [N].
 
         Attributes ``filter``, ``cut_off_Hz`` and ``order`` name the filter. The file of a run that
-        is done holds it, to single precision; of others it is made of the record.
+        is done holds it; of others it is made of the record.
 
         Raises
         ------

@@ -54,11 +54,23 @@ def report(
             help="Folder of `catenary accuracy --axes grid`, whose errors stand beside the limits.",
         ),
     ] = None,
+    cost: Annotated[
+        Path | None,
+        typer.Option(
+            "--cost",
+            metavar="STUDY",
+            help="Folder of `catenary plan --cost -o STUDY`, whose costs stand beside the effects.",
+        ),
+    ] = None,
 ) -> None:
     """Serial."""
     records = _records(folder)
     console.alone()  # starts MPI as one process, before anything imports it
-    from catenary.cases.studies.full_report.scene_of_run import SceneOfRun, measured_errors
+    from catenary.cases.studies.full_report.scene_of_run import (
+        SceneOfRun,
+        measured_costs,
+        measured_errors,
+    )
     from catenary.cases.studies.full_report.sections import full_sections
     from catenary.postproc.read.results import Results
     from catenary.postproc.report.report import write_report
@@ -68,14 +80,17 @@ def report(
         try:
             scene = SceneOfRun(results)
         except CatenaryError as error:
-            if accuracy is not None:
+            if accuracy is not None or cost is not None:
                 raise
             console.warn(f"the report has no data sheets: {error}")
             scene = None
     measured: tuple[dict[str, float], str] = ({}, "")
     if accuracy is not None and scene is not None:
         measured = measured_errors(scene.scene, accuracy), str(accuracy)
-    entries, text = full_sections(scene), scene and scene.input_text
+    costs: tuple[dict[str, str], str] = ({}, "")
+    if cost is not None and scene is not None:
+        costs = measured_costs(scene, cost), str(cost)
+    entries, text = full_sections(scene, costs), scene and scene.input_text
     beside = {INPUT: text} if text else {}
     written = write_report(
         folder,

@@ -14,9 +14,12 @@ from catenary.cases.scene.scene import Scene
 from catenary.meshgen.line import Line
 from catenary.solver.problem.irregularities import LengthErrors
 
+FORWARD, BACKWARD = DIRECTIONS = ("forward", "backward")
 # Places are rounded to this [m, as decimals], so that a line which is its own mirror image is so
 # to the last digit.
 _DECIMALS = 9
+# Tables that have no part in the line, nor in what befalls it.
+_NOT_OF_LINE = ("case", "train", "pantographs", "evaluation", "output", "test")
 
 
 def turned(scene: Scene) -> Scene:
@@ -54,6 +57,16 @@ def turned(scene: Scene) -> Scene:
         _turn_course(raw.get("vehicle", {}).get(motion) or {}, length)
     _turn_run(raw, line, length)
     return scene_from(raw, Origin(f"{scene.origin.file}, turned round", recorded=True))
+
+
+def has_mirrored_line(scene: Scene, other: Scene) -> bool:
+    """Whether a scene and the ``other``, which is turned, have the same line, so that trains of
+    both directions meet the same. Where it is evaluated is no part of it. Not collective."""
+    here, there = (
+        {name: table for name, table in resolved(one).items() if name not in _NOT_OF_LINE}
+        for one in (scene, other)
+    )
+    return here == there
 
 
 def _refuse_one_sided(scene: Scene) -> None:

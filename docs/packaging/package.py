@@ -6,7 +6,7 @@ from spack.package import *
 class Catenary(PythonPackage):
     """Parallel finite elements for railway overhead lines coupled with pantographs."""
 
-    license("BSD-3-Clause")
+    license("BSD-3-Clause AND CC-BY-4.0")
 
     # A checkout: spack dev-build catenary@main
     version("main", branch="main")

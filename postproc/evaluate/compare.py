@@ -197,7 +197,7 @@ def _span_sums(run: Results, number: int) -> SpanSums | None:
     if position.size < 2 or not (np.isfinite(position).all() and np.isfinite(force).all()):
         return None
     try:
-        force = filters.low_pass(force, run.dt)
+        force = filters.contact_force(run, number)
     except InputError:  # sampled too slowly; statistics say so
         return None
     return span_sums(position, force, _evaluated_masts(run))

@@ -104,7 +104,7 @@ def indicate(results: Results) -> Indicators:
             continue
         del position
         try:
-            filtered = filters.low_pass(results.column("contact_force", p), results.dt)[within]
+            filtered = filters.contact_force(results, p)[within]
         except InputError:  # the statistics say so
             continue
         deviation[p] = filtered.std()

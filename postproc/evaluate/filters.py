@@ -8,12 +8,16 @@ gain is 1/2 (-6 dB), at frequency f of a low-pass 1 / (1 + (tan(pi f dt)/tan(pi 
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import signal
 from scipy.integrate import trapezoid
 
 from catenary.base.errors import InputError
+
+if TYPE_CHECKING:
+    from catenary.postproc.read.results import Results
 
 CUT_OFF = 20.0
 BAND_LIMIT = 5.0
@@ -61,6 +65,30 @@ def low_pass(values: np.ndarray, dt: float, cut_off: float = CUT_OFF) -> np.ndar
     """
     check_sampling(dt, cut_off)
     return _both_ways(_sections("low", (cut_off,), dt), values, dt, cut_off)
+
+
+def contact_force(results: Results, index: int) -> np.ndarray:
+    """Contact force of a pantograph below 20 Hz, (n,) [N], as the file has it. Not collective.
+
+    It is filtered anew where the file has none, such as that of a run that is not done; the digits
+    are the same.
+
+    Parameters
+    ----------
+    results : Results
+        Results of the run.
+    index : int
+        Number of the pantograph, from zero.
+
+    Raises
+    ------
+    InputError
+        If the time step is too long for the filter.
+    """
+    stored = results.stored_filtered_force(index)
+    if stored is not None and stored[1] == ABOUT:
+        return stored[0]
+    return low_pass(results.column("contact_force", index), results.dt)
 
 
 def band_0_5(values: np.ndarray, dt: float) -> np.ndarray:

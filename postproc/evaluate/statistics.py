@@ -174,14 +174,16 @@ def contact_statistics(
     within = (position >= evaluation[0]) & (position <= evaluation[1])
     return PantographStatistics(
         name=name,
-        **_of_force(force, within, dt),
+        **_of_force(force, filters.low_pass(force, dt)[within], within, dt),
         contact_height_range=_range(wire_height, within, dt),
     )
 
 
-def _of_force(force: np.ndarray, within: np.ndarray, dt: float) -> dict[str, Any]:
-    """Statistics of the force of a pantograph; at no time more than a few records are in memory."""
-    filtered = filters.low_pass(force, dt)[within]
+def _of_force(
+    force: np.ndarray, filtered: np.ndarray, within: np.ndarray, dt: float
+) -> dict[str, Any]:
+    """Statistics of the force (n,) of a pantograph, with the filtered one within the stretch; at no
+    time more than a few records are in memory."""
     mean, std = float(filtered.mean()), float(filtered.std())
     edges, percent = histogram(filtered)
     maximum, minimum = float(filtered.max()), float(filtered.min())
@@ -258,9 +260,10 @@ def _pantograph(name: str, number: int, results: Results) -> PantographStatistic
         )
     try:
         force = results.column("contact_force", number)
+        filtered = filters.contact_force(results, number)[within]
         return PantographStatistics(
             name=name,
-            **_of_force(force, within, results.dt),
+            **_of_force(force, filtered, within, results.dt),
             contact_height_range=_range(results.column("wire_height", number), within, results.dt),
             unjudged=_unjudged(_noun(name), force[within], results),
         )

@@ -17,6 +17,7 @@ from catenary.base.errors import InputError
 from catenary.postproc.files.dimensions import describe_filtered
 from catenary.postproc.files.disk import MARGIN, NoRoom, reserve
 from catenary.postproc.files.hdf5.array_writes import set_attribute
+from catenary.postproc.files.hdf5.block_reading import column
 from catenary.postproc.files.hdf5.checked import HDF5_ERRORS, create_checked, text_of
 
 logger = logging.getLogger("catenary.results")
@@ -41,7 +42,7 @@ class ForceFilter(NamedTuple):
 
 
 def store_filtered(file: h5py.File, force: ForceFilter, dt: float) -> None:
-    """Store the filtered contact force of all steps, to single precision [N].
+    """Store the filtered contact force of all steps [N].
 
     It is left out where the disk has no room for it, which is logged.
 
@@ -53,7 +54,7 @@ def store_filtered(file: h5py.File, force: ForceFilter, dt: float) -> None:
     record = file["channels/contact_force"]
     if not record.size or not np.isfinite(record[...]).all():
         return
-    values = force.filtered(record[...], dt).astype(np.float32)
+    values = force.filtered(record[...], dt)
     try:
         reserve(file.id.get_vfd_handle(), file.id.get_filesize(), values.nbytes + MARGIN)
     except NoRoom:
@@ -72,9 +73,11 @@ def drop_filtered(file: h5py.File) -> None:
         del file[GROUP]
 
 
-def filtered_in(file: Any, shape: tuple[int, int]) -> tuple[np.ndarray, dict[str, Any]] | None:
-    """The filtered force (n, n_pantographs) [N] and what its filter is; None if there is none that
-    is valid.
+def filtered_in(
+    file: Any, shape: tuple[int, int], index: int | None = None
+) -> tuple[np.ndarray, dict[str, Any]] | None:
+    """The filtered force (n, n_pantographs) [N], or (n,) of one, and what its filter is; None if
+    there is none that is valid, or one of an earlier version, which is to single precision.
 
     Parameters
     ----------
@@ -82,14 +85,16 @@ def filtered_in(file: Any, shape: tuple[int, int]) -> tuple[np.ndarray, dict[str
         Result file, or the tables of a march.
     shape : tuple of int
         Shape of the force of all steps.
+    index : int or None
+        Number of the pantograph; all if None.
     """
     if PATH not in file:
         return None
     try:
         table = file[PATH]
-        if table.shape != shape or table.dtype.kind != "f":
+        if table.shape != shape or table.dtype != np.float64:
             return None
-        values = np.asarray(table[...], dtype=float)
+        values = table[...] if index is None else column(table, slice(0, shape[0]), index)
         about = {name: text_of(table.attrs[name]) for name in _ABOUT}
     except (*HDF5_ERRORS, InputError):
         return None

@@ -131,7 +131,7 @@ def film_data(results: Results) -> FilmData:
         results.time,
         results.channel("contact_position"),
         force,
-        _filtered(force, results.dt),
+        _filtered(results, force),
         results.channel("head_height"),
         results.pantograph_names(),
     )
@@ -164,9 +164,9 @@ def _gone(results: Results, x: np.ndarray) -> np.ndarray:
     return gone
 
 
-def _filtered(force: np.ndarray, dt: float) -> np.ndarray:
+def _filtered(results: Results, force: np.ndarray) -> np.ndarray:
     try:
-        columns = [filters.low_pass(column, dt) for column in force.T]
+        columns = [filters.contact_force(results, p) for p in range(force.shape[1])]
     except InputError:
         return np.full_like(force, np.nan)
     return np.column_stack(columns)

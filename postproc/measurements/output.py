@@ -128,11 +128,17 @@ def uplifts_table(found: Comparison) -> StudyTable:
 def write(folder: Path, found: Comparison) -> list[Path]:
     """Write page, tables, JSON and pictures into a folder; returns the files. Not collective."""
     # A text does without Matplotlib.
-    from catenary.postproc.measurements import drawings
+    from catenary.postproc.report.pictures import overlays
     from catenary.postproc.report.pictures.figures import painted
 
-    pictures = painted(_FORCE, lambda: drawings.forces(found.overlays))
-    pictures |= painted(_UPLIFT, lambda: drawings.uplifts(found.uplift))
+    panels = [
+        (one.pantograph, [("run", one.place, one.run), ("measured", one.place, one.measured)])
+        for one in found.overlays
+    ]
+    own = found.uplift
+    uplifts = own and [("run", own.place, own.run), ("measured", own.place, own.measured)]
+    pictures = painted(_FORCE, lambda: overlays.forces(panels))
+    pictures |= painted(_UPLIFT, lambda: overlays.uplifts(uplifts or ()))
     content: dict[str, bytes | str] = {f"{name}.png": data for name, data in pictures.items()}
     content[FIGURES], content[FORCES] = figures_table(found).csv(), forces_table(found).csv()
     if found.uplift is not None:

@@ -173,10 +173,15 @@ class Results(TrainOfRun):
         """
         return self.rows(name, slice(0, self.n_rows(name)))
 
-    def stored_filtered_force(self) -> tuple[np.ndarray, dict[str, Any]] | None:
-        """The filtered contact force (n, n_pantographs) [N] and what its filter is; None where the
-        file has none that is valid, such as that of a run that is not done."""
-        return filtered_in(self._file, (self._length, self.n_pantographs))
+    def stored_filtered_force(
+        self, index: int | None = None
+    ) -> tuple[np.ndarray, dict[str, Any]] | None:
+        """The filtered contact force (n, n_pantographs) [N], or (n,) of one pantograph, and what
+        its filter is; None where the file has none that is valid, such as that of a run that is not
+        done, or a damaged force beside it."""
+        if self._path("contact_force") in self._file.records.damaged:
+            return None
+        return filtered_in(self._file, (self._length, self.n_pantographs), index)
 
     def rows(self, name: str, part: slice) -> np.ndarray:
         """Some rows of a channel, shape (rows, columns), NaN where it is damaged and where the

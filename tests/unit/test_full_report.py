@@ -21,7 +21,20 @@ from catenary.cases.scene.problem import resolved
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.accuracy.analysis import Row
 from catenary.cases.studies.accuracy.output import table_of
-from catenary.cases.studies.full_report.scene_of_run import SceneOfRun, measured_errors
+from catenary.cases.studies.effect_cost.output import write
+from catenary.cases.studies.effect_cost.study import (
+    Costs,
+    Measured,
+    Size,
+    Switch,
+    SwitchableEffects,
+    Wish,
+)
+from catenary.cases.studies.full_report.scene_of_run import (
+    SceneOfRun,
+    measured_costs,
+    measured_errors,
+)
 from catenary.postproc.read.results import Results
 from catenary.postproc.report.pictures import interactive
 
@@ -216,3 +229,45 @@ def test_a_report_shows_measured_errors(folder: Path, tmp_path: Path) -> None:
     assert "The error is that of step and mesh, from" in words
     assert re.search(r"maximum contact force passed [\d.]+ < 350.0 [\d.]+ 3.00 N", words)
     assert re.search(r"uplift at steady arms passed [\d.]+ ≤ 120.0 [\d.]+ 0.50 mm", words)
+
+
+def cost_study(folder: Path, case: str, on: bool) -> Path:
+    """The record of a study of costs, as its own writer makes it: of slackening droppers."""
+    switch = Switch("dropper_slackening", "droppers that slacken", on, {}, ())
+    figures = {"mean_N": 150.0, "std_N": 30.0, "max_N": 220.0, "min_N": 80.0, "max_uplift_mm": 50.0}
+    size = Size(100, (4, 4), (4,))
+    changed = [Measured(switch, "done", size, 0.8, [figures | {"std_N": 33.0}])]
+    choice = SwitchableEffects([switch], [], {})
+    found = Costs(case, Wish(case), choice, (0.0, 50.0), 10, size, 5.0, [figures], ["p"], changed)
+    write(found, folder)
+    return folder
+
+
+@pytest.mark.process
+def test_a_report_shows_measured_costs_of_effects(folder: Path, tmp_path: Path) -> None:
+    shutil.copy(folder / "run.h5", tmp_path / "run.h5")
+    invoke("report", str(tmp_path))
+    without = words_of((tmp_path / "report.html").read_text())
+    assert "catenary report with --cost FOLDER shows it here" in without
+    invoke("report", str(tmp_path), "--cost", str(cost_study(tmp_path, "ac_simple", on=True)))
+    words = words_of((tmp_path / "report.html").read_text())
+    assert "it costs 1.25 times; without it sigma changes by +10 %, most of all: keep it." in words
+    assert f"costs and changes are those of {tmp_path}" in words
+    assert "with --cost FOLDER" not in words
+
+
+def test_costs_of_another_case_or_of_other_effects_are_refused(
+    folder: Path, tmp_path: Path
+) -> None:
+    with Results(folder) as results:
+        scene = SceneOfRun(results)
+    assert set(measured_costs(scene, cost_study(tmp_path, "ac_simple", on=True))) == {
+        "dropper_slackening"
+    }
+    with pytest.raises(InputError, match="without the effect dropper_slackening, the run is one w"):
+        measured_costs(scene, cost_study(tmp_path, "ac_simple", on=False))
+    with pytest.raises(InputError, match="a study of curve, the run is one of ac_simple"):
+        measured_costs(scene, cost_study(tmp_path, "curve", on=True))
+    (tmp_path / "cost.json").write_text("{}")
+    with pytest.raises(InputError, match="is no record of `catenary plan --cost`"):
+        measured_costs(scene, tmp_path)

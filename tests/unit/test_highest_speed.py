@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 from mpi4py import MPI
 from typer.testing import CliRunner
@@ -16,7 +17,9 @@ from typer.testing import CliRunner
 import catenary
 from catenary.base.errors import InputError
 from catenary.cases.cli.main import app
-from catenary.cases.scene.load import read_draft
+from catenary.cases.scene.load import load_scene, read_draft
+from catenary.cases.scene.problem import line_of
+from catenary.cases.scene.turned import BACKWARD, FORWARD, turned
 from catenary.cases.studies.questions.highest_speed import (
     ALL,
     KEY,
@@ -28,11 +31,13 @@ from catenary.cases.studies.questions.highest_speed import (
 )
 from catenary.cases.studies.sweep.jobs import AS_USUAL, Ended
 from catenary.cases.studies.sweep.together import Marching
-from catenary.cases.studies.sweep.variants import Variant
+from catenary.cases.studies.sweep.variants import DIRECTION, Variant, text_of
 
 CASE = "en50318_2002"
 # Of EN 50318:2002: 20 kN on 1.35 kg/m.
 WAVE_SPEED = 3.6 * np.sqrt(20e3 / 1.35)
+SPLICE = {"kind": "splice", "at_m": 430.0, "mass_kg": 1.0}
+ONE_SIDED = f"line.fittings=[{text_of(SPLICE)}]"
 
 
 def searched(
@@ -41,8 +46,13 @@ def searched(
     holds: dict[str, Callable[[float], bool]],
     refused_beyond: float = np.inf,
     wanted: Sequence[str] = (),
+    backward: float | None = None,
 ) -> tuple[SpeedStudy, list[float]]:
-    """A search among verdicts that are functions of the speed, and the speeds that it marched."""
+    """A search among verdicts that are functions of the speed, and the speeds that it marched.
+
+    The line is its own mirror image; with ``backward`` it is not, and trains that run backward see
+    verdicts of so much higher speeds.
+    """
     marched: list[float] = []
 
     def of(self: Marching, variants: Sequence[Variant]) -> list[Ended]:
@@ -50,6 +60,9 @@ def searched(
         for variant in variants:
             speed = float(variant.varied[KEY])
             marched.append(speed)
+            if variant.varied[DIRECTION] == BACKWARD:
+                assert backward is not None
+                speed += backward
             rows = [
                 {
                     "criterion": name,
@@ -69,8 +82,9 @@ def searched(
         return ended
 
     monkeypatch.setattr(Marching, "of", of)
-    marching = Marching(read_draft(CASE), None, MPI.COMM_SELF, AS_USUAL)
-    found = find_speeds(marching, CASE, speeds, wanted)
+    draft = read_draft(CASE, () if backward is None else (ONE_SIDED,))
+    marching = Marching(draft, None, MPI.COMM_SELF, AS_USUAL)
+    found = find_speeds(marching, draft.scene(), speeds, wanted)
     return found, marched
 
 
@@ -105,7 +119,8 @@ def test_all_criteria_hold_where_each_does(monkeypatch: pytest.MonkeyPatch) -> N
     whole = found.holds[0]
     assert whole.criterion == ALL and whole.stopped_by == ("first",)
     assert whole.stretches[0].slowest == 210 and 299 <= whole.stretches[0].fastest < 300
-    assert "fails: first." in as_text(found)
+    assert "fails in both directions: first." in as_text(found)
+    assert "its own mirror image" in as_text(found)
     row = table_of_criteria(found).records()[1]
     assert row["criterion"] == "first" and row["value"] == row["fails_at_km_h"] == 300
     (other,) = searched(monkeypatch, Speeds(), holds, wanted=["SEC"])[0].holds[1:]
@@ -119,9 +134,51 @@ def test_a_speed_that_cannot_be_run_ends_a_stretch(monkeypatch: pytest.MonkeyPat
     whole = found.holds[0]
     assert 310 <= whole.stretches[0].fastest <= 311 < (whole.stretches[0].fails_at or 0)
     assert whole.stopped_by == ("is too fast",) and whole.fails_by is None
-    assert "to 360 km/h could not be run and count as failed; the first: is too fast" in as_text(
+    assert "to 360 km/h could not be made and count as failed; the first: is too fast" in as_text(
         found
     )
+
+
+def test_the_direction_that_fails_first_ends_a_stretch(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Backward all verdicts are those of 25 km/h faster."""
+    holds = {
+        "ends": lambda v: v <= 287.3,
+        "begins": lambda v: v >= 216.1,
+        "peak": lambda v: not 300.0 < v < 306.0,
+    }
+    found, marched = searched(monkeypatch, Speeds(200, 360, 5, 0.5), holds, backward=25.0)
+    ends, begins, peak = found.holds[1:]
+    assert 261.8 <= ends.stretches[0].fastest <= 262.3 and ends.direction == BACKWARD
+    assert 261.8 <= (ends.highest[BACKWARD] or 0) <= 262.3
+    assert 286.8 <= (ends.highest[FORWARD] or 0) <= 287.3
+    assert ends.fails_by is not None and ends.fails_by[0] > 287.3
+    # Backward it holds from the beginning on, so that the direction of the scene decides.
+    assert 216.1 <= begins.stretches[0].slowest <= 216.6 and begins.direction == ""
+    assert [(round(s.slowest), round(s.fastest)) for s in peak.stretches] == [
+        (200, 275), (281, 300), (306, 360),
+    ]  # fmt: skip
+    assert "km/h fails backward: ends." in as_text(found)
+    row = table_of_criteria(found).records()[1]
+    assert row["direction"] == BACKWARD
+    assert row["highest_backward_km_h"] < row["highest_forward_km_h"]
+    # Each speed twice, once in each direction.
+    assert len(marched) == 2 * len(set(marched)) == len(found.ended)
+
+
+def test_a_line_without_mirror_image_is_judged_one_way(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Marching, "of", lambda self, variants: [Ended(v, "done") for v in variants])
+    key = "irregularities.contact_wire_height.standard_deviation_mm"
+    draft = read_draft(CASE, [f"{key}=5"])
+    marching = Marching(draft, None, MPI.COMM_SELF, AS_USUAL)
+    found = find_speeds(marching, draft.scene(), Speeds(), ())
+    assert found.directions == (FORWARD,)
+    assert f"Trains run forward alone: {key} " in as_text(found)
+    with pytest.raises(InputError, match=f"{key}.* has no mirror image"):
+        find_speeds(marching, draft.scene(), Speeds(), (), BACKWARD)
+    chosen = find_speeds(marching, draft.scene(), Speeds(), (), FORWARD)
+    assert chosen.one_way == "Trains run forward alone, as chosen."
+    with pytest.raises(InputError, match='direction "up" is none of forward, backward'):
+        find_speeds(marching, draft.scene(), Speeds(), (), "up")
 
 
 @pytest.mark.parametrize(
@@ -142,6 +199,7 @@ def test_what_is_no_range_is_refused(words: list[str], told: str) -> None:
 def test_the_command_agrees_with_runs_by_hand(tmp_path: Path) -> None:
     """The speed limit is 0.7 of the wave speed; other verdicts are those of runs."""
     words = ["speed", CASE, "--short", "--from", "300", "--to", "310", "--within", "2.5"]
+    words += ["--set", ONE_SIDED]
     done = CliRunner().invoke(app, [*words, "-o", str(tmp_path)])
     assert done.exit_code == 0, done.output
     rows = {
@@ -152,14 +210,29 @@ def test_the_command_agrees_with_runs_by_hand(tmp_path: Path) -> None:
     assert float(limit["highest_km_h"]) <= 0.7 * WAVE_SPEED < float(limit["fails_at_km_h"])
     assert float(limit["limit"]) == pytest.approx(0.7 * WAVE_SPEED)
     runs = json.loads((tmp_path / "speed.json").read_text())["runs"]
-    by_hand = catenary.sweep(catenary.load(CASE, short=True), {KEY: [r[KEY] for r in runs]})
-    for row, (_, other) in zip(runs, by_hand.iterrows(), strict=True):
-        assert row["failed"] == other.failed
-        # Lanes leave round-off alone.
-        assert row["std_N"] == pytest.approx(other.std_N, abs=1e-8)
-    held = [row[KEY] for row in runs if not row["failed"]]
-    assert float(rows[ALL]["holds_from_km_h"]) == held[0]
-    assert float(rows[ALL]["highest_km_h"]) == held[-1]
+    speeds = [row[KEY] for row in runs if row["direction"] == FORWARD]
+    scene = load_scene(CASE, shortened=True)
+    length = line_of(scene).support_positions[-1]
+    # The mirror image as a user writes it: the splice and the evaluated stretch at L - x.
+    start = length - scene.evaluation.to_m
+    mirrored = {
+        "line.fittings": [{**SPLICE, "at_m": length - SPLICE["at_m"]}],
+        "evaluation.from_m": start,
+        "evaluation.to_m": length - scene.evaluation.from_m,
+        "train.start_m": start - scene.evaluation.from_m + scene.train.start_m,
+    }
+    held = set(speeds)
+    for way, changes in ((FORWARD, {"line.fittings": [SPLICE]}), (BACKWARD, mirrored)):
+        own = [row for row in runs if row["direction"] == way]
+        assert [row[KEY] for row in own] == speeds
+        by_hand = catenary.sweep(catenary.load(CASE, short=True).replace(changes), {KEY: speeds})
+        for row, (_, other) in zip(own, by_hand.iterrows(), strict=True):
+            assert row["failed"] == other.failed
+            # Lanes leave round-off alone.
+            assert row["std_N"] == pytest.approx(other.std_N, abs=1e-8)
+        held -= {row[KEY] for row in own if row["failed"]}
+    assert float(rows[ALL]["holds_from_km_h"]) == min(held)
+    assert float(rows[ALL]["highest_km_h"]) == max(held)
     assert (tmp_path / "speed.png").is_file() and not (tmp_path / "rows_so_far").exists()
     again = CliRunner().invoke(app, [*words, "-o", str(tmp_path)])
     assert again.exit_code == 2 and "is there already" in again.output
@@ -168,11 +241,21 @@ def test_the_command_agrees_with_runs_by_hand(tmp_path: Path) -> None:
 @pytest.mark.study
 @pytest.mark.parametrize("case", [CASE, "ac_simple", "re330_stitched", "ambrosio2012"])
 def test_speeds_of_shipped_cases_are_those_of_sweeps(case: str) -> None:
-    """Each criterion at every 10 km/h from 200 to 320 km/h, from whole runs."""
-    scene = catenary.load(case, short=True)
+    """Each criterion at every 10 km/h from 200 to 320 km/h, from whole runs in both directions."""
+    scene = catenary.load(case, short=True).replace({"line.fittings": [SPLICE]})
     table = catenary.highest_speeds(scene, 200, 320, within=10)
     speeds = [float(v) for v in range(200, 321, 10)]
-    by_hand = catenary.sweep(scene, {KEY: speeds})
+    draft = read_draft(case, [ONE_SIDED], shortened=True)
+    tables = turned(draft.scene()).model_dump(exclude_none=True, exclude_defaults=True)
+    backward = catenary.load({**tables, "effects": draft.raw.get("effects", {})})
+    runs = {
+        way: catenary.sweep(own, {KEY: speeds}).set_index(KEY)
+        for way, own in ((FORWARD, scene), (BACKWARD, backward))
+    }
+
+    def is_held(way: str, speed: float, name: str) -> bool:
+        run: Any = runs[way].loc[[speed]].iloc[0]
+        return run.outcome == "done" and not (run.failed if name == ALL else name in run.failed)
 
     def stretch(is_held: list[bool]) -> tuple[float, float] | None:
         """First stretch of neighbouring speeds going up."""
@@ -183,13 +266,18 @@ def test_speeds_of_shipped_cases_are_those_of_sweeps(case: str) -> None:
         return speeds[begin], speeds[begin + length - 1]
 
     for row in table.to_dict("records"):
-        runs: list[Any] = [by_hand[by_hand[KEY] == speed].iloc[0] for speed in speeds]
         name = row["criterion"]
-        held = [
-            run.outcome == "done" and not (run.failed if name == ALL else name in run.failed)
-            for run in runs
-        ]
+        held = {way: [is_held(way, speed, name) for speed in speeds] for way in runs}
+        both = [all(own) for own in zip(*held.values(), strict=True)]
         found = (
             None if np.isnan(row["highest_km_h"]) else (row["holds_from_km_h"], row["highest_km_h"])
         )
-        assert found == stretch(held), name
+        assert found == stretch(both), name
+        for way, own in held.items():
+            first = stretch(own)
+            highest = row[f"highest_{way}_km_h"]
+            assert np.isnan(highest) if first is None else highest == first[1], (name, way)
+        if not pd.isna(row["fails_at_km_h"]):
+            place = speeds.index(row["fails_at_km_h"])
+            failed = [way for way, own in held.items() if not own[place]]
+            assert row["direction"] == (failed[0] if len(failed) == 1 else "both"), name

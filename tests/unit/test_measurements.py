@@ -21,9 +21,12 @@ from catenary.cases.run.runner import run_case
 from catenary.cases.scene.load import load_scene
 from catenary.cases.studies.measured.description import Description
 from catenary.cases.studies.measured.passages import passage_of
+from catenary.cases.studies.reference.judgement import FAILED, NOT_JUDGED, PASSED, any_failed
+from catenary.cases.studies.reference.validation import line_test
 from catenary.cases.studies.task_files import checked_table
 from catenary.postproc.evaluate.compare import compare
 from catenary.postproc.evaluate.span_differences import SpanSums, differences, span_sums
+from catenary.postproc.measurements import output
 from catenary.postproc.measurements.alignment import align, correlation_time
 from catenary.postproc.measurements.comparison import Comparison, compare_with
 from catenary.postproc.measurements.passage import RunForce
@@ -294,6 +297,28 @@ def test_three_runs_stand_side_by_side(run: Path, tmp_path: Path) -> None:
 
 def invoke(*words: str) -> Any:
     return CliRunner().invoke(app, ["compare", *words])
+
+
+def test_a_validation_takes_a_comparison_as_its_line_test(
+    run: Path, table: pd.DataFrame, tmp_path: Path
+) -> None:
+    """A force sensor shows 4 N too much, of which the description allows 2.5 N."""
+    off = table.assign(force_N=table["force_N"] + 4.0)
+    output.write(tmp_path, found_in(run, off, tolerances={"mean_N": 2.5}))
+    step = line_test(tmp_path)
+    rows = {row["quantity"]: row for row in step.rows}
+    mean = rows["mean [N]"]
+    assert mean["verdict"] == FAILED and mean["difference"] == pytest.approx(-4.0, abs=0.1)
+    assert mean["upper"] - mean["reference"] == pytest.approx(2.5) and mean["compared"]
+    assert mean["configuration"] == run.name
+    deviation = rows["standard deviation [N]"]
+    assert deviation["verdict"] == PASSED and not deviation["compared"]
+    assert rows["maximum [N]"]["verdict"] == NOT_JUDGED  # no tolerance is known
+    assert any_failed(step.rows)
+    assert "m.csv beside" in step.told and "Error: pantograph: the measured force" in step.told
+    (tmp_path / "measurement.json").write_text("{}")
+    with pytest.raises(InputError, match="is no record of `catenary compare` with a measurement"):
+        line_test(tmp_path)
 
 
 @pytest.mark.process

@@ -157,6 +157,16 @@ def test_the_wheel_holds_all_modules_and_data_and_no_tests(installed: Path) -> N
     assert (installed / "bin" / "catenary").is_file()
 
 
+def test_the_wheel_names_both_licences_and_holds_their_texts(installed: Path) -> None:
+    """The program is BSD-3-Clause, the reference solutions that it brings are CC BY 4.0."""
+    (info,) = installed.glob("catenary-*.dist-info")
+    told = (info / "METADATA").read_text().partition("\n\n")[0].splitlines()
+    assert "License-Expression: BSD-3-Clause AND CC-BY-4.0" in told
+    texts = [line.removeprefix("License-File: ") for line in told if line.startswith("License-F")]
+    for name, word in zip(sorted(texts), ("BSD", "CC-BY-4.0"), strict=True):
+        assert word in (info / "licenses" / name).read_text()
+
+
 def test_the_source_archive_can_build_the_wheel(sources: Path, tmp_path: Path) -> None:
     build = f"from setuptools.build_meta import build_sdist; print(build_sdist({str(tmp_path)!r}))"
     must(run(sys.executable, "-c", build, cwd=sources))

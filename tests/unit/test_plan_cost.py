@@ -162,7 +162,7 @@ def test_rounds_that_a_busy_machine_slows_down_do_not_change_a_ratio() -> None:
 def costs_of(row: Measured, as_it_is: list[dict[str, float | None]]) -> Costs:
     choice = SwitchableEffects([row.switch], ["vertical"], {"pre_sag": "a pre-sag"})
     size = Size(100, (4, 4), (4,))
-    return Costs(Wish("x"), choice, (0.0, 50.0), 10, size, 12.5, as_it_is, ["p"], [row])
+    return Costs("x", Wish("x"), choice, (0.0, 50.0), 10, size, 12.5, as_it_is, ["p"], [row])
 
 
 def figures(sigma: float | None, most: float = 200.0) -> list[dict[str, float | None]]:

@@ -259,11 +259,12 @@ def runs_of_validation() -> dict[str, Ended]:
 
 
 def test_a_validation_finds_what_is_wrong(runs_of_validation: dict[str, Ended]) -> None:
-    found = validation.validate(list(runs_of_validation.values()))
+    no_test = validation.line_test(None)
+    found = validation.validate(list(runs_of_validation.values()), no_test)
     rest, elasticity, ranges, reference, line_test = found.steps
     assert (len(rest.rows), len(elasticity.rows), len(ranges.rows)) == (9, 6, 16)
     assert len({row["configuration"] for row in reference.rows}) == 12
-    assert not line_test.rows and "no line test" in line_test.why
+    assert not line_test.rows and "no line test" in line_test.told
     assert {row["verdict"] for row in found.rows} == {PASSED, "not judged"}
     wrong = runs_of_validation
     wrong["ac_simple_275_one"].summary["static"]["dropper_lengths_m"][1] += 0.0049
@@ -272,7 +273,7 @@ def test_a_validation_finds_what_is_wrong(runs_of_validation: dict[str, Ended]) 
     wrong["en50318_2002_300"].summary["pantographs"][0]["std_N"] = 40.01
     wrong["dc_simple_250_two"].summary["pantographs"][1]["std_N"] *= 1.21
     wrong["ac_stitched_320_one"].summary["supports"][UPLIFT] *= 0.79
-    steps = validation.validate(list(wrong.values())).steps
+    steps = validation.validate(list(wrong.values()), no_test).steps
     failed = [[row for row in step.rows if row["verdict"] == FAILED] for step in steps]
     assert [len(rows) for rows in failed] == [1, 1, 1, 2, 0]
     assert failed[3][1]["configuration"] == "dc_simple_250_two"

@@ -12,7 +12,7 @@ from catenary.cases.run.at_rest.static_table import static_table
 from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.problem import line_of, resolved
 from catenary.cases.scene.scene import Scene
-from catenary.cases.scene.turned import turned
+from catenary.cases.scene.turned import has_mirrored_line, turned
 
 # Spans of two lengths in an order of their own, droppers that are no mirror image of themselves.
 ONE_SIDED = (
@@ -85,6 +85,10 @@ def test_the_run_in_is_as_long_in_both_directions() -> None:
 def test_a_symmetric_line_is_its_own_mirror_image() -> None:
     scene = scene_of()
     assert plain(turned(scene)) == plain(scene)
+    early = scene_of("evaluation.from_m=330", "evaluation.to_m=1100")
+    assert plain(turned(early)) != plain(early) and has_mirrored_line(early, turned(early))
+    other = scene_of(*ONE_SIDED)
+    assert not has_mirrored_line(other, turned(other))
     key = "irregularities.dropper_lengths.by_dropper"
     # Spans 1 to 30 of 9 droppers.
     here, there = (

@@ -11,11 +11,12 @@ from measuring import COMM, check
 
 from catenary.cases.run.runner import run_case
 from catenary.cases.scene.load import Draft, read_draft
+from catenary.cases.scene.turned import BACKWARD
 from catenary.cases.studies.optimise import study as optimising
 from catenary.cases.studies.optimise.checks import AS_IS, FINER_MESH, SHORTER_STEP, UNSEEN, change
 from catenary.cases.studies.optimise.task import OptimiseTask
 from catenary.cases.studies.scene_sets.evaluation import BROKE, Evaluation, evaluate, workers
-from catenary.cases.studies.scene_sets.scene_set import BACKWARD, SceneSet, SetTable, members_of
+from catenary.cases.studies.scene_sets.scene_set import SceneSet, SetTable, members_of
 from catenary.cases.studies.task_files import read_task
 from catenary.cases.studies.tolerance import study as tolerating
 from catenary.cases.studies.tolerance.task import ToleranceTask

@@ -66,6 +66,8 @@ DC_SIMPLE = replace(
 )
 STUDIES = {
     "ac_simple_320_one": AC_SIMPLE,
+    # The trailing one starts where the one alone does.
+    "ac_simple_320_two": replace(AC_SIMPLE, starts=(310.0, 110.0)),
     "dc_simple_200_one": DC_SIMPLE,
 }
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from contextlib import ExitStack
+from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -66,11 +67,18 @@ def _begun(
     return Marching(draft, out, comm, options), scene, comm
 
 
+class Direction(StrEnum):
+    """Of the train along the line of the scene."""
+
+    FORWARD = "forward"
+    BACKWARD = "backward"
+
+
 @verb(
     "speed",
-    help="Find the highest speed at which the acceptance criteria hold, all of them and each by "
-    "itself: an ensemble over speeds, then bisection. The same command continues one that was "
-    "stopped.",
+    help="Find the highest speed at which the acceptance criteria hold in both directions, all of "
+    "them and each by itself: an ensemble over speeds, then bisection. The same command continues "
+    "one that was stopped.",
     epilog="Example: catenary speed en50318_2002 -o results/highest --from 200 --to 360",
 )
 def speed(
@@ -93,6 +101,13 @@ def speed(
             help="Part of the name of a criterion, such as deviation; repeatable. All if absent."
         ),
     ] = None,
+    direction: Annotated[
+        Direction | None,
+        typer.Option(
+            help="The one direction of the train to judge; both if absent, where the line can be "
+            "turned."
+        ),
+    ] = None,
     out: Annotated[
         Path | None,
         folder_option("Folder for tables and picture; without it nothing is written."),
@@ -110,7 +125,7 @@ def speed(
     from catenary.cases.studies.records import held_study
 
     with held_study(out, comm, f"catenary speed {words.case}") as (_, write):
-        found = question.find_speeds(marching, scene.case.name, speeds, criterion or [])
+        found = question.find_speeds(marching, scene, speeds, criterion or [], direction)
         files = write(lambda folder: question.write(folder, found))
     tell(question.as_text(found), files)
     return console.DONE

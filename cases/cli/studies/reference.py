@@ -122,29 +122,37 @@ def judge(
 @verb(
     "validate",
     help="Validate this installation by the steps of EN 50318: line at rest, reference model of "
-    "2002, reference models in the manner of 2018; write the statement with all figures.",
+    "2002, reference models in the manner of 2018, a line test; write the statement with all "
+    "figures.",
     epilog="Example: catenary validate -o results/validation -j 0",
 )
 def validate(
     out: Out,
+    measured: Annotated[
+        Path | None,
+        typer.Option(
+            "--measured",
+            metavar="FOLDER",
+            help="Folder of `catenary compare RUN FILE -o FOLDER`: a line test beside its run.",
+        ),
+    ] = None,
     n_jobs: Jobs = 1,
     strict: Strict = False,
     force: Force = False,
     verbose: Verbose = False,
 ) -> int:
     """Collective."""
-    from catenary.cases.studies.reference.validation import jobs_of_validation
+    from catenary.cases.studies.reference import validation as study
 
-    def read() -> tuple[list[Job], list[str]]:
+    def read() -> tuple[tuple[list[Job], study.Step], list[str]]:
         refuse_table(out / "validation.csv", force)
-        return jobs_of_validation(), []
+        return (study.jobs_of_validation(), study.line_test(measured)), []
 
-    comm, jobs, arguments = begin(read, verbose, lambda made: made[0].scene)
+    comm, (jobs, tested), arguments = begin(read, verbose, lambda made: made[0][0].scene)
     from catenary.base.parallel import on_root
     from catenary.cases.result_folder.folder_lock import held
     from catenary.cases.studies.accuracy.runs import RUNS
     from catenary.cases.studies.reference import pages
-    from catenary.cases.studies.reference import validation as study
     from catenary.cases.studies.reference.judgement import any_failed
     from catenary.cases.studies.sweep.jobs import RunOptions, interrupted
     from catenary.cases.studies.sweep.run_jobs import run_jobs
@@ -155,7 +163,7 @@ def validate(
         if interrupted(ended):
             console.complain("the validation was interrupted; the same command continues it")
             return console.BROKEN
-        found = on_root(comm, lambda: study.validate(ended), takes_long=True)
+        found = on_root(comm, lambda: study.validate(ended, tested), takes_long=True)
         files = on_root(comm, lambda: pages.write_validation(out, found), takes_long=True)
     console.say("\n" + pages.validation_text(found) + "\n\n" + "\n".join(map(str, files)))
     return console.NOT_ACCEPTED if strict and any_failed(found.rows) else console.DONE

@@ -96,7 +96,7 @@ def estimate_files(
     n_ends = len(GAUGES) * recording.end_x.size
     kept = 2 * (_STATE_ARRAYS * n_dofs + 2 * (n_droppers + n_arms + n_ends))
     at_rest = _PER_NODE * recording.n_nodes + _PER_DROPPER * n_droppers
-    filtered = 0.5 * _BYTES * len(problem.train.placements) * (recording.n_steps + 1)
+    filtered = _BYTES * len(problem.train.placements) * (recording.n_steps + 1)
     head = _EMPTY_FILE + len(json.dumps(resolved(scene)))
     film = 0.0
     if recording.field_every:

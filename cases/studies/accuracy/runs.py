@@ -67,8 +67,7 @@ def measure(results: Results) -> dict[str, Any]:
         if not covers(position, (start, end)):
             histories.append([])
             continue
-        force = results.column("contact_force", p)
-        curve = CubicSpline(position, filters.low_pass(force, results.dt))
+        curve = CubicSpline(position, filters.contact_force(results, p))
         histories.append(np.round(curve(places), 4).tolist())
     return {"histories": histories}
 

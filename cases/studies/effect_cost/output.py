@@ -12,6 +12,8 @@ from catenary.postproc.evaluate.wording import counted, fixed
 from catenary.postproc.report.study_table import Column, StudyTable, remark_lines, write_files
 
 TABLE, RECORD, TEXT = "cost.csv", "cost.json", "cost.txt"
+# In the column "simulated": the scene simulates the effect.
+LEFT_OUT = "left out"
 # Figures of a table for people.
 _HEADS = {"mean_N": "mean", "std_N": "sigma", "max_N": "max", "min_N": "min", UPLIFT: "uplift"}
 # A ratio of times that is none: what clocks and caches make of equal steps.
@@ -122,7 +124,7 @@ def as_text(found: Costs) -> str:
     mine = ("", found.names[0])
     leading = replace(table, rows=[row for row in table.rows if row["pantograph"] in mine])
     lines = [
-        f"{found.wish.case}: evaluated from {start:g} to {end:g} m; "
+        f"{found.case}: evaluated from {start:g} to {end:g} m; "
         f"{counted(found.wish.rounds, 'repetition')} of {counted(found.n_steps, 'step')} in turns.",
         "Forces in N, uplift in mm; of an effect that is switched, what changes. cost: how many "
         "times as long",
@@ -177,7 +179,7 @@ def _rows(found: Costs, one: Measured) -> list[dict[str, Any]]:
     run, remarks = _told(one)
     simulated = "as it is"
     if switch.name:
-        simulated = "left out" if switch.on else "switched on"
+        simulated = LEFT_OUT if switch.on else "switched on"
     head: dict[str, Any] = {
         "run": run,
         "effect": "" if not switch.name else switch.name,
@@ -226,7 +228,7 @@ def sentence(found: Costs, row: Measured) -> str:
 def record_of(found: Costs) -> dict[str, Any]:
     """Everything for JSON."""
     return {
-        "case": found.wish.case,
+        "case": found.case,
         "assignments": list(found.wish.overrides),
         "evaluation_m": list(found.stretch),
         "rounds": found.wish.rounds,

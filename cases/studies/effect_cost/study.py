@@ -190,6 +190,7 @@ class Costs:
 
     Attributes
     ----------
+    case : name of the case
     wish, effects : what was asked for, and what the scene leaves to choose
     stretch : evaluated, from and to [m]
     n_steps : of a timed round
@@ -199,6 +200,7 @@ class Costs:
     rows : one of each switch
     """
 
+    case: str
     wish: Wish
     effects: SwitchableEffects
     stretch: tuple[float, float]
@@ -331,7 +333,10 @@ def measure(
         size = size_of(as_it_is)
     names = [one["name"] for one in whole.summary["pantographs"]]
     stretch, figures = (scene.evaluation.from_m, scene.evaluation.to_m), figures_of(whole.summary)
-    return Costs(wish, effects, stretch, n_steps, size, step, figures, names, rows, whole.remarks)
+    return Costs(
+        scene.case.name, wish, effects, stretch, n_steps, size, step, figures, names, rows,
+        whole.remarks,
+    )  # fmt: skip
 
 
 def _round_of(problem: Problem) -> tuple[int, int]:

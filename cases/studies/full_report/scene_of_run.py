@@ -1,10 +1,11 @@
-"""The scene that a run recorded, and the errors that a study of its case measured."""
+"""The scene that a run recorded, and what studies of its case measured: errors, and costs."""
 
 from __future__ import annotations
 
 import json
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import tomli_w
 
@@ -14,10 +15,11 @@ from catenary.cases.scene.input.faults import Origin
 from catenary.cases.scene.load import scene_from
 from catenary.cases.scene.problem import problem_of, resolved
 from catenary.cases.scene.scene import Scene
-from catenary.cases.studies.accuracy.output import RECORD
+from catenary.cases.studies.accuracy import output as accuracy
+from catenary.cases.studies.effect_cost import output as effect_cost
 from catenary.postproc.read.results import Results
 from catenary.postproc.report.sections.run_facts import INPUT
-from catenary.solver.effects.all_effects import registry
+from catenary.solver.effects.all_effects import active, registry
 from catenary.solver.problem.problem import Problem
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest
 
@@ -92,14 +94,7 @@ def measured_errors(scene: Scene, folder: Path) -> dict[str, float]:
     InputError
         If there is no such study, if it is of another case, or lacks the scene's step and mesh.
     """
-    path = folder / RECORD
-    try:
-        record = json.loads(path.read_text(encoding="utf-8"))
-        rows, case = record["rows"], record["case"]
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise InputError(f"{path} is no record of `catenary accuracy`: {error}") from error
-    if case != scene.case.name:
-        raise InputError(f"{path} is a study of {case}, the run is one of {scene.case.name}")
+    rows = _rows_of(folder / accuracy.RECORD, "catenary accuracy", scene)
     dt, elements = scene.numerics.dt_s, scene.mesh.elements_per_gap
     own = [
         row
@@ -111,8 +106,46 @@ def measured_errors(scene: Scene, folder: Path) -> dict[str, float]:
     ]
     if not own:
         raise InputError(
-            f"{path} has no run with a step of {1e3 * dt:g} ms and {elements} elements per gap, "
-            "as this one has: vary both with --axes grid, without --quick"
+            f"{folder / accuracy.RECORD} has no run with a step of {1e3 * dt:g} ms and {elements} "
+            "elements per gap, as this one has: vary both with --axes grid, without --quick"
         )
     known = {quantity: own[0][column] for quantity, column in _COLUMNS.items()}
     return {quantity: abs(error) for quantity, error in known.items() if error is not None}
+
+
+def measured_costs(scene: SceneOfRun, folder: Path) -> dict[str, str]:
+    """A sentence on what each effect costs and changes, by its name. Not collective.
+
+    Parameters
+    ----------
+    folder : of `catenary plan CASE --cost -o FOLDER`
+
+    Raises
+    ------
+    InputError
+        If there is no such study, if it is of another case or of other effects.
+    """
+    path = folder / effect_cost.RECORD
+    rows = _rows_of(path, "catenary plan --cost", scene.scene)
+    on = {effect.name for effect in active(scene.problem)}
+    found = {}
+    for row in rows:
+        name = row["effect"]
+        if name and (row["simulated"] == effect_cost.LEFT_OUT) != (name in on):
+            there, here = ("without", "with") if name in on else ("with", "without")
+            raise InputError(f"{path} is a study {there} the effect {name}, the run is one {here}")
+        if name:
+            found[name] = row["advice"]
+    return found
+
+
+def _rows_of(path: Path, verb: str, scene: Scene) -> list[dict[str, Any]]:
+    """The rows of the record of a study of a scene's case."""
+    try:
+        record = json.loads(path.read_text(encoding="utf-8"))
+        rows, case = list(record["rows"]), record["case"]
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise InputError(f"{path} is no record of `{verb}`: {error}") from error
+    if case != scene.case.name:
+        raise InputError(f"{path} is a study of {case}, the run is one of {scene.case.name}")
+    return rows

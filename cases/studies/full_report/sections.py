@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import partial
 
 import numpy as np
@@ -51,13 +52,17 @@ def _waves(scene: SceneOfRun, run: EvaluatedRun) -> Section:
     return Section(heading, [], [picture])
 
 
-def full_sections(scene: SceneOfRun | None) -> list[SectionEntry]:
+def full_sections(
+    scene: SceneOfRun | None, costs: tuple[Mapping[str, str], str] = ({}, "")
+) -> list[SectionEntry]:
     """The sections of a full report in their order.
 
     Parameters
     ----------
     scene : of the run; None leaves out what needs it
+    costs : of its effects, as ``run_facts.effects`` takes them
     """
+    effects = SectionEntry("effects", partial(run_facts.effects, costs=costs))
     worst = partial(worst_places.section, scene)
     behind = {"motion": [SectionEntry("worst", worst, dynamics.has_statistics, full=True)]}
     text = None
@@ -70,6 +75,13 @@ def full_sections(scene: SceneOfRun | None) -> list[SectionEntry]:
             behind["above"] = [SectionEntry("pantographs", sheet, full=True)]
     last = SectionEntry("signatures", partial(run_facts.signatures, text), full=True)
     return [
-        *(one for entry in SECTIONS for one in (entry, *behind.get(entry.name, ()))),
+        *(
+            one
+            for entry in SECTIONS
+            for one in (
+                effects if entry.name == effects.name else entry,
+                *behind.get(entry.name, ()),
+            )
+        ),
         last,
     ]

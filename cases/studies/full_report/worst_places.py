@@ -128,7 +128,7 @@ def _span(results: Results, passage: Passage) -> Figure:
     rows = slice(*np.searchsorted(position, (low, high)).tolist())
     figure, (force, height) = stacked(6.0, 2)
     raw = results.column("contact_force", p)
-    filtered = filters.low_pass(raw, results.dt)[rows]
+    filtered = filters.contact_force(results, p)[rows]
     for axes in (force, height):
         mark_line(axes, results, low, high)
         axes.axvspan(passage.start, passage.end, color="#f6e3c3", zorder=0.5, label="worst span")

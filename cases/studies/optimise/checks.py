@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 from catenary.base.errors import InputError
 from catenary.cases.scene.load import Draft
 from catenary.cases.scene.problem import line_of
+from catenary.cases.scene.turned import DIRECTIONS
 from catenary.cases.studies.optimise.task import OptimiseTask
 from catenary.cases.studies.scene_sets.evaluation import (
     BROKE,
@@ -17,7 +18,6 @@ from catenary.cases.studies.scene_sets.evaluation import (
     identity,
 )
 from catenary.cases.studies.scene_sets.scene_set import (
-    DIRECTIONS,
     ErrorSamples,
     Member,
     SceneSet,

@@ -13,6 +13,7 @@ from catenary.cases.process.workers import Pool
 from catenary.cases.scene.input.toml_input import REMOVED
 from catenary.cases.scene.load import Draft
 from catenary.cases.scene.scene import Scene
+from catenary.cases.scene.turned import FORWARD
 from catenary.cases.studies.optimise.checks import (
     Check,
     Row,
@@ -29,7 +30,7 @@ from catenary.cases.studies.optimise.task import OptimiseTask
 from catenary.cases.studies.optimise.variables import Variables, variables_of
 from catenary.cases.studies.records import KeptRows
 from catenary.cases.studies.scene_sets.evaluation import Evaluation
-from catenary.cases.studies.scene_sets.scene_set import FORWARD, SceneSet, members_of
+from catenary.cases.studies.scene_sets.scene_set import SceneSet, members_of
 from catenary.cases.studies.sweep.variants import value_at
 from catenary.postproc.report.study_table import StudyTable
 

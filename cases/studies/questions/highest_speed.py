@@ -1,14 +1,17 @@
 """Highest speed at which acceptance criteria hold: an ensemble over speeds, then bisection.
 
-Criteria are not monotonic in speed: mean-force limits are also missed at low speeds, and resonances
-of the line make stretches of speeds between which a criterion fails. The search therefore keeps all
-stretches that the first, even division shows, and bisects each of their ends.
+A criterion holds at a speed if it does so for the train in both directions. Criteria are not
+monotonic in speed: mean-force limits are also missed at low speeds, and resonances of the line make
+stretches of speeds between which a criterion fails. The search therefore keeps all stretches that
+the first, even division shows, and bisects each of their ends.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
+from itertools import product
 from math import ceil
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -18,15 +21,18 @@ from matplotlib.figure import Figure
 
 from catenary.base.errors import InputError
 from catenary.cases.scene.input.faults import shown
+from catenary.cases.scene.scene import Scene
+from catenary.cases.scene.turned import BACKWARD, DIRECTIONS, FORWARD, has_mirrored_line, turned
 from catenary.cases.studies.sweep.jobs import STATISTICS, Ended
 from catenary.cases.studies.sweep.output import remarks_of, table_of
 from catenary.cases.studies.sweep.together import Marching
-from catenary.cases.studies.sweep.variants import VariedKey, product
+from catenary.cases.studies.sweep.variants import DIRECTION, VariedKey
+from catenary.cases.studies.sweep.variants import product as variants_of
 from catenary.postproc.report.pictures import figures
 from catenary.postproc.report.study_table import Column, Row, StudyTable, write_files
 
 KEY = "train.speed_km_h"
-ALL = "all criteria"
+ALL, BOTH = "all criteria", "both"
 TABLE, RUNS, RECORD, PICTURE = "speed.csv", "speeds.csv", "speed.json", "speed.png"
 # Statistic of a panel, and the criteria whose limits stand in it.
 _PANELS = (
@@ -101,16 +107,21 @@ class Holds(NamedTuple):
     Attributes
     ----------
     criterion : its name, or ``ALL``
-    stretches : ascending, empty where it holds at no speed
-    fails_by : value and limit at the first failure going up, None where there is none
+    stretches : in all directions, ascending, empty where it holds at no speed
+    highest : last speed of the first stretch of each direction by itself [km/h], None without one
+    fails_by : value and limit at the first failure going up, None where there is none; of two
+        directions that fail those of the one that is further off
     unit : of these
+    direction : that fails there, or ``BOTH``
     stopped_by : of ``ALL``, the criteria that fail there, or what refuses the speed
     """
 
     criterion: str
     stretches: tuple[Stretch, ...]
+    highest: Mapping[str, float | None]
     fails_by: tuple[float, float] | None
     unit: str
+    direction: str
     stopped_by: tuple[str, ...]
 
 
@@ -121,51 +132,102 @@ class SpeedStudy(NamedTuple):
     ----------
     case : name of the case
     speeds : the range
+    directions : in which trains were marched
+    one_way : why that is one direction, empty if both were
     holds : ``ALL`` first, then each criterion
     not_judged : criteria without a verdict at any speed
-    ended : how each speed ended, ascending
+    ended : how each speed ended, ascending, direction by direction
     """
 
     case: str
     speeds: Speeds
+    directions: tuple[str, ...]
+    one_way: str
     holds: tuple[Holds, ...]
     not_judged: tuple[str, ...]
     ended: tuple[Ended, ...]
 
 
-def find_speeds(marching: Marching, case: str, speeds: Speeds, wanted: Sequence[str]) -> SpeedStudy:
+def find_speeds(
+    marching: Marching,
+    scene: Scene,
+    speeds: Speeds,
+    wanted: Sequence[str],
+    direction: str | None = None,
+) -> SpeedStudy:
     """March the speeds, and find where the criteria hold. Collective.
 
     Parameters
     ----------
     marching : of the case
-    case : its name
+    scene : of the case, at its own speed
     wanted : parts of names of criteria, all criteria if there are none
+    direction : "forward" or "backward"; both if None, as far as the scene can be turned
 
     Raises
     ------
     InputError
-        If the range is none, if no speed can be run, or if no criterion has a wanted name.
+        If the range is none, if no speed can be run, if no criterion has a wanted name, or if the
+        scene cannot be turned for the one ``direction``.
     Interrupted
         If a signal came.
     """
+    marched, alike, one_way = _directions(scene, direction)
+    judged = DIRECTIONS if alike else marched
+    ended: _Marched = {}
 
-    def marched(own: Sequence[float]) -> dict[float, Ended]:
-        variants = product([VariedKey(KEY, tuple(f"{speed:.8g}" for speed in own))], {})
-        return dict(zip(own, marching.of(variants), strict=True))
+    def march(own: Sequence[float]) -> None:
+        vary = [VariedKey(KEY, tuple(f"{speed:.8g}" for speed in own))]
+        variants = [
+            replace(one, name=f"{one.name}__{way}", varied={DIRECTION: way, **one.varied})
+            for way in marched
+            for one in variants_of(vary, {})
+        ]
+        places = product(judged, own)
+        found = marching.of(variants)
+        ended.update(zip(places, [*found, *found] if alike else found, strict=True))
 
-    ended = marched(speeds.first())
-    names, not_judged = _criteria(ended, wanted)
-    while more := _between(ended, [ALL, *names], names, speeds.within):
-        ended |= marched(more)
-    found = tuple(_holds(ended, name, names) for name in (ALL, *names))
-    in_order = tuple(ended[speed] for speed in sorted(ended))
-    return SpeedStudy(case, speeds, found, tuple(not_judged), in_order)
+    march(speeds.first())
+    names, not_judged = _criteria(ended.values(), wanted)
+    while more := _between(ended, judged, names, speeds.within):
+        march(more)
+    found = tuple(_holds(ended, name, names, judged) for name in (ALL, *names))
+    in_order = tuple(ended[place] for place in product(marched, _speeds(ended)))
+    return SpeedStudy(scene.case.name, speeds, marched, one_way, found, tuple(not_judged), in_order)
 
 
-def _criteria(ended: dict[float, Ended], wanted: Sequence[str]) -> tuple[list[str], list[str]]:
+def _directions(scene: Scene, wanted: str | None) -> tuple[tuple[str, ...], bool, str]:
+    """Directions to march in, whether the other one is alike, and why these are not both."""
+    if wanted not in (None, *DIRECTIONS):
+        raise InputError(f"the direction {shown(wanted)} is none of {', '.join(DIRECTIONS)}")
+    chosen = f"Trains run {wanted} alone, as chosen."
+    if wanted == FORWARD:
+        return (FORWARD,), False, chosen
+    try:
+        there = turned(scene)
+    except InputError as error:
+        if wanted is not None:
+            raise
+        return (FORWARD,), False, f"Trains run forward alone: {error}."
+    if wanted is not None:
+        return (BACKWARD,), False, chosen
+    if has_mirrored_line(scene, there):
+        mirrored = "The line is its own mirror image, so that backward is as forward."
+        return (FORWARD,), True, mirrored
+    return DIRECTIONS, False, ""
+
+
+# How each direction and speed ended.
+_Marched = dict[tuple[str, float], Ended]
+
+
+def _speeds(ended: _Marched) -> list[float]:
+    return sorted({speed for _, speed in ended})
+
+
+def _criteria(ended: Iterable[Ended], wanted: Sequence[str]) -> tuple[list[str], list[str]]:
     """Names of the wanted criteria: those that are judged at any speed, and the others."""
-    rows = [row for one in ended.values() for row in one.summary.get("acceptance", [])]
+    rows = [row for one in ended for row in one.summary.get("acceptance", [])]
     known = list(dict.fromkeys(row["criterion"] for row in rows))
     for text in wanted:
         if not any(text.lower() in name.lower() for name in known):
@@ -184,50 +246,80 @@ def _row(one: Ended, name: str) -> dict[str, Any] | None:
     return next((row for row in rows if row["criterion"] == name), None)
 
 
-def _is_held(one: Ended, name: str, names: Sequence[str]) -> bool:
-    """Whether a criterion, or each of ``names``, holds; not where a speed could not be run."""
-    rows = [_row(one, own) for own in (names if name == ALL else [name])]
+def _is_held(
+    ended: _Marched, speed: float, directions: Sequence[str], names: Sequence[str]
+) -> bool:
+    """Whether each of the criteria holds in each direction; not where a speed could not be run."""
+    rows = [_row(ended[way, speed], name) for way in directions for name in names]
     return bool(rows) and all(row is not None and row["passed"] is True for row in rows)
 
 
 def _between(
-    ended: dict[float, Ended], asked: Sequence[str], names: Sequence[str], within: float
+    ended: _Marched, directions: Sequence[str], names: Sequence[str], within: float
 ) -> list[float]:
     """Middles of neighbouring speeds farther apart than ``within`` of which one fails."""
-    speeds = sorted(ended)
-    middles = set()
+    speeds, middles = _speeds(ended), []
     for slower, faster in zip(speeds, speeds[1:], strict=False):
         if faster - slower > within and any(
-            _is_held(ended[slower], name, names) != _is_held(ended[faster], name, names)
-            for name in asked
+            _is_held(ended, slower, [way], [name]) != _is_held(ended, faster, [way], [name])
+            for way in directions
+            for name in names
         ):
-            middles.add(round(0.5 * (slower + faster), 4))
-    return sorted(middles)
+            middles.append(round(0.5 * (slower + faster), 4))
+    return middles
 
 
-def _holds(ended: dict[float, Ended], name: str, names: Sequence[str]) -> Holds:
-    speeds = sorted(ended)
+def _stretches(
+    ended: _Marched, directions: Sequence[str], names: Sequence[str]
+) -> tuple[Stretch, ...]:
+    """Where each of the criteria holds in each direction, ascending."""
+    speeds = _speeds(ended)
+    held = [_is_held(ended, speed, directions, names) for speed in speeds]
     stretches: list[Stretch] = []
     begin: float | None = None
-    for number, speed in enumerate(speeds):
-        if not _is_held(ended[speed], name, names):
-            begin = None
+    for speed, holds, following, goes_on in zip(
+        speeds, held, [*speeds[1:], None], [*held[1:], False], strict=True
+    ):
+        if not holds:
             continue
         begin = speed if begin is None else begin
-        following = speeds[number + 1] if number + 1 < len(speeds) else None
-        if following is None or not _is_held(ended[following], name, names):
+        if not goes_on:
             stretches.append(Stretch(begin, speed, following))
-    fails_at = stretches[0].fails_at if stretches else speeds[0]
-    failed = None if fails_at is None else ended[fails_at]
-    row = None if failed is None else _row(failed, name)
-    by = None if row is None or row["value"] is None else (row["value"], row["limit"])
-    stopped: tuple[str, ...] = ()
-    if name == ALL and failed is not None:
-        stopped = tuple(n for n in names if not _is_held(failed, n, names))
-        stopped = stopped if failed.done else (failed.outcome,)
-    rows = (_row(one, name) for one in ended.values())
-    unit = next((str(row["unit"]) for row in rows if row is not None), "")
-    return Holds(name, tuple(stretches), by, unit, stopped)
+            begin = None
+    return tuple(stretches)
+
+
+def _holds(ended: _Marched, name: str, names: Sequence[str], directions: Sequence[str]) -> Holds:
+    own = names if name == ALL else [name]
+    stretches = _stretches(ended, directions, own)
+    highest = {}
+    for way in directions:
+        alone = _stretches(ended, [way], own)
+        highest[way] = alone[0].fastest if alone else None
+    fails_at = stretches[0].fails_at if stretches else _speeds(ended)[0]
+    failed = {
+        way: ended[way, fails_at]
+        for way in directions
+        if fails_at is not None and not _is_held(ended, fails_at, [way], own)
+    }
+    rows = [row for one in failed.values() if (row := _row(one, name)) is not None]
+    by = [(row["value"], row["limit"]) for row in rows if row["value"] is not None]
+    stopped: list[str] = []
+    if name == ALL:
+        for way, one in failed.items():
+            missed = [n for n in names if not _is_held(ended, fails_at, [way], [n])]
+            stopped += missed if one.done else [one.outcome]
+    known = (_row(one, name) for one in ended.values())
+    unit = next((str(row["unit"]) for row in known if row is not None), "")
+    return Holds(
+        name,
+        stretches,
+        highest,
+        max(by, key=lambda pair: abs(pair[0] - pair[1]), default=None),
+        unit,
+        next(iter(failed), "") if len(failed) < 2 else BOTH,
+        tuple(dict.fromkeys(stopped)),
+    )
 
 
 def table_of_criteria(study: SpeedStudy) -> StudyTable:
@@ -237,10 +329,12 @@ def table_of_criteria(study: SpeedStudy) -> StudyTable:
         Column("holds_from_km_h", "holds from", ".1f"),
         Column("highest_km_h", "to [km/h]", ".1f"),
         Column("fails_at_km_h", "fails at", ".1f"),
+        Column("direction", "direction"),
         Column("value", "with", ".4g"),
         Column("limit", "limit", ".4g"),
         Column("unit", "unit"),
         Column("more_stretches_km_h", "holds again"),
+        *(Column(f"highest_{way}_km_h") for way in DIRECTIONS),
         Column("stopped_by"),
     ]
     return StudyTable(columns, [_cells(one, study.speeds.slowest) for one in study.holds])
@@ -256,6 +350,8 @@ def _cells(one: Holds, slowest: float) -> Row:
         "fails_at_km_h": slowest if first is None else first.fails_at,
         "value": value,
         "limit": limit,
+        "direction": one.direction,
+        **{f"highest_{way}_km_h": one.highest.get(way) for way in DIRECTIONS},
         "unit": one.unit,
         "more_stretches_km_h": [f"{own.slowest:g}-{own.fastest:g}" for own in one.stretches[1:]],
         "stopped_by": list(one.stopped_by),
@@ -277,22 +373,23 @@ def as_text(study: SpeedStudy) -> str:
         if first.fails_at is None:
             answer += ", the end of the range."
         else:
-            answer += f"; at {first.fails_at:.1f} km/h fails: {'; '.join(whole.stopped_by)}."
-    lines = [f"{study.case}, {len(study.ended)} speeds {where}. {answer}", ""]
+            way = "in both directions" if whole.direction == BOTH else whole.direction
+            answer += f"; at {first.fails_at:.1f} km/h fails {way}: {'; '.join(whole.stopped_by)}."
+    n_speeds = len(study.ended) // len(study.directions)
+    lines = [f"{study.case}, {n_speeds} speeds {where}. {answer}", ""]
     lines += [table_of_criteria(study).text(), ""]
     if study.not_judged:
         lines.append(f"Not judged: {'; '.join(study.not_judged)}.")
     refused = [one for one in study.ended if not one.done]
     if refused:
-        slowest, fastest = refused[0].variant.varied[KEY], refused[-1].variant.varied[KEY]
+        beyond = [float(one.variant.varied[KEY]) for one in refused]
+        slowest, fastest = min(beyond), max(beyond)
         lines.append(
-            f"{len(refused)} speeds from {slowest} to {fastest} km/h could not be run and count as "
-            f"failed; the first: {refused[0].outcome}"
+            f"{len(refused)} runs from {slowest:g} to {fastest:g} km/h could not be made and count "
+            f"as failed; the first: {refused[0].outcome}"
         )
-    lines.append(
-        "Trains run in the direction of the scene alone. Stretches narrower than "
-        f"{speeds.step:g} km/h may be missed."
-    )
+    said = study.one_way or "Each speed was run in both directions, and counts if both hold."
+    lines.append(f"{said} Stretches narrower than {speeds.step:g} km/h may be missed.")
     return "\n".join([*lines, *remarks_of(study.ended)])
 
 
@@ -302,6 +399,8 @@ def write(folder: Path, study: SpeedStudy) -> list[Path]:
     record = {
         "case": study.case,
         **{f"{name}_km_h": value for name, value in study.speeds._asdict().items()},
+        "directions": study.directions,
+        "one_way": study.one_way,
         "criteria": criteria.records(),
         "not_judged": study.not_judged,
         "runs": runs.records(),
@@ -320,32 +419,36 @@ def draw(study: SpeedStudy) -> Figure | None:
     figure = figures.new_figure(0.6 + 2.0 * len(_PANELS))
     panels = figure.subplots(len(_PANELS), 1, sharex=True)
     names = list(dict.fromkeys(row["pantograph"] for row in rows))
+    looks = dict(zip(study.directions, ("o-", "s:"), strict=False))
     for (statistic, criterion), axes in zip(_PANELS, panels, strict=True):
         for stretch in study.holds[0].stretches:
             axes.axvspan(stretch.slowest, stretch.fastest, color=figures.SHADE, zorder=0)
         of_line = statistic == "max_uplift_mm"
-        for number, name in enumerate(names[:1] if of_line else names):
-            own = [row for row in rows if row["pantograph"] == name]
+        for (number, name), (way, look) in product(
+            enumerate(names[:1] if of_line else names), looks.items()
+        ):
+            own = [row for row in rows if (row["pantograph"], row[DIRECTION]) == (name, way)]
             y = [np.nan if row[statistic] is None else row[statistic] for row in own]
-            label = None if of_line else name
-            figures.curve(axes, [row[KEY] for row in own], y, number, label, "o-")
+            label = None if of_line else f"{name}, {way}" if len(looks) > 1 else name
+            figures.curve(axes, [row[KEY] for row in own], y, number, label, look)
         # Limits of all criteria whose names begin so, as one look of dashed lines.
         for places in _limits(study, criterion):
             axes.plot(*zip(*places, strict=True), "--", color=figures.LIMIT, linewidth=1.0)
         figures.tidy(axes, "", STATISTICS[statistic].meaning)
     if any(_limits(study, criterion) for _, criterion in _PANELS):
         panels[0].plot([], [], "--", color=figures.LIMIT, linewidth=1.0, label="limit")
-    figures.legend_above(panels[0], columns=min(len(names) + 1, 4))
+    figures.legend_above(panels[0], columns=min(len(names) * len(looks) + 1, 4))
     panels[-1].set_xlabel("train speed [km/h]")
     return figure
 
 
 def _limits(study: SpeedStudy, criterion: str) -> list[list[tuple[float, float]]]:
     """Speed and limit [km/h], the criterion's unit, of each criterion whose name begins so."""
-    limits: dict[str, list[tuple[float, float]]] = {}
+    limits: dict[tuple[str, str], list[tuple[float, float]]] = {}
     for one in study.ended:
+        way = one.variant.varied[DIRECTION]
         for row in one.summary.get("acceptance", []):
             if row["criterion"].startswith(criterion) and row["limit"] is not None:
                 place = (float(one.variant.varied[KEY]), float(row["limit"]))
-                limits.setdefault(row["criterion"], []).append(place)
+                limits.setdefault((way, row["criterion"]), []).append(place)
     return list(limits.values())

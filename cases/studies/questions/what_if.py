@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
@@ -23,8 +22,7 @@ from catenary.postproc.evaluate import statistics as stats
 from catenary.postproc.evaluate.statistics import RunStatistics, slack_times
 from catenary.postproc.read.results import Results
 from catenary.postproc.report.page import page
-from catenary.postproc.report.pictures import figures
-from catenary.postproc.report.pictures.envelope import thinned
+from catenary.postproc.report.pictures import figures, overlays
 from catenary.postproc.report.sections.section import Picture, Section, Text
 from catenary.postproc.report.study_table import Column, StudyTable, remark_lines, write_files
 
@@ -291,35 +289,34 @@ def _sections(found: Differences) -> Iterator[Section]:
         yield Section("Remarks", remarks)
 
 
-@figures.own_style()
-def draw_forces(a: Results, b: Results) -> Figure:
+def draw_forces(a: Results, b: Results) -> Figure | None:
     """Contact forces of both runs along the track, a panel for each pantograph that both have."""
-    n = min(a.n_pantographs, b.n_pantographs)
-    figure, panels = figures.stacked(0.7 + 2.7 * n, n, shared=True)
-    for p, axes in enumerate(panels):
-        for number, (run, words) in enumerate(zip((a, b), WORDS.values(), strict=True)):
-            force = run.column("contact_force", p)
-            with contextlib.suppress(InputError):  # sampled too slowly; statistics say so
-                force = filters.low_pass(force, run.dt)
-            chosen = thinned(force)
-            x = run.column("contact_position", p)[chosen]
-            figures.curve(axes, x, force[chosen], number, words)
-        axes.axvspan(*a.evaluation, color=figures.SHADE, zorder=0)
-        figures.tidy(axes, "", "contact force [N]", a.pantograph_names()[p].capitalize())
-        figures.legend_above(axes)
-    panels[-1].set_xlabel("position along the track [m]")
-    return figure
+    names = a.pantograph_names()[: min(a.n_pantographs, b.n_pantographs)]
+    panels = [
+        (
+            name,
+            [
+                (words, run.column("contact_position", p), _force(run, p))
+                for run, words in zip((a, b), WORDS.values(), strict=True)
+            ],
+        )
+        for p, name in enumerate(names)
+    ]
+    return overlays.forces(panels, a.evaluation)
 
 
-@figures.own_style()
-def draw_uplift(a: Results, b: Results) -> Figure:
+def _force(run: Results, pantograph: int) -> np.ndarray:
+    """The contact force below 20 Hz (n,) [N]; all of it if it is sampled too slowly."""
+    try:
+        return filters.contact_force(run, pantograph)
+    except InputError:  # statistics say so
+        return run.column("contact_force", pantograph)
+
+
+def draw_uplift(a: Results, b: Results) -> Figure | None:
     """Largest uplift at each steady arm of both runs."""
-    figure, (axes,) = figures.stacked(3.2, 1)
-    for number, (run, words) in enumerate(zip((a, b), WORDS.values(), strict=True)):
-        uplift = 1e3 * run.extremes("arm_uplift")[1]
-        order = np.argsort(run.line("arm_x"), kind="stable")
-        figures.curve(axes, run.line("arm_x")[order], uplift[order], number, words, "o-")
-    axes.axvspan(*a.evaluation, color=figures.SHADE, zorder=0)
-    figures.tidy(axes, "position along the track [m]", "largest uplift [mm]")
-    figures.legend_above(axes)
-    return figure
+    curves = [
+        (words, run.line("arm_x"), run.extremes("arm_uplift")[1])
+        for run, words in zip((a, b), WORDS.values(), strict=True)
+    ]
+    return overlays.uplifts(curves, a.evaluation)

@@ -120,7 +120,7 @@ def _passages(results: Results) -> list[Passage]:
     masts, found = results.line("support_x"), []
     for p in range(results.n_pantographs):
         position, force = results.column("contact_position", p), results.column("contact_force", p)
-        filtered = filters.low_pass(force, results.dt)
+        filtered = filters.contact_force(results, p)
         own = []
         for span in spans_in_stretch(results):
             start, end = float(masts[span]), float(masts[span + 1])

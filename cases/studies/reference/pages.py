@@ -9,15 +9,13 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from matplotlib.figure import Figure
-
 from catenary.cases.studies.reference.judgement import FAILED, NOT_JUDGED, counts, judged, table_of
 from catenary.cases.studies.reference.others_results import Others
 from catenary.cases.studies.reference.validation import Step, Validation
 from catenary.postproc.evaluate.wording import UNCOMPARED_SAYS
 from catenary.postproc.files.disk import plain, write_all
 from catenary.postproc.report.page import page
-from catenary.postproc.report.pictures import figures
+from catenary.postproc.report.pictures import figures, overlays
 from catenary.postproc.report.sections.section import Picture, Section, Text
 from catenary.postproc.report.study_table import StudyTable
 
@@ -49,7 +47,12 @@ def write_judged(folder: Path, others: Sequence[Others]) -> list[Path]:
     for one in others:
         if one.forces:
             name = one.solution.configuration.name
-            pictures |= figures.painted(name, partial(draw_forces, one))
+            place, reference = one.solution.place, one.solution.forces
+            panels = [
+                (of, [("reference", place, reference[of]), ("judged", place, force)])
+                for of, force in one.forces.items()
+            ]
+            pictures |= figures.painted(name, partial(overlays.forces, panels))
     sections = []
     for one in others:
         name = one.solution.configuration.name
@@ -70,21 +73,6 @@ def _nothing() -> None:
     """Pictures are made before the page."""
 
 
-@figures.own_style()
-def draw_forces(one: Others) -> Figure:
-    """Forces of a program beside those of the reference, a panel for each pantograph."""
-    n = len(one.forces)
-    figure, panels = figures.stacked(0.7 + 2.7 * n, n, shared=True)
-    for axes, (of, force) in zip(panels, one.forces.items(), strict=True):
-        solution = one.solution
-        figures.curve(axes, solution.place, solution.forces[of], 0, "reference")
-        figures.curve(axes, solution.place, force, 1, "judged")
-        figures.tidy(axes, "", "contact force [N]", of.capitalize())
-        figures.legend_above(axes)
-    panels[-1].set_xlabel("position along the track [m]")
-    return figure
-
-
 def validation_text(found: Validation) -> str:
     """The statement for a terminal: each step in a line, and what fails."""
     lines = [f"{found.installation['program']}, {found.installation['machine']}", ""]
@@ -97,7 +85,9 @@ def validation_text(found: Validation) -> str:
 
 
 def _said(step: Step) -> str:
-    return counts(step.rows) if step.rows else f"{NOT_JUDGED}: {step.why}."
+    return (
+        f"{counts(step.rows)} {step.told}".rstrip() if step.rows else f"{NOT_JUDGED}: {step.told}"
+    )
 
 
 def _closing(found: Validation) -> list[str]:

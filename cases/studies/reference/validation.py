@@ -3,21 +3,31 @@
 from __future__ import annotations
 
 import csv
+import json
 import platform
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
+from pathlib import Path
 from typing import Any
 
-from catenary.base.errors import RunBroken
+from catenary.base.errors import InputError, RunBroken
 from catenary.cases.scene.input.case_files import find_case
 from catenary.cases.scene.load import load_scene
 from catenary.cases.studies.reference.configurations import RECORDED, configurations
 from catenary.cases.studies.reference.convergence import LINE, UPLIFT, figures_of
-from catenary.cases.studies.reference.judgement import bounds_of, judged, judged_row, limits
+from catenary.cases.studies.reference.judgement import (
+    NOT_JUDGED,
+    bounds_of,
+    judged,
+    judged_row,
+    limits,
+)
 from catenary.cases.studies.reference.solutions import read
 from catenary.cases.studies.sweep.jobs import Ended, Job
 from catenary.cases.studies.sweep.variants import Variant
+from catenary.postproc.measurements.comparison import LINE_TEST
+from catenary.postproc.measurements.output import SUMMARY
 
 # Quantities of accepted_ranges.csv by their names here.
 _OF_RANGES = {
@@ -35,11 +45,12 @@ _ELASTICITY = ("elasticity_max_mm_per_N", "elasticity_min_mm_per_N")
 
 @dataclass(frozen=True)
 class Step:
-    """A step of the validation: title, rows of ``judgement.COLUMNS``, and why there are none."""
+    """A step of the validation: title, rows of ``judgement.COLUMNS``, and a sentence on them, or
+    why there are none."""
 
     title: str
     rows: Sequence[dict[str, Any]]
-    why: str = ""
+    told: str = ""
 
 
 @dataclass(frozen=True)
@@ -70,12 +81,53 @@ def jobs_of_validation() -> list[Job]:
     return jobs
 
 
-def validate(ended: Sequence[Ended]) -> Validation:
+def line_test(folder: Path | None) -> Step:
+    """The step that compares a run with a measured passage. Not collective.
+
+    Parameters
+    ----------
+    folder : of `catenary compare RUN FILE -o FOLDER`; None if no line was measured
+
+    Raises
+    ------
+    InputError
+        If the folder holds no such comparison.
+    """
+    rule = limits()["line_test"]
+    if folder is None:
+        return Step(rule["title"], [], rule["why"])
+    path = folder / SUMMARY
+    try:
+        record = json.loads(path.read_text(encoding="utf-8"))
+        run, errors = record["run"], [one["text"] for one in record["errors"]]
+        rows = [_measured_row(Path(run).parent.name, one) for one in record["figures"]]
+        told = f"{record['measured']} beside {run}."
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise InputError(
+            f"{path} is no record of `catenary compare` with a measurement: {error}"
+        ) from error
+    return Step(rule["title"], rows, " ".join([told, *(f"Error: {text}." for text in errors)]))
+
+
+def _measured_row(run: str, one: Mapping[str, Any]) -> dict[str, Any]:
+    """A figure of a run beside the measured one; noise may leave one beyond its bounds unjudged."""
+    value, measured, tolerance = one["run"], one["measured"], one["tolerance"]
+    bounds = None if tolerance is None else (measured - tolerance, measured + tolerance)
+    rule = {"clause": one["source"], "compared": one["source"] != LINE_TEST}
+    quantity = f"{one['figure']} [{one['unit']}]"
+    row = judged_row(run, one["pantograph"] or LINE, quantity, value, bounds, rule)
+    if one["verdict"].startswith(NOT_JUDGED):
+        row["verdict"] = NOT_JUDGED
+    return row | {"reference": measured, "difference": value - measured}
+
+
+def validate(ended: Sequence[Ended], measured: Step) -> Validation:
     """The validation from its runs. Not collective.
 
     Parameters
     ----------
     ended : of ``jobs_of_validation``
+    measured : its last step, as ``line_test`` gives it
 
     Raises
     ------
@@ -100,7 +152,7 @@ def validate(ended: Sequence[Ended]) -> Validation:
         Step(rules["elasticity"]["title"], elasticity),
         Step(rules["ranges"]["title"], _in_ranges(summaries)),
         Step(rules["reference"]["title"], references),
-        Step(rules["line_test"]["title"], [], rules["line_test"]["why"]),
+        measured,
     ]
     installation = {
         "program": f"catenary {version('catenary')}",

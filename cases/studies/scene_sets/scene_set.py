@@ -15,11 +15,9 @@ from catenary.cases.scene.keys.table import Table
 from catenary.cases.scene.line.imperfections import Seed
 from catenary.cases.scene.load import Draft
 from catenary.cases.scene.scene import Scene
-from catenary.cases.scene.turned import turned
+from catenary.cases.scene.turned import FORWARD, turned
 from catenary.cases.studies.sweep.jobs import STATISTICS
 
-FORWARD, BACKWARD = "forward", "backward"
-DIRECTIONS = (FORWARD, BACKWARD)
 Direction = Literal["forward", "backward"]
 MOST_SCENES = 1000
 _LENGTHS = "irregularities.dropper_lengths"

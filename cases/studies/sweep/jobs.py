@@ -13,7 +13,8 @@ from catenary.cases.scene.input.toml_input import Assigned
 from catenary.cases.scene.keys.keys import nearest
 from catenary.cases.scene.load import Draft, load_scene, read_draft
 from catenary.cases.scene.scene import Scene
-from catenary.cases.studies.sweep.variants import NAMES, Variant
+from catenary.cases.scene.turned import BACKWARD, turned
+from catenary.cases.studies.sweep.variants import DIRECTION, NAMES, Variant
 from catenary.postproc.report.study_table import Column
 
 # Statistics in a sweep's table: of a row's pantograph, and of the line.
@@ -121,7 +122,7 @@ def interrupted(ended: Sequence[Ended]) -> bool:
 
 def _assigned(variant: Variant) -> list[Assigned]:
     """The assignments of a variant, each with what gave it."""
-    own = len(variant.assignments) - sum(key != NAMES for key in variant.varied)
+    own = len(variant.assignments) - sum(key not in (NAMES, DIRECTION) for key in variant.varied)
     by_name = f"by the variant {variant.name}"
     return [
         Assigned(text, "--vary", "on the command line (--vary)")
@@ -215,7 +216,8 @@ def scene_of(draft: Draft, variant: Variant, several: bool) -> Scene:
     """
     _refuse_petsc(variant)
     try:
-        return load_scene(draft, varied=_assigned(variant))
+        scene = load_scene(draft, varied=_assigned(variant))
+        return turned(scene) if variant.varied.get(DIRECTION) == BACKWARD else scene
     except UnfitScene:
         raise
     except InputError as error:

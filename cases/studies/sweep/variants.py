@@ -23,8 +23,9 @@ from catenary.postproc.files.csv_text import begins_formula
 MAX_VARIANTS = 10_000
 MOST_LETTERS = 200  # in a variant's name
 _LONGEST_SLUG = 100  # folder names may have 255 bytes; room for what a user puts around them
-# The column of the names of variants in a file, beside those of the varied keys.
-NAMES = "variant"
+# Columns beside those of the varied keys that are no keys: names of variants in a file, and the
+# direction of the train, whose scene is turned for the one backward.
+NAMES, DIRECTION = "variant", "direction"
 _OPENING, _CLOSING, _QUOTES = "[{", "]}", "\"'"
 
 

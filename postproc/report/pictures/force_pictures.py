@@ -49,7 +49,7 @@ def contact_force(results: Results) -> Figure:
         light: dict[str, Any] = {"alpha": 0.3, "linewidth": 0.6, "label": "unfiltered"}
         curves = [(chosen, force[chosen], light)]
         try:
-            force = filters.low_pass(force, results.dt)
+            force = filters.contact_force(results, p)
         except InputError:  # sampled too slowly; the report says so
             pass
         else:

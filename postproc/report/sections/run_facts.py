@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from hashlib import sha256
 
 import numpy as np
@@ -62,16 +62,34 @@ def _checks(run: EvaluatedRun) -> Iterator[Text | StudyTable]:
         yield Text("The program has no remark on this run.")
 
 
-def effects(run: EvaluatedRun) -> Section:
-    """Each effect that was simulated, and those that were not, with the reasons."""
-    about = run.results.attributes
-    heads = ["effect", "", "what it is", "why"]
+def effects(run: EvaluatedRun, costs: tuple[Mapping[str, str], str] = ({}, "")) -> Section:
+    """Each effect that was simulated, and those that were not, with the reasons.
+
+    Parameters
+    ----------
+    costs : by names of effects a sentence on what each costs and changes, and the study that
+        measured them
+    """
+    about, (told, study) = run.results.attributes, costs
+    heads = ["effect", "", "what it is", "why", *(["what it costs and changes"] if told else [])]
     on, off = (
-        texts_table(heads, [[name, state, *words] for name, *words in about[f"effects_{state}"]])
+        texts_table(
+            heads,
+            [
+                [name, state, *words, *([told.get(name, "–")] if told else [])]
+                for name, *words in about[f"effects_{state}"]
+            ],
+        )
         for state in ("on", "off")
     )
     left = Folded(f"What was not simulated: {counted(len(off.rows), 'effect')}", off)
-    how = f"catenary plan {about['case']} --cost measures what each costs and changes."
+    how = (
+        "Costs are how many times as long a step takes with the effect as without; costs and "
+        f"changes are those of {study}."
+        if told
+        else f"catenary plan {about['case']} --cost -o FOLDER measures what each costs and "
+        "changes; catenary report with --cost FOLDER shows it here."
+    )
     return Section("What was simulated", [on, Text(how)], folded=[left])
 
 

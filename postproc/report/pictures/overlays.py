@@ -1,0 +1,63 @@
+"""Pictures of passages over each other: of two runs, or of a run and what was measured."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from catenary.postproc.report.pictures import figures
+from catenary.postproc.report.pictures.envelope import thinned
+
+_PLACE = "position along the track [m]"
+# Label, places along the track (n,) [m], and values (n,) there.
+Curve = tuple[str, np.ndarray, np.ndarray]
+
+
+@figures.own_style()
+def forces(
+    panels: Sequence[tuple[str, Sequence[Curve]]], evaluated: tuple[float, float] | None = None
+) -> Figure | None:
+    """Contact forces along the track, a panel for each pantograph; None without pantographs.
+
+    Parameters
+    ----------
+    panels : name of each pantograph, and curves [N]
+    evaluated : stretch that is shaded, from and to [m]
+    """
+    if not panels:
+        return None
+    n = len(panels)
+    figure, axes = figures.stacked(0.7 + 2.7 * n, n, shared=True)
+    for own, (name, curves) in zip(axes, panels, strict=True):
+        for number, (label, place, force) in enumerate(curves):
+            chosen = thinned(force)
+            figures.curve(own, place[chosen], force[chosen], number, label)
+        if evaluated is not None:
+            own.axvspan(*evaluated, color=figures.SHADE, zorder=0)
+        figures.tidy(own, "", "contact force [N]", name.capitalize())
+        figures.legend_above(own)
+    axes[-1].set_xlabel(_PLACE)
+    return figure
+
+
+@figures.own_style()
+def uplifts(curves: Sequence[Curve], evaluated: tuple[float, float] | None = None) -> Figure | None:
+    """Largest uplifts at supports, as marks; None without any.
+
+    Parameters
+    ----------
+    curves : of uplifts [m]
+    evaluated : stretch that is shaded, from and to [m]
+    """
+    if not curves:
+        return None
+    figure, (axes,) = figures.stacked(3.2, 1)
+    for number, (label, place, uplift) in enumerate(curves):
+        figures.curve(axes, place, 1e3 * uplift, number, label, "o")
+    if evaluated is not None:
+        axes.axvspan(*evaluated, color=figures.SHADE, zorder=0)
+    figures.tidy(axes, _PLACE, "largest uplift [mm]")
+    figures.legend_above(axes)
+    return figure
