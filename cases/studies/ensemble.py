@@ -8,7 +8,7 @@ what their own runs write as ``summary.json``.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -101,12 +101,20 @@ _BEYOND = 60.0
 
 
 class Marched(NamedTuple):
-    """How a scene ended: its ``summary``, as its own run writes one, or the sentence of what broke
-    in ``outcome``, which else is "done"."""
+    """How a scene ended.
+
+    Attributes
+    ----------
+    number : of the scene
+    outcome : "done", or the sentence of what broke
+    summary : as its own run writes one, empty unless done
+    tables : histories of the train by their paths in a result file, ``time`` among them, likewise
+    """
 
     number: int
     outcome: str
     summary: dict[str, Any]
+    tables: Mapping[str, np.ndarray] = {}
 
 
 class Marches:
@@ -172,7 +180,8 @@ class Marches:
                     number = ended.number
                     del left[number]
                     head = line.header(scenes[number], problems[number], ended.at_rest)
-                    yield Marched(number, DONE, _summary(head, *_tables(ended), DONE))
+                    tables, extremes = _tables(ended)
+                    yield Marched(number, DONE, _summary(head, tables, extremes, DONE), tables)
         yield from refused
         for number in left:
             yield _alone(line, number, scenes[number], problems[number])
@@ -348,8 +357,9 @@ def _alone(line: _Line, number: int, scene: Scene, problem: Problem) -> Marched:
         return Marched(number, outcome.outcome, {})
     head = line.header(scene, problem, rest)
     head = replace(head, attributes={**head.attributes, "watched": watch.facts()})
-    summary = _summary(head, keeper.tables(), keeper.extremes(), outcome.outcome)
-    return Marched(number, outcome.outcome, summary)
+    tables = keeper.tables()
+    summary = _summary(head, tables, keeper.extremes(), outcome.outcome)
+    return Marched(number, outcome.outcome, summary, tables)
 
 
 def _summary(
