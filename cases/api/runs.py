@@ -115,6 +115,7 @@ def sweep(
     *,
     sample: Mapping[str, Any] | str | Path | None = None,
     only_statistics: bool = False,
+    histories: Sequence[str] = (),
     jobs: int = 1,
     force: bool = False,
     progress: bool = False,
@@ -137,6 +138,9 @@ def sweep(
     only_statistics : bool
         Whether nothing but the table is kept, and no result file of a variant: for thousands of
         them. Variants that share a line march side by side.
+    histories : sequence of str
+        With ``only_statistics`` and ``out``: histories of all variants that are kept in
+        ``out/histories.h5``, of contact_force, filtered_force, head_height and wire_height.
     jobs : int
         Runs at the same time, each in a process of its own; 0 for one on each core. Under mpirun
         the number of processes: a run on each.
@@ -172,6 +176,8 @@ def sweep(
     from catenary.cases.studies.sweep.output import table_of
     from catenary.cases.studies.sweep.sweep import run_sweep, sweep_of
 
+    if histories and out is None:
+        raise InputError("histories are kept in a file: give the folder out, too")
     draft, comm = draft_of(scene), _communicator(comm)
     if sample is None:
         variants, sampling = _listed(vary), None
@@ -185,7 +191,14 @@ def sweep(
     say = _line if progress else _nothing
     with ExitStack() as stack:
         folder = Path(out) if out is not None else stack.enter_context(_temporary(comm, "sweep"))
-        made = sweep_of(draft, variants, folder, only_statistics=only_statistics, force=force)
+        made = sweep_of(
+            draft,
+            variants,
+            folder,
+            only_statistics=only_statistics,
+            histories=histories,
+            force=force,
+        )
         options = stack.enter_context(options_of(made.first.petsc.given()))
         stack.enter_context(_shown(False, comm))
         plan = RunOptions(force, options, say if comm.rank == 0 else _nothing, jobs)

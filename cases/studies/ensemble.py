@@ -8,7 +8,7 @@ what their own runs write as ``summary.json``.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -101,12 +101,20 @@ _BEYOND = 60.0
 
 
 class Marched(NamedTuple):
-    """How a scene ended: its ``summary``, as its own run writes one, or the sentence of what broke
-    in ``outcome``, which else is "done"."""
+    """How a scene ended.
+
+    Attributes
+    ----------
+    number : of the scene
+    outcome : "done", or the sentence of what broke
+    summary : as its own run writes one, empty unless done
+    tables : histories of the train by their paths in a result file, ``time`` among them, likewise
+    """
 
     number: int
     outcome: str
     summary: dict[str, Any]
+    tables: Mapping[str, np.ndarray] = {}
 
 
 class Marches:
@@ -150,32 +158,49 @@ class Marches:
         except CatenaryError as error:
             yield from (Marched(number, str(error), {}) for number in problems)
             return
-        left = dict.fromkeys(problems)
-        refused: list[Marched] = []
+        left, by_themselves = dict.fromkeys(problems), list[Marched]()
 
         def together() -> Iterator[tuple[int, LineAtRest]]:
-            """Those whose lines have the same matrices."""
+            """Those whose lines have the same matrices; others march when it is their turn."""
             for number, problem in problems.items():
                 try:
                     at_rest = line.rest_of(problem)
                 except CatenaryError as error:
                     del left[number]
-                    refused.append(Marched(number, str(error), {}))
+                    by_themselves.append(Marched(number, str(error), {}))
                     continue
                 if line.moves_alike(at_rest):
                     yield number, at_rest
+                else:
+                    alone_from(number, at_rest)
+
+        def alone_from(number: int, at_rest: LineAtRest) -> None:
+            del left[number]
+            own = scenes[number], problems[number], at_rest
+            by_themselves.append(_alone(line, number, *own))
 
         if line.shared is not None:
             for ended in march_side_by_side(line.shared, together()):
-                # A march by itself says why a step has no forces, or a train no place.
-                if isinstance(ended, SceneHistory) and not (ended.is_left or _is_unusual(ended)):
-                    number = ended.number
+                if not isinstance(ended, SceneHistory):
+                    continue  # a march by itself says why a train has no place
+                number = ended.number
+                if ended.is_left or _is_unusual(ended):  # and why a step has no forces
+                    alone_from(number, ended.at_rest)
+                else:
                     del left[number]
                     head = line.header(scenes[number], problems[number], ended.at_rest)
-                    yield Marched(number, DONE, _summary(head, *_tables(ended), DONE))
-        yield from refused
+                    tables, extremes = _tables(ended)
+                    yield Marched(number, DONE, _summary(head, tables, extremes, DONE), tables)
+                yield from by_themselves
+                by_themselves.clear()
+        yield from by_themselves
         for number in left:
-            yield _alone(line, number, scenes[number], problems[number])
+            try:
+                at_rest = line.rest_of(problems[number])
+            except CatenaryError as error:
+                yield Marched(number, str(error), {})
+            else:
+                yield _alone(line, number, scenes[number], problems[number], at_rest)
 
     def _line_for(self, key: str, scenes: dict[int, Scene], problems: dict[int, Problem]) -> _Line:
         first = next(iter(problems))
@@ -334,11 +359,10 @@ def _tables(history: SceneHistory) -> tuple[dict[str, np.ndarray], dict[str, np.
     return tables, {"arm_uplift": uplift, "dropper_force": history.dropper_force}
 
 
-def _alone(line: _Line, number: int, scene: Scene, problem: Problem) -> Marched:
+def _alone(line: _Line, number: int, scene: Scene, problem: Problem, rest: LineAtRest) -> Marched:
     """March a scene by itself."""
     keeper, dt = Keeper(), problem.numerics.dt
     try:
-        rest = line.rest_of(problem)
         with March(alone(), *rest) as march:
             watch = RunWatch(alone(), watched(rest, True), watch_cadence(dt))
             outcome = march.run([watch, keeper])
@@ -348,8 +372,9 @@ def _alone(line: _Line, number: int, scene: Scene, problem: Problem) -> Marched:
         return Marched(number, outcome.outcome, {})
     head = line.header(scene, problem, rest)
     head = replace(head, attributes={**head.attributes, "watched": watch.facts()})
-    summary = _summary(head, keeper.tables(), keeper.extremes(), outcome.outcome)
-    return Marched(number, outcome.outcome, summary)
+    tables = keeper.tables()
+    summary = _summary(head, tables, keeper.extremes(), outcome.outcome)
+    return Marched(number, outcome.outcome, summary, tables)
 
 
 def _summary(

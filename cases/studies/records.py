@@ -129,17 +129,18 @@ class KeptRows:
 
     def get(self, depends_on: Any) -> Any:
         """Rows that are there, None if none or they are damaged. Not collective."""
-        path = self._path(depends_on)
+        path = self.path_of(depends_on)
         record = None if path is None else read_record(path)
         return None if record is None else record["rows"]
 
     def keep(self, depends_on: Any, rows: Any) -> None:
         """Leave a record of rows. Not collective; RunBroken if the disk refuses."""
-        if (path := self._path(depends_on)) is not None:
+        if (path := self.path_of(depends_on)) is not None:
             rows = json.loads(json.dumps(rows, default=lambda value: value.item()))
             write_record(path, {"rows": rows})
 
-    def _path(self, depends_on: Any) -> Path | None:
+    def path_of(self, depends_on: Any) -> Path | None:
+        """The file of a record, None if nothing is kept."""
         if self._folder is None:
             return None
         text = json.dumps(plain(depends_on), sort_keys=True)

@@ -288,7 +288,7 @@ def write_all(folder: Path, content: Mapping[str, bytes | str]) -> list[Path]:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise _unwritten(folder, error) from error
+        raise unwritten(folder, error) from error
     return write_into(folder, content)
 
 
@@ -304,11 +304,12 @@ def write_into(folder: Path, content: Mapping[str, bytes | str]) -> list[Path]:
         try:
             write_whole(folder / name, data)
         except OSError as error:
-            raise _unwritten(folder / name, error) from error
+            raise unwritten(folder / name, error) from error
     return [folder / name for name in content]
 
 
-def _unwritten(path: Path, error: OSError) -> RunBroken:
+def unwritten(path: Path, error: OSError) -> RunBroken:
+    """The error for the user where a file or folder could not be written."""
     return RunBroken(
         f"writing {path} failed ({reason(error)}): {remedy(error)}; what was written before stays "
         "readable"

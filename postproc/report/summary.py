@@ -138,8 +138,17 @@ def _pantograph(
         "loss_percent": p.loss_percent,
         "arcing_percent": p.arcing_percent,
         "contact_height_range_mm": 1e3 * p.contact_height_range,
+        "histogram": _histogram(p),
         "max_constraint_violation_m": violation,
     }
+
+
+def _histogram(p: PantographStatistics) -> dict[str, Any] | None:
+    """Share of time of the filtered force in bins of one width from ``from_N`` up."""
+    edges = p.histogram_edges
+    if not p.histogram_percent.size:
+        return None
+    return {"from_N": edges[0], "bin_N": edges[1] - edges[0], "percent": p.histogram_percent}
 
 
 def _supports(statistics: RunStatistics, wires: list[str]) -> dict[str, Any]:

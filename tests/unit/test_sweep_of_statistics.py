@@ -6,12 +6,18 @@ import json
 from pathlib import Path
 from typing import Any
 
+import h5py
+import numpy as np
 import pandas as pd
 import pytest
 
 import catenary
 from catenary.base.errors import InputError
 from catenary.cases.studies.records import FOLDER
+from catenary.cases.studies.sweep.force_histograms import force_histograms
+from catenary.cases.studies.sweep.histories import KeptHistories
+from catenary.cases.studies.sweep.jobs import HISTORIES, Ended
+from catenary.cases.studies.sweep.variants import Variant
 
 VARY: dict[str, list[Any]] = {
     "train.speed_km_h": [230, 240, 250],
@@ -73,3 +79,100 @@ def test_a_variant_that_is_refused_has_its_row(scene: catenary.Scene) -> None:
     assert found.outcome[0] == "done" and "wave" in found.outcome[1]
     with pytest.raises(InputError, match="wave"):
         catenary.sweep(scene, {"train.speed_km_h": [600, 620]}, only_statistics=True)
+
+
+SPEEDS = [240, 600, 250, 230, 235]  # the second is refused; pieces have four variants
+
+
+@pytest.fixture(scope="module")
+def whole_runs(scene: catenary.Scene, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("runs")
+    catenary.sweep(scene, {"train.speed_km_h": SPEEDS}, folder)
+    return folder
+
+
+def histories(scene: catenary.Scene, out: Path, **more: Any) -> dict[str, np.ndarray]:
+    """All tables of the histories of an ensemble."""
+    vary = {"train.speed_km_h": SPEEDS}
+    catenary.sweep(scene, vary, out, only_statistics=True, histories=tuple(HISTORIES), **more)
+    with h5py.File(out / "histories.h5") as file:
+        return {name: table[...] for name, table in file.items()}
+
+
+def test_histories_are_those_of_whole_runs(
+    scene: catenary.Scene, whole_runs: Path, tmp_path: Path
+) -> None:
+    found = histories(scene, tmp_path)
+    assert found["train.speed_km_h"].tolist() == SPEEDS
+    for row, name in enumerate(found["variant"].astype(str)):
+        n = np.isfinite(found["time"][row]).sum()
+        if name == "speed_km_h_600":
+            assert not n and np.isnan(found["contact_force"][row]).all()
+            continue
+        with h5py.File(whole_runs / name / "run.h5") as run:
+            assert np.array_equal(found["time"][row, :n], run["time"][...])
+            for own, path in {
+                **{name: f"channels/{name}" for name in HISTORIES},
+                "filtered_force": "filtered/contact_force",
+                "position": "channels/contact_position",
+            }.items():
+                # Single precision: 24 bits of forces below 300 N and heights below 8 m.
+                bound = 300.0 * 2.0**-24 if "force" in own else 8.0 * 2.0**-24
+                difference = found[own][row, :n] - run[path][...]
+                assert np.abs(difference).max() <= bound
+                assert np.isnan(found[own][row, n:]).all()
+
+
+def test_the_same_call_completes_histories(
+    scene: catenary.Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with monkeypatch.context() as stopped:
+        stopped.setattr(KeptHistories, "join", lambda *_: None)
+        with pytest.raises(FileNotFoundError):
+            histories(scene, tmp_path)
+    one, other = sorted((tmp_path / FOLDER).glob("*.h5"))
+    one.unlink()
+    kept = other.with_suffix(".json").stat().st_mtime_ns
+    whole, joined = histories(scene, tmp_path), tmp_path / "histories.h5"
+    assert other.with_suffix(".json").stat().st_mtime_ns == kept
+    assert not list((tmp_path / FOLDER).glob("*.h5"))
+    made = joined.stat().st_mtime_ns
+    assert [*histories(scene, tmp_path)] == [*whole] and joined.stat().st_mtime_ns == made
+    again = histories(scene, tmp_path, force=True)
+    assert joined.stat().st_mtime_ns != made
+    for name, table in whole.items():
+        np.testing.assert_array_equal(again[name], table)
+
+
+def test_histories_that_there_are_not_are_refused(scene: catenary.Scene, tmp_path: Path) -> None:
+    vary = {"train.speed_km_h": [240, 250]}
+    for out, more, words in (
+        (tmp_path, {"only_statistics": True, "histories": ["force"]}, "force is no history"),
+        (tmp_path, {"histories": ["contact_force"]}, "run.h5"),
+        (None, {"only_statistics": True, "histories": ["contact_force"]}, "folder"),
+    ):
+        with pytest.raises(InputError, match=words):
+            catenary.sweep(scene, vary, out, **more)
+    assert not list(tmp_path.iterdir())
+
+
+def test_histograms_are_those_of_the_filtered_forces(
+    scene: catenary.Scene, whole_runs: Path
+) -> None:
+    names = ("speed_km_h_240", "speed_km_h_250")
+    texts = [(whole_runs / name / "summary.json").read_text() for name in names]
+    ended = [
+        Ended(Variant(name, ()), "done", json.loads(text))
+        for name, text in zip(names, texts, strict=True)
+    ]
+    found = force_histograms([*ended, Ended(Variant("speed_km_h_600", ()), "refused")])
+    assert found is not None and list(found.variants) == [*names]
+    for name, percent in zip(found.variants, found.percent, strict=True):
+        with h5py.File(whole_runs / name / "run.h5") as run:
+            x, force = run["channels/contact_position"][:, 0], run["filtered/contact_force"][:, 0]
+            low, high = run["line/evaluation_range"][...]
+        within = force[(x >= low) & (x <= high)]
+        counts, _ = np.histogram(within, found.edges)
+        # Single precision in the file may move a step across the edge of a bin.
+        assert np.abs(percent - 100.0 * counts / within.size).max() <= 200.0 / within.size
+        assert percent.sum() == pytest.approx(100.0)

@@ -74,6 +74,23 @@ def sweep(
             "Variants that share a line march side by side.",
         ),
     ] = False,
+    histories: Annotated[
+        str | None,
+        typer.Option(
+            "--histories",
+            metavar="NAME,...",
+            help="With --only-statistics, also keep histories of all variants in one file, "
+            "histories.h5: contact_force, filtered_force, head_height, wire_height.",
+        ),
+    ] = None,
+    histogram: Annotated[
+        bool,
+        typer.Option(
+            "--histogram",
+            help="Also write force_histogram.csv, the share of time in bins of the filtered "
+            "contact force, and a picture of it.",
+        ),
+    ] = False,
     n_jobs: Jobs = 1,
     part: PartOfRuns = None,
     force: Force = False,
@@ -102,8 +119,15 @@ def sweep(
             variants = samples(sampling, draft.scene(), str(sample))
         if reports and only_statistics:
             raise InputError("--only-statistics leaves nothing that --reports could draw")
-        kept = {"full_report": reports, "only_statistics": only_statistics, "force": force}
-        made = sweep_of(draft, variants, out, **kept)
+        made = sweep_of(
+            draft,
+            variants,
+            out,
+            full_report=reports,
+            only_statistics=only_statistics,
+            histories=_names(histories),
+            force=force,
+        )
         return (made, sampling), options
 
     comm, (made, sampling), arguments = begin(read, verbose, lambda made: made[0].first)
@@ -117,7 +141,7 @@ def sweep(
     command = f"catenary sweep {words.case}"
     drawn = _names(plotted)
     lines = drawn if sampling is None else None  # samples are drawn as points
-    ended, files = run_sweep(made, out, comm, options, command, lines)
+    ended, files = run_sweep(made, out, comm, options, command, lines, histogram)
     from catenary.cases.studies.sweep import output as sweep_output
 
     if sampling is None:

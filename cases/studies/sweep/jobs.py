@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, TypeVar
 
@@ -38,15 +38,31 @@ OF_LINE = (
     Column("min_dropper_force_N", meaning="minimum dropper force [N]"),
 )
 STATISTICS = {column.name: column for column in (*OF_PANTOGRAPH, *OF_LINE)}
+# Histories that an ensemble can keep of each pantograph, with unit and meaning.
+HISTORIES = {
+    "contact_force": ("N", "contact force, >= 0 in compression"),
+    "filtered_force": ("N", "contact force, 0-20 Hz, on which statistics stand"),
+    "head_height": ("m", "height of the pan head above top of rail"),
+    "wire_height": ("m", "height of the contact wire above top of rail where the pan head is"),
+}
 
 
 def check_statistics(names: Sequence[str]) -> None:
     """Raise InputError if one of ``names`` is no statistic of a sweep's table."""
+    _check_names(names, STATISTICS, "statistic")
+
+
+def check_histories(names: Sequence[str]) -> None:
+    """Raise InputError if one of ``names`` is no history that an ensemble keeps."""
+    _check_names(names, HISTORIES, "history of --histories")
+
+
+def _check_names(names: Sequence[str], known: Mapping[str, Any], what: str) -> None:
     for name in names:
-        if name not in STATISTICS:
-            near = nearest(name, list(STATISTICS))
-            hint = f"did you mean {near}?" if near else f"there are {', '.join(STATISTICS)}"
-            raise InputError(f"{shown(name)[1:-1]} is no statistic; {hint}")
+        if name not in known:
+            near = nearest(name, list(known))
+            hint = f"did you mean {near}?" if near else f"there are {', '.join(known)}"
+            raise InputError(f"{shown(name)[1:-1]} is no {what}; {hint}")
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from catenary.cases.scene.input.toml_input import REMOVED, parse_assignment
 from catenary.cases.scene.keys.keys import ANY
 from catenary.cases.scene.keys.units import SUFFIXES, unit_of
+from catenary.cases.studies.sweep import force_histograms
 from catenary.cases.studies.sweep.jobs import OF_LINE, OF_PANTOGRAPH, STATISTICS, Ended
 from catenary.cases.studies.sweep.variants import NAMES
 from catenary.cases.terminal.key_list import Key, keys_of_a_scene
@@ -121,11 +122,16 @@ def remarks_of(ended: Sequence[Ended]) -> list[str]:
 
 
 def write(
-    out_dir: Path, case: str, ended: Sequence[Ended], plotted: Sequence[str] | None
+    out_dir: Path,
+    case: str,
+    ended: Sequence[Ended],
+    plotted: Sequence[str] | None,
+    histogram: bool = False,
 ) -> list[Path]:
     """Write table, record and picture of a sweep; returns the files. Not collective.
 
-    The picture is left out if fewer than two variants are done, or if ``plotted`` is None.
+    The picture is left out if fewer than two variants are done, or if ``plotted`` is None;
+    ``histogram`` adds those of the contact forces.
     """
     table = table_of(ended)
     record = {
@@ -140,6 +146,8 @@ def write(
     content = table_files(record, table)
     if plotted is not None and sum(one.done for one in ended) > 1:
         content[PICTURE] = partial(draw, table.rows, varied_keys(ended), plotted)
+    if histogram:
+        content |= force_histograms.files(ended)
     return write_files(out_dir, content)
 
 

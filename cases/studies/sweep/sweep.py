@@ -10,7 +10,15 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from catenary.base.errors import InputError
 from catenary.cases.result_folder.output_folder import refuse_earlier, refuse_impossible
 from catenary.cases.scene.load import Draft
-from catenary.cases.studies.sweep.jobs import Ended, Job, RunOptions, in_order, jobs_and_refused
+from catenary.cases.studies.sweep.jobs import (
+    Ended,
+    Job,
+    RunOptions,
+    check_histories,
+    in_order,
+    interrupted,
+    jobs_and_refused,
+)
 from catenary.cases.studies.sweep.variants import Variant
 
 if TYPE_CHECKING:
@@ -41,23 +49,28 @@ def sweep_of(
     *,
     full_report: bool = False,
     only_statistics: bool = False,
+    histories: Sequence[str] = (),
     force: bool = False,
 ) -> Sweep:
     """A sweep of a case into a folder, all scenes checked. Not collective.
 
-    With ``only_statistics`` there is no run of a variant on the disk, and scenes are checked when
-    it is their turn.
+    With ``only_statistics`` there is no run of a variant on the disk, but for ``histories``, and
+    scenes are checked when it is their turn.
 
     Raises
     ------
     InputError
-        As ``jobs_and_refused``, or if the folder has the table of a sweep with variants that this
-        one has not, and ``force`` is not given.
+        If one of ``histories`` is none, or whole runs are kept, which have them; as
+        ``jobs_and_refused``, or if the folder has the table of a sweep with variants that this one
+        has not, and ``force`` is not given.
     """
+    check_histories(histories)
+    if histories and not only_statistics:
+        raise InputError("--histories goes with --only-statistics: whole runs keep all in run.h5")
     if only_statistics:
         from catenary.cases.studies.sweep.together import ensemble_of
 
-        ensemble = ensemble_of(draft, variants)
+        ensemble = ensemble_of(draft, variants, histories)
         refuse_other_sweep(out, variants, force)
         return Sweep(variants, [], [], ensemble)
     jobs, refused = jobs_and_refused(draft, variants, full_report)
@@ -72,6 +85,7 @@ def run_sweep(
     options: RunOptions,
     command: str,
     plotted: Sequence[str] | None,
+    histogram: bool = False,
 ) -> tuple[list[Ended], list[Path]]:
     """Run what is not done yet, and write table and picture. Collective.
 
@@ -79,6 +93,7 @@ def run_sweep(
     ----------
     command : what this process does, for others that want the folder
     plotted : statistics that are drawn; the usual ones if there are none, no picture of None
+    histogram : whether histograms of the contact forces are written too
 
     Returns
     -------
@@ -95,7 +110,11 @@ def run_sweep(
         if sweep.ensemble is not None:
             on_root(comm, lambda: refuse_earlier(out, options.force))
         ended = in_order(sweep.variants, _run(sweep, out, comm, options), sweep.refused)
-        files = on_root(comm, lambda: output.write(out, name, ended, show), takes_long=True)
+        files = on_root(
+            comm, lambda: output.write(out, name, ended, show, histogram), takes_long=True
+        )
+    if sweep.ensemble is not None and sweep.ensemble.histories and not interrupted(ended):
+        files.append(out / "histories.h5")
     return ended, files
 
 

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from catenary.base.errors import CatenaryError, InputError
+from catenary.base.parallel import on_root
 from catenary.cases.process.interrupts import Interrupted
 from catenary.cases.process.petsc_options import start_petsc
 from catenary.cases.process.workers import WorkerLost, at_once
@@ -39,14 +40,18 @@ class Ensemble(NamedTuple):
     draft : the case
     variants : in their order
     first : the scene of the first variant that can be run
+    histories : which histories are kept, names out of ``jobs.HISTORIES``
     """
 
     draft: Draft
     variants: Sequence[Variant]
     first: Scene
+    histories: tuple[str, ...] = ()
 
 
-def ensemble_of(draft: Draft, variants: Sequence[Variant]) -> Ensemble:
+def ensemble_of(
+    draft: Draft, variants: Sequence[Variant], histories: Sequence[str] = ()
+) -> Ensemble:
     """An ensemble of which one variant at least can be run; others are looked at when it is their
     turn. Not collective.
 
@@ -59,7 +64,8 @@ def ensemble_of(draft: Draft, variants: Sequence[Variant]) -> Ensemble:
     refused: CatenaryError | None = None
     for variant in variants:
         try:
-            return Ensemble(draft, variants, scene_of(draft, variant, len(variants) > 1))
+            first = scene_of(draft, variant, len(variants) > 1)
+            return Ensemble(draft, variants, first, tuple(histories))
         except UnfitScene as error:
             refused = refused or error
     assert refused is not None
@@ -84,23 +90,30 @@ def run_ensemble(
     if part is not None:
         pieces = part.of(pieces)
     variants = [variant for piece in pieces for variant in piece]
-    kept = KeptRows(out, options.force)
     told = json.dumps(ensemble.draft.table(), sort_keys=True, default=str)
     case = hashlib.sha256(told.encode()).hexdigest()
 
     def depends_on(piece: Sequence[Variant]) -> list[Any]:
         assignments = [[variant.name, *variant.assignments] for variant in piece]
-        return [case, assignments]
+        return [case, assignments, *ensemble.histories]
 
-    march = _March(ensemble.draft)
+    kept, histories = KeptRows(out, options.force), None
+    files: Sequence[Path | None] = [None] * len(pieces)
+    if ensemble.histories:
+        assert out is not None
+        from catenary.cases.studies.sweep.histories import KeptHistories
+
+        sweep = hashlib.sha256(json.dumps(list(map(depends_on, pieces))).encode()).hexdigest()
+        kept = histories = KeptHistories(out, ensemble.histories, sweep, options.force)
+        files = [histories.file_of(depends_on(piece)) for piece in pieces]
     n_at_once = at_once(options.n_jobs, comm)
     if comm.size > 1:  # a march is one rank's: all without -j would do the same
         n_at_once = comm.size
     begin, ended = time.perf_counter(), list[Ended]()
     outcomes = kept.each(
-        march,
-        pieces,
-        depends_on,
+        _March(ensemble),
+        list(zip(pieces, files, strict=True)),
+        lambda item: depends_on(item[0]),
         n_at_once,
         comm,
         partial(start_petsc, list(options.petsc)),
@@ -120,6 +133,10 @@ def run_ensemble(
             )
     except Interrupted:
         ended.append(Ended(variants[len(ended)], INTERRUPTED))
+        return ended
+    if histories is not None and part is None:
+        sizes = {file: len(piece) for file, piece in zip(files, pieces, strict=True) if file}
+        on_root(comm, lambda: histories.join(variants, sizes), takes_long=True)
     return ended
 
 
@@ -153,14 +170,21 @@ class Marching:
 class _March:
     """Marches a piece of variants; goes to the processes that do so."""
 
-    def __init__(self, draft: Draft) -> None:
-        self._draft = draft
+    def __init__(self, ensemble: Ensemble) -> None:
+        self._draft, self._histories = ensemble.draft, ensemble.histories
         self._marches: Any = None
 
-    def __call__(self, piece: Sequence[Variant], comm: Any) -> list[list[Any]]:
-        """Outcome and what is kept of the summary of each. Not collective."""
-        from catenary.cases.studies.ensemble import Marches
+    def __call__(self, work: tuple[Sequence[Variant], Path | None], comm: Any) -> list[list[Any]]:
+        """Outcome and what is kept of the summary of each. Not collective.
 
+        Parameters
+        ----------
+        work : variants, and the file of their histories
+        """
+        from catenary.cases.studies.ensemble import Marches
+        from catenary.cases.studies.sweep.histories import piece_file
+
+        piece, file = work
         rows: list[list[Any]] = [[] for _ in piece]
         scenes, numbers = [], []
         for number, variant in enumerate(piece):
@@ -171,12 +195,15 @@ class _March:
                 rows[number] = [str(error), {}]
         if self._marches is None:
             self._marches = Marches()
-        for marched in self._marches.of(scenes):
-            kept = {name: marched.summary[name] for name in _KEPT if name in marched.summary}
-            if marched.outcome == DONE:
-                uplift = marched.summary["supports"]["max_uplift_mm"]
-                kept["supports"] = {"max_uplift_mm": uplift}
-            rows[numbers[marched.number]] = [marched.outcome, kept]
+        with piece_file(file, self._histories) as put:
+            for marched in self._marches.of(scenes):
+                number = numbers[marched.number]
+                kept = {name: marched.summary[name] for name in _KEPT if name in marched.summary}
+                if marched.outcome == DONE:
+                    uplift = marched.summary["supports"]["max_uplift_mm"]
+                    kept["supports"] = {"max_uplift_mm": uplift}
+                    put(number, marched.tables)
+                rows[number] = [marched.outcome, kept]
         return rows
 
     def __getstate__(self) -> dict[str, Any]:

@@ -1,0 +1,208 @@
+"""Histories of an ensemble's variants in one HDF5 file, padded with NaN to the longest.
+
+A piece of work leaves those of its variants in a file beside its record; when all are done they
+are joined, a variant at a time, and the files of the pieces go. Names, units and dimensions are
+those of netCDF-4 and CF, so that xarray opens the file by names.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from catenary.cases.studies.records import KeptRows
+from catenary.cases.studies.sweep.jobs import HISTORIES
+from catenary.cases.studies.sweep.variants import NAMES, Variant
+from catenary.postproc.evaluate import filters
+from catenary.postproc.files.dimensions import CONVENTIONS
+from catenary.postproc.files.disk import appears_whole, opened, unwritten
+from catenary.postproc.files.hdf5.checked import HDF5_ERRORS
+from catenary.postproc.files.hdf5.self_contained import open_own
+
+FILE = "histories.h5"
+# Attribute that says of which sweep a joined file is.
+_SWEEP = "sweep"
+_TIME, _POSITION, _VARIANT = "time", "position", "variant"
+_ALWAYS = {
+    _TIME: ("s", "simulated time"),
+    _POSITION: ("m", "position of the contact along the track"),
+}
+_DIMENSIONS = (_VARIANT, "step", "pantograph")
+_LONGEST_CHUNK = 1 << 16  # steps
+
+Put = Callable[[int, Mapping[str, np.ndarray]], None]
+
+
+@contextmanager
+def piece_file(path: Path | None, names: Sequence[str]) -> Iterator[Put]:
+    """What takes the histories of a piece of work: number of a variant, and its tables by their
+    paths in a result file. A context manager; the file appears whole at its end. Not collective.
+
+    Parameters
+    ----------
+    path : None to keep none
+    names : out of ``HISTORIES``
+
+    Raises
+    ------
+    RunBroken
+        If the disk refuses.
+    """
+    if path is None:
+        yield lambda number, tables: None
+        return
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with appears_whole(path) as partial, opened(partial, "w") as file:
+
+            def put(number: int, tables: Mapping[str, np.ndarray]) -> None:
+                group = file.create_group(str(number))
+                for name, values in _chosen(tables, names).items():
+                    group.create_dataset(name, data=values)
+
+            yield put
+    except OSError as error:
+        raise unwritten(path, error) from error
+
+
+def _chosen(tables: Mapping[str, np.ndarray], names: Sequence[str]) -> dict[str, np.ndarray]:
+    """Time (n_steps,), position and the histories (n_steps, n_pantographs), in single precision."""
+    time, kept = tables["time"], {}
+    for name in names:
+        if name == "filtered_force":
+            force = tables["channels/contact_force"]
+            values = filters.low_pass(force, float(time[1] - time[0]))
+        else:
+            values = tables[f"channels/{name}"]
+        kept[name] = values.astype(np.float32)
+    return {_TIME: time, _POSITION: tables["channels/contact_position"], **kept}
+
+
+class KeptHistories(KeptRows):
+    """Rows of the pieces of an ensemble, and their histories beside them.
+
+    Parameters
+    ----------
+    out : folder of the sweep
+    names : which histories, out of ``HISTORIES``
+    sweep : digest that names the sweep
+    force : forget what is there
+    """
+
+    def __init__(self, out: Path, names: Sequence[str], sweep: str, force: bool = False) -> None:
+        super().__init__(out, force)
+        self._path, self._names, self._sweep, self._force = out / FILE, names, sweep, force
+
+    def get(self, depends_on: Any) -> Any:
+        """Rows that are there and have their histories. Not collective."""
+        there = self.file_of(depends_on).is_file() or self._is_joined()
+        return super().get(depends_on) if there else None
+
+    def file_of(self, depends_on: Any) -> Path:
+        """Where a piece of work leaves its histories, until they are joined."""
+        record = self.path_of(depends_on)
+        assert record is not None
+        return record.with_suffix(".h5")
+
+    def join(self, variants: Sequence[Variant], pieces: Mapping[Path, int]) -> None:
+        """Make one file of those of the pieces, and remove these. Not collective.
+
+        Parameters
+        ----------
+        variants : of all pieces, in their order
+        pieces : the file of each, and its number of variants
+
+        Raises
+        ------
+        RunBroken
+            If the disk refuses.
+        """
+        if not self._is_joined():
+            shapes = [shape for piece in pieces for shape in _shapes(piece)]
+            n_steps, n = np.max(shapes, axis=0, initial=1).tolist()
+            try:
+                with appears_whole(self._path) as partial, opened(partial, "w") as file:
+                    _describe(file, variants, self._names, (len(variants), n_steps, n))
+                    row = 0
+                    for piece, size in pieces.items():
+                        _copy(piece, size, file, row)
+                        row += size
+                    file.attrs[_SWEEP] = self._sweep
+            except OSError as error:
+                raise unwritten(self._path, error) from error
+        for piece in pieces:
+            piece.unlink(missing_ok=True)
+
+    def _is_joined(self) -> bool:
+        """Whether the joined histories of this sweep are there."""
+        if self._force:
+            return False
+        try:
+            with open_own(self._path) as file:
+                return bool(file.attrs.get(_SWEEP) == self._sweep)
+        except HDF5_ERRORS:
+            return False
+
+
+def _shapes(piece: Path) -> list[tuple[int, int]]:
+    with open_own(piece) as file:
+        return [group[_POSITION].shape for group in file.values()]
+
+
+def _copy(piece: Path, n: int, file: h5py.File, first: int) -> None:
+    """Copy the variants of a piece to the rows from ``first`` on."""
+    with open_own(piece) as source:
+        for number in range(n):
+            if str(number) not in source:
+                continue  # a variant that broke
+            for name, table in source[str(number)].items():
+                place = (first + number, *(slice(0, size) for size in table.shape))
+                file[name][place] = table[...]
+
+
+def _describe(
+    file: h5py.File, variants: Sequence[Variant], names: Sequence[str], shape: tuple[int, int, int]
+) -> None:
+    """Make tables of NaN with their dimensions and units, and the varied keys of each variant."""
+    file.attrs["Conventions"] = CONVENTIONS
+    file.create_dataset(_VARIANT, data=[one.name for one in variants], dtype=h5py.string_dtype())
+    for name, size in zip(_DIMENSIONS[1:], shape[1:], strict=True):
+        file.create_dataset(name, data=np.arange(size) + (name == "pantograph"))
+    for name in _DIMENSIONS:
+        file[name].make_scale(name)
+    varied = dict.fromkeys(key for one in variants for key in one.varied if key != NAMES)
+    for key in varied:
+        table = file.create_dataset(
+            key, data=_numbers([one.varied.get(key, "") for one in variants])
+        )
+        table.dims[0].attach_scale(file[_VARIANT])
+    for name in (_TIME, _POSITION, *names):
+        n = 2 if name == _TIME else 3
+        table = file.create_dataset(
+            name,
+            shape=shape[:n],
+            maxshape=(None, *shape[1:n]),  # a compressed table of a fixed length is refused
+            dtype="f8" if name in _ALWAYS else "f4",
+            chunks=(1, min(shape[1], _LONGEST_CHUNK), shape[2])[:n],
+            fillvalue=np.nan,
+            compression="gzip",
+            shuffle=True,
+        )
+        table.attrs["units"], table.attrs["long_name"] = {**_ALWAYS, **HISTORIES}[name]
+        if name not in _ALWAYS:
+            table.attrs["coordinates"] = " ".join([*_ALWAYS, *varied])
+        for axis, dimension in enumerate(_DIMENSIONS[:n]):
+            table.dims[axis].attach_scale(file[dimension])
+
+
+def _numbers(texts: Sequence[str]) -> Any:
+    """Numbers, if all texts are some, else the texts."""
+    try:
+        return np.array([float(text) for text in texts])
+    except ValueError:
+        return list(texts)
