@@ -22,6 +22,7 @@ from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.accuracy.analysis import Row
 from catenary.cases.studies.accuracy.output import table_of
 from catenary.cases.studies.full_report.scene_of_run import SceneOfRun, measured_errors
+from catenary.postproc.files.own_files import OWN_FILES
 from catenary.postproc.read.results import Results
 from catenary.postproc.report.pictures import interactive
 
@@ -42,6 +43,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     said = invoke("report", str(out), "--pdf", "--interactive").splitlines()
     assert {Path(line).name for line in said} >= {"report.html", "report.pdf", "input.toml"}
     assert all(Path(line).is_file() for line in said)
+    # Not one picture twice, and all that another run with --force replaces is known.
+    assert not list(out.glob("*.png"))
+    assert {Path(line).name for line in said} <= {*OWN_FILES, "input.toml"}
     return out
 
 

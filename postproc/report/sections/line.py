@@ -66,11 +66,12 @@ def at_rest(run: EvaluatedRun) -> Section:
 
 
 def _of_rest(results: Results) -> Iterator[Text | StudyTable]:
-    elasticity, span = 1e3 * results.static("elasticity"), results.reference_span + 1
+    elasticity, span = 1e3 * results.static("elasticity"), results.span_at_rest + 1
     if elasticity.size:
         low, high = elasticity.min(), elasticity.max()
         yield Text(
-            f"Elasticity between {number(low, 3)} and {number(high, 3)} mm/N (non-uniformity "
+            f"Elasticity in span {span}, in the middle of the line: {number(low, 3)} to "
+            f"{number(high, 3)} mm/N (non-uniformity "
             f"{number(100 * (high - low) / (high + low))} %)."
         )
     own = [row for row in csv_tables.dropper_table(results) if row.span == span]
@@ -93,7 +94,8 @@ def _droppers(results: Results, rows: Sequence[DropperRow], title: str = "") -> 
     heads += ["hangs from", "and carries"] if several else []
     cells = [
         [row.span, row.number, number(row.position, 3), number(row.x, 3), number(row.length, 3),
-         number(row.force), *((row.upper, row.lower) if several else ())]
+         number(row.force),
+         *((row.upper.replace("_", " "), row.lower.replace("_", " ")) if several else ())]
         for row in rows
     ]  # fmt: skip
     return texts_table(heads, cells, set(range(6)), title)
