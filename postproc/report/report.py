@@ -205,9 +205,11 @@ def _page(
     """The page of a run; the files of its pictures by name, others as for ``page``."""
     results = run.results
     start, end = (number(place, 0) for place in results.evaluation)
+    program, version = next(iter(results.attributes["versions"].items()))
     lead = (
         f"Case {results.attributes['case']}: {number(KMH * results.fact('speed'), 0)} km/h, "
-        f"{counted(results.n_pantographs, 'pantograph')}, evaluated from {start} to {end} m."
+        f"{counted(results.n_pantographs, 'pantograph')}, evaluated from {start} to {end} m. "
+        f"Simulated on {str(results.attributes['created'])[:10]} by {program} {version}."
     )
     title = results.attributes["title"]
     return page(title, lead, sections.values(), pictures, list(sections), plots, script)

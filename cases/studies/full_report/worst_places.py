@@ -67,8 +67,8 @@ def _blocks(results: Results, places: WorstPlaces, causes: Causes) -> Iterator[T
     if everywhere:
         yield Text("acts on all spans alike:", "note", "The line as a whole", everywhere)
     yield Text(
-        "Causes are candidates, near in place or frequency; none is proved. catenary worst lists "
-        "all places."
+        "Causes are candidates, near in place or frequency; none is proved. For all places: "
+        "catenary worst."
     )
     rows = [
         [p.span + 1, f"{p.start:.0f} to {p.end:.0f}", names[p.pantograph], number(p.std),

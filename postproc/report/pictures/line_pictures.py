@@ -164,7 +164,7 @@ def static_line(results: Results) -> Figure:
     for number, (name, wire) in enumerate(profiles.items()):
         x, height = wire.drawn(wire.height)
         shown = (x >= start) & (x <= end)
-        if not shown.any():
+        if np.count_nonzero(shown) < 2:
             continue
         profile.plot(
             x[shown],

@@ -76,7 +76,7 @@ def _of_rest(results: Results) -> Iterator[Text | StudyTable]:
         )
     own = [row for row in csv_tables.dropper_table(results) if row.span == span]
     if own:
-        yield _droppers(results, own, f"Droppers of span {span}")
+        yield _droppers(results, own, f"Droppers of span {span}", first=1)
 
 
 def _all_droppers(results: Results) -> Iterator[Folded]:
@@ -87,7 +87,10 @@ def _all_droppers(results: Results) -> Iterator[Folded]:
     yield Folded(title, _droppers(results, rows))
 
 
-def _droppers(results: Results, rows: Sequence[DropperRow], title: str = "") -> StudyTable:
+def _droppers(
+    results: Results, rows: Sequence[DropperRow], title: str = "", first: int = 0
+) -> StudyTable:
+    """A table of droppers from the column ``first`` on."""
     heads = ["span", "dropper", "position in span [m]", "position [m]", "length [m]"]
     heads.append("force at rest [N]")
     several = csv_tables.joins_several(results)
@@ -98,7 +101,7 @@ def _droppers(results: Results, rows: Sequence[DropperRow], title: str = "") -> 
          *((row.upper.replace("_", " "), row.lower.replace("_", " ")) if several else ())]
         for row in rows
     ]  # fmt: skip
-    return texts_table(heads, cells, set(range(6)), title)
+    return texts_table(heads[first:], [row[first:] for row in cells], set(range(6 - first)), title)
 
 
 def has_registration(run: EvaluatedRun) -> bool:
