@@ -320,7 +320,7 @@ def describe(data: MultibodyData) -> str:
     )
     if standing.actuator_force is not None:
         text += f"; {data.actuator} at {standing.actuator_force:.0f} N"
-    text += f" for {standing.static_force:.1f} N"
+    text += f" for a static force of {standing.static_force:.1f} N"
     if data.all_bodies is None:
         return f"{text}; reduced to tables over its height"
     way = data.all_bodies

@@ -18,30 +18,32 @@ logger = logging.getLogger("catenary.record")
 
 RUN_FILE = "run.h5"
 FIELD_FILES = ("fields.h5", "fields.xdmf")
-REPORT_FILES = (
-    "summary.json",
-    "report.html",
-    "droppers.csv",
-    "contact_force.png",
-    "strip_forces.png",
-    "wire_forces.png",
-    "statistics.png",
-    "histogram.png",
-    "uplift.png",
-    "droppers.png",
-    "static.png",
-    "plan_view.png",
-    "registration.csv",
-    "energy.png",
+_PICTURES = (
+    *("contact_force", "strip_forces", "wire_forces", "statistics", "histogram", "uplift"),
+    *("droppers", "static", "plan_view", "energy"),
     *(
-        f"channel_{channel.name}.png"
+        f"channel_{channel.name}"
         for channel in (*CHANNELS.values(), *ENERGIES.values())
         if (channel.values or channel.energy) and not channel.own_picture
     ),
 )
-# File that a sweep leaves beside a run's files.
+REPORT_FILES = (
+    *("summary.json", "report.html", "droppers.csv", "registration.csv"),
+    *(f"{name}.png" for name in _PICTURES),
+)
+_OF_FULL_REPORTS = (
+    *("lateral_place", "spectrum", "contact_height", "space_time", "line"),
+    *("worst_span", "worst_support", "worst_dropper", "longest_slack"),
+    *(f"pantograph_{n}" for n in range(1, 17)),
+)
+# What `catenary report` leaves besides, but for its input.toml, which a user may have changed.
+FULL_REPORT_FILES = (
+    *("report.pdf", "report_interactive.html"),
+    *(f"{name}.svg" for name in (*_PICTURES, *_OF_FULL_REPORTS)),
+)
+# What a sweep leaves beside a run's files.
 VARIANT_FILE = "variant.json"
-OWN_FILES = (RUN_FILE, *FIELD_FILES, *REPORT_FILES, VARIANT_FILE)
+OWN_FILES = (RUN_FILE, *FIELD_FILES, *REPORT_FILES, *FULL_REPORT_FILES, VARIANT_FILE)
 
 _PART = re.compile(r"\.(?P<name>.+)\.\d+\.part")
 # A report may be written beside a run; its files are made in less [s].

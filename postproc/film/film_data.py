@@ -81,6 +81,15 @@ class FilmData:
         """Name of the contact wire that is lowest at rest at a place along the track [m]."""
         return self.contacts[int(self._at_rest(np.array([x]))[:, 0].argmin())]
 
+    def lowest_contact_nodes(self) -> np.ndarray:
+        """Nodes of contact wires where no other contact wire is lower at rest, (n,) along x."""
+        own = []
+        for number, name in enumerate(self.contacts):
+            nodes = self.wires[name]
+            own.append(nodes[self._at_rest(self.points[nodes, 0]).argmin(axis=0) == number])
+        found = np.concatenate(own)
+        return found[np.argsort(self.points[found, 0], kind="stable")]
+
     def contacts_at(self, x: float) -> list[str]:
         """Names of the contact wires at a place along the track, all beyond their ends [m]."""
         there = [n for n in self.contacts if self._is_there(n, np.array([x]))[0]]

@@ -163,6 +163,15 @@ class LineOfRun:
         away = np.abs(0.5 * (masts[usual] + masts[usual + 1]) - middle)
         return int(usual[np.argmin(away)])
 
+    @cached_property
+    def span_at_rest(self) -> int:
+        """The span along which the elasticity is known, counted from 0: one in the middle of the
+        line outside overlaps."""
+        at, masts = self.static("elasticity_x"), self.line("support_x")
+        if not at.size:
+            return self.reference_span
+        return int(np.searchsorted(masts, 0.5 * (at[0] + at[-1]), side="right")) - 1
+
     def _contact_wires_in(self, masts: np.ndarray) -> np.ndarray:
         """How many contact wires run in each span, (n_spans,)."""
         x, elements = self.line("node_points")[:, 0], self.elements()

@@ -17,6 +17,7 @@ from catenary.postproc.evaluate.statistics import RunStatistics
 from catenary.postproc.evaluate.verdict import Criterion
 from catenary.postproc.evaluate.wording import counted
 from catenary.postproc.files.disk import write_into
+from catenary.postproc.files.own_files import REPORT_FILES
 from catenary.postproc.read.records import Records
 from catenary.postproc.read.results import Results
 from catenary.postproc.report import csv_tables
@@ -91,7 +92,7 @@ def write_report(
     entries : the sections, None for those of ``quick_sections``
     beside : texts of further files by name
     measured : errors of quantities that a study measured, and the study, as ``EvaluatedRun``
-    vector : pictures are SVG files instead of PNG files
+    vector : pictures are SVG files instead of PNG files, which are removed
     on_paper : write ``report.pdf`` too
     interactive : write ``report_interactive.html`` too, whose pictures are Plotly's
 
@@ -140,6 +141,10 @@ def write_report(
         if on_paper:
             content["report.pdf"] = pdf(html)
         files += write_into(out, content)
+        # The same pictures as the run drew them.
+        earlier = {Path(name).with_suffix(".png").name for name in pictures if vector}
+        for name in earlier.intersection(REPORT_FILES):
+            (out / name).unlink(missing_ok=True)
     return Report(files, criteria, run.verdict if run.results.complete else None)
 
 
@@ -200,9 +205,11 @@ def _page(
     """The page of a run; the files of its pictures by name, others as for ``page``."""
     results = run.results
     start, end = (number(place, 0) for place in results.evaluation)
+    program, version = next(iter(results.attributes["versions"].items()))
     lead = (
         f"Case {results.attributes['case']}: {number(KMH * results.fact('speed'), 0)} km/h, "
-        f"{counted(results.n_pantographs, 'pantograph')}, evaluated from {start} to {end} m."
+        f"{counted(results.n_pantographs, 'pantograph')}, evaluated from {start} to {end} m. "
+        f"Simulated on {str(results.attributes['created'])[:10]} by {program} {version}."
     )
     title = results.attributes["title"]
     return page(title, lead, sections.values(), pictures, list(sections), plots, script)

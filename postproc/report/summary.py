@@ -164,10 +164,10 @@ def _supports(statistics: RunStatistics, wires: list[str]) -> dict[str, Any]:
 
 
 def _static(results: Results) -> dict[str, Any]:
-    in_span = results.line("dropper_span") == results.reference_span
+    in_span = results.line("dropper_span") == results.span_at_rest
     elasticity = 1e3 * results.static("elasticity")
     return {
-        "span": results.reference_span + 1,
+        "span": results.span_at_rest + 1,
         "dropper_lengths_m": results.static("dropper_length")[in_span],
         "dropper_forces_N": results.static("dropper_force")[in_span],
         "elasticity_mm_per_N": {

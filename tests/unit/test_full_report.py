@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import itertools
 import json
 import re
 import shutil
@@ -35,6 +36,7 @@ from catenary.cases.studies.full_report.scene_of_run import (
     measured_costs,
     measured_errors,
 )
+from catenary.postproc.files.own_files import OWN_FILES
 from catenary.postproc.read.results import Results
 from catenary.postproc.report.pictures import interactive
 
@@ -55,6 +57,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     said = invoke("report", str(out), "--pdf", "--interactive").splitlines()
     assert {Path(line).name for line in said} >= {"report.html", "report.pdf", "input.toml"}
     assert all(Path(line).is_file() for line in said)
+    # Not one picture twice, and all that another run with --force replaces is known.
+    assert not list(out.glob("*.png"))
+    assert {Path(line).name for line in said} <= {*OWN_FILES, "input.toml"}
     return out
 
 
@@ -76,12 +81,23 @@ def test_pages_are_valid_and_ask_for_nothing(folder: Path, name: str) -> None:
         for key, address in element.attrib.items():
             if key in ("src", "href", "srcset", "data", "action"):
                 assert address.startswith(("#", "data:image/")), (element.tag, key)
-    anchors = {one.get("href") for one in tree.iter("a")}
-    assert anchors == {f"#{one.get('id')}" for one in tree.iter("h2")}
+    skip, *anchors = (one.get("href") for one in tree.iter("a"))
+    assert skip == "#content" and tree.find(".//main").get("id") == "content"
+    assert anchors == [f"#{one.get('id')}" for one in tree.iter("h2")]
+    # What scrolls is reached by keyboard and has a name, and so has every picture.
+    for element in tree.iter():
+        if element.get("class") in ("scroll", "plot"):
+            assert element.get("role") in ("region", "group") and element.get("aria-label")
+            assert element.get("tabindex") == "0" or element.get("class") == "plot"
+    assert all(one.get("alt") for one in tree.iter("img"))
+    levels = [int(one.tag[1]) for one in tree.iter() if re.fullmatch("h[1-6]", str(one.tag))]
+    assert levels[0] == 1 and all(b - a <= 1 for a, b in itertools.pairwise(levels))
     scripts = [one for one in tree.iter("script")]
     assert bool(scripts) == (name == "report_interactive.html")
     plots = [one for one in tree.iter("div") if one.get("class") == "plot"]
     assert (len(plots) > 10) == bool(scripts)
+    # Plotly has a button that uploads a picture.
+    assert ("showSendToCloud: false" in text) == bool(scripts)
 
 
 @pytest.mark.process

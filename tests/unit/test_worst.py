@@ -11,10 +11,16 @@ import pytest
 from typer.testing import CliRunner
 
 from catenary.cases.cli.main import app
-from catenary.cases.studies.questions.causes import Causes
+from catenary.cases.run.scene_mesh import mesh_of
+from catenary.cases.scene.input.case_files import find_case
+from catenary.cases.scene.load import load_scene
+from catenary.cases.scene.problem import problem_of
+from catenary.cases.studies.questions.causes import Causes, elasticity_along
 from catenary.cases.studies.questions.worst import Passage, stands_out, worst_places
 from catenary.postproc.evaluate.statistics import contact_statistics
 from catenary.postproc.read.results import Results
+from catenary.solver.statics.elasticity import elasticity
+from catenary.solver.statics.line_at_rest import line_at_rest
 
 # Three missing droppers, a mass, three droppers cut too short, in spans of 60 m.
 PLANTED = {9: "missing", 13: "hard spot of 10 kg", 16: "higher at 930 m"}
@@ -171,3 +177,25 @@ def test_what_is_no_run_is_refused(tmp_path: Path) -> None:
     for folder in (tmp_path / "nowhere", tmp_path):
         done = CliRunner().invoke(app, ["worst", str(folder)])
         assert done.exit_code == 2 and len(done.output.strip().splitlines()) == 1
+
+
+def test_elasticity_of_an_overlap_is_that_of_the_wires_that_a_head_meets() -> None:
+    scene = load_scene(find_case("overlap"))
+    rest = line_at_rest(problem_of(scene), mesh_of(scene))
+    masts = rest.problem.line.support_positions
+    start, end = float(masts[11]), float(masts[19])  # the overlap is spans 14 to 17, from 1
+    x, lift = elasticity_along(rest, start, end)
+    found = elasticity(rest.model, start, end)
+    # In the first span of the overlap the other wire hangs 0.15 m and more higher; a head of 160 N
+    # lifts the lower one by less than 160 N * 0.5 mm/N = 0.08 m.
+    alone = (x > masts[13]) & (x < masts[14])
+    assert np.isfinite(found.of_wires[alone]).all()
+    np.testing.assert_allclose(lift[alone], found.of_wires[alone, 0], rtol=1e-9)
+    # At the mast in the middle both are at one height, and a head presses both.
+    middle = int(np.argmin(np.abs(x - masts[15])))
+    assert lift[middle] == pytest.approx(found.lift[middle], rel=1e-6)
+    assert lift[middle] < 0.9 * found.of_wires[middle].min()
+    # The ends of the wires, which are anchored 0.6 m higher, are no stiff places: two wires give
+    # way half as much as one, whose stiffest place has 0.174 mm/N, or a little more.
+    assert found.lift.min() < 1e-9
+    assert lift.min() > 0.5 * rest.lift.lift.min() > 0.08e-3

@@ -29,7 +29,7 @@ def description_of(data: PantographData, static_force: float) -> str:
         return describe(data) + _strips_of(data.strips)
     masses = ", ".join(f"{mass:g}" for mass in data.masses)
     noun = "mass" if len(data.masses) == 1 else "masses"
-    text = f"lumped: {len(data.masses)} {noun} of {masses} kg; {static_force:.1f} N"
+    text = f"lumped: {len(data.masses)} {noun} of {masses} kg; static force {static_force:.1f} N"
     return text + _strips_of(data.strips) + _tied_of(data)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import Any
 
@@ -19,7 +19,7 @@ from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import LineMesh
 from catenary.meshgen.slowest_wave import slowest_wave_of
 from catenary.meshgen.wires import Role, Wire
-from catenary.postproc.report.pictures.figures import COLOURS, new_figure, own_style, tidy
+from catenary.postproc.report.pictures.figures import COLOURS, FewTicks, new_figure, own_style, tidy
 from catenary.postproc.report.sections.section import EvaluatedRun, Picture, Section, Text, number
 from catenary.postproc.report.study_table import StudyTable, texts_table
 from catenary.solver.effects.all_effects import simulated
@@ -33,7 +33,7 @@ _OFF = 1e-6
 def line(scene: SceneOfRun, run: EvaluatedRun) -> Section:
     """The line to scale, and what it is made of."""
     rest = scene.at_rest
-    text = "The line at rest: three spans from the side and above, and a cross-section."
+    text = "The line at rest from the side and from above, and a cross-section."
     picture = Picture(
         "line", text, lambda: line_figure(scene.scene, scene.problem, rest.mesh, rest.form)[0]
     )
@@ -74,12 +74,15 @@ def _geometry(rest: LineAtRest, line: Line) -> Iterator[list[Any]]:
     places[:, 2] = rest.form.height
     if rest.form.lateral is not None:
         places[:, 1] = rest.form.lateral.y
-    contact, messengers = line.wires_of(Role.CONTACT)[0], line.wires_of(Role.MESSENGER)
-    y, height = _course(rest.mesh, places, contact, masts)
+    # Of several contact wires the lowest is the one that the train meets.
+    contact = _courses(rest.mesh, places, line.wires_of(Role.CONTACT), masts)
+    met = np.nanargmin(contact[:, 1], axis=0), np.arange(masts.size)
+    y, height = contact[:, 0][met], contact[:, 1][met]
     at = "at the supports of the running spans"
     yield [f"contact wire above the rail {at}", _range(height, 3), "m"]
+    messengers = line.wires_of(Role.MESSENGER)
     if messengers:
-        above = _course(rest.mesh, places, messengers[0], masts)[1] - height
+        above = np.nanmin(_courses(rest.mesh, places, messengers, masts)[:, 1], axis=0) - height
         yield ["encumbrance there (messenger wire above contact wire)", _range(above, 3), "m"]
     if np.nanmax(np.abs(y), initial=0.0) > 0.0:
         yield ["stagger there, to the left", _range(y, 3), "m"]
@@ -87,17 +90,18 @@ def _geometry(rest: LineAtRest, line: Line) -> Iterator[list[Any]]:
     yield ["largest pre-sag wanted", number(1e3 * sag, 1), "mm"]
 
 
-def _course(
-    mesh: LineMesh, places: np.ndarray, wire: Wire, x: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Lateral places and heights of a wire at rest, (n,) each [m], NaN where it is absent."""
-    found = np.full((2, x.size), np.nan)
-    for nodes in mesh.pieces(wire.name):
-        own = places[nodes]
-        there = (x >= own[0, 0] - _OFF) & (x <= own[-1, 0] + _OFF)
-        for axis in (0, 1):
-            found[axis, there] = np.interp(x[there], own[:, 0], own[:, axis + 1])
-    return found[0], found[1]
+def _courses(
+    mesh: LineMesh, places: np.ndarray, wires: Sequence[Wire], x: np.ndarray
+) -> np.ndarray:
+    """Lateral places and heights of wires at rest, (wires, 2, n) [m], NaN where one is absent."""
+    found = np.full((len(wires), 2, x.size), np.nan)
+    for of_wire, wire in zip(found, wires, strict=True):
+        for nodes in mesh.pieces(wire.name):
+            own = places[nodes]
+            there = (x >= own[0, 0] - _OFF) & (x <= own[-1, 0] + _OFF)
+            for axis in (0, 1):
+                of_wire[axis, there] = np.interp(x[there], own[:, 0], own[:, axis + 1])
+    return found
 
 
 def _hardware(problem: Problem) -> Iterator[list[Any]]:
@@ -110,10 +114,13 @@ def _hardware(problem: Problem) -> Iterator[list[Any]]:
         stiffness = (
             "radial force over length" if kind.by_radial_force else f"{kind.stiffness:g} N/m"
         )
-        data = (
-            f"{kind.length:g} m, {kind.mass_per_length:g} kg/m, clamp {kind.clamp_mass:g} kg, "
-            f"vertical stiffness {stiffness}"
-        )
+        mass = f"{kind.mass_per_length:g} kg/m, clamp {kind.clamp_mass:g} kg"
+        massless = kind.mass_per_length * kind.length + kind.clamp_mass == 0.0
+        data = ", ".join([
+            *([f"length {kind.length:g} m"] if kind.length else []),
+            "massless" if massless else mass,
+            f"vertical stiffness {stiffness}",
+        ])  # fmt: skip
         if kind.uplift_stop is not None:
             data += f", stop at {1e3 * kind.uplift_stop:g} mm with {kind.stop_stiffness:g} N/m"
         yield [f"steady arms on {_plain(arms.wire)}", len(arms.x), data]
@@ -121,11 +128,11 @@ def _hardware(problem: Problem) -> Iterator[list[Any]]:
         yield [
             f"supports of {_plain(supports.wire)}",
             len(supports.x),
-            f"{supports.stiffness:g} N/m",
+            f"stiffness {supports.stiffness:g} N/m",
         ]
     for clamps in line.clamps:
         joined = f"{_plain(clamps.upper)} to {_plain(clamps.lower)}"
-        data = f"{clamps.stiffness:g} N/m, {clamps.mass:g} kg"
+        data = f"stiffness {clamps.stiffness:g} N/m, {clamps.mass:g} kg"
         yield [f"clamps, {joined}", len(clamps.x), data]
     for own in line.fittings:
         masses = _range(np.array(own.mass), 2)
@@ -134,11 +141,13 @@ def _hardware(problem: Problem) -> Iterator[list[Any]]:
 
 def _of_dropper(kind: DropperKind) -> str:
     if kind.stiffness is not None:
-        data = f"{kind.stiffness:g} N/m"
+        data = f"stiffness {kind.stiffness:g} N/m"
     elif kind.axial_stiffness is not None:
         data = f"EA {kind.axial_stiffness:g} N"
     else:
         data = f"curve of {kind.n_pieces + 1} points"
+    if kind.mass_per_length + kind.upper_clamp_mass + kind.lower_clamp_mass == 0.0:
+        return f"{data}, massless"
     clamps = f"clamps {kind.upper_clamp_mass:g} kg above and {kind.lower_clamp_mass:g} kg below"
     return f"{data}, {kind.mass_per_length:g} kg/m, {clamps}"
 
@@ -163,7 +172,9 @@ def pantographs(scene: SceneOfRun, run: EvaluatedRun) -> Section:
         kinds.setdefault(said["kind"], (placement, said["description"]))
     pictures = [
         Picture(
-            f"pantograph_{n}", f"{name}, {_how_drawn(one[0].data)}.", partial(_drawn, one[0].data)
+            f"pantograph_{n}",
+            f"{_plain(name)}, {_how_drawn(one[0].data)}.",
+            partial(_drawn, one[0].data),
         )
         for n, (name, one) in enumerate(kinds.items(), start=1)
     ]
@@ -172,7 +183,7 @@ def pantographs(scene: SceneOfRun, run: EvaluatedRun) -> Section:
 
 def _how_drawn(data: Any) -> str:
     if isinstance(data, LumpedData):
-        return "a scheme of its masses and springs; the head is to scale"
+        return "sketched from the side and from the front: a head of its length, springs and arms"
     return "drawn to scale from its joints"
 
 
@@ -180,7 +191,7 @@ def _pantograph_blocks(
     kinds: dict[str, tuple[Placement, str]],
 ) -> Iterator[Text | StudyTable]:
     for name, (placement, description) in kinds.items():
-        yield Text(f"{description}; static force {placement.static_force:.1f} N.", "", name)
+        yield Text(f"{_plain(name)}: {description}.")
         data = placement.data
         if isinstance(data, LumpedData):
             rows = [
@@ -190,17 +201,18 @@ def _pantograph_blocks(
                 )
             ]
             heads = ["mass", "mass [kg]", "stiffness below [N/m]", "damping below [N s/m]"]
-            yield texts_table(heads, rows, {1, 2, 3}, name)
+            yield texts_table(heads, rows, {1, 2, 3})
         else:
             rows = [[_plain(body.name), f"{body.mass:g}", *(f"{i:g}" for i in body.inertia)]
                     for body in data.system.bodies]  # fmt: skip
             heads = ["body", "mass [kg]", "Ixx [kg m²]", "Iyy [kg m²]", "Izz [kg m²]"]
-            yield texts_table(heads, rows, {1, 2, 3, 4}, name)
+            yield texts_table(heads, rows, {1, 2, 3, 4})
         strips = data.strips
         rows = [["strips", str(strips.number), ""]]
         if strips.number > 1:
             rows.append(["distance of the strips", number(strips.spacing, 3), "m"])
-        rows.append(["length of a strip", number(strips.length, 3), "m"])
+        if strips.length is not None:
+            rows.append(["length of a strip", number(strips.length, 3), "m"])
         if strips.suspension is not None:
             own = strips.suspension
             rows += [
@@ -218,16 +230,17 @@ def _drawn(data: Any) -> Figure:
     n_places = data.n_masses if isinstance(data, LumpedData) else 1
     rest = shape.pose(np.full(n_places, shape.below), 0.0, shape.below, shape.below).rest
     figure = new_figure(3.6)
-    for axes, across, label in zip(
-        figure.subplots(1, 2, sharey=True), (0, 1), ("along the track [m]", "to the left [m]"),
-        strict=True,
-    ):  # fmt: skip
+    wide = np.ptp(rest[:, :2], axis=0) + 0.3  # both to one scale
+    panels = figure.subplots(1, 2, sharey=True, width_ratios=wide.tolist())
+    labels = "along the track [m]", "to the left [m]"
+    for axes, across, label in zip(panels, (0, 1), labels, strict=True):
         for kind, (first, second) in zip(shape.kinds, shape.cells, strict=True):
             ends = rest[[first, second]]
             tone = COLOURS[1] if kind == HEAD else COLOURS[0] if kind == SPRING else "#222222"
             axes.plot(
                 ends[:, across], ends[:, 2], color=tone, linewidth=2.2 if kind == HEAD else 1.3
             )
-        axes.set_aspect("equal")
+        axes.set_aspect("equal", adjustable="datalim")
+        axes.xaxis.set_major_locator(FewTicks(4))
         tidy(axes, label, "height [m]" if across == 0 else "")
     return figure

@@ -47,7 +47,7 @@ def _waves(scene: SceneOfRun, run: EvaluatedRun) -> Section:
     except InputError as error:
         return Section(heading, [Text(f"There is no picture: {error}.")])
     supports = results.line("support_x")
-    text = "Velocity of the contact wire over place and time, with the pantographs' courses."
+    text = "Velocity of the lowest contact wire over place and time, and the pantographs' courses."
     picture = Picture("space_time", text, lambda: pictures.space_time(seen, theory, supports))
     return Section(heading, [], [picture])
 

@@ -10,13 +10,14 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from catenary.cases.studies.full_report.scene_of_run import SceneOfRun
-from catenary.cases.studies.questions.causes import Causes
+from catenary.cases.studies.questions.causes import Causes, elasticity_along
 from catenary.cases.studies.questions.worst import Passage, Spot, WorstPlaces, worst_places
 from catenary.postproc.evaluate import filters
 from catenary.postproc.read.results import Results
 from catenary.postproc.report.pictures.figures import (
     COLOURS,
     LIMIT,
+    WORST,
     colour,
     legend_above,
     own_style,
@@ -26,7 +27,6 @@ from catenary.postproc.report.pictures.figures import (
 from catenary.postproc.report.pictures.marks import mark_line
 from catenary.postproc.report.sections.section import EvaluatedRun, Picture, Section, Text, number
 from catenary.postproc.report.study_table import StudyTable, texts_table
-from catenary.solver.statics.elasticity import elasticity
 
 # What is shown to both sides of an arm or a dropper [m], and how many places tables have.
 _BESIDE, _MOST = 30.0, 5
@@ -41,15 +41,9 @@ def section(scene: SceneOfRun | None, run: EvaluatedRun) -> Section:
     scene : of the run, for the elasticity of its line; None if it is not known
     """
     results, places = run.results, worst_places(run.results)
-    causes = Causes(results, places.passages, _elasticity(results, scene))
+    along = None if scene is None else elasticity_along(scene.at_rest, *results.evaluation)
+    causes = Causes(results, places.passages, along)
     return Section("Worst places", _blocks(results, places, causes), _pictures(results, places))
-
-
-def _elasticity(results: Results, scene: SceneOfRun | None) -> tuple[np.ndarray, np.ndarray] | None:
-    if scene is None:
-        return None
-    found = elasticity(scene.at_rest.model, *results.evaluation)
-    return found.x, found.lift
 
 
 def _blocks(results: Results, places: WorstPlaces, causes: Causes) -> Iterator[Text | StudyTable]:
@@ -66,14 +60,15 @@ def _blocks(results: Results, places: WorstPlaces, causes: Causes) -> Iterator[T
         )
     for first, spots, words in _KINDS:
         for spot in spots(places)[:1]:
-            said = words.format(x=spot.x, v=spot.value, m=spot.median)
+            said = words.format(at=spot.place, v=spot.value, m=spot.median)
             items = causes.at(spot.x) or [_NO_CAUSE]
             yield Text(f"{said}{_out(spot.stands_out)}.", "note", first, items)
     everywhere = causes.of_line()
     if everywhere:
         yield Text("acts on all spans alike:", "note", "The line as a whole", everywhere)
     yield Text(
-        "Candidates are near in place or frequency; none is proved. The verb worst tells all."
+        "Causes are candidates, near in place or frequency; none is proved. For all places: "
+        "catenary worst."
     )
     rows = [
         [p.span + 1, f"{p.start:.0f} to {p.end:.0f}", names[p.pantograph], number(p.std),
@@ -86,9 +81,9 @@ def _blocks(results: Results, places: WorstPlaces, causes: Causes) -> Iterator[T
 
 
 _KINDS: tuple[tuple[str, Callable[[WorstPlaces], Sequence[Spot]], str], ...] = (
-    ("Worst support:", lambda p: p.arms, "{x:.1f} m, uplift {v:.1f} mm (median {m:.1f} mm)"),
-    ("Worst dropper:", lambda p: p.forces, "{x:.1f} m, up to {v:.0f} N (usual {m:.0f} N)"),
-    ("Longest slack:", lambda p: p.slack, "dropper at {x:.1f} m, {v:.2f} s (usual {m:.2f} s)"),
+    ("Worst support:", lambda p: p.arms, "{at}, uplift {v:.1f} mm (median {m:.1f} mm)"),
+    ("Worst dropper:", lambda p: p.forces, "{at}, up to {v:.0f} N (median {m:.0f} N)"),
+    ("Longest slack:", lambda p: p.slack, "dropper at {at}, {v:.2f} s (median {m:.2f} s)"),
 )
 
 
@@ -110,7 +105,7 @@ def _pictures(results: Results, places: WorstPlaces) -> Iterator[Picture]:
         ("longest_slack", places.slack, "dropper_force", "Force of the dropper with longest slack"),
     ):
         for spot in spots[:1]:
-            caption = f"{what}, {spot.x:.1f} m, as the train passes."
+            caption = f"{what}, {spot.place}, as the train passes."
             yield Picture(name, caption, partial(_passage, results, channel, spot))
 
 
@@ -131,20 +126,22 @@ def _span(results: Results, passage: Passage) -> Figure:
     filtered = filters.contact_force(results, p)[rows]
     for axes in (force, height):
         mark_line(axes, results, low, high)
-        axes.axvspan(passage.start, passage.end, color="#f6e3c3", zorder=0.5, label="worst span")
+        axes.axvspan(passage.start, passage.end, color=WORST, zorder=0.5, label="worst span")
     x = position[rows]
     light: dict[str, Any] = {"color": colour(p), "alpha": 0.35, "linewidth": 0.7}
     force.plot(x, raw[rows], label="unfiltered", **light)
     force.plot(x, filtered, color=colour(p), linewidth=1.6, label="20 Hz low-pass")
-    for which, word in ((np.argmax, "largest"), (np.argmin, "smallest")):
+    for which, word, offset in ((np.argmax, "largest", (6, 4)), (np.argmin, "smallest", (6, -12))):
         within = np.flatnonzero((x >= passage.start) & (x <= passage.end))
         at = int(within[which(filtered[within])])
         force.annotate(
             f"{word} {filtered[at]:.0f} N at {x[at]:.1f} m", (x[at], filtered[at]),
-            xytext=(6, 4 if word == "largest" else -12), textcoords="offset points", fontsize=8,
+            xytext=offset, textcoords="offset points", fontsize=8,
         )  # fmt: skip
         force.plot(x[at], filtered[at], "o", color=LIMIT, ms=4)
     force.axhline(0.0, color=LIMIT, linewidth=0.9)
+    low, high = force.get_ylim()
+    force.set_ylim(low - 0.06 * (high - low), high)  # for the words below the smallest force
     tidy(force, "", "contact force [N]")
     legend_above(force, 6)
     line = results.column("wire_height", p)[rows]
@@ -173,7 +170,8 @@ def _passage(results: Results, channel: str, spot: Spot) -> Figure:
         axes.axvline(behind[p], color=colour(p), linestyle="--", linewidth=1.1, label=label)
     if not is_uplift:
         slack = values <= 0.0
-        axes.plot(x[slack], values[slack], ".", color=LIMIT, ms=3, label="slack")
+        if slack.any():
+            axes.plot(x[slack], values[slack], ".", color=LIMIT, ms=3, label="slack")
     axes.axhline(0.0, color="#6b6b6b", linewidth=0.7)
     axes.margins(x=0.0)
     who = "leading pantograph" if results.n_pantographs > 1 else "pantograph"

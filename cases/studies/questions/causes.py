@@ -9,7 +9,10 @@ from typing import Any
 import numpy as np
 
 from catenary.cases.studies.questions.worst import Passage, dropper_likes, spans_in_stretch
+from catenary.meshgen.wires import Role
 from catenary.postproc.read.results import Results
+from catenary.solver.statics.elasticity import elasticity
+from catenary.solver.statics.line_at_rest import LineAtRest
 
 # Frequencies so close are near each other, lengths so far apart differ [-].
 _NEAR, _LONGER = 0.1, 0.05
@@ -18,8 +21,33 @@ _FELT = 0.01
 # Elasticity beyond that of other spans [-], height beyond them [m] and rest force of droppers
 # beyond their likes [-] from which on these are candidates.
 _SOFTER, _HIGHER, _HEAVIER = 0.1, 5e-3, 0.5
+# Lift under a unit force below which a contact wire is held [m/N].
+_ANCHORED = 1e-9
 _POINTS = 101  # at which profiles of spans are compared
 _FEWEST = 3
+
+
+def elasticity_along(rest: LineAtRest, start: float, end: float) -> tuple[np.ndarray, np.ndarray]:
+    """Elasticity that a train's head meets along a stretch. Not collective.
+
+    Parameters
+    ----------
+    rest : the line at rest, with its train
+    start, end : of the stretch [m]
+
+    Returns
+    -------
+    x, lift : (n,) places [m], and how far the largest static force lifts a head above the lowest
+        contact wire there, over that force [m/N]; wires that hang higher are not touched by it
+    """
+    found = elasticity(rest.model, start, end)
+    force = max((own.static_force for own in rest.problem.train.placements), default=0.0) or 1.0
+    height = np.full(found.of_wires.shape, np.nan)
+    for number, wire in enumerate(rest.problem.line.wires_of(Role.CONTACT)):
+        nodes = rest.mesh.wires[wire.name]
+        height[:, number] = np.interp(found.x, rest.mesh.x(nodes), rest.form.height[nodes])
+    height[~np.isfinite(found.of_wires)] = np.nan
+    return found.x, (found.pressed(height, force) - np.nanmin(height, axis=1)) / force
 
 
 class Causes:
@@ -29,8 +57,7 @@ class Causes:
     ----------
     results : of the run, open
     passages : of all spans of the evaluated stretch
-    elasticity : places (n,) [m] and lift under a unit force (n,) [m/N] along the stretch; None if
-        it is not known
+    elasticity : what `elasticity_along` finds for the stretch; None if it is not known
     """
 
     def __init__(
@@ -95,7 +122,7 @@ class Causes:
                     profile.x[-1]]  # fmt: skip
             for x in sorted(set(map(float, ends))):
                 if low <= x <= high:
-                    yield f"the contact wire {name} begins or ends at {x:.0f} m (overlap, section)"
+                    yield f"{name.replace('_', ' ')} begins or ends at {x:.0f} m (overlap, section)"
 
     def _defect_end(self, defect: dict[str, Any]) -> float:
         """Where a defect ends along the track [m]: worn wires have a length."""
@@ -157,8 +184,9 @@ class Causes:
         x, lift = self._elasticity
         found = {}
         for span in spans_in_stretch(self._results):
+            # Where a wire is anchored it does not give way; that is no elasticity of the line.
             (own,) = np.nonzero(
-                (x >= self._masts[span]) & (x <= self._masts[span + 1]) & np.isfinite(lift)
+                (x >= self._masts[span]) & (x <= self._masts[span + 1]) & (lift > _ANCHORED)
             )
             if own.size:
                 soft, stiff = own[np.argmax(lift[own])], own[np.argmin(lift[own])]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -53,6 +54,7 @@ class Spot(NamedTuple):
     ----------
     number : of it, from 0
     x : where it is [m]
+    wire : name of the wire that it holds, where there are several; else empty
     value : uplift of an arm [mm], largest force of a dropper [N], or its time slack [s]
     median : of its likes
     stands_out : whether the value is far above it, None where there are too few others
@@ -60,9 +62,15 @@ class Spot(NamedTuple):
 
     number: int
     x: float
+    wire: str
     value: float
     median: float
     stands_out: bool | None
+
+    @property
+    def place(self) -> str:
+        """Where it is, in words."""
+        return f"{self.x:.1f} m{self.wire and f', {self.wire}'}"
 
 
 class WorstPlaces(NamedTuple):
@@ -95,18 +103,27 @@ def worst_places(results: Results) -> WorstPlaces:
     statistics = stats.evaluate(results)
     supports, droppers = statistics.supports, statistics.droppers
     everywhere = np.zeros(supports.x.size, dtype=np.int64)
+    names = list(results.roles)
+    of_arms = _of_several(results.arm_wires())
+    of_droppers = _of_several([names[wire] for wire in results.dropper_wires()[:, 1].tolist()])
     likes = dropper_likes(results)
     times = slack_times(results)
     # One that never carries is missing or loose, and not slack at times.
     carries = droppers.evaluated & (droppers.highest > 0.0)
-    slack = _spots(droppers.x, times, carries, likes)
+    slack = _spots(droppers.x, times, carries, likes, of_droppers)
     return WorstPlaces(
         sorted(_passages(results), key=lambda one: -one.std),
-        _spots(supports.x, 1e3 * supports.uplift, supports.evaluated, everywhere),
-        _spots(droppers.x, droppers.highest, droppers.evaluated, likes),
+        _spots(supports.x, 1e3 * supports.uplift, supports.evaluated, everywhere, of_arms),
+        _spots(droppers.x, droppers.highest, droppers.evaluated, likes, of_droppers),
         [one for one in slack if one.value > 0.0],
         droppers.lowest,
     )
+
+
+def _of_several(wires: Sequence[str]) -> list[str]:
+    """Names of wires as words, all empty if they are of one wire."""
+    several = len(set(wires)) > 1
+    return [name.replace("_", " ") if several else "" for name in wires]
 
 
 def spans_in_stretch(results: Results) -> list[int]:
@@ -164,7 +181,11 @@ def dropper_likes(results: Results) -> np.ndarray:
 
 
 def _spots(
-    x: np.ndarray, values: np.ndarray, evaluated: np.ndarray, likes: np.ndarray
+    x: np.ndarray,
+    values: np.ndarray,
+    evaluated: np.ndarray,
+    likes: np.ndarray,
+    wires: Sequence[str],
 ) -> list[Spot]:
     """Evaluated places whose value is known, the largest first."""
     spots = []
@@ -172,6 +193,6 @@ def _spots(
     for group in np.unique(likes[known]):
         (own,) = np.nonzero(known & (likes == group))
         median = float(np.median(values[own]))
-        for number, is_out in zip(own.tolist(), stands_out(values[own]), strict=True):
-            spots.append(Spot(number, float(x[number]), float(values[number]), median, is_out))
+        for n, is_out in zip(own.tolist(), stands_out(values[own]), strict=True):
+            spots.append(Spot(n, float(x[n]), wires[n], float(values[n]), median, is_out))
     return sorted(spots, key=lambda one: -one.value)

@@ -11,11 +11,10 @@ from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.input.faults import Origin
 from catenary.cases.scene.load import scene_from
 from catenary.cases.scene.problem import problem_of
-from catenary.cases.studies.questions.causes import Causes
+from catenary.cases.studies.questions.causes import Causes, elasticity_along
 from catenary.cases.studies.questions.worst import Passage, Spot, WorstPlaces, worst_places
 from catenary.postproc.read.results import Results
 from catenary.postproc.report.study_table import Column, StudyTable, write_files
-from catenary.solver.statics.elasticity import elasticity
 from catenary.solver.statics.line_at_rest import line_at_rest
 
 NONE = "no cause found"
@@ -47,9 +46,9 @@ def answer_of(results: Results, count: int) -> Answer:
         lines.append("No span lies whole within the evaluated stretch and the record.")
     lines += _of_spans(places.passages, causes, names, count)
     for title, spots, words in (
-        ("Supports by uplift", places.arms, "{x:.0f} m: {v:.1f} mm, median {m:.1f} mm"),
-        ("Droppers by largest force", places.forces, "{x:.1f} m: {v:.0f} N, usual {m:.0f} N"),
-        ("Droppers by time slack", places.slack, "{x:.1f} m: {v:.2f} s, usual {m:.2f} s"),
+        ("Supports by uplift", places.arms, "{at}: {v:.1f} mm, median {m:.1f} mm"),
+        ("Droppers by largest force", places.forces, "{at}: {v:.0f} N, median {m:.0f} N"),
+        ("Droppers by time slack", places.slack, "{at}: {v:.2f} s, median {m:.2f} s"),
     ):
         lines += _of_spots(title, spots[:count], words, causes)
     everywhere = causes.of_line()
@@ -80,10 +79,9 @@ def _elasticity(results: Results) -> tuple[Any, str]:
         origin = Origin(str(results.path), recorded=True)
         scene = scene_from(results.attributes["config"], origin)
         at_rest = line_at_rest(problem_of(scene), mesh_of(scene))
-        found = elasticity(at_rest.model, *results.evaluation)
+        return elasticity_along(at_rest, *results.evaluation), ""
     except CatenaryError as error:
         return None, str(error)
-    return (found.x, found.lift), ""
 
 
 def _of_spans(
@@ -108,7 +106,8 @@ def _of_spans(
 def _of_spots(title: str, spots: Sequence[Spot], words: str, causes: Causes) -> list[str]:
     lines = ["", title] if spots else []
     for one in spots:
-        lines.append("  " + words.format(x=one.x, v=one.value, m=one.median) + _out(one.stands_out))
+        said = words.format(at=one.place, v=one.value, m=one.median)
+        lines.append(f"  {said}{_out(one.stands_out)}")
         lines += _told(causes.at(one.x))
     return lines
 
@@ -137,7 +136,7 @@ def _spans_table(passages: Sequence[Passage], causes: Causes, names: Sequence[st
 
 
 def _supports_table(arms: Sequence[Spot], causes: Causes) -> StudyTable:
-    heads = ("x_m", "max_uplift_mm", "median_mm", "stands_out", "causes")
+    heads = ("x_m", "wire", "max_uplift_mm", "median_mm", "stands_out", "causes")
     return _table(heads, ((*one[1:], causes.at(one.x)) for one in arms))
 
 
@@ -148,8 +147,9 @@ def _droppers_table(places: WorstPlaces, causes: Causes) -> StudyTable:
         times, least = slack.get(one.number), float(places.least[one.number])
         stands_out = (times is not None and times.stands_out) or one.stands_out
         slack_s = 0.0 if times is None else times.value
-        cells.append((one.x, one.value, one.median, least, slack_s, stands_out, causes.at(one.x)))
-    heads = ("x_m", "max_N", "usual_max_N", "min_N", "slack_s", "stands_out", "causes")
+        values = one.value, one.median, least, slack_s, stands_out
+        cells.append((one.x, one.wire, *values, causes.at(one.x)))
+    heads = ("x_m", "wire", "max_N", "usual_max_N", "min_N", "slack_s", "stands_out", "causes")
     return _table(heads, cells)
 
 

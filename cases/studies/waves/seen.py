@@ -136,7 +136,7 @@ class WireMotion:
 def waves_seen(
     data: FilmData, snapshots: Snapshots, others: Sequence[NodeMotion] = ()
 ) -> WavesSeen:
-    """The motion of the contact wire in the snapshots of a run, which ``others`` see as well.
+    """The motion of the lowest contact wire in the snapshots of a run, which ``others`` see too.
 
     Not collective.
 
@@ -145,7 +145,7 @@ def waves_seen(
     InputError
         If the snapshots are not at equal distances in time, or fewer than three.
     """
-    nodes = data.wires[data.contact]
+    nodes = data.lowest_contact_nodes()
     wire = WireMotion(nodes, data.points[nodes, 0])
     for number, time in enumerate(snapshots.times.tolist()):
         uplift = snapshots.uplift(number)

@@ -63,7 +63,12 @@ class WaveTheory:
 
     def speeds(self) -> list[tuple[float, str]]:
         """Speeds of waves [m/s] and what they are of: the wires, the periodic line up to 20 Hz."""
-        found = [(speed, f"{name.replace('_', ' ')} {self._as}") for name, speed in self.wires]
+        # Wires of one speed, such as those of two tension sections, are one line in pictures.
+        wires: dict[str, tuple[float, str]] = {}
+        for name, speed in self.wires:
+            words = f"{name.replace('_', ' ')} {self._as}"
+            wires.setdefault(f"{speed:.6g}", (speed, words))
+        found = list(wires.values())
         if self.bloch is not None:
             speed, at = self.bloch.fastest(HIGHEST)
             found.append((speed, f"fastest energy of the line ({at:.1f} Hz)"))

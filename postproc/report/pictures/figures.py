@@ -29,9 +29,10 @@ from catenary.base.errors import CatenaryError
 
 logger = logging.getLogger("catenary.pictures")
 
-COLOURS = ("#1f5fa8", "#d1641b", "#2f8f4e", "#7b4fa3", "#8c6d31", "#444444")
-GREY, LIGHT, SHADE, LIMIT = "#6b6b6b", "#c9c9c9", "#eef3e6", "#b3261e"
-RUN_IN = "#fdf7e3"
+# Okabe and Ito's colours, which the colour-blind tell apart; stripes are blue, yellow and orange.
+COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#000000")
+GREY, LIGHT, SHADE, LIMIT = "#6b6b6b", "#c9c9c9", "#e1e8f2", "#b3261e"
+RUN_IN, WORST = "#fff4cc", "#fbd9b5"
 WIDTH = 9.0
 _RESOLUTION = 130
 # Room around panels whose layout is not computed [inch]: tick labels of six characters and a

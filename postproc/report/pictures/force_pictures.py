@@ -21,6 +21,7 @@ from catenary.postproc.report.pictures.figures import (
     LIMIT,
     RUN_IN,
     colour,
+    curve,
     legend_above,
     own_style,
     stacked,
@@ -98,7 +99,7 @@ def force_spectrum(results: Results, lengths: Mapping[str, float]) -> Figure:
         stretch = min(force.size, max(wanted, _FEWEST))
         frequency, power = signal.welch(force, 1.0 / results.dt, nperseg=stretch, detrend="linear")
         shown = (frequency > 0.0) & (frequency <= _HIGHEST)
-        axes.plot(frequency[shown], power[shown], color=colour(p), linewidth=1.3, label=name)
+        curve(axes, frequency[shown], power[shown], p, name, _look(p), 1.3)
     for (word, length), style in zip(lengths.items(), ("--", ":"), strict=False):
         first = speed / length
         label = f"{word} passing, {first:.2f} Hz and multiples"
@@ -113,6 +114,11 @@ def force_spectrum(results: Results, lengths: Mapping[str, float]) -> Figure:
     tidy(axes, "frequency [Hz]", "spectral density [N²/Hz]")
     legend_above(axes)
     return figure
+
+
+def _look(pantograph: int) -> str:
+    """Line of a pantograph in a panel of several, which a print without colours tells apart."""
+    return ("-", "--", "-.", ":")[pantograph % 4]
 
 
 @own_style()
@@ -134,8 +140,7 @@ def contact_height(
         mark_line(axes, results, start, end)
         for p, (name, own) in enumerate(heights.items()):
             chosen = thinned(own[number])
-            x, values = own[0][chosen], factor * own[number][chosen]
-            axes.plot(x, values, color=colour(p), linewidth=1.2, label=name)
+            curve(axes, own[0][chosen], factor * own[number][chosen], p, name, _look(p))
         tidy(axes, "", label)
         legend_above(axes)
     gradient.set_xlabel("position of the pantograph along the track [m]")

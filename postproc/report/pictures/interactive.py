@@ -65,6 +65,13 @@ def as_json(figure: Figure) -> str:
     }
     data: list[dict[str, Any]] = []
     named: set[str] = set()
+    if figure.legends:  # of all panels: an entry each, without points
+        layout["legend"]["y"] = 1.0
+    for own in figure.legends:
+        for line, text in zip(own.get_lines(), own.get_texts(), strict=True):
+            entry = {"type": "scatter", "mode": "lines", "x": [None], "y": [None]}
+            look = {"color": to_hex(line.get_color())}
+            data.append(entry | {"name": text.get_text(), "line": look, "showlegend": True})
     for number, axes in enumerate(panels, start=1):
         own = "" if number == 1 else str(number)
         layout |= _axes(axes, own, panels)
@@ -73,7 +80,12 @@ def as_json(figure: Figure) -> str:
             trace["showlegend"] = bool(name) and name not in named
             named.add(name)
             data.append(trace | {"xaxis": f"x{own}", "yaxis": f"y{own}", "legendgroup": name})
-        layout["shapes"] += list(_shapes(axes, own))
+        for shape in _shapes(axes, own):
+            # One entry of the legend shows and hides all shapes of a name.
+            name = shape.get("name", "")
+            shape |= {"showlegend": bool(name) and name not in named, "legendgroup": name}
+            named.add(name)
+            layout["shapes"].append(shape)
         layout["annotations"] += list(_annotations(axes, own))
     return json.dumps({"data": data, "layout": layout}, separators=(",", ":"))
 
@@ -137,7 +149,9 @@ def _traces(axes: Axes) -> Iterator[dict[str, Any]]:
         modes = [*(["lines"] if drawn else []), *(["markers"] if marker in _SYMBOLS else [])]
         if not modes:
             continue
-        colour = to_hex(line.get_color())
+        colour, face = to_hex(line.get_color()), line.get_markerfacecolor()
+        symbol = _SYMBOLS.get(marker, "circle")
+        is_open = str(face) == "none" and not symbol.endswith("-open")
         yield {
             "type": "scatter",
             "mode": "+".join(modes),
@@ -146,8 +160,9 @@ def _traces(axes: Axes) -> Iterator[dict[str, Any]]:
             "opacity": line.get_alpha() or 1.0,
             "line": {"color": colour, "width": line.get_linewidth(),
                      "dash": _DASHES.get(str(style), "solid")},
-            "marker": {"color": colour, "size": line.get_markersize() + 1.0,
-                       "symbol": _SYMBOLS.get(marker, "circle")},
+            "marker": {"color": to_hex(line.get_markeredgecolor()),
+                       "size": line.get_markersize() + 1.0,
+                       "symbol": f"{symbol}-open" if is_open else symbol},
             **_named(line.get_label()),
         }  # fmt: skip
     for ranges in axes.collections:
@@ -174,8 +189,9 @@ def _shapes(axes: Axes, own: str) -> Iterator[dict[str, Any]]:
             patch.get_x() + patch.get_width(), patch.get_y() + patch.get_height()
         )  # fmt: skip
         ends = _ends(axes, own, patch.get_data_transform(), low, high)
-        colour = to_hex(patch.get_facecolor())
-        yield {"type": "rect", "layer": "below", "fillcolor": colour, "line": {"width": 0}, **ends}
+        face = patch.get_facecolor()
+        yield {"type": "rect", "layer": "below", "fillcolor": to_hex(face), "opacity": face[3],
+               "line": {"width": 0}, **ends, **_named(patch.get_label())}  # fmt: skip
     for line in axes.lines:
         across = line.get_transform() in (axes.get_xaxis_transform(), axes.get_yaxis_transform())
         if across and line.get_linestyle() != "None":
@@ -186,15 +202,14 @@ def _shapes(axes: Axes, own: str) -> Iterator[dict[str, Any]]:
                          "dash": _DASHES.get(str(line.get_linestyle()), "solid")},
                 **_ends(axes, own, line.get_transform(), (x0, y0), (x1, y1)),
                 **_named(line.get_label()),
-                "showlegend": not str(line.get_label()).startswith("_"),
             }  # fmt: skip
     for ranges in axes.collections:
         if isinstance(ranges, LineCollection) and ranges.get_transform() != axes.transData:
             colour = _colour_of(ranges)
             for low, high in ranges.get_segments():
                 ends = _ends(axes, own, ranges.get_transform(), low, high)
-                look = {"color": colour, "width": 1.0}
-                yield {"type": "line", "layer": "below", "line": look, **ends}
+                look, name = {"color": colour, "width": 1.0}, _named(ranges.get_label())
+                yield {"type": "line", "layer": "below", "line": look, **ends, **name}
 
 
 def _colour_of(lines: LineCollection) -> str:
@@ -229,8 +244,9 @@ def _annotations(axes: Axes, own: str) -> Iterator[dict[str, Any]]:
                "showarrow": False, "yshift": 10, "font": font}  # fmt: skip
     title = axes.get_title(loc="left")
     if title:
-        yield {"text": title, "x": 0.0, "y": 1.0, "xref": f"x{own} domain", "xanchor": "left",
-               "yref": f"y{own} domain", "yanchor": "bottom", "showarrow": False}  # fmt: skip
+        yield {"text": title.replace("\n", "<br>"), "x": 0.0, "y": 1.0, "xref": f"x{own} domain",
+               "xanchor": "left", "yref": f"y{own} domain", "yanchor": "bottom",
+               "showarrow": False, "align": "left"}  # fmt: skip
 
 
 def _named(label: object) -> dict[str, str]:

@@ -28,6 +28,7 @@ _FACTORS = (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000)
 _WIDTH, _HEIGHT = 12.0, 8.1
 _LEFT, _LONG, _CROSS = 0.95, 7.5, 2.7
 _SIDE, _PLAN, _LOW, _GAP = 3.9, 1.75, 0.6, 0.8
+_NARROW = 0.3  # half of the least width that is shown [m]
 _MARGIN = 0.08  # of a range, on both sides
 _MOST_NAMED = 12  # marks that have a number and a line below
 _LINE = 0.22  # of text [inch]
@@ -176,13 +177,12 @@ def _cross_section(
     axes.axvline(0.0, color=GREY, lw=0.5, ls="--")
     axes.set_aspect("equal", adjustable="box", anchor="N")
     axes.margins(0.15)
+    low, high = axes.get_xlim()
+    axes.set_xlim(min(low, -_NARROW), max(high, _NARROW))
     axes.set_xlabel("to the left [m]")
     arms = "sketched" if form.lateral is None else "at rest"
-    axes.set_title(
-        f"cross-section at {at:g} m, arms\n{arms}; hollow: at {between:g} m",
-        loc="left",
-        fontsize=10,
-    )
+    title = f"cross-section at {at:g} m,\narms {arms};\nhollow: at {between:g} m"
+    axes.set_title(title, loc="left", fontsize=10)
 
 
 def _wires(axes: Axes, line: Line, mesh: LineMesh, points: np.ndarray, axis: int) -> None:
@@ -224,7 +224,7 @@ def _to_scale(
     """Limit the axes to a stretch, with the largest exaggeration that shows all of it."""
     seen = points[(points[:, 0] >= stretch[0]) & (points[:, 0] <= stretch[1]), axis]
     low, high = min(seen.min(), -reach or np.inf), max(seen.max(), reach or -np.inf)
-    needed = max((high - low) * (1.0 + 2.0 * _MARGIN), 1e-3)
+    needed = max((high - low) * (1.0 + 2.0 * _MARGIN), 2.0 * _NARROW)
     shown = (stretch[1] - stretch[0]) * height / _LONG
     factor = max(one for one in _FACTORS if one == 1 or shown / one >= needed)
     middle, half = 0.5 * (low + high), 0.5 * shown / factor

@@ -150,20 +150,22 @@ def dropper_force(results: Results, statistics: RunStatistics) -> Figure:
 
 @own_style()
 def static_line(results: Results) -> Figure:
-    """Contact-wire profile of the reference span and its neighbours; elasticity along a span.
+    """Contact-wire profile of the span whose elasticity is known and its neighbours; elasticity.
 
     Of several contact wires each has a curve.
     """
-    profiles = results.contact_profiles()
     at, lift = results.static("elasticity_x"), results.static("elasticity")
-    masts, span = results.line("support_x"), results.reference_span
+    masts, span = results.line("support_x"), results.span_at_rest
     figure, (profile, compliance) = stacked(5.2, 2)
 
     start, end = masts[max(span - 1, 0)], masts[min(span + 2, masts.size - 1)]
+    profiles = results.contact_profiles()
     level = min(float(np.interp(masts[span], wire.x, wire.height)) for wire in profiles.values())
     for number, (name, wire) in enumerate(profiles.items()):
         x, height = wire.drawn(wire.height)
         shown = (x >= start) & (x <= end)
+        if np.count_nonzero(shown) < 2:
+            continue
         profile.plot(
             x[shown],
             1e3 * (height[shown] - level),
@@ -181,18 +183,20 @@ def static_line(results: Results) -> Figure:
     )
     legend_above(profile)
 
-    if len(profiles) > 1:
-        own = results.static("elasticity_of_wires")
-        for number, name in enumerate(profiles):
+    own = results.static("elasticity_of_wires")
+    there = np.flatnonzero(np.isfinite(own).any(axis=0)).tolist()
+    if len(there) > 1:
+        names = list(profiles)
+        for number in there:
             known = np.isfinite(own[:, number])
             compliance.plot(
                 at[known],
                 1e3 * own[known, number],
                 color=colour(number),
                 linestyle="--" if number else "-",
-                label=f"{name.replace('_', ' ')} alone",
+                label=f"{names[number].replace('_', ' ')} alone",
             )
-    look = (COLOURS[0], "elasticity") if len(profiles) == 1 else (GREY, "all contact wires")
+    look = (GREY, "all contact wires") if len(there) > 1 else (COLOURS[0], "elasticity")
     compliance.plot(at, 1e3 * lift, color=look[0], linewidth=1.5, label=look[1])
     if at.size:
         mark_static(compliance, results, float(at.min()), float(at.max()))
@@ -201,7 +205,7 @@ def static_line(results: Results) -> Figure:
         compliance,
         "position along the track [m]",
         "lift under unit force [mm/N]",
-        "Elasticity along a span",
+        f"Elasticity along span {span + 1}",
     )
     legend_above(compliance)
     return figure

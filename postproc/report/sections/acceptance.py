@@ -60,8 +60,13 @@ def _status(run: EvaluatedRun) -> Iterator[Text]:
     yield from (Text(sentence, "open") for sentence in run.statistics.complaints)
 
 
+def _fewest(one: Criterion) -> int:
+    """Decimals of figures of a criterion, at least."""
+    return 3 if one.unit == "%" else 1
+
+
 def _figures(one: Criterion) -> tuple[str, str]:
-    digits = decimals_that_tell(one.value, one.limit, 3 if one.unit == "%" else 1)
+    digits = decimals_that_tell(one.value, one.limit, _fewest(one))
     return number(one.value, digits), number(one.limit, digits)
 
 
@@ -95,7 +100,8 @@ def _error_of(one: Criterion, errors: Mapping[str, Mapping[str, float]]) -> floa
 
 
 def _error(one: Criterion, errors: Mapping[str, Mapping[str, float]]) -> str:
-    return number(_error_of(one, errors), 2)
+    error = _error_of(one, errors)
+    return number(error, decimals_that_tell(error, 0.0, 2))
 
 
 def _distance(one: Criterion) -> float:
@@ -106,7 +112,7 @@ def _distance(one: Criterion) -> float:
 
 
 def _margin(one: Criterion) -> str:
-    return number(_distance(one), decimals_that_tell(_distance(one), 0.0, 1))
+    return number(_distance(one), decimals_that_tell(_distance(one), 0.0, _fewest(one)))
 
 
 def nearest_limit(run: EvaluatedRun) -> Iterator[str]:
@@ -126,14 +132,14 @@ def nearest_limit(run: EvaluatedRun) -> Iterator[str]:
         )
     errors, what = errors_of(run), _SOURCES[bool(run.measured)]
     turned = [
-        f"{label} (margin {_margin(one)}, error {_error(one, errors)} {one.unit})"
+        f"{label} (margin {_margin(one)} {one.unit}, error {_error(one, errors)} {one.unit})"
         for one, label in judged
         if abs(_distance(one)) <= _error_of(one, errors)
     ]
     if turned:
-        yield f"The {what} could turn: {'; '.join(turned)}."
+        yield f"The {what} could turn the verdict on: {'; '.join(turned)}."
     elif any(np.isfinite(_error_of(one, errors)) for one, _ in judged):
-        yield f"The {what} is smaller than every margin that it is known for."
+        yield f"The {what} turns no verdict: where it is known, it is smaller than the margin."
 
 
 def section(run: EvaluatedRun) -> Section:
@@ -144,12 +150,14 @@ def section(run: EvaluatedRun) -> Section:
 def _criteria(run: EvaluatedRun) -> Iterator[Text | StudyTable]:
     rows, left = [], []
     errors = errors_of(run)
+    # Where no limit is compared the verdict says so, once.
+    some = any(one.compared for one in run.criteria)
     for one, label in zip(run.criteria, labels(run.criteria), strict=True):
         if one.absent:
             left.append(f"{label}: because {one.because}")
             continue
         value, limit = _figures(one)
-        source = one.clause if one.compared else f"{one.clause}; {_UNCOMPARED}"
+        source = f"{one.clause}; {_UNCOMPARED}" if some and not one.compared else one.clause
         words = one.unit, source
         of_margin = _margin(one), _error(one, errors)
         first = label, _WORDS[one.passed], value, _RELATIONS[one.relation], limit

@@ -11,7 +11,6 @@ from catenary.base.errors import InputError
 from catenary.postproc.evaluate import filters
 from catenary.postproc.evaluate.statistics import slack_times
 from catenary.postproc.read.results import Results
-from catenary.postproc.report import csv_tables
 from catenary.postproc.report.sections.section import (
     EvaluatedRun,
     Folded,
@@ -135,9 +134,9 @@ def _tables(run: EvaluatedRun) -> Iterator[StudyTable]:
         heads = ["position [m]", "wire", "largest uplift [mm]", "margin [mm]"]
         yield texts_table(heads, rows, {0, 2, 3}, "Uplift at the evaluated steady arms")
     at_rest, slack = results.static("dropper_force"), slack_times(results)
-    several = csv_tables.joins_several(results)
     names = [name.replace("_", " ") for name in results.roles]
     carried = [names[wire] for wire in results.dropper_wires()[:, 1].tolist()]
+    several = len(set(carried)) > 1
     rows = [
         [*([carried[n]] if several else ()), number(droppers.x[n], 2),
          number(at_rest[n]), number(droppers.highest[n]),

@@ -66,16 +66,17 @@ def at_rest(run: EvaluatedRun) -> Section:
 
 
 def _of_rest(results: Results) -> Iterator[Text | StudyTable]:
-    elasticity, span = 1e3 * results.static("elasticity"), results.reference_span + 1
+    elasticity, span = 1e3 * results.static("elasticity"), results.span_at_rest + 1
     if elasticity.size:
         low, high = elasticity.min(), elasticity.max()
         yield Text(
-            f"Elasticity between {number(low, 3)} and {number(high, 3)} mm/N (non-uniformity "
+            f"Elasticity in span {span}, in the middle of the line: {number(low, 3)} to "
+            f"{number(high, 3)} mm/N (non-uniformity "
             f"{number(100 * (high - low) / (high + low))} %)."
         )
     own = [row for row in csv_tables.dropper_table(results) if row.span == span]
     if own:
-        yield _droppers(results, own, f"Droppers of span {span}")
+        yield _droppers(results, own, f"Droppers of span {span}", first=1)
 
 
 def _all_droppers(results: Results) -> Iterator[Folded]:
@@ -86,17 +87,21 @@ def _all_droppers(results: Results) -> Iterator[Folded]:
     yield Folded(title, _droppers(results, rows))
 
 
-def _droppers(results: Results, rows: Sequence[DropperRow], title: str = "") -> StudyTable:
+def _droppers(
+    results: Results, rows: Sequence[DropperRow], title: str = "", first: int = 0
+) -> StudyTable:
+    """A table of droppers from the column ``first`` on."""
     heads = ["span", "dropper", "position in span [m]", "position [m]", "length [m]"]
     heads.append("force at rest [N]")
     several = csv_tables.joins_several(results)
     heads += ["hangs from", "and carries"] if several else []
     cells = [
         [row.span, row.number, number(row.position, 3), number(row.x, 3), number(row.length, 3),
-         number(row.force), *((row.upper, row.lower) if several else ())]
+         number(row.force),
+         *((row.upper.replace("_", " "), row.lower.replace("_", " ")) if several else ())]
         for row in rows
     ]  # fmt: skip
-    return texts_table(heads, cells, set(range(6)), title)
+    return texts_table(heads[first:], [row[first:] for row in cells], set(range(6 - first)), title)
 
 
 def has_registration(run: EvaluatedRun) -> bool:

@@ -80,17 +80,19 @@ def told(error: float, *criteria: Criterion) -> str:
 def test_an_error_larger_than_the_margin_could_turn_a_verdict() -> None:
     mean = criterion(149.0, 150.0, "<=", "mean_force")
     largest = criterion(345.0, 350.0, "<=", "force_max")
-    assert "could turn: mean_force of the run (margin 1.0, error 1.50 N)." in told(1.5, mean)
-    assert "is smaller than every margin" in told(0.9, mean)
+    assert "could turn the verdict on: mean_force of the run (margin 1.0 N, error 1.50 N)." in told(
+        1.5, mean
+    )
+    assert "it is smaller than the margin" in told(0.9, mean)
     # Extremes have three times the rms error of the history.
-    assert "could turn: force_max of the run" in told(1.7, largest)
-    assert "smaller than every margin" in told(1.6, largest)
+    assert "could turn the verdict on: force_max of the run" in told(1.7, largest)
+    assert "it is smaller than the margin" in told(1.6, largest)
     # A force that is nearly lost has a margin as well, though no share of its limit, which is zero.
-    assert "could turn: force_min of the run (margin 2.0, error 3.00 N)." in told(
+    assert "could turn the verdict on: force_min of the run (margin 2.0 N, error 3.00 N)." in told(
         1.0, criterion(2.0, 0.0, ">", "force_min")
     )
     # A failed criterion can be turned as well; what has no estimate cannot be.
-    assert "could turn: mean_force of the run (margin -1.0" in told(
+    assert "could turn the verdict on: mean_force of the run (margin -1.0" in told(
         1.5, criterion(151.0, 150.0, "<=", "mean_force")
     )
     assert "turn" not in told(np.nan, mean) and "smaller" not in told(np.nan, mean)
