@@ -29,7 +29,7 @@ def description_of(data: PantographData, static_force: float) -> str:
         return describe(data) + _strips_of(data.strips)
     masses = ", ".join(f"{mass:g}" for mass in data.masses)
     noun = "mass" if len(data.masses) == 1 else "masses"
-    text = f"lumped: {len(data.masses)} {noun} of {masses} kg; {static_force:.1f} N"
+    text = f"lumped: {len(data.masses)} {noun} of {masses} kg; static force {static_force:.1f} N"
     return text + _strips_of(data.strips) + _tied_of(data)
 
 
@@ -76,7 +76,12 @@ def _description(placement: Placement, problem: Problem) -> str:
     if acts.wind is None:
         return text
     factor = placement.data.crosswind_factor
-    return f"{text}, where the square of a cross wind counts {factor:g} times (crosswind_factor)"
+    if factor == 0.0:
+        return f"{text}; a cross wind does not change it (crosswind_factor 0)"
+    return (
+        f"{text}; {factor:g} of the square of a cross wind adds to that of the air's speed "
+        "(crosswind_factor)"
+    )
 
 
 def header_words(scene: Scene, problem: Problem) -> list[dict[str, str]]:

@@ -24,7 +24,9 @@ from catenary.postproc.report.sections.section import EvaluatedRun, Picture, Sec
 from catenary.postproc.report.study_table import StudyTable, texts_table
 from catenary.solver.effects.all_effects import simulated
 from catenary.solver.problem.problem import Placement, Problem
+from catenary.solver.problem.wind import Wind
 from catenary.solver.statics.line_at_rest import LineAtRest
+from catenary.solver.wind.wind_at import exposure
 
 # Places along the track closer than this are one [m].
 _OFF = 1e-6
@@ -59,6 +61,9 @@ def _line_blocks(problem: Problem, rest: LineAtRest) -> Iterator[StudyTable]:
     hardware = list(_hardware(problem))
     if hardware:
         yield texts_table(["part", "number", "data"], hardware, {1}, "Hardware")
+    wind = simulated(problem).wind
+    if wind is not None:
+        yield texts_table(["", "value", "unit"], list(_of_wind(wind)), {1}, "Wind")
 
 
 def _geometry(rest: LineAtRest, line: Line) -> Iterator[list[Any]]:
@@ -84,7 +89,8 @@ def _geometry(rest: LineAtRest, line: Line) -> Iterator[list[Any]]:
     if np.nanmax(np.abs(y), initial=0.0) > 0.0:
         yield ["stagger there, to the left", _range(y, 3), "m"]
     sag = max((max(own.sag, default=0.0) for own in line.profiles), default=0.0)
-    yield ["largest pre-sag wanted", number(1e3 * sag, 1), "mm"]
+    if sag > 0.0:
+        yield ["largest pre-sag wanted", number(1e3 * sag, 1), "mm"]
 
 
 def _course(
@@ -107,16 +113,18 @@ def _hardware(problem: Problem) -> Iterator[list[Any]]:
         yield [f"droppers, {joined}", len(group.lower_x), _of_dropper(group.kind)]
     for arms in line.steady_arms:
         kind = arms.kind
-        stiffness = (
-            "radial force over length" if kind.by_radial_force else f"{kind.stiffness:g} N/m"
-        )
-        data = (
-            f"{kind.length:g} m, {kind.mass_per_length:g} kg/m, clamp {kind.clamp_mass:g} kg, "
-            f"vertical stiffness {stiffness}"
-        )
+        known = [
+            (kind.length, f"{kind.length:g} m"),
+            (kind.mass_per_length, f"{kind.mass_per_length:g} kg/m"),
+            (kind.clamp_mass, f"clamp {kind.clamp_mass:g} kg"),
+            (kind.by_radial_force, "vertical stiffness radial force over length"),
+            (kind.stiffness, f"vertical stiffness {kind.stiffness:g} N/m"),
+        ]
+        data = [said for value, said in known if value]
         if kind.uplift_stop is not None:
-            data += f", stop at {1e3 * kind.uplift_stop:g} mm with {kind.stop_stiffness:g} N/m"
-        yield [f"steady arms on {_plain(arms.wire)}", len(arms.x), data]
+            stop = f"stop at {1e3 * kind.uplift_stop:g} mm with {kind.stop_stiffness:g} N/m"
+            data.append(stop)
+        yield [f"steady arms on {_plain(arms.wire)}", len(arms.x), ", ".join(data)]
     for supports in line.supports:
         yield [
             f"supports of {_plain(supports.wire)}",
@@ -130,6 +138,29 @@ def _hardware(problem: Problem) -> Iterator[list[Any]]:
     for own in line.fittings:
         masses = _range(np.array(own.mass), 2)
         yield [f"{own.kind} on {_plain(own.wire)}", len(own.x), f"{masses} kg"]
+
+
+def _of_wind(wind: Wind) -> Iterator[list[Any]]:
+    yield [f"mean speed {wind.reference_height:g} m above ground", number(wind.speed), "m/s"]
+    yield ["blows, from the train's direction to the left", number(np.rad2deg(wind.direction)), "°"]
+    law = wind.profile
+    if law.exponent is None:
+        yield ["roughness length of the logarithmic profile", f"{law.roughness:g}", "m"]
+    else:
+        yield ["exponent of the profile", f"{law.exponent:g}", ""]
+    yield [f"mean speed at the wires, {wind.height:g} m above ground", number(wind.mean), "m/s"]
+    for own in wind.stretches:
+        there = wind.mean * exposure(wind, np.array([own.start]))[0]
+        height = wind.height if own.height is None else own.height
+        where = f"from {own.start:.6g} to {own.end:.6g} m, {height:g} m above ground"
+        yield [f"the same {where}", number(there), "m/s"]
+    yield ["density of the air", f"{wind.density:g}", "kg/m³"]
+    if wind.gusts is not None:
+        spectrum = wind.gusts.spectrum.replace("_", " ").title()
+        yield [f"turbulence intensity, spectrum of {spectrum}", f"{wind.intensity:.3g}", ""]
+        yield ["gusts, lowest frequency", f"{wind.gusts.lowest:g}", "Hz"]
+        yield ["gusts, highest frequency", f"{wind.gusts.highest:g}", "Hz"]
+        yield ["seed of the gusts", str(wind.gusts.seed), ""]
 
 
 def _of_dropper(kind: DropperKind) -> str:
@@ -180,7 +211,7 @@ def _pantograph_blocks(
     kinds: dict[str, tuple[Placement, str]],
 ) -> Iterator[Text | StudyTable]:
     for name, (placement, description) in kinds.items():
-        yield Text(f"{description}; static force {placement.static_force:.1f} N.", "", name)
+        yield Text(f"{description}.", "", name)
         data = placement.data
         if isinstance(data, LumpedData):
             rows = [
@@ -200,7 +231,8 @@ def _pantograph_blocks(
         rows = [["strips", str(strips.number), ""]]
         if strips.number > 1:
             rows.append(["distance of the strips", number(strips.spacing, 3), "m"])
-        rows.append(["length of a strip", number(strips.length, 3), "m"])
+        if strips.length is not None:
+            rows.append(["length of a strip", number(strips.length, 3), "m"])
         if strips.suspension is not None:
             own = strips.suspension
             rows += [
@@ -218,10 +250,11 @@ def _drawn(data: Any) -> Figure:
     n_places = data.n_masses if isinstance(data, LumpedData) else 1
     rest = shape.pose(np.full(n_places, shape.below), 0.0, shape.below, shape.below).rest
     figure = new_figure(3.6)
-    for axes, across, label in zip(
-        figure.subplots(1, 2, sharey=True), (0, 1), ("along the track [m]", "to the left [m]"),
-        strict=True,
-    ):  # fmt: skip
+    # Panels as wide as what they show: both have one scale.
+    widths = np.ptp(rest[:, :2], axis=0)
+    panels = figure.subplots(1, 2, sharey=True, width_ratios=widths.tolist())
+    labels = "along the track [m]", "to the left [m]"
+    for axes, across, label in zip(panels, (0, 1), labels, strict=True):
         for kind, (first, second) in zip(shape.kinds, shape.cells, strict=True):
             ends = rest[[first, second]]
             tone = COLOURS[1] if kind == HEAD else COLOURS[0] if kind == SPRING else "#222222"
@@ -230,4 +263,5 @@ def _drawn(data: Any) -> Figure:
             )
         axes.set_aspect("equal")
         tidy(axes, label, "height [m]" if across == 0 else "")
+    panels[1].locator_params(axis="x", nbins=4)
     return figure

@@ -28,6 +28,7 @@ _FACTORS = (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000)
 _WIDTH, _HEIGHT = 12.0, 8.1
 _LEFT, _LONG, _CROSS = 0.95, 7.5, 2.7
 _SIDE, _PLAN, _LOW, _GAP = 3.9, 1.75, 0.6, 0.8
+_LEAST = 0.5  # width and height that a cross-section shows [m]
 _MARGIN = 0.08  # of a range, on both sides
 _MOST_NAMED = 12  # marks that have a number and a line below
 _LINE = 0.22  # of text [inch]
@@ -174,8 +175,13 @@ def _cross_section(
     if half_head is not None:
         axes.plot([-half_head, half_head], [lowest, lowest], color="black", lw=2.0)
     axes.axvline(0.0, color=GREY, lw=0.5, ls="--")
-    axes.set_aspect("equal", adjustable="box", anchor="N")
     axes.margins(0.15)
+    # A single wire in the middle of the track is a point.
+    for axis in ("x", "y"):
+        low, high = getattr(axes, f"get_{axis}lim")()
+        spare = max(0.5 * (_LEAST - (high - low)), 0.0)
+        getattr(axes, f"set_{axis}lim")(low - spare, high + spare)
+    axes.set_aspect("equal", adjustable="box", anchor="N")
     axes.set_xlabel("to the left [m]")
     arms = "sketched" if form.lateral is None else "at rest"
     axes.set_title(
