@@ -6,6 +6,8 @@ import logging
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from catenary.base.errors import InputError
 from catenary.cases.result_folder.output_files import new_file
 from catenary.cases.scene.checks.mesh_size import MANY_NODES, size_of
@@ -67,7 +69,8 @@ def write_mesh_of(scene: Scene, path: Path, force: bool) -> LineMesh:
 def draw_scene(scene: Scene, path: Path, force: bool) -> tuple[float, float]:
     """Draw a scene's line at rest into a new file; from where to where [m]. Not collective.
 
-    Three running spans in the middle, or the first overlap with a span on either side.
+    Three spans in the middle of the evaluated stretch, or the first overlap with a span on either
+    side.
 
     Raises
     ------
@@ -104,7 +107,8 @@ def line_figure(
         spans = overlaps.first[0] - 1, overlaps.first[0] + overlaps.n_spans + 1
     else:
         first, last = line.n_transition[0], line.n_spans - line.n_transition[1]
-        middle = (first + last) // 2
+        judged = np.searchsorted(masts, 0.5 * sum(problem.evaluation), side="right") - 1
+        middle = int(np.clip(judged, first, last - 1))
         spans = max(middle - 1, 0), min(middle + 2, line.n_spans)
     stretch = float(masts[spans[0]]), float(masts[spans[1]])
     lengths = [scene.pantographs[place.name].strips.length_m for place in scene.train.pantographs]

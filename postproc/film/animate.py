@@ -192,7 +192,7 @@ class Pictures:
         every = wish.every or _TRAVEL * width
         self.times = times_of_pictures(shown, data.speed, every)
         picture = Picture.of(view, data, scenery.roof, width, drawing.ASPECT)
-        extremes = snapshots.extremes(numbers)
+        extremes = snapshots.extremes(numbers, self._seen)
         projection = Projection(
             view, picture.scale(data, extremes, wish.motion), scenery.roof + 0.5
         )
@@ -205,7 +205,11 @@ class Pictures:
             blow = data.excitation
             self.chart = RingingChart(self.drawing.chart, data, blow, snapshots, numbers)
         else:
-            rows = data.row_at(float(shown[0])), data.row_at(float(shown[-1])) + 1
+            first, last = (data.row_at(float(end)) for end in shown[[0, -1]])
+            # What the first picture shows of the force lies behind the train already.
+            low = self._span(first, width)[0]
+            begin = min(int(x.searchsorted(low)) for x in data.position[: first + 1].T)
+            rows = min(begin, first), last + 1
             self.chart = ForceChart(self.drawing.chart, data, rows, width)
         self.drawing.moving += self.chart.moving
 
@@ -233,6 +237,15 @@ class Pictures:
         middle = float(self._scenery.data.position[row, self._followed].mean())
         return middle - _BEHIND * width, middle + (1.0 - _BEHIND) * width
 
+    def _seen(self, number: int) -> np.ndarray:
+        """Which nodes a picture shows at a snapshot, (n_nodes,), all where it shows none."""
+        data = self._scenery.data
+        row = data.row_at(float(self._snapshots.times[number]))
+        low, high = self._span(row, self._width)
+        x = data.points[:, 0]
+        inside = (x >= low) & (x <= high)
+        return inside if inside.any() else np.ones_like(inside)
+
     def _fitting(self, numbers: np.ndarray, wanted: float | None) -> float:
         """Length of line that pictures show: what is wanted, or less where snapshots have less."""
         data, snapshots = self._scenery.data, self._snapshots
@@ -259,12 +272,17 @@ class Pictures:
         return max(width, _LEAST_WIDTH)
 
     def _strongest(self, shown: np.ndarray) -> float | None:
-        """Largest force of a dropper while the film runs, of many records in some of them [N]."""
+        """Largest force of a dropper that the film shows, of many records in some of them [N]."""
         if not self._dropper_time.size:
             return None
         first, last = self._dropper_time.searchsorted(shown[[0, -1]])
         rows = np.unique(np.linspace(first, max(first, last - 1), _SAMPLED).astype(int))
-        found = [float(np.nanmax(self._dropper_row(row), initial=0.0)) for row in rows.tolist()]
+        x, found = self._results.line("dropper_x"), []
+        for row in rows.tolist():
+            time = float(self._dropper_time[min(row, self._dropper_time.size - 1)])
+            low, high = self._span(self._scenery.data.row_at(time), self._width)
+            shown_here = self._dropper_row(row)[(x >= low) & (x <= high)]
+            found.append(float(np.nanmax(shown_here, initial=0.0)))
         largest = float(np.quantile(found, 0.98))
         return float(f"{largest:.2g}") if largest > 0.0 else None
 

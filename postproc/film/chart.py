@@ -29,7 +29,7 @@ class ForceChart:
     ----------
     axes : where it is drawn
     data : of the run
-    rows : records that the film shows, from the first to one after the last
+    rows : records that the chart shows, from the first to one after the last
     width : length of line that is shown [m]
     """
 
@@ -60,8 +60,9 @@ class ForceChart:
         self._axes.set_xlim(low, high)
         for p, (raw, bold) in enumerate(self.curves):
             x = data.position[:, p]
-            begin = max(self._first, int(x.searchsorted(low)) - 1)
-            end = max(row + 1, begin + 1)
+            # A pantograph may be behind all that is shown.
+            begin = min(max(self._first, int(x.searchsorted(low)) - 1), row)
+            end = row + 1
             # Back from the record, which is always shown.
             chosen = slice(
                 end - 1, begin - 1 if begin else None, -(1 + (end - begin) // _MOST_POINTS)

@@ -41,6 +41,8 @@ _MOST_LETTERS = 90
 _USUAL = 4.0
 # Length of the arrow of a force: share of the drawn room above the contact wire per N.
 _ARROW = 0.0035
+# A force's value stands above what is so far beside it at most, as shares of the picture's width.
+_BESIDE_VALUE, _ABOVE_VALUE = 0.03, 0.014
 # Length of line that is seen from behind the train, from behind the first pantograph on [m].
 _SEEN_BEHIND, _SEEN_AHEAD = 10.0, 65.0
 # What is that near to the picture is drawn [m]; half the length of lines across the track [m].
@@ -179,7 +181,8 @@ class Drawing:
         self.values = [
             axes.text(
                 0.0, 0.0, "", color=drawn.COLOURS[p % len(drawn.COLOURS)], fontsize=17,
-                fontweight="bold", ha="left", va="center", clip_on=True, animated=True,
+                fontweight="bold", clip_on=True, va="center",
+                ha="left" if self._picture.view is View.ALONG else "center", animated=True,
                 bbox={"facecolor": "white", "alpha": 0.75, "edgecolor": "none", "pad": 2.0},
             )
             for p in range(self._scenery.data.n_pantographs)
@@ -237,12 +240,13 @@ class Drawing:
                 self._show_droppers(lines, None if forces is None else forces[chosen])
             else:
                 self._still[kind].set_segments(list(lines))
+        lines = np.zeros((0, 2, 2))
         if wires:
             lines, colour, thick = (np.concatenate(own) for own in zip(*wires, strict=True))
             self.wires.set_segments(list(lines))
             self.wires.set_array(colour)
             self.wires.set_linewidth(thick.tolist())
-        self._show_beside(row, beside, eye)
+        self._show_beside(row, beside, eye, lines)
 
     def _show_droppers(self, lines: np.ndarray, forces: np.ndarray | None) -> None:
         slack = np.zeros(len(lines), dtype=bool) if forces is None else forces <= 0.0
@@ -250,8 +254,11 @@ class Drawing:
         self.droppers.set_array(np.full(len(lines), np.nan) if forces is None else forces[~slack])
         self.slack.set_segments(list(lines[slack]))
 
-    def _show_beside(self, row: int, beside: dict[str, Places], eye: float) -> None:
-        """Show train, track, pantographs and forces."""
+    def _show_beside(
+        self, row: int, beside: dict[str, Places], eye: float, wires: np.ndarray
+    ) -> None:
+        """Show train, track, pantographs and forces, and their values above the ``wires``, whose
+        ends (n, 2, 2) are places in the picture."""
         seen, data, parts = self._projection.seen, self._scenery.data, self._scenery.parts
         rest, moved = beside[TRACK]
         if self._picture.view is View.ALONG:
@@ -268,15 +275,23 @@ class Drawing:
             along = self._projection.scale.along
             rest[:, 0] = middle + along * (rest[:, 0] - middle)
             moved[:, 0] *= along
-        self.bodies.set_segments(list(seen(rest, moved, eye)[parts[PANTOGRAPHS].cells]))
+        bodies = seen(rest, moved, eye)[parts[PANTOGRAPHS].cells]
+        self.bodies.set_segments(list(bodies))
+        above = np.concatenate([wires, bodies]).reshape(-1, 2)
+        width = float(np.ptp(self._axes.get_xlim()))
         arrows = []
         tops = seen(*beside[drawn.FORCES], eye)
         for force, at, text in zip(data.force[row].tolist(), tops, self.values, strict=True):
             arrow = self._arrow(max(force, 0.0)) + at
             arrows.append(arrow)
             text.set_text(f"{force:.0f} N")
-            beyond = 0.012 * np.ptp(self._axes.get_xlim())
-            text.set_position((at[0] + beyond, arrow[..., 1].max()))
+            top = float(arrow[..., 1].max())
+            if self._picture.view is View.ALONG:
+                # Wires go up to the edge of the picture.
+                text.set_position((at[0] + 0.012 * width, top))
+                continue
+            near = above[np.abs(above[:, 0] - at[0]) < _BESIDE_VALUE * width, 1]
+            text.set_position((at[0], max(top, near.max(initial=top)) + _ABOVE_VALUE * width))
         self._arrows.set_segments(list(np.concatenate(arrows)))
 
     def _arrow(self, force: float) -> np.ndarray:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -198,14 +198,23 @@ class Snapshots:
                 "the scene again without output.field_window_m, field_spans and field_parts"
             )
 
-    def extremes(self, numbers: np.ndarray) -> np.ndarray:
+    def extremes(
+        self, numbers: np.ndarray, seen: Callable[[int], np.ndarray] | None = None
+    ) -> np.ndarray:
         """Smallest and largest motion along x, y, z in some snapshots, (2, 3) [m], zero included.
 
         Of many snapshots some are looked through, and the rare ones that exceed almost all others
         are left out.
+
+        Parameters
+        ----------
+        numbers : of the snapshots
+        seen : (n_nodes,) which nodes count in a snapshot, one at least; None for all
         """
         some = numbers[:: max(1, numbers.size // _SAMPLED)].tolist()
         moved = [self.displacement(one) for one in some]
+        if seen is not None:
+            moved = [own[seen(one)] for one, own in zip(some, moved, strict=True)]
         low = np.quantile([np.nanmin(one, axis=0) for one in moved], 1.0 - _ALMOST_ALL, axis=0)
         high = np.quantile([np.nanmax(one, axis=0) for one in moved], _ALMOST_ALL, axis=0)
         return np.array([np.minimum(low, 0.0), np.maximum(high, 0.0)])

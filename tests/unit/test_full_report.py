@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import itertools
 import json
+import math
 import re
 import shutil
 import tomllib
@@ -31,6 +32,7 @@ from catenary.cases.studies.effect_cost.study import (
     SwitchableEffects,
     Wish,
 )
+from catenary.cases.studies.full_report import data_sheets
 from catenary.cases.studies.full_report.scene_of_run import (
     SceneOfRun,
     measured_costs,
@@ -167,6 +169,30 @@ def test_a_rail_has_neither_droppers_nor_a_view_from_above(tmp_path: Path) -> No
     words = words_of(page)
     assert "Worst span:" in words and "Worst dropper:" not in words
     assert "droppers that slackened" not in words and "Evaluated droppers" not in words
+    # Nothing is told of what the rail has not: effects that are off, rods of its arms, pre-sag.
+    effects = words.split("What was simulated")[-1].split("What was not simulated")[0]
+    assert "contact_loss" in effects and "dropper" not in effects
+    assert "clamp 7 kg" in words and "0 kg/m" not in words and "pre-sag wanted" not in words
+    # The limit of the uplift, 500 times as much as the rail has, is named and not drawn.
+    svg = (tmp_path / "uplift.svg").read_text()
+    assert "limit 120 mm, far above" in svg and ">dropper<" not in svg
+    assert re.search(
+        r"Elasticity from [0-9.]+ to [0-9.]+ m.*between 0.00165 and 0.0261 mm/N", words
+    )
+
+
+def test_the_data_sheet_tells_the_wind() -> None:
+    """Speeds at the wires by the logarithmic law, ln(z / z0) / ln(10 m / z0) of that at 10 m."""
+    recorded = resolved(load_scene("windy_viaduct", shortened=True))
+    scene = SceneOfRun(_Recorded(recorded))  # type: ignore[arg-type]
+    blocks = data_sheets.line(scene, None).blocks  # type: ignore[arg-type]
+    table = next(block for block in blocks if getattr(block, "title", "") == "Wind")
+    rows = {row[0]: row[1:] for row in table.texts()}
+    for name, height in (("at the wires", 6.0), ("from 660 to 1100 m", 31.0)):
+        (value,) = (own[0] for key, own in rows.items() if name in key)
+        expected = 25.0 * math.log(height / 0.05) / math.log(10.0 / 0.05)
+        assert float(value) == pytest.approx(expected, abs=0.051)  # one decimal is shown
+    assert ["0.18", ""] in rows.values()
 
 
 @pytest.mark.process

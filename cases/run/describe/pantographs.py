@@ -76,7 +76,12 @@ def _description(placement: Placement, problem: Problem) -> str:
     if acts.wind is None:
         return text
     factor = placement.data.crosswind_factor
-    return f"{text}, where the square of a cross wind counts {factor:g} times (crosswind_factor)"
+    if factor == 0.0:
+        return f"{text}; a cross wind does not change it (crosswind_factor 0)"
+    return (
+        f"{text}; {factor:g} of the square of a cross wind adds to that of the air's speed "
+        "(crosswind_factor)"
+    )
 
 
 def header_words(scene: Scene, problem: Problem) -> list[dict[str, str]]:

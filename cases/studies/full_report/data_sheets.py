@@ -24,7 +24,9 @@ from catenary.postproc.report.sections.section import EvaluatedRun, Picture, Sec
 from catenary.postproc.report.study_table import StudyTable, texts_table
 from catenary.solver.effects.all_effects import simulated
 from catenary.solver.problem.problem import Placement, Problem
+from catenary.solver.problem.wind import Wind
 from catenary.solver.statics.line_at_rest import LineAtRest
+from catenary.solver.wind.wind_at import exposure
 
 # Places along the track closer than this are one [m].
 _OFF = 1e-6
@@ -59,6 +61,9 @@ def _line_blocks(problem: Problem, rest: LineAtRest) -> Iterator[StudyTable]:
     hardware = list(_hardware(problem))
     if hardware:
         yield texts_table(["part", "number", "data"], hardware, {1}, "Hardware")
+    wind = simulated(problem).wind
+    if wind is not None:
+        yield texts_table(["", "value", "unit"], list(_of_wind(wind)), {1}, "Wind")
 
 
 def _geometry(rest: LineAtRest, line: Line) -> Iterator[list[Any]]:
@@ -87,7 +92,8 @@ def _geometry(rest: LineAtRest, line: Line) -> Iterator[list[Any]]:
     if np.nanmax(np.abs(y), initial=0.0) > 0.0:
         yield ["stagger there, to the left", _range(y, 3), "m"]
     sag = max((max(own.sag, default=0.0) for own in line.profiles), default=0.0)
-    yield ["largest pre-sag wanted", number(1e3 * sag, 1), "mm"]
+    if sag > 0.0:
+        yield ["largest pre-sag wanted", number(1e3 * sag, 1), "mm"]
 
 
 def _courses(
@@ -111,19 +117,18 @@ def _hardware(problem: Problem) -> Iterator[list[Any]]:
         yield [f"droppers, {joined}", len(group.lower_x), _of_dropper(group.kind)]
     for arms in line.steady_arms:
         kind = arms.kind
-        stiffness = (
-            "radial force over length" if kind.by_radial_force else f"{kind.stiffness:g} N/m"
-        )
-        mass = f"{kind.mass_per_length:g} kg/m, clamp {kind.clamp_mass:g} kg"
-        massless = kind.mass_per_length * kind.length + kind.clamp_mass == 0.0
-        data = ", ".join([
-            *([f"length {kind.length:g} m"] if kind.length else []),
-            "massless" if massless else mass,
-            f"vertical stiffness {stiffness}",
-        ])  # fmt: skip
+        known = [
+            (kind.length, f"{kind.length:g} m"),
+            (kind.mass_per_length, f"{kind.mass_per_length:g} kg/m"),
+            (kind.clamp_mass, f"clamp {kind.clamp_mass:g} kg"),
+            (kind.by_radial_force, "vertical stiffness radial force over length"),
+            (kind.stiffness, f"vertical stiffness {kind.stiffness:g} N/m"),
+        ]
+        data = [said for value, said in known if value]
         if kind.uplift_stop is not None:
-            data += f", stop at {1e3 * kind.uplift_stop:g} mm with {kind.stop_stiffness:g} N/m"
-        yield [f"steady arms on {_plain(arms.wire)}", len(arms.x), data]
+            stop = f"stop at {1e3 * kind.uplift_stop:g} mm with {kind.stop_stiffness:g} N/m"
+            data.append(stop)
+        yield [f"steady arms on {_plain(arms.wire)}", len(arms.x), ", ".join(data)]
     for supports in line.supports:
         yield [
             f"supports of {_plain(supports.wire)}",
@@ -132,11 +137,34 @@ def _hardware(problem: Problem) -> Iterator[list[Any]]:
         ]
     for clamps in line.clamps:
         joined = f"{_plain(clamps.upper)} to {_plain(clamps.lower)}"
-        data = f"stiffness {clamps.stiffness:g} N/m, {clamps.mass:g} kg"
-        yield [f"clamps, {joined}", len(clamps.x), data]
+        held = f"stiffness {clamps.stiffness:g} N/m, {clamps.mass:g} kg"
+        yield [f"clamps, {joined}", len(clamps.x), held]
     for own in line.fittings:
         masses = _range(np.array(own.mass), 2)
         yield [f"{own.kind} on {_plain(own.wire)}", len(own.x), f"{masses} kg"]
+
+
+def _of_wind(wind: Wind) -> Iterator[list[Any]]:
+    yield [f"mean speed {wind.reference_height:g} m above ground", number(wind.speed), "m/s"]
+    yield ["blows, from the train's direction to the left", number(np.rad2deg(wind.direction)), "°"]
+    law = wind.profile
+    if law.exponent is None:
+        yield ["roughness length of the logarithmic profile", f"{law.roughness:g}", "m"]
+    else:
+        yield ["exponent of the profile", f"{law.exponent:g}", ""]
+    yield [f"mean speed at the wires, {wind.height:g} m above ground", number(wind.mean), "m/s"]
+    for own in wind.stretches:
+        there = wind.mean * exposure(wind, np.array([own.start]))[0]
+        height = wind.height if own.height is None else own.height
+        where = f"from {own.start:.6g} to {own.end:.6g} m, {height:g} m above ground"
+        yield [f"the same {where}", number(there), "m/s"]
+    yield ["density of the air", f"{wind.density:g}", "kg/m³"]
+    if wind.gusts is not None:
+        spectrum = wind.gusts.spectrum.replace("_", " ").title()
+        yield [f"turbulence intensity, spectrum of {spectrum}", f"{wind.intensity:.3g}", ""]
+        yield ["gusts, lowest frequency", f"{wind.gusts.lowest:g}", "Hz"]
+        yield ["gusts, highest frequency", f"{wind.gusts.highest:g}", "Hz"]
+        yield ["seed of the gusts", str(wind.gusts.seed), ""]
 
 
 def _of_dropper(kind: DropperKind) -> str:
@@ -191,7 +219,7 @@ def _pantograph_blocks(
     kinds: dict[str, tuple[Placement, str]],
 ) -> Iterator[Text | StudyTable]:
     for name, (placement, description) in kinds.items():
-        yield Text(f"{_plain(name)}: {description}.")
+        yield Text(f"{description}.", "", name)
         data = placement.data
         if isinstance(data, LumpedData):
             rows = [

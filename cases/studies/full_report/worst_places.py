@@ -51,7 +51,7 @@ def _blocks(results: Results, places: WorstPlaces, causes: Causes) -> Iterator[T
     if places.passages:
         one = places.passages[0]
         yield Text(
-            f"span {one.span + 1}, {one.start:.0f} to {one.end:.0f} m, {names[one.pantograph]}: "
+            f"span {one.span + 1}, {one.start:.6g} to {one.end:.6g} m, {names[one.pantograph]}: "
             f"standard deviation {one.std:.1f} N (median of all spans {one.median:.1f} N), force "
             f"{one.minimum:.0f} to {one.maximum:.0f} N{_out(one.stands_out)}.",
             "note",
@@ -67,11 +67,11 @@ def _blocks(results: Results, places: WorstPlaces, causes: Causes) -> Iterator[T
     if everywhere:
         yield Text("acts on all spans alike:", "note", "The line as a whole", everywhere)
     yield Text(
-        "Causes are candidates, near in place or frequency; none is proved. For all places: "
-        "catenary worst."
+        "Candidates are near in place or frequency; none is proved. catenary worst FOLDER prints "
+        "them all."
     )
     rows = [
-        [p.span + 1, f"{p.start:.0f} to {p.end:.0f}", names[p.pantograph], number(p.std),
+        [p.span + 1, f"{p.start:.6g} to {p.end:.6g}", names[p.pantograph], number(p.std),
          number(p.maximum), number(p.minimum), number(p.loss, 3)]
         for p in places.passages[:_MOST]
     ]  # fmt: skip
@@ -140,8 +140,7 @@ def _span(results: Results, passage: Passage) -> Figure:
         )  # fmt: skip
         force.plot(x[at], filtered[at], "o", color=LIMIT, ms=4)
     force.axhline(0.0, color=LIMIT, linewidth=0.9)
-    low, high = force.get_ylim()
-    force.set_ylim(low - 0.06 * (high - low), high)  # for the words below the smallest force
+    force.margins(y=0.15)  # for what is written at the extremes
     tidy(force, "", "contact force [N]")
     legend_above(force, 6)
     line = results.column("wire_height", p)[rows]

@@ -78,6 +78,8 @@ def own_style() -> Iterator[None]:
         return
     # To set a backend would import pyplot, which nothing here needs.
     usual = {key: value for key, value in matplotlib.rcParamsDefault.items() if key != "backend"}
+    # A tick tells its value by itself, not what is to be added to a number in a corner.
+    usual["axes.formatter.useoffset"] = False
     with matplotlib.rc_context(usual):
         _in_own_style = True
         try:

@@ -28,7 +28,7 @@ _FACTORS = (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000)
 _WIDTH, _HEIGHT = 12.0, 8.1
 _LEFT, _LONG, _CROSS = 0.95, 7.5, 2.7
 _SIDE, _PLAN, _LOW, _GAP = 3.9, 1.75, 0.6, 0.8
-_NARROW = 0.3  # half of the least width that is shown [m]
+_LEAST = 0.5  # least width and height that a drawing shows [m]
 _MARGIN = 0.08  # of a range, on both sides
 _MOST_NAMED = 12  # marks that have a number and a line below
 _LINE = 0.22  # of text [inch]
@@ -175,10 +175,13 @@ def _cross_section(
     if half_head is not None:
         axes.plot([-half_head, half_head], [lowest, lowest], color="black", lw=2.0)
     axes.axvline(0.0, color=GREY, lw=0.5, ls="--")
-    axes.set_aspect("equal", adjustable="box", anchor="N")
     axes.margins(0.15)
-    low, high = axes.get_xlim()
-    axes.set_xlim(min(low, -_NARROW), max(high, _NARROW))
+    # A single wire in the middle of the track is a point.
+    for axis in ("x", "y"):
+        low, high = getattr(axes, f"get_{axis}lim")()
+        spare = max(0.5 * (_LEAST - (high - low)), 0.0)
+        getattr(axes, f"set_{axis}lim")(low - spare, high + spare)
+    axes.set_aspect("equal", adjustable="box", anchor="N")
     axes.set_xlabel("to the left [m]")
     arms = "sketched" if form.lateral is None else "at rest"
     title = f"cross-section at {at:g} m,\narms {arms};\nhollow: at {between:g} m"
@@ -224,7 +227,7 @@ def _to_scale(
     """Limit the axes to a stretch, with the largest exaggeration that shows all of it."""
     seen = points[(points[:, 0] >= stretch[0]) & (points[:, 0] <= stretch[1]), axis]
     low, high = min(seen.min(), -reach or np.inf), max(seen.max(), reach or -np.inf)
-    needed = max((high - low) * (1.0 + 2.0 * _MARGIN), 2.0 * _NARROW)
+    needed = max((high - low) * (1.0 + 2.0 * _MARGIN), _LEAST)
     shown = (stretch[1] - stretch[0]) * height / _LONG
     factor = max(one for one in _FACTORS if one == 1 or shown / one >= needed)
     middle, half = 0.5 * (low + high), 0.5 * shown / factor

@@ -33,6 +33,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+# A limit so many times the largest uplift is left out of its picture, whose dots would be at zero.
+_FAR = 20.0
 # Evaluated arms whose passage is drawn.
 _MOST_ARMS = 60
 
@@ -53,10 +55,14 @@ def arm_uplift(results: Results, statistics: RunStatistics, limit: float | None)
     along.plot(
         supports.x, 1e3 * supports.uplift, "o", color="#222222", ms=4, label="largest uplift"
     )
-    if limit is not None:
-        along.axhline(1e3 * limit, color=LIMIT, linewidth=1.1, label=f"limit {1e3 * limit:.0f} mm")
     along.set_xlim(*with_margin(supports.x))
     along.set_ylim(bottom=0.0)
+    if limit is not None:
+        label = f"limit {1e3 * limit:.0f} mm"
+        if limit < _FAR * np.nanmax(supports.uplift, initial=0.0):
+            along.axhline(1e3 * limit, color=LIMIT, linewidth=1.1, label=label)
+        else:
+            along.plot([], [], color=LIMIT, linewidth=1.1, label=f"{label}, far above")
     tidy(along, "position along the track [m]", "largest uplift [mm]", "All arms")
     legend_above(along)
     return figure
@@ -238,7 +244,7 @@ def plan_view(results: Results) -> Figure | None:
     profiles = results.contact_profiles()
     for number, (name, wire) in enumerate(profiles.items()):
         assert wire.y is not None
-        label = "contact wire" if len(profiles) == 1 else name
+        label = "contact wire" if len(profiles) == 1 else name.replace("_", " ")
         plan.plot(*wire.drawn(wire.y), color=colour(number), linewidth=1.2, label=label)
     plan.plot(registration.x, registration.stagger, "o", ms=3, color=GREY, label="steady arm")
     plan.axhline(0.0, color=GREY, linewidth=0.6, linestyle="--")

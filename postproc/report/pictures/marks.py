@@ -84,7 +84,7 @@ def mark_line(axes: Axes, results: Results, start: float, end: float) -> None:
     _uprights(axes, support, 0.9)
     dropper = results.line("dropper_x")
     dropper = dropper[(dropper >= start) & (dropper <= end)]
-    if dropper.size <= _MOST_DROPPERS:
+    if 0 < dropper.size <= _MOST_DROPPERS:
         axes.plot(
             dropper,
             np.full(dropper.size, 0.015),
@@ -118,7 +118,7 @@ def mark_static(axes: Axes, results: Results, start: float, end: float) -> None:
         color=GREY,
         markersize=7,
         transform=axes.get_xaxis_transform(),
-        label="dropper",
+        label="dropper" if dropper.size else None,
     )
     axes.set_xlim(*with_margin(np.array([start, end])))
 

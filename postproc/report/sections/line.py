@@ -69,9 +69,10 @@ def _of_rest(results: Results) -> Iterator[Text | StudyTable]:
     elasticity, span = 1e3 * results.static("elasticity"), results.span_at_rest + 1
     if elasticity.size:
         low, high = elasticity.min(), elasticity.max()
+        start, end = results.static("elasticity_x")[[0, -1]]
         yield Text(
-            f"Elasticity in span {span}, in the middle of the line: {number(low, 3)} to "
-            f"{number(high, 3)} mm/N (non-uniformity "
+            f"Elasticity in span {span}, {start:.6g} to {end:.6g} m, in the middle of the line: "
+            f"{number(low, 3)} to {number(high, 3)} mm/N (non-uniformity "
             f"{number(100 * (high - low) / (high + low))} %)."
         )
     own = [row for row in csv_tables.dropper_table(results) if row.span == span]
@@ -127,9 +128,11 @@ def _lateral(results: Results) -> Iterator[Text]:
     for name, wire in results.contact_profiles().items():
         assert wire.y is not None
         own = wire.y[(wire.x >= first) & (wire.x <= last)]
+        words = name.replace("_", " ").capitalize()
+        low, high = (number(float(end), 3) for end in (own.min(), own.max()))
         yield Text(
-            f"{name} lies between {number(float(own.min()), 3)} and {number(float(own.max()), 3)} "
-            "m to the left of the track's axis in the running spans."
+            f"{words} lies between {low} and {high} m to the left of the track's axis in the "
+            "running spans."
         )
 
 

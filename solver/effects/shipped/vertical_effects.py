@@ -277,7 +277,9 @@ register(
         "paper eq. (2.7)",
         default=True,
         requires=("gravity",),
+        applies=lambda p: bool(p.line.droppers),
         law=lambda laws, p: replace(laws, slackening=True, kept_ratio=0.0),
+        data="droppers",
     )
 )
 register(

@@ -403,7 +403,7 @@ def test_the_drawing_has_forces_places_and_colours_of_the_run(
     assert written[0] == data.title
     assert any("heights × " in own and "motion × " in own and "schematic" in own for own in written)
     np.testing.assert_allclose(ends, np.column_stack([data.position[row], data.force[row]]))
-    # Nothing is drawn from before the film or far behind the picture.
+    # Nothing is drawn from before the run or far behind the picture.
     assert min(first) >= min(data.position[0].min(), limits[0]) - 0.1
     assert limits[1] - limits[0] == pytest.approx(100.0)
     assert later[0] - limits[0] == pytest.approx(0.05 * 300.0 / 3.6)
@@ -412,6 +412,60 @@ def test_the_drawing_has_forces_places_and_colours_of_the_run(
     assert uplift.max() == pytest.approx(60.0, abs=25.0)
     assert norm.vmin <= uplift.min() and 0.75 * norm.vmax < uplift.max() <= 1.05 * norm.vmax
     assert norm.vmin > -0.7 * norm.vmax and node >= 0
+
+
+def test_the_chart_shows_what_was_before_the_film_and_none_of_what_will_be(
+    recorded: Callable[..., Path],
+) -> None:
+    """A film from 0.5 s on: the force since the left end of its first picture, and nothing of a
+    pantograph that is behind it."""
+    with pictures_of(recorded(50, 0.0, 40.0), Wish(0.5, 0.9, width=50.0, camera="1")) as made:
+        made.show(0.5)
+        low, high = made.drawing.chart.get_xlim()
+        data = made._scenery.data
+        leading, trailing = (curve[0].get_xydata() for curve in made.chart.curves)
+        at, behind = data.position[data.row_at(0.5)]
+    assert behind < low < at < high
+    begin = max(low, data.position[0, 0])
+    assert leading[0, 0] == pytest.approx(begin, abs=0.1) and leading[-1, 0] == at
+    assert np.all(trailing[:, 0] <= behind)
+
+
+def test_values_of_forces_stand_above_the_wires(folder: Path) -> None:
+    """No wire, arrow or body passes through the box of a value, whose height is 17 pt."""
+    for view in (View.SIDE, View.OBLIQUE, View.PLAN):
+        with pictures_of(folder, Wish(view=view)) as made:
+            made.show(0.5)
+            made.drawing.pixels()
+            drawn = made.drawing
+            box = drawn.values[0].get_window_extent()
+            ends = [np.concatenate(part.get_segments()) for part in
+                    (drawn.wires, drawn.bodies, drawn._arrows)]  # fmt: skip
+            seen = drawn._axes.transData.transform(np.concatenate(ends))
+        beside = (seen[:, 0] > box.x0) & (seen[:, 0] < box.x1)
+        assert beside.sum() > 4 and seen[beside, 1].max() < box.y0
+
+
+def test_scales_of_colours_are_of_what_pictures_show(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A wire that is lifted 0.5 m where no picture is changes no colour."""
+    wish = Wish(0.3, 0.5, width=40.0)
+    with pictures_of(folder, wish) as made:
+        before = made.drawing._colours
+        unseen = ~np.any([made._seen(number) for number in range(6, 11)], axis=0)
+    assert 10 < unseen.sum() < unseen.size - 10
+    usual = Snapshots.displacement
+
+    def lifted(self: Snapshots, number: int) -> np.ndarray:
+        moved = usual(self, number).copy()
+        moved[unseen, 2] = 0.5
+        return moved
+
+    monkeypatch.setattr(Snapshots, "displacement", lifted)
+    with pictures_of(folder, wish) as made:
+        assert made.drawing._colours == before
+        assert made._snapshots.extremes(np.arange(6, 11))[1, 2] == 0.5
 
 
 def test_slack_droppers_are_dashed_and_others_have_the_colour_of_their_force(folder: Path) -> None:
