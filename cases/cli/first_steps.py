@@ -82,7 +82,7 @@ def new(
 @app.command(
     "doctor",
     help="Check that Catenary works here: packages, compiled kernels, PETSc, MPI, HDF5, compiler, "
-    "films, ParaView, file locks, memory. A line each says OK, missing or broken, and how to mend "
+    "films, ParaView, file locks, memory. Each line says OK, missing or broken, and how to mend "
     "it; exits with 1 if no run is possible.",
     epilog="Example: catenary doctor",
 )

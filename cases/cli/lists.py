@@ -43,9 +43,9 @@ def list_cases(
         typer.Argument(
             metavar="FILTER",
             autocompletion=completion.keys,
-            help="With --keys: a part of a key, or a pattern with * and ?; tells also bounds, the "
-            "words that a key accepts, and typical values. With --rules: a book, whose criteria "
-            "and limits are told.",
+            help="With --keys: a part of a key, or a pattern with * and ?; prints bounds, accepted "
+            "words and typical values too. With --rules: a book, whose criteria and limits are "
+            "printed.",
         ),
     ] = None,
 ) -> None:

@@ -26,7 +26,7 @@ def pantograph(
         typer.Option(
             "--kind",
             metavar="NAME",
-            help="Which table of [pantographs]; the leading one's if absent.",
+            help="Table of [pantographs]; that of the leading pantograph if absent.",
         ),
     ] = None,
     out: Annotated[
@@ -50,7 +50,7 @@ def pantograph(
         typer.Option(
             "--fit-from",
             metavar="HZ",
-            help="Fit above this frequency: below it the raising decides, which no spring need be.",
+            help="Lowest frequency of the fit; below it the response is that of the lift.",
         ),
     ] = 0.5,
     force: Force = False,

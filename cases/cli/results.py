@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 Motion = Annotated[
     float | None,
-    typer.Option("--motion", min=1, max=1e5, help="Factor by which motions are drawn larger."),
+    typer.Option("--motion", min=1, max=1e5, help="Factor by which displacements are enlarged."),
 ]
 FromWhere = Annotated[
     View | None,
@@ -95,8 +95,8 @@ def report(
 
 @app.command(
     "compare",
-    help="Print the figures of several runs side by side and which of their differences are "
-    "more than chance, or compare a run with a measured passage: errors of the measurement, "
+    help="Print the figures of several runs side by side, with the statistical significance of "
+    "their differences, or compare a run with a measured passage: errors of the measurement, "
     "figures of both, tolerances.",
     epilog="Example: catenary compare results/coarse results/fine, or with a measurement: "
     "catenary compare results/en300 measured.csv --description measured.toml -o results/measured",
@@ -181,16 +181,14 @@ def animate(
     end: Annotated[
         float | None, typer.Option("--to", min=0, max=1e7, help="Simulated time to end at [s].")
     ] = None,
-    rate: Annotated[
-        float, typer.Option("--fps", min=1, max=120, help="Pictures shown a second.")
-    ] = 25.0,
+    rate: Annotated[float, typer.Option("--fps", min=1, max=120, help="Frames per second.")] = 25.0,
     every: Annotated[
         float | None,
         typer.Option(
             "--every-m",
             min=1e-3,
             max=1e4,
-            help="Travel of the train between two pictures; a hundredth of their width if absent.",
+            help="Travel of the train between two frames; a hundredth of their width if absent.",
         ),
     ] = None,
     width: Annotated[
@@ -204,7 +202,7 @@ def animate(
     camera: Annotated[
         str | None,
         typer.Option(
-            help="Pantograph that the camera goes with: its name, or its number from the front; "
+            help="Pantograph that the camera follows: its name, or its number from the front; "
             "the middle of all if absent."
         ),
     ] = None,
@@ -234,7 +232,7 @@ def animate(
 @app.command(
     "paraview",
     help="Write paraview/view.py into the folder of a run: a script that opens it in ParaView, "
-    "with pantographs, forces and masts, heights and motions drawn larger.",
+    "with pantographs, forces and masts, heights and displacements enlarged.",
     epilog="Example: catenary paraview results/en300",
 )
 @console.guarded

@@ -198,7 +198,10 @@ def submit(
     ranks: Annotated[
         int,
         typer.Option(
-            "--ranks", min=1, max=10**6, help="MPI ranks; with --array of a task, a run on each."
+            "--ranks",
+            min=1,
+            max=10**6,
+            help="MPI ranks; with --array those of each task, one run on each.",
         ),
     ] = 1,
     nodes: Annotated[

@@ -24,7 +24,7 @@ from catenary.cases.terminal import console
     "identify",
     help="Find parameters of a case, such as errors of dropper lengths, tensions, damping and "
     "masses, from a measured contact force or head height: most probable values, their "
-    "uncertainty, what the data do not tell, and whether the model fits.",
+    "uncertainty, what the data cannot determine, and whether the model fits.",
     epilog="Example: catenary identify ac_simple measured.csv task.toml -o results/identified",
 )
 @console.guarded

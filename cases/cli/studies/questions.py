@@ -82,10 +82,10 @@ def speed(
         float, typer.Option("--to", metavar="KM_H", help="Highest speed [km/h].")
     ] = 360.0,
     step: Annotated[
-        float, typer.Option(metavar="KM_H", help="Distance of the speeds marched first [km/h].")
+        float, typer.Option(metavar="KM_H", help="Step of the speeds that are run first [km/h].")
     ] = 10.0,
     within: Annotated[
-        float, typer.Option(metavar="KM_H", help="How closely speeds are bisected [km/h].")
+        float, typer.Option(metavar="KM_H", help="Bisect the speed to this accuracy [km/h].")
     ] = 1.0,
     criterion: Annotated[
         list[str] | None,
@@ -133,7 +133,7 @@ def separation(
     farthest: Annotated[
         float, typer.Option("--to", metavar="M", help="Longest distance [m].")
     ] = 400.0,
-    step: Annotated[float, typer.Option(metavar="M", help="From one to the next [m].")] = 1.0,
+    step: Annotated[float, typer.Option(metavar="M", help="Step between distances [m].")] = 1.0,
     out: Annotated[
         Path | None,
         folder_option("Folder for table and picture; without it nothing is written."),
@@ -214,7 +214,7 @@ def what_if(
 
 @app.command(
     "worst",
-    help="Name the worst spans, supports and droppers of a run, with candidates for the cause: "
+    help="Name the worst spans, supports and droppers of a run, with possible causes: "
     "defects, elasticity, reflections, ends of wires, the pantograph ahead.",
     epilog="Example: catenary worst results/en300",
 )

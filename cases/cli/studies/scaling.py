@@ -27,11 +27,15 @@ def scaling(
     ] = "64,512,4096",
     latency: Annotated[
         float | None,
-        typer.Option("--latency-us", help="Of a message; measured on several ranks if absent."),
+        typer.Option(
+            "--latency-us", help="Latency of a message; measured on several ranks if absent."
+        ),
     ] = None,
     bandwidth: Annotated[
         float | None,
-        typer.Option("--bandwidth-GB-per-s", help="Of a message; given with the latency."),
+        typer.Option(
+            "--bandwidth-GB-per-s", help="Bandwidth of a message; given with the latency."
+        ),
     ] = None,
 ) -> int:
     """Collective."""

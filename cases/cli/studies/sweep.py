@@ -71,7 +71,7 @@ def sweep(
         bool,
         typer.Option(
             "--only-statistics",
-            help="Keep the table alone and no result file of a variant: for thousands of them. "
+            help="Write the table but no result files: for thousands of variants. "
             "Variants that share a line march side by side.",
         ),
     ] = False,
