@@ -16,8 +16,9 @@ from catenary.cases.terminal import console
 
 @app.command(
     "new",
-    help="Write a commented case to begin with into the new folder NAME: NAME/case.toml, which "
-    "`check` and `run` take. Without --topology it asks which kind of line, on a terminal.",
+    help="Write a commented case as a beginning of your own. `check` and `run` take the new "
+    "folder NAME with its NAME/case.toml. Without --topology it asks which kind of line, on "
+    "a terminal.",
     epilog="Example: catenary new my_line --topology stitched --spans spans.csv --droppers "
     "droppers.csv",
 )
@@ -81,9 +82,9 @@ def new(
 
 @app.command(
     "doctor",
-    help="Check that Catenary works here: packages, compiled kernels, PETSc, MPI, HDF5, compiler, "
-    "films, ParaView, file locks, memory. Each line says OK, missing or broken, and how to mend "
-    "it; exits with 1 if no run is possible.",
+    help="Check that Catenary works here. Packages, compiled kernels, PETSc, MPI, HDF5, compiler, "
+    "films, ParaView, file locks, memory: each line says OK, missing or broken, and how to "
+    "mend it; exits with 1 if no run is possible.",
     epilog="Example: catenary doctor",
 )
 @console.guarded

@@ -14,8 +14,7 @@ from catenary.cases.terminal import console
 
 @app.command(
     "list",
-    help="List the shipped cases, keys of a scene, ready pantographs, rule books, or the schema of "
-    "case.toml.",
+    help="List cases, keys, pantographs, rule books or the schema.",
     epilog="Example: catenary list --keys damping",
 )
 @console.guarded

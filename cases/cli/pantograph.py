@@ -13,8 +13,9 @@ from catenary.cases.terminal import console
 
 @app.command(
     "pantograph",
-    help="Print static force, equivalent masses, natural frequencies and frequency response of a "
-    "case's pantograph, and a lumped model fitted to it; with -o also write them as files.",
+    help="Print the frequency response of a case's pantograph. Also its static force, equivalent "
+    "masses, natural frequencies, and a lumped model fitted to it; with -o they are written "
+    "as files.",
     epilog="Example: catenary pantograph ambrosio2012 --fit 2 -o results/pantograph",
 )
 @console.guarded

@@ -20,8 +20,8 @@ _MOST_ROUNDS = 1000
 
 @app.command(
     "plan",
-    help="Print which effects a case simulates and what time, memory and disk it needs. With "
-    "--cost, switch each effect in turn, and print the time of a step and the change of results.",
+    help="Print what a case simulates and what a run of it needs. With --cost, switch each effect "
+    "in turn, and print the time of a step and the change of results.",
     epilog="Example: catenary plan ac_simple --set train.speed_km_h=320; "
     "catenary plan ambrosio2012 --cost --stretch-m 100 -o results/cost",
 )

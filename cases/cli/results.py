@@ -32,7 +32,7 @@ FromWhere = Annotated[
 
 @app.command(
     "report",
-    help="Write the full report of a run from its result file, with data sheets, worst places, "
+    help="Write the full report of a run from its result file. It has data sheets, worst places, "
     "spectra and vector pictures.",
     epilog="Example: catenary report results/en300 --pdf",
 )
@@ -95,9 +95,9 @@ def report(
 
 @app.command(
     "compare",
-    help="Print the figures of several runs side by side, with the statistical significance of "
-    "their differences, or compare a run with a measured passage: errors of the measurement, "
-    "figures of both, tolerances.",
+    help="Compare runs with each other or with a measurement. Of several runs it prints the "
+    "figures side by side, with the statistical significance of their differences; of a run "
+    "and a measured passage, errors of the measurement, figures of both, tolerances.",
     epilog="Example: catenary compare results/coarse results/fine, or with a measurement: "
     "catenary compare results/en300 measured.csv --description measured.toml -o results/measured",
 )
@@ -167,8 +167,8 @@ def _compare_measured(
 
 @app.command(
     "animate",
-    help="Make a film of a run, film.mp4 and film.gif: the line and its pantographs, the contact "
-    "force beneath, from the snapshots of fields.h5.",
+    help="Make a film of a run, film.mp4 and film.gif. It shows the line and its pantographs, the "
+    "contact force beneath, from the snapshots of fields.h5.",
     epilog="Example: catenary animate results/en300 --from 2 --to 6 --camera trailing",
 )
 @console.guarded
@@ -231,8 +231,8 @@ def animate(
 
 @app.command(
     "paraview",
-    help="Write paraview/view.py into the folder of a run: a script that opens it in ParaView, "
-    "with pantographs, forces and masts, heights and displacements enlarged.",
+    help="Write a script that opens a run in ParaView. paraview/view.py in the folder of the run "
+    "shows pantographs, forces and masts, heights and displacements enlarged.",
     epilog="Example: catenary paraview results/en300",
 )
 @console.guarded

@@ -20,9 +20,9 @@ _MOST_REPEATS = 99
 
 @app.command(
     "accuracy",
-    help="Vary step, mesh, scheme, coupling and models of a case; print the error of each setting, "
-    "its time, and what to take for a wanted accuracy. The same command continues a study that was "
-    "stopped.",
+    help="Find the step and mesh that a wanted accuracy needs. Step, mesh, scheme, coupling and "
+    "models of a case are varied; the error and time of each setting are printed. The same "
+    "command continues one that was stopped.",
     epilog="Example: catenary accuracy en50318_2002 -o results/accuracy --axes dt,grid --target 2%",
 )
 @console.guarded

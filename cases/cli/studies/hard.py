@@ -22,9 +22,9 @@ TABLES = ("hard.csv", "hard.md")
 
 @app.command(
     "hard",
-    help="Run the collection of hard cases and print which limits they keep: energy, bounds, "
-    "refinement, schemes, and ranks under mpirun. Some five minutes; exits with 3 if a limit is "
-    "not kept. With -o the same command continues one that was stopped.",
+    help="Run the hard cases and print which limits they keep. Limits are energy, bounds, "
+    "refinement, schemes, and ranks under mpirun. Some five minutes; exits with 3 if a limit "
+    "is not kept. With -o the same command continues one that was stopped.",
     epilog="Example: catenary hard -o results/hard",
 )
 @console.guarded

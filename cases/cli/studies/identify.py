@@ -22,9 +22,10 @@ from catenary.cases.terminal import console
 
 @app.command(
     "identify",
-    help="Find parameters of a case, such as errors of dropper lengths, tensions, damping and "
-    "masses, from a measured contact force or head height: most probable values, their "
-    "uncertainty, what the data cannot determine, and whether the model fits.",
+    help="Find parameters of a case from a measured passage. Errors of dropper lengths, tensions, "
+    "damping, masses and others follow from a measured contact force or head height: most "
+    "probable values, their uncertainty, what the data cannot determine, and whether the "
+    "model fits.",
     epilog="Example: catenary identify ac_simple measured.csv task.toml -o results/identified",
 )
 @console.guarded

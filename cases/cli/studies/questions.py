@@ -67,9 +67,9 @@ def _begun(
 
 @app.command(
     "speed",
-    help="Find the highest speed at which the acceptance criteria hold, all of them and each by "
-    "itself: an ensemble over speeds, then bisection. The same command continues one that was "
-    "stopped.",
+    help="Find the highest speed at which the criteria hold. All acceptance criteria together and "
+    "each by itself: an ensemble over speeds, then bisection. The same command continues one "
+    "that was stopped.",
     epilog="Example: catenary speed en50318_2002 -o results/highest --from 200 --to 360",
 )
 @console.guarded
@@ -118,9 +118,9 @@ def speed(
 
 @app.command(
     "separation",
-    help="Find good and bad distances of two pantographs: deviation, least force and uplift over "
-    "the distance, where acceptance criteria fail, and which waves explain it. The same command "
-    "continues one that was stopped.",
+    help="Find good and bad distances of two pantographs. It prints deviation, least force and "
+    "uplift over the distance, where acceptance criteria fail, and which waves explain it. "
+    "The same command continues one that was stopped.",
     epilog="Example: catenary separation en50318_2002 -o results/distances --from 50 --to 200 "
     "--step 5",
 )
@@ -162,9 +162,9 @@ def separation(
 
 @app.command(
     "what-if",
-    help="Run a case as it is and with the changes of --set, and show the differences: "
-    "statistics, uplift by support, droppers, verdicts. The same command continues runs that were "
-    "stopped.",
+    help="Run a case with and without changes, and compare them. The changes are those of --set; "
+    "compared are statistics, uplift by support, droppers, verdicts. The same command "
+    "continues runs that were stopped.",
     epilog="Example: catenary what-if en50318_2002 --set line.contact_wire.tension_N=22000 "
     "-o results/tension",
 )
@@ -214,7 +214,7 @@ def what_if(
 
 @app.command(
     "worst",
-    help="Name the worst spans, supports and droppers of a run, with possible causes: "
+    help="Name the worst spans, supports and droppers of a run. Each has possible causes: "
     "defects, elasticity, reflections, ends of wires, the pantograph ahead.",
     epilog="Example: catenary worst results/en300",
 )

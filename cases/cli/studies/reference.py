@@ -18,9 +18,9 @@ if TYPE_CHECKING:
 
 @app.command(
     "reference",
-    help="Make the reference solutions anew: models of EN 50318 at two speeds under one and two "
-    "pantographs, refined in step and mesh, with error bars. Takes an hour; the same command "
-    "continues what was stopped.",
+    help="Make the reference solutions anew. Models of EN 50318 at two speeds under one and two "
+    "pantographs are refined in step and mesh, with error bars. Takes an hour; the same "
+    "command continues what was stopped.",
     epilog="Example: catenary reference ac_simple -o results/reference -j 0",
 )
 @console.guarded
@@ -67,8 +67,8 @@ def reference(
 
 @app.command(
     "judge",
-    help="Compare results of any program with the reference solutions: differences, error bars, "
-    "tolerances of EN 50318, verdicts.",
+    help="Compare results of any program with reference solutions. It prints differences, error "
+    "bars, tolerances of EN 50318 and verdicts.",
     epilog="Example: catenary judge forces.csv --of ac_simple_275_one -o results/judged",
 )
 @console.guarded
@@ -114,8 +114,8 @@ def judge(
 
 @app.command(
     "validate",
-    help="Validate this installation by the steps of EN 50318: line at rest, reference model of "
-    "2002, reference models in the manner of 2018; write the statement with all figures.",
+    help="Validate this installation by the steps of EN 50318. Line at rest, reference model of "
+    "2002, reference models in the manner of 2018; it writes the statement with all figures.",
     epilog="Example: catenary validate -o results/validation -j 0",
 )
 @console.guarded

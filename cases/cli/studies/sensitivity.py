@@ -16,8 +16,8 @@ TABLE = "sensitivity.csv"
 
 @app.command(
     "sensitivity",
-    help="Print the derivatives of the contact-force statistics and the largest uplift of a case "
-    "with respect to its parameters, from one march, and rank them: what a millimetre, a "
+    help="Rank what the parameters of a case change. It prints the derivatives of the contact- "
+    "force statistics and the largest uplift, from one march: what a millimetre, a "
     "kilonewton of tension, a kilogram or a per cent changes.",
     epilog="Example: catenary sensitivity en50318_2002 -p line.contact_wire.tension_N "
     "-p pantographs.reference.masses_kg.0",

@@ -37,8 +37,8 @@ _SHOWN_BROKEN, _SHOWN_REFUSED = 3, 20
 
 @app.command(
     "sweep",
-    help="Run variants of a case and put their statistics side by side. The "
-    "same command continues a sweep that was stopped.",
+    help="Run variants of a case and tabulate their statistics. The same command continues a "
+    "sweep that was stopped.",
     epilog="Example: catenary sweep en50318_2002 -o results/speeds --vary "
     "train.speed_km_h=200,250,300 --vary contact.stiffness_N_per_m=2e4,5e4",
 )
