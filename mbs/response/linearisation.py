@@ -95,10 +95,6 @@ class LinearModel:
         """
         return self.amplitudes(frequencies) @ self.push
 
-    def static_stiffness(self) -> float:
-        """Force upward that it takes to hold the point a metre higher, per metre [N/m]."""
-        return float(1.0 / (self.push @ linalg.solve(self.stiffness, self.push)))
-
     def modes(self) -> tuple[Mode, ...]:
         """Free motions by growing frequency."""
         k = len(self.push)

@@ -40,15 +40,6 @@ def quaternion_product(p: np.ndarray, r: np.ndarray) -> np.ndarray:
     )
 
 
-def parameter_rates(parameters: np.ndarray, spin: np.ndarray) -> np.ndarray:
-    """dp/dt = 1/2 L^T omega' (..., 4) [1/s] of angular velocities in body axes (..., 3) [rad/s].
-
-    Keeps p^T p for any p: the norm changes by the errors of integration only.
-    """
-    as_quaternion = np.concatenate([np.zeros((*spin.shape[:-1], 1)), spin], axis=-1)
-    return 0.5 * quaternion_product(parameters, as_quaternion)
-
-
 def normalised(parameters: np.ndarray) -> np.ndarray:
     """Euler parameters (..., 4) scaled to p^T p = 1."""
     return parameters / np.linalg.norm(parameters, axis=-1, keepdims=True)
@@ -135,27 +126,13 @@ class Motion:
         places = np.hstack([self.position, self.parameters])[:-1].ravel()
         return np.concatenate([places, self.velocities])
 
-    def from_vector(self, state: np.ndarray) -> Motion:
-        """The motion of an integrated ``state`` (13 n,), Euler parameters normalised."""
-        n = self.n_bodies
-        places = state[: 7 * n].reshape(n, 7).copy()
-        places[:, 3:] = normalised(places[:, 3:])
-        return self._at(places, state[7 * n :])
-
     def restored(self, state: np.ndarray) -> Motion:
         """The motion that ``to_vector`` gave as ``state``, to the last digit."""
         n = self.n_bodies
-        return self._at(state[: 7 * n].reshape(n, 7), state[7 * n :])
-
-    def _at(self, places: np.ndarray, velocities: np.ndarray) -> Motion:
+        places = state[: 7 * n].reshape(n, 7)
         position = np.vstack([places[:, :3], np.zeros(3)])
         parameters = np.vstack([places[:, 3:], [1.0, 0.0, 0.0, 0.0]])
-        return Motion(self.numbers, position, parameters, *_split(velocities))
-
-    def place_rates(self) -> np.ndarray:
-        """Rates of positions and Euler parameters, shape (7 n,)."""
-        rates = parameter_rates(self.parameters, self.spin)
-        return np.hstack([self.velocity, rates])[:-1].ravel()
+        return Motion(self.numbers, position, parameters, *_split(state[7 * n :]))
 
 
 def _split(velocities: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

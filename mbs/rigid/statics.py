@@ -1,4 +1,4 @@
-"""Multibody systems at rest: equilibrium, what an actuator must push, what a point feels like.
+"""Multibody systems at rest: equilibrium, and what an actuator must push.
 
 By virtual work: at rest N^T g = 0 with N the velocities that the joints allow (null space of
 Phi_q), so that reactions need not be known.
@@ -9,14 +9,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy import linalg
 
 from catenary.base.errors import InputError, RunBroken
-from catenary.mbs.rigid.arrays import ORIGIN, Joint
-from catenary.mbs.rigid.bodies import Motion, Vector
+from catenary.mbs.rigid.arrays import Joint
+from catenary.mbs.rigid.bodies import Motion
 from catenary.mbs.rigid.forces import Actuator
-from catenary.mbs.rigid.joints import unit
-from catenary.mbs.rigid.kinematics import point
 from catenary.mbs.rigid.least_squares import least_squares, null_space
 from catenary.mbs.rigid.system import System
 
@@ -202,25 +199,3 @@ def calibrate_actuator(
         f"Actuator {actuator!r} would need {push:.3g} N for a static force of {static_force:g} N, "
         "which is beyond calculation: check its points, springs and stops."
     )
-
-
-def equivalent_mass(
-    system: System,
-    motion: Motion,
-    body: str,
-    at: Vector = ORIGIN,
-    along: Vector = (0.0, 0.0, 1.0),
-    time: float = 0.0,
-) -> float:
-    """Mass [kg] that a suddenly growing force on a point feels along a direction in space.
-
-    Bodies behind springs that the joints do not move along stand still and do not count.
-    """
-    jacobian = system.constraints(motion, time).jacobian
-    free = null_space(jacobian)
-    # Velocities of the point per velocity of each free motion.
-    way = unit(along) @ point(motion, body, at).jacobian @ free
-    if np.abs(way).max(initial=0.0) < 1e-9:
-        raise InputError(f"The joints do not let body {body!r} move along {tuple(along)}.")
-    mass = free.T @ (system.mass[:, None] * free)
-    return float(1.0 / (way @ linalg.solve(mass, way, assume_a="pos")))

@@ -48,19 +48,6 @@ class LateralShape:
             pulled[:, None], self.arm_force / np.where(pulled, tension, 1.0)[:, None], level
         )
 
-    @property
-    def arm_inclination(self) -> np.ndarray:
-        """By how much each arm rises from its wire to its hinge, (n_arms,) [rad]."""
-        sideways, upward, along = self.arm_direction.T
-        return np.arctan2(upward, np.hypot(sideways, along))
-
-    @property
-    def arm_slew(self) -> np.ndarray:
-        """By how much the hinge of each arm is ahead of its wire along the track, seen from above,
-        (n_arms,) [rad]."""
-        sideways, _, along = self.arm_direction.T
-        return np.arctan2(along, np.abs(sideways))
-
 
 @dataclass(frozen=True)
 class Equilibrium:

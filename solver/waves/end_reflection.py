@@ -53,11 +53,6 @@ class EndReflection:
         largest, rms = self.of_faster(speed)
         return largest**2, rms**2
 
-    def share_below(self, amplitude: float, speed: float) -> float:
-        """Of how many of the waves that outrun a train [m/s] less than an amplitude comes back."""
-        found = self._of_faster(speed)
-        return float((found < amplitude).mean()) if found.size else np.nan
-
     def _of_faster(self, speed: float) -> np.ndarray:
         return np.asarray(self.reflected[self.group_velocity > speed])
 

@@ -16,9 +16,32 @@ import numpy as np
 from scipy import linalg
 
 from catenary.base.errors import InputError, RunBroken
-from catenary.mbs.rigid.bodies import Motion
+from catenary.mbs.rigid.bodies import Motion, normalised, quaternion_product
 from catenary.mbs.rigid.kinematics import Quantity
 from catenary.mbs.rigid.system import System, independent_rows
+
+
+def parameter_rates(parameters: np.ndarray, spin: np.ndarray) -> np.ndarray:
+    """dp/dt = 1/2 L^T omega' (..., 4) [1/s] of angular velocities in body axes (..., 3) [rad/s].
+
+    Keeps p^T p for any p: the norm changes by the errors of integration only.
+    """
+    as_quaternion = np.concatenate([np.zeros((*spin.shape[:-1], 1)), spin], axis=-1)
+    return 0.5 * quaternion_product(parameters, as_quaternion)
+
+
+def place_rates(motion: Motion) -> np.ndarray:
+    """Rates of positions and Euler parameters, shape (7 n,)."""
+    rates = parameter_rates(motion.parameters, motion.spin)
+    return np.hstack([motion.velocity, rates])[:-1].ravel()
+
+
+def of_vector(motion: Motion, state: np.ndarray) -> Motion:
+    """The motion of an integrated ``state`` (13 n,), Euler parameters normalised."""
+    n = motion.n_bodies
+    places = state[: 7 * n].reshape(n, 7).copy()
+    places[:, 3:] = normalised(places[:, 3:])
+    return motion.restored(np.concatenate([places.ravel(), state[7 * n :]]))
 
 
 class ConstraintHandling(Protocol):
@@ -63,7 +86,7 @@ class Baumgarte:
         feedback = 2.0 * self.damping * rows.rate + self.frequency**2 * rows.value
         rows = rows._replace(drift=rows.drift + feedback)
         acceleration = system.accelerations(motion, time, rows).acceleration
-        return np.concatenate([motion.place_rates(), acceleration])
+        return np.concatenate([place_rates(motion), acceleration])
 
 
 @dataclass
@@ -115,7 +138,7 @@ class AugmentedLagrangian:
             acceleration += step
             change = float(np.abs(step).max())
             if change <= self.tolerance * max(1.0, float(np.abs(acceleration).max())):
-                return np.concatenate([motion.place_rates(), acceleration])
+                return np.concatenate([place_rates(motion), acceleration])
         raise RunBroken(
             f"The augmented Lagrangian does not converge at {time:g} s "
             f"(last change {change:.2g}): choose another penalty than {self.penalty:g}."
@@ -175,4 +198,4 @@ class CoordinatePartitioning:
         """Rates of the state (13 n,)."""
         motion, rows = self.correct(system, motion, time)
         acceleration = system.accelerations(motion, time, rows).acceleration
-        return np.concatenate([motion.place_rates(), acceleration])
+        return np.concatenate([place_rates(motion), acceleration])

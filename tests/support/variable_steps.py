@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from constraint_handling import ConstraintHandling, project
+from constraint_handling import ConstraintHandling, of_vector, project
 from scipy.integrate import solve_ivp
 
 from catenary.base.errors import InputError, RunBroken
@@ -71,7 +71,7 @@ def integrate(
         pattern = motion
 
         def rates(time: float, state: np.ndarray, pattern: Motion = pattern) -> np.ndarray:
-            return handling.rates(system, pattern.from_vector(state), time)
+            return handling.rates(system, of_vector(pattern, state), time)
 
         span = end - begin
         result = solve_ivp(
@@ -91,7 +91,7 @@ def integrate(
         # The last step was cut off at the end of the interval.
         first_step = float(np.diff(result.t).max())
         state = result.y[:, -1]
-        motion = motion.from_vector(state)
+        motion = of_vector(motion, state)
         errors.append(_errors(system, motion, state, end))
         if correct:
             motion = project(system, motion, end)

@@ -125,10 +125,7 @@ def test_a_layer_takes_most_of_the_energy_at_every_frequency(
 ) -> None:
     found = damped(n, 1.5, own)
     energy = found.energy_of_faster(SPEED)
-    print(
-        f"{n} spans, {own}: energy back at most {energy[0]:.2e}, mean {energy[1]:.2e}; amplitude "
-        f"below 2 % of {found.share_below(0.02, SPEED):.3f} of the waves"
-    )
+    print(f"{n} spans, {own}: energy back at most {energy[0]:.2e}, mean {energy[1]:.2e}")
     assert energy[0] < largest and energy[1] < mean
 
 

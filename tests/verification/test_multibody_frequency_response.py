@@ -46,7 +46,8 @@ def test_one_mass_on_a_spring() -> None:
     check("frequency [Hz]", mode.frequency, np.sqrt(stiffness / mass) / (2 * np.pi), within=1e-12)
     ratio = damping / (2 * np.sqrt(stiffness * mass))
     check("damping ratio", mode.damping_ratio, ratio, within=1e-12)
-    check("static stiffness [N/m]", model.static_stiffness(), stiffness, within=1e-9)
+    found = 1.0 / model.receptance(np.zeros(1))[0].real
+    check("static stiffness [N/m]", found, stiffness, within=1e-9)
     # Far above resonance the spring hardly matters: k / (m w^2).
     masses = apparent_mass([1000.0], model.receptance([1000.0]))
     within = 2 * (stiffness / (2 * np.pi * 1000) ** 2 + damping / (2 * np.pi * 1000))
@@ -185,7 +186,8 @@ def test_seven_bodies_have_the_figures_of_the_mechanism() -> None:
     # 0.2 N s/m of the frame's damper on 26.
     check("its damping ratio", swinging.damping_ratio, ratio, within=0.01 * ratio)
     in_series = 240.0 * 6000.0 / 6240.0
-    check("static stiffness [N/m]", model.static_stiffness(), in_series, within=0.01 * in_series)
+    found = 1.0 / model.receptance(np.zeros(1))[0].real
+    check("static stiffness [N/m]", found, in_series, within=0.01 * in_series)
     high = apparent_mass([300.0], model.receptance([300.0]))
     check("apparent mass at 300 Hz [kg]", high.real, 7.8, within=6000 / (2 * np.pi * 300) ** 2)
 

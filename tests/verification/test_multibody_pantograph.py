@@ -14,6 +14,7 @@ from constraint_handling import (
     ConstraintHandling,
     CoordinatePartitioning,
 )
+from equivalent_mass import equivalent_mass
 from measuring import check
 from variable_steps import integrate
 
@@ -21,7 +22,7 @@ from catenary.base.errors import InputError
 from catenary.mbs.rigid.forces import PointForce
 from catenary.mbs.rigid.joints import PrescribedPoint, constant
 from catenary.mbs.rigid.kinematics import point
-from catenary.mbs.rigid.statics import calibrate_actuator, equilibrium, equivalent_mass, held_force
+from catenary.mbs.rigid.statics import calibrate_actuator, equilibrium, held_force
 from catenary.mbs.rigid.system import System
 
 ARM, HEAD = ambrosio.STABILISATION_ARM, ambrosio.HEAD

@@ -6,6 +6,7 @@ import numpy as np
 import paper_pantograph as ambrosio
 import pytest
 from constraint_handling import Baumgarte
+from equivalent_mass import equivalent_mass
 from measuring import check
 from scipy.integrate import solve_ivp
 from variable_steps import integrate
@@ -16,7 +17,6 @@ from catenary.mbs.rigid.bodies import SPACE, Body
 from catenary.mbs.rigid.forces import Gravity, SpringDamper
 from catenary.mbs.rigid.joints import PrescribedPoint, Revolute, constant
 from catenary.mbs.rigid.kinematics import point
-from catenary.mbs.rigid.statics import equivalent_mass
 from catenary.mbs.rigid.system import System
 
 ARM = ambrosio.STABILISATION_ARM

@@ -136,16 +136,18 @@ def test_a_staggered_line_with_tensioners_keeps_its_tension_and_its_arms_swing()
     check("travel [m]", form.along[arms], moved, within=stretched)
     slew = form.along[arms] / length
     # The bar's length stays, but for what 1e7 N/m give.
-    level = length * np.cos(installed.lateral.arm_inclination)
-    upward = length * np.sin(installed.lateral.arm_inclination)
-    upward -= (form.height - installed.height)[arms]
+    sideways, upward, ahead = length * installed.lateral.arm_direction.T
+    level = np.hypot(sideways, ahead)
+    upward = upward - (form.height - installed.height)[arms]
     swung = level - np.sqrt(length**2 - form.along[arms] ** 2 - upward**2)
     sides = np.sign(installed.lateral.arm_force[:, 0])
     pulled = sides * (form.lateral.y - installed.lateral.y)[arms]
     check("to the hinge [m]", pulled, swung, within=5e-5)
     travel = form.along[arms]
     check("x^2 / 2 l [m]", pulled, travel**2 / (2 * length), within=0.02 * pulled.max())
-    check("slew [rad]", form.lateral.arm_slew, -slew, within=0.02 * slew.max())
+    sideways, _, ahead = form.lateral.arm_direction.T
+    found = np.arctan2(ahead, np.abs(sideways))
+    check("slew [rad]", found, -slew, within=0.02 * slew.max())
     # From arm to arm the tension falls by the arm's force along the track.
     along = form.lateral.arm_force[:, 2]
     radial = np.hypot(form.lateral.arm_force[:, 0], along)

@@ -130,10 +130,6 @@ class Unknowns:
         result[self.numbers[there]] = np.broadcast_to(by_node, there.shape)[there]
         return result
 
-    def station_of(self, nodes: np.ndarray) -> np.ndarray:
-        """Stations of mesh nodes, shape as ``nodes``."""
-        return self.station[nodes]
-
     def stations_over(self, low: int, high: int) -> tuple[int, int]:
         """Range of the stations that have any of the numbers [``low``, ``high``)."""
         first = int(np.searchsorted(self.starts, low, side="right")) - 1

@@ -1,6 +1,6 @@
 """The channels of a run: one table of what is recorded, and where its values come from.
 
-Time loop, recorder, result file, its reader and checks, CSV, report and documents all read
+Time loop, recorder, result file, its reader and checks, report and documents all read
 ``CHANNELS``. To add a channel, add a row. Its ``values`` names an array that every step keeps up to
 date; a step in the compiled loop copies it as well.
 """

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from equivalent_mass import equivalent_mass
 from measuring import check
 
 from catenary.base.errors import InputError, RunBroken
@@ -16,7 +17,7 @@ from catenary.mbs.rigid.joints import (
     Spherical,
     constant,
 )
-from catenary.mbs.rigid.statics import calibrate_actuator, equilibrium, equivalent_mass, held_force
+from catenary.mbs.rigid.statics import calibrate_actuator, equilibrium, held_force
 from catenary.mbs.rigid.system import System
 
 G = 9.81

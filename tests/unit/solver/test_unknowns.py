@@ -78,9 +78,9 @@ def check(mesh: LineMesh, found: Unknowns) -> None:
     taken = np.sort(found.numbers[found.numbers >= 0])
     assert (np.diff(taken) > 0).all() and taken[-1] < found.size
     assert found.missing.size == found.size - taken.size
-    stations = found.station_of(joined(mesh))
+    stations = found.station[joined(mesh)]
     assert np.abs(np.diff(stations, axis=1)).max() <= 1
-    x, station = mesh.points[:, 0], found.station_of(np.arange(mesh.n_nodes))
+    x, station = mesh.points[:, 0], found.station[np.arange(mesh.n_nodes)]
     for place in (0.0, 60.0, 61.7):
         low, high = found.within(place, place + 20.0)
         inside = (x >= place) & (x <= place + 20.0)
@@ -95,8 +95,8 @@ def test_nodes_of_one_place_are_a_station() -> None:
     assert found.width == 4 and found.in_stations and not found.missing.size
     check(mesh, found)
     contact, messenger = mesh.wires[CONTACT_WIRE], mesh.wires[MESSENGER_WIRE]
-    assert (found.station_of(contact) == np.arange(contact.size)).all()
-    assert (found.station_of(messenger) == np.arange(contact.size)).all()
+    assert (found.station[contact] == np.arange(contact.size)).all()
+    assert (found.station[messenger] == np.arange(contact.size)).all()
 
 
 def test_groups_of_unknowns_stand_together_in_a_station() -> None:
