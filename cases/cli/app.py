@@ -217,7 +217,7 @@ def options(
             "--version",
             callback=_version,
             is_eager=True,
-            help="Versions of Catenary, PETSc, MPI, HDF5, Numba and others.",
+            help="Print the versions of Catenary, PETSc, MPI, HDF5 and packages.",
         ),
     ] = False,
 ) -> None:

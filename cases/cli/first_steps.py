@@ -16,8 +16,7 @@ from catenary.cases.terminal import console
 
 @serial_verb(
     "list",
-    help="List the shipped cases, keys of a scene, ready pantographs, rule books, or the schema of "
-    "case.toml.",
+    help="List cases, keys, pantographs, rule books or the schema.",
     epilog="Example: catenary list --keys damping",
 )
 def list_cases(
@@ -43,9 +42,9 @@ def list_cases(
         typer.Argument(
             metavar="FILTER",
             autocompletion=completion.keys,
-            help="With --keys: a part of a key, or a pattern with * and ?; tells also bounds, the "
-            "words that a key accepts, and typical values. With --rules: a book, whose criteria "
-            "and limits are told.",
+            help="With --keys: a part of a key, or a pattern with * and ?; prints bounds, accepted "
+            "words and typical values too. With --rules: a book, whose criteria and limits are "
+            "printed.",
         ),
     ] = None,
 ) -> None:
@@ -97,8 +96,9 @@ def list_cases(
 
 @serial_verb(
     "new",
-    help="Write a commented case to begin with into the new folder NAME: NAME/case.toml, which "
-    "`check` and `run` take. Without --topology it asks which kind of line, on a terminal.",
+    help="Write a commented case as a beginning of your own. `check` and `run` take the new "
+    "folder NAME with its NAME/case.toml. Without --topology it asks which kind of line, on "
+    "a terminal.",
     epilog="Example: catenary new my_line --topology stitched --spans spans.csv --droppers "
     "droppers.csv",
 )
@@ -160,9 +160,9 @@ def new(
 
 @serial_verb(
     "doctor",
-    help="Check that Catenary works here: packages, compiled kernels, PETSc, MPI, HDF5, compiler, "
-    "films, ParaView, file locks, memory. A line each says OK, missing or broken, and how to mend "
-    "it; exits with 1 if no run is possible.",
+    help="Check that Catenary works here. Packages, compiled kernels, PETSc, MPI, HDF5, compiler, "
+    "films, ParaView, file locks, memory: each line says OK, missing or broken, and how to "
+    "mend it; exits with 1 if no run is possible.",
     epilog="Example: catenary doctor",
 )
 def doctor() -> int:

@@ -15,8 +15,8 @@ from catenary.postproc.evaluate.wording import counted
 
 @serial_verb(
     "check",
-    help="Check a case: keys, bounds, geometry, effects, mesh, pantographs, and that no dropper is "
-    "slack at rest. Writes nothing.",
+    help="Check a case without running it. It looks at keys, bounds, geometry, effects, mesh, "
+    "pantographs, and whether a dropper is slack at rest; it writes nothing.",
     epilog="Example: catenary check my_line/case.toml --set line.dropper.pre_sag_mid_mm=60",
 )
 def check(
@@ -43,7 +43,8 @@ def check(
 
 @serial_verb(
     "mesh",
-    help="Write the mesh of a case as a Gmsh file, or a drawing to scale of its line at rest.",
+    help="Write the mesh of a case, or draw its line to scale. The mesh is a Gmsh file; the "
+    "drawing shows the line at rest.",
     epilog="Example: catenary mesh re330_stitched -o re330.svg",
 )
 def mesh(
@@ -73,7 +74,7 @@ def mesh(
 
 @serial_verb(
     "static",
-    help="Print the dropper table, registration, sag and elasticity of a case at rest.",
+    help="Print droppers, registration, sag, elasticity at rest.",
     epilog="Example: catenary static ac_simple -o droppers.csv",
 )
 def static(
@@ -137,8 +138,8 @@ def static(
 
 @serial_verb(
     "prepare",
-    help="Write a line with its pantographs for steps from outside: a C program, a real-time "
-    "computer or a controller in Python.",
+    help="Write a line and its pantographs for steps from outside. A C program, a real-time "
+    "computer or a controller in Python takes these steps.",
     epilog="Example: catenary prepare en50318_2002 -o en300.line --set train.speed_km_h=300",
 )
 def prepare(

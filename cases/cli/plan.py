@@ -20,8 +20,8 @@ _MOST_ROUNDS = 1000
 
 @serial_verb(
     "plan",
-    help="Print what a case simulates and what not, and what it will cost. With --cost, run it "
-    "with each effect the other way, and print what a step then takes and what changes.",
+    help="Print what a case simulates and what a run of it needs. With --cost, switch each effect "
+    "in turn, and print the time of a step and the change of results.",
     epilog="Example: catenary plan ac_simple --set train.speed_km_h=320; "
     "catenary plan ambrosio2012 --cost --stretch-m 100 -o results/cost",
 )
@@ -50,12 +50,12 @@ def plan(
         typer.Option(
             "--tolerance",
             metavar="PERCENT",
-            help="With --cost: changes below are not worth an effect; 1% if absent.",
+            help="With --cost: smaller changes of results do not count; 1% if absent.",
         ),
     ] = None,
     out: Annotated[
         Path | None,
-        folder_option("With --cost: for table, CSV, JSON, and runs, which are then not run again."),
+        folder_option("With --cost: folder for tables and runs; the same command reuses these."),
     ] = None,
     as_json: Annotated[
         bool, typer.Option("--json", help="With --cost: print JSON in place of the table.")

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 Motion = Annotated[
     float | None,
-    typer.Option("--motion", min=1, max=1e5, help="Factor by which motions are drawn larger."),
+    typer.Option("--motion", min=1, max=1e5, help="Factor by which displacements are enlarged."),
 ]
 FromWhere = Annotated[
     View | None,
@@ -32,7 +32,7 @@ FromWhere = Annotated[
 
 @serial_verb(
     "report",
-    help="Write the full report of a run from its result file, with data sheets, worst places, "
+    help="Write the full report of a run from its result file. It has data sheets, worst places, "
     "spectra and vector pictures.",
     epilog="Example: catenary report results/en300 --pdf",
 )
@@ -108,9 +108,9 @@ def report(
 
 @serial_verb(
     "compare",
-    help="Print the figures of several runs side by side and which of their differences are "
-    "more than chance, or compare a run with a measured passage: errors of the measurement, "
-    "figures of both, tolerances.",
+    help="Compare runs with each other or with a measurement. Of several runs it prints the "
+    "figures side by side, with the statistical significance of their differences; of a run "
+    "and a measured passage, errors of the measurement, figures of both, tolerances.",
     epilog="Example: catenary compare results/coarse results/fine, or with a measurement: "
     "catenary compare results/en300 measured.csv --description measured.toml -o results/measured",
 )
@@ -178,8 +178,8 @@ def _compare_measured(
 
 @serial_verb(
     "animate",
-    help="Make a film of a run, film.mp4 and film.gif: the line and its pantographs, the contact "
-    "force beneath, from the snapshots of fields.h5.",
+    help="Make a film of a run, film.mp4 and film.gif. It shows the line and its pantographs, the "
+    "contact force beneath, from the snapshots of fields.h5.",
     epilog="Example: catenary animate results/en300 --from 2 --to 6 --camera trailing",
 )
 def animate(
@@ -190,16 +190,14 @@ def animate(
     end: Annotated[
         float | None, typer.Option("--to", min=0, max=1e7, help="Simulated time to end at [s].")
     ] = None,
-    rate: Annotated[
-        float, typer.Option("--fps", min=1, max=120, help="Pictures shown a second.")
-    ] = 25.0,
+    rate: Annotated[float, typer.Option("--fps", min=1, max=120, help="Frames per second.")] = 25.0,
     every: Annotated[
         float | None,
         typer.Option(
             "--every-m",
             min=1e-3,
             max=1e4,
-            help="Travel of the train between two pictures; a hundredth of their width if absent.",
+            help="Travel of the train between two frames; a hundredth of their width if absent.",
         ),
     ] = None,
     width: Annotated[
@@ -213,7 +211,7 @@ def animate(
     camera: Annotated[
         str | None,
         typer.Option(
-            help="Pantograph that the camera goes with: its name, or its number from the front; "
+            help="Pantograph that the camera follows: its name, or its number from the front; "
             "the middle of all if absent."
         ),
     ] = None,
@@ -242,8 +240,8 @@ def animate(
 
 @serial_verb(
     "paraview",
-    help="Write paraview/view.py into the folder of a run: a script that opens it in ParaView, "
-    "with pantographs, forces and masts, heights and motions drawn larger.",
+    help="Write a script that opens a run in ParaView. paraview/view.py in the folder of the run "
+    "shows pantographs, forces and masts, heights and displacements enlarged.",
     epilog="Example: catenary paraview results/en300",
 )
 def paraview(

@@ -95,8 +95,8 @@ def run(
 
 @verb(
     "restart",
-    help="Continue an interrupted or broken run from the last state in its result file, or let one "
-    "that is done go on to a later end.",
+    help="Continue an interrupted run, or prolong a finished one. It goes on from the last state "
+    "in the result file of a run that was interrupted, broke or is done.",
     epilog="Example: catenary restart results/en300; catenary restart results/en300 --until-m 900 "
     "--evaluate 600:840",
 )
@@ -181,9 +181,9 @@ def _end(result: RunOutcome, folder: Path, strict: bool) -> int:
 
 @serial_verb(
     "submit",
-    help="Hand a run to SLURM: a job with time and memory from the plan, and jobs that continue it "
-    "where a limit of time or a lost node ends one. With --array a sweep or study: a job array "
-    "whose tasks make the runs, and a job that makes the table.",
+    help="Hand a run to SLURM, with time and memory from the plan. Jobs that wait continue it "
+    "where a limit of time or a lost node ends one. With --array a sweep or study: a job "
+    "array whose tasks make the runs, and a job that makes the table.",
     epilog="Example: catenary submit en50318_2002 -o results/en300 --ranks 4 --print > job.sh; "
     "catenary submit en50318_2002 -o results/speeds --array 10 --vary train.speed_km_h=200,250,300",
 )
@@ -193,7 +193,10 @@ def submit(
     ranks: Annotated[
         int,
         typer.Option(
-            "--ranks", min=1, max=10**6, help="MPI ranks; with --array of a task, a run on each."
+            "--ranks",
+            min=1,
+            max=10**6,
+            help="MPI ranks; with --array those of each task, one run on each.",
         ),
     ] = 1,
     nodes: Annotated[

@@ -158,13 +158,12 @@ def recording_of(
 
 def train_of(problem: Problem) -> channels.Train:
     """What decides which channels a run of a problem has. Not collective."""
-    places, laws = problem.train.placements, simulated(problem)
+    places = problem.train.placements
     return channels.Train(
         tuple(len(place.data.strip_offsets) for place in places),
         any(has_joints(place.data) for place in places),
         len(problem.line.wires_of(Role.CONTACT)),
-        laws.lateral,
-        laws.uplift_stops,
+        simulated(problem),
         moves_along(problem),
     )
 

@@ -1,4 +1,4 @@
-"""Multibody systems at rest: equilibrium, what an actuator must push, what a point feels like.
+"""Multibody systems at rest: equilibrium, and what an actuator must push.
 
 By virtual work: at rest N^T g = 0 with N the velocities that the joints allow (null space of
 Phi_q), so that reactions need not be known.

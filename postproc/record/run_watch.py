@@ -309,7 +309,7 @@ class StripWatch(Observer):
 
     def start(self, stage: Stage) -> None:
         """Begin to watch a march."""
-        ends = stage.n_wires * np.cumsum([0, *stage.train.n_strips])
+        ends = stage.train.n_wires * np.cumsum([0, *stage.train.n_strips])
         self._contacts = [slice(*pair) for pair in zip(ends[:-1], ends[1:], strict=True)]
         self._warned = [False] * stage.n_pantographs
 

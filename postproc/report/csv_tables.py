@@ -1,9 +1,8 @@
-"""Tables for spreadsheets: the droppers as they are cut, the channels of the pantographs."""
+"""Tables for spreadsheets: the droppers as they are cut."""
 
 from __future__ import annotations
 
-import io
-from typing import NamedTuple, TextIO
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,10 +10,6 @@ from catenary.postproc.evaluate.statistics import slack_times
 from catenary.postproc.evaluate.wording import fixed
 from catenary.postproc.files.csv_text import csv_text
 from catenary.postproc.read.results import Results
-from catenary.solver.time_loop.views import channels
-
-# Steps that are written at once.
-_ROWS = 10_000
 
 
 class DropperRow(NamedTuple):
@@ -120,51 +115,3 @@ def droppers_csv(results: Results) -> str:
 
 def _known(value: float, digits: int) -> str:
     return fixed(value, digits) if np.isfinite(value) else ""
-
-
-def pantographs_csv(results: Results) -> str:
-    """Time and the channels of all pantographs as CSV text, one line a step. Not collective."""
-    stream = io.StringIO()
-    write_pantographs_csv(results, stream)
-    return stream.getvalue()
-
-
-def write_pantographs_csv(results: Results, stream: TextIO) -> None:
-    """The same into an open text file, by blocks of steps. Not collective."""
-    names = results.pantograph_names()
-    prefixes = [f"{name} " if len(names) > 1 else "" for name in names]
-    there = [c for c in channels.train_channels() if results.has(c.name)]
-    tables = [c for c in there if c.per == channels.PANTOGRAPH]
-    by_strip = [c for c in there if c.per == channels.STRIP]
-    heads = [channels.TIME.label]
-    heads += [prefix + channel.label for channel in tables for prefix in prefixes]
-    strips = []
-    for prefix, columns in zip(prefixes, results.strip_columns(), strict=True):
-        if len(columns) > 1:
-            heads += [f"{prefix}strip {n + 1} {c.label}" for c in by_strip for n in range(2)]
-            strips.append(slice(columns.start, columns.stop))
-    by_wire = [c for c in there if c.per == channels.WIRE]
-    for prefix, wires in zip(prefixes, results.wire_columns(), strict=True):
-        heads += [f"{prefix}{name} {c.label}" for c in by_wire for name in wires]
-    by_contact = [c for c in there if c.per == channels.CONTACT]
-    contacts = list(zip(prefixes, results.contact_columns(), results.contact_names(), strict=True))
-    for prefix, _, own in contacts:
-        heads += [f"{prefix}{n} {c.label}".strip() for c in by_contact for n in own]
-    stream.write(csv_text(heads, ()))
-    for start in range(0, results.n_rows("time"), _ROWS):
-        part = slice(start, min(start + _ROWS, results.n_rows("time")))
-        blocks = [results.times(part)[:, None]]
-        blocks += [results.rows(channel.name, part) for channel in tables]
-        rows = [results.rows(channel.name, part) for channel in by_strip]
-        blocks += [values[:, own] for own in strips for values in rows]
-        blocks += _by_pantograph([results.rows(c.name, part) for c in by_wire], len(prefixes))
-        rows = [results.rows(channel.name, part) for channel in by_contact]
-        blocks += [values[:, columns] for _, columns, _ in contacts for values in rows]
-        # To add zero takes the sign from a negative one.
-        np.savetxt(stream, np.hstack(blocks) + 0.0, fmt="%.9g", delimiter=",")
-
-
-def _by_pantograph(tables: list[np.ndarray], n: int) -> list[np.ndarray]:
-    """Tables (rows, n columns each) of several channels, pantograph by pantograph."""
-    split = [np.split(table, n, axis=1) for table in tables]
-    return [own[p] for p in range(n) for own in split]

@@ -1,7 +1,7 @@
 """Loads in time: forces on unknowns of a line beside those of contacts and droppers.
 
-Three kinds, by what is known ahead of the march: a shape times a function of time, a field sampled
-in space and time, and a function in Python. Compiled loops evaluate all of them.
+By what is known ahead of the march: a shape times a function of time, a field sampled in space and
+time, past accelerations of an end, and a function in Python. Compiled loops evaluate all of them.
 """
 
 from __future__ import annotations

@@ -96,6 +96,7 @@ def test_the_help_lists_every_verb() -> None:
     assert result.exit_code == 0
     for verb in VERBS:
         assert f"  {verb} " in result.stdout
+    assert "..." not in result.stdout.split("Commands:")[1]  # first sentences fit into a line
 
 
 @pytest.mark.process

@@ -146,7 +146,7 @@ def test_lines_without_lateral_motion_have_none_of_it() -> None:
     run.run([rows])
     run.destroy()
     assert rows["lateral_place"].shape[1] == rows["lateral_displacement"].shape[1] == 0
-    assert not rows.stage.train.lateral
+    assert not rows.stage.train.laws.lateral
 
 
 def test_nodes_of_contact_wires_are_those_of_the_mesh() -> None:

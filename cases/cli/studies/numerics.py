@@ -34,9 +34,9 @@ _MOST_REPEATS = 99
 
 @verb(
     "accuracy",
-    help="Vary step, mesh, scheme, coupling and models of a case; print the error of each setting, "
-    "its time, and what to take for a wanted accuracy. The same command continues a study that was "
-    "stopped.",
+    help="Find the step and mesh that a wanted accuracy needs. Step, mesh, scheme, coupling and "
+    "models of a case are varied; the error and time of each setting are printed. The same "
+    "command continues one that was stopped.",
     epilog="Example: catenary accuracy en50318_2002 -o results/accuracy --axes dt,grid --target 2%",
 )
 def accuracy(
@@ -112,9 +112,9 @@ TABLES = ("hard.csv", "hard.md")
 
 @verb(
     "hard",
-    help="Run the collection of hard cases and print which limits they keep: energy, bounds, "
-    "refinement, schemes, and ranks under mpirun. Some five minutes; exits with 3 if a limit is "
-    "not kept. With -o the same command continues one that was stopped.",
+    help="Run the hard cases and print which limits they keep. Limits are energy, bounds, "
+    "refinement, schemes, and ranks under mpirun. Some five minutes; exits with 3 if a limit "
+    "is not kept. With -o the same command continues one that was stopped.",
     epilog="Example: catenary hard -o results/hard",
 )
 def hard(

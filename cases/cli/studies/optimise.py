@@ -71,10 +71,11 @@ class TaskWords:
 
 @serial_verb(
     "optimise",
-    help="Choose droppers, tensions, pantographs or any numbers of a scene for the smallest "
-    "standard deviation of the contact force, or another statistic, over both directions, several "
-    "speeds, trains and installation errors; check what is found with a finer mesh, a shorter step "
-    "and unseen errors. The same command continues one that was stopped.",
+    help="Choose numbers of a scene for the calmest contact force. Droppers, tensions, "
+    "pantographs or any others are chosen for the smallest standard deviation of the contact "
+    "force, or another statistic, over both directions, several speeds, trains and "
+    "installation errors; the optimum is checked with a finer mesh, a shorter step and "
+    "unseen errors. The same command continues one that was stopped.",
     epilog="Example: catenary optimise ac_simple droppers.toml -o results/optimum "
     "--set train.speed_km_h=320",
 )
@@ -89,9 +90,10 @@ def optimise(words: TaskWords) -> int:
 
 @serial_verb(
     "tolerance",
-    help="Find how far droppers, heights, tensions or any numbers of a scene may be off for each "
-    "acceptance criterion to hold with 99 %: by samples of errors, and in the worst case. The same "
-    "command continues one that was stopped.",
+    help="Find the tolerances within which the criteria hold. Droppers, heights, tensions or any "
+    "numbers of a scene may be off so far that each acceptance criterion holds with a "
+    "probability of 99 %, by samples of errors, and in the worst case. The same command "
+    "continues one that was stopped.",
     epilog="Example: catenary tolerance en50318_2002 installation.toml -o results/tolerance",
 )
 def tolerance(words: TaskWords) -> int:

@@ -24,8 +24,9 @@ from catenary.cases.terminal import console
 
 @serial_verb(
     "pantograph",
-    help="Print static force, equivalent masses, natural frequencies and frequency response of a "
-    "case's pantograph, and a lumped model fitted to it; with -o also write them as files.",
+    help="Print the frequency response of a case's pantograph. Also its static force, equivalent "
+    "masses, natural frequencies, and a lumped model fitted to it; with -o they are written "
+    "as files.",
     epilog="Example: catenary pantograph ambrosio2012 --fit 2 -o results/pantograph",
 )
 def pantograph(
@@ -35,7 +36,7 @@ def pantograph(
         typer.Option(
             "--kind",
             metavar="NAME",
-            help="Which table of [pantographs]; the leading one's if absent.",
+            help="Table of [pantographs]; that of the leading pantograph if absent.",
         ),
     ] = None,
     out: Annotated[
@@ -59,7 +60,7 @@ def pantograph(
         typer.Option(
             "--fit-from",
             metavar="HZ",
-            help="Fit above this frequency: below it the raising decides, which no spring need be.",
+            help="Lowest frequency of the fit; below it the response is that of the lift.",
         ),
     ] = 0.5,
     force: Force = False,
@@ -87,9 +88,9 @@ SENSITIVITIES = "sensitivity.csv"
 
 @serial_verb(
     "sensitivity",
-    help="Differentiate the contact-force statistics and the largest uplift of a case by its "
-    "parameters, in one march, and rank them: what a millimetre, a kilonewton of tension, a "
-    "kilogram or a per cent changes.",
+    help="Rank what the parameters of a case change. It prints the derivatives of the contact-"
+    "force statistics and the largest uplift, from one march: what a millimetre, a "
+    "kilonewton of tension, a kilogram or a per cent changes.",
     epilog="Example: catenary sensitivity en50318_2002 -p line.contact_wire.tension_N "
     "-p pantographs.reference.masses_kg.0",
 )
@@ -138,9 +139,10 @@ def sensitivity(
 
 @serial_verb(
     "identify",
-    help="Find parameters of a case, such as errors of dropper lengths, tensions, damping and "
-    "masses, from a measured contact force or head height: most probable values, their "
-    "uncertainty, what the data do not tell, and whether the model fits.",
+    help="Find parameters of a case from a measured passage. Errors of dropper lengths, tensions, "
+    "damping, masses and others follow from a measured contact force or head height: most "
+    "probable values, their uncertainty, what the data cannot determine, and whether the "
+    "model fits.",
     epilog="Example: catenary identify ac_simple measured.csv task.toml -o results/identified",
 )
 def identify(

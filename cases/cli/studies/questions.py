@@ -76,9 +76,9 @@ class Direction(StrEnum):
 
 @verb(
     "speed",
-    help="Find the highest speed at which the acceptance criteria hold in both directions, all of "
-    "them and each by itself: an ensemble over speeds, then bisection. The same command continues "
-    "one that was stopped.",
+    help="Find the highest speed at which the criteria hold in both directions. All acceptance "
+    "criteria together and each by itself: an ensemble over speeds, then bisection. The same "
+    "command continues one that was stopped.",
     epilog="Example: catenary speed en50318_2002 -o results/highest --from 200 --to 360",
 )
 def speed(
@@ -90,10 +90,10 @@ def speed(
         float, typer.Option("--to", metavar="KM_H", help="Highest speed [km/h].")
     ] = 360.0,
     step: Annotated[
-        float, typer.Option(metavar="KM_H", help="Distance of the speeds marched first [km/h].")
+        float, typer.Option(metavar="KM_H", help="Step of the speeds that are run first [km/h].")
     ] = 10.0,
     within: Annotated[
-        float, typer.Option(metavar="KM_H", help="How closely speeds are bisected [km/h].")
+        float, typer.Option(metavar="KM_H", help="Bisect the speed to this accuracy [km/h].")
     ] = 1.0,
     criterion: Annotated[
         list[str] | None,
@@ -133,9 +133,9 @@ def speed(
 
 @verb(
     "separation",
-    help="Find good and bad distances of two pantographs: deviation, least force and uplift over "
-    "the distance, where acceptance criteria fail, and which waves explain it. The same command "
-    "continues one that was stopped.",
+    help="Find good and bad distances of two pantographs. It prints deviation, least force and "
+    "uplift over the distance, where acceptance criteria fail, and which waves explain it. "
+    "The same command continues one that was stopped.",
     epilog="Example: catenary separation en50318_2002 -o results/distances --from 50 --to 200 "
     "--step 5",
 )
@@ -147,7 +147,7 @@ def separation(
     farthest: Annotated[
         float, typer.Option("--to", metavar="M", help="Longest distance [m].")
     ] = 400.0,
-    step: Annotated[float, typer.Option(metavar="M", help="From one to the next [m].")] = 1.0,
+    step: Annotated[float, typer.Option(metavar="M", help="Step between distances [m].")] = 1.0,
     out: Annotated[
         Path | None,
         folder_option("Folder for table and picture; without it nothing is written."),
@@ -176,9 +176,9 @@ def separation(
 
 @verb(
     "what-if",
-    help="Run a case as it is and with the changes of --set, and show the differences: "
-    "statistics, uplift by support, droppers, verdicts. The same command continues runs that were "
-    "stopped.",
+    help="Run a case with and without changes, and compare them. The changes are those of --set; "
+    "compared are statistics, uplift by support, droppers, verdicts. The same command "
+    "continues runs that were stopped.",
     epilog="Example: catenary what-if en50318_2002 --set line.contact_wire.tension_N=22000 "
     "-o results/tension",
 )
@@ -227,7 +227,7 @@ def what_if(
 
 @serial_verb(
     "worst",
-    help="Name the worst spans, supports and droppers of a run, with candidates for the cause: "
+    help="Name the worst spans, supports and droppers of a run. Each has possible causes: "
     "defects, elasticity, reflections, ends of wires, the pantograph ahead.",
     epilog="Example: catenary worst results/en300",
 )

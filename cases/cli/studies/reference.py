@@ -28,9 +28,9 @@ if TYPE_CHECKING:
 
 @verb(
     "reference",
-    help="Make the reference solutions anew: models of EN 50318 at two speeds under one and two "
-    "pantographs, refined in step and mesh, with error bars. Takes an hour; the same command "
-    "continues what was stopped.",
+    help="Make the reference solutions anew. Models of EN 50318 at two speeds under one and two "
+    "pantographs are refined in step and mesh, with error bars. Takes an hour; the same "
+    "command continues what was stopped.",
     epilog="Example: catenary reference ac_simple -o results/reference -j 0",
 )
 def reference(
@@ -76,8 +76,8 @@ def reference(
 
 @serial_verb(
     "judge",
-    help="Compare results of any program with the reference solutions: differences, error bars, "
-    "tolerances of EN 50318, verdicts.",
+    help="Compare results of any program with reference solutions. It prints differences, error "
+    "bars, tolerances of EN 50318 and verdicts.",
     epilog="Example: catenary judge forces.csv --of ac_simple_275_one -o results/judged",
 )
 def judge(
@@ -121,9 +121,9 @@ def judge(
 
 @verb(
     "validate",
-    help="Validate this installation by the steps of EN 50318: line at rest, reference model of "
-    "2002, reference models in the manner of 2018, a line test; write the statement with all "
-    "figures.",
+    help="Validate this installation by the steps of EN 50318. Line at rest, reference model of "
+    "2002, reference models in the manner of 2018, a line test; it writes the statement with "
+    "all figures.",
     epilog="Example: catenary validate -o results/validation -j 0",
 )
 def validate(

@@ -13,9 +13,9 @@ from catenary.cases.terminal import console
 
 @verb(
     "scaling",
-    help="Predict what a step of a case takes on many ranks, from latency and bandwidth of "
-    "messages: those between the ranks that it is started on, or given ones. On several ranks it "
-    "also times all messages of a step between them.",
+    help="Predict the time of a step on many ranks. It follows from latency and bandwidth of "
+    "messages: those between the ranks that it is started on, or given ones. On several "
+    "ranks it also times all messages of a step between them.",
     epilog="Example: mpirun -n 8 --oversubscribe catenary scaling ambrosio2012 "
     "--ranks 64,512,4096 --set line.n_spans=10000",
 )
@@ -26,11 +26,15 @@ def scaling(
     ] = "64,512,4096",
     latency: Annotated[
         float | None,
-        typer.Option("--latency-us", help="Of a message; measured on several ranks if absent."),
+        typer.Option(
+            "--latency-us", help="Latency of a message; measured on several ranks if absent."
+        ),
     ] = None,
     bandwidth: Annotated[
         float | None,
-        typer.Option("--bandwidth-GB-per-s", help="Of a message; given with the latency."),
+        typer.Option(
+            "--bandwidth-GB-per-s", help="Bandwidth of a message; given with the latency."
+        ),
     ] = None,
 ) -> int:
     """Collective."""

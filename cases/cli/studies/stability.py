@@ -15,9 +15,10 @@ TABLE, PICTURE = "stability_map.csv", "stability_map.png"
 
 @serial_verb(
     "stability-map",
-    help="Find the largest stable step of every coupling against contact stiffness and head mass, "
-    "from the matrices of a step and by marching, and draw it. Some three minutes; exits with 3 "
-    "if matrices and marches do not agree. The same command continues one that was stopped.",
+    help="Find the largest stable step of every coupling. It is found against contact stiffness "
+    "and head mass, from the matrices of a step and by marching, and drawn. Some three "
+    "minutes; exits with 3 if matrices and marches do not agree. The same command continues "
+    "one that was stopped.",
     epilog="Example: catenary stability-map en50318_2002 -o results/stability",
 )
 def stability_map(

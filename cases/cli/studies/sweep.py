@@ -37,8 +37,8 @@ _SHOWN_BROKEN, _SHOWN_REFUSED = 3, 20
 
 @verb(
     "sweep",
-    help="Run variants of a case and put their statistics side by side. The "
-    "same command continues a sweep that was stopped.",
+    help="Run variants of a case and tabulate their statistics. The same command continues a "
+    "sweep that was stopped.",
     epilog="Example: catenary sweep en50318_2002 -o results/speeds --vary "
     "train.speed_km_h=200,250,300 --vary contact.stiffness_N_per_m=2e4,5e4",
 )
@@ -70,7 +70,7 @@ def sweep(
         bool,
         typer.Option(
             "--only-statistics",
-            help="Keep the table alone and no result file of a variant: for thousands of them. "
+            help="Write the table but no result files: for thousands of variants. "
             "Variants that share a line march side by side.",
         ),
     ] = False,

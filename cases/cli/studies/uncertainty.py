@@ -15,8 +15,9 @@ from catenary.cases.terminal import console
 
 @serial_verb(
     "uncertainty",
-    help="Evaluate the table of a sweep: quantiles, probabilities that acceptance criteria fail, "
-    "sensitivity indices, all with 95 % bounds, and pictures.",
+    help="Evaluate the table of a sweep with uncertain keys. It prints quantiles, probabilities "
+    "that acceptance criteria fail and sensitivity indices, all with 95 % bounds, and draws "
+    "pictures.",
     epilog="Example: catenary uncertainty results/tolerances",
 )
 def uncertainty(
@@ -53,8 +54,8 @@ def uncertainty(
 
 @serial_verb(
     "merge",
-    help="Join sweeps of one case that ran in several folders, such as the parts of --part, into "
-    "one table. Folders that contradict each other are refused.",
+    help="Join sweeps of one case that ran in several folders. Folders such as the parts of "
+    "--part become one table; those that contradict each other are refused.",
     epilog="Example: catenary merge results/part_1 results/part_2 -o results/tolerances",
 )
 def merge(

@@ -25,7 +25,7 @@ class WaveWords(SceneWords):
 
     case: Annotated[
         str,
-        typer.Argument(help="A case, which is run with a snapshot each 10 ms, or a run's folder."),
+        typer.Argument(help="A case, which is run with a snapshot every 10 ms, or a run's folder."),
     ]
 
 
@@ -35,11 +35,11 @@ class Excited:
 
     force_n: Annotated[
         float | None,
-        typer.Option("--force-N", help="Of a force or a pulse; the static force if absent."),
+        typer.Option("--force-N", help="Moving force or pulse; the static force if absent."),
     ] = None
     frequency_hz: Annotated[
         float | None,
-        typer.Option("--frequency-Hz", help="Of a force that moves; constant if absent."),
+        typer.Option("--frequency-Hz", help="Frequency of a moving force; constant if absent."),
     ] = None
     at_m: Annotated[
         float | None,
@@ -47,26 +47,27 @@ class Excited:
     ] = None
     duration_s: Annotated[
         float | None,
-        typer.Option("--duration-s", help="Of a pulse (0.1 if absent) or a hammer (0.02)."),
+        typer.Option("--duration-s", help="Duration of a pulse (0.1 if absent) or hammer (0.02)."),
     ] = None
     impulse_ns: Annotated[
-        float | None, typer.Option("--impulse-Ns", help="Of a hammer; 10 if absent.")
+        float | None, typer.Option("--impulse-Ns", help="Impulse of a hammer; 10 if absent.")
     ] = None
 
 
 @serial_verb(
     "waves",
-    help="Analyse wave propagation along a line under a train, a moving force, a pulse or a "
-    "hammer: motion over place and time, in the frame of the train, and over wavenumber and "
-    "frequency, energy ahead and behind, beside the waves, pass bands and group velocities of the "
-    "periodic line. `catenary separation` shows how two pantographs act on each other.",
+    help="Analyse wave propagation along a line. A train, a moving force, a pulse or a hammer "
+    "excites them: motion over place and time, in the frame of the train, and over "
+    "wavenumber and frequency, energy ahead and behind, beside the waves, pass bands and "
+    "group velocities of the periodic line. `catenary separation` shows how two pantographs "
+    "act on each other.",
     epilog="Example: catenary waves en50318_2002 -o results/waves; catenary waves results/waves; "
     "catenary waves en50318_2002 --excite hammer --at-m 630 -o results/hammer",
 )
 def waves(
     words: WaveWords,
     excited: Excited,
-    out: Annotated[Path | None, folder_option("For a case.")] = None,
+    out: Annotated[Path | None, folder_option("Folder for the results of a case.")] = None,
     excite: Annotated[
         str,
         typer.Option(

@@ -1,6 +1,6 @@
 """The channels of a run: one table of what is recorded, and where its values come from.
 
-Time loop, recorder, result file, its reader and checks, CSV, report and documents all read
+Time loop, recorder, result file, its reader and checks, report and documents all read
 ``CHANNELS``. To add a channel, add a row. Its ``values`` names an array that every step keeps up to
 date; a step in the compiled loop copies it as well.
 """
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
     from catenary.solver.contact.forces_on_line import ForcesOnLine
     from catenary.solver.contact.train.pantographs import Pantographs
+    from catenary.solver.problem.simulated import Simulated
     from catenary.solver.schemes.scheme import Scheme
 
 PANTOGRAPH = "pantograph"
@@ -64,15 +65,21 @@ class Energies(NamedTuple):
 
 
 class Train(NamedTuple):
-    """Train as far as it decides which channels a run has: strips of each pantograph in running
-    order, whether a pantograph has joints that may open, the number of contact wires, whether these
-    move sideways, whether steady arms have stops, and whether wires move along the track."""
+    """What decides which channels a run has.
+
+    Attributes
+    ----------
+    n_strips : of each pantograph in running order
+    joints_in_loop : whether a pantograph has joints that may open, all its bodies being moved
+    n_wires : number of contact wires
+    laws : what effects have set, None without effects
+    moves_along : whether wires move along the track
+    """
 
     n_strips: tuple[int, ...]
-    joints_in_loop: bool
+    joints_in_loop: bool = False
     n_wires: int = 1
-    lateral: bool = False
-    uplift_stops: bool = False
+    laws: Simulated | None = None
     moves_along: bool = False
 
     @property
@@ -214,7 +221,7 @@ CHANNELS: dict[str, Channel] = {
             "by strip in the order of the wires; NaN where it is not on the strip",
             CONTACT,
             lambda sources: sources.pantographs.lateral_place,
-            when=lambda train: train.lateral,
+            when=lambda train: bool(train.laws and train.laws.lateral),
             may_be_nan=True,
             own_picture=True,
         ),
@@ -224,7 +231,7 @@ CHANNELS: dict[str, Channel] = {
             "lateral displacement of a contact wire from rest where a strip meets it, to the left",
             CONTACT,
             lambda sources: sources.pantographs.lateral_displacement,
-            when=lambda train: train.lateral,
+            when=lambda train: bool(train.laws and train.laws.lateral),
         ),
         Channel(
             "constraint_violation",
@@ -259,7 +266,7 @@ CHANNELS: dict[str, Channel] = {
             "force of the stop above a steady arm on the contact wire, downward",
             ARM,
             lambda sources: sources.link_force.get(UPLIFT_STOPS, _nothing()),
-            when=lambda train: train.uplift_stops,
+            when=lambda train: bool(train.laws and train.laws.uplift_stops),
         ),
         *(
             Channel(
@@ -330,7 +337,7 @@ def line_channels(train: Train | None = None) -> tuple[str, ...]:
 
 def line_channels_of_all() -> tuple[str, ...]:
     """Names of the channels of the line that every run has."""
-    return line_channels(Train((), joints_in_loop=False))
+    return line_channels(Train(()))
 
 
 def train_channels(train: Train | None = None) -> tuple[Channel, ...]:

@@ -17,7 +17,6 @@ from catenary.postproc.files.hdf5 import block_reading
 from catenary.postproc.files.kept_extremes import store_extremes
 from catenary.postproc.files.run_schema import COMPLETE
 from catenary.postproc.read.results import Results
-from catenary.postproc.report import csv_tables
 from catenary.postproc.report.pictures import envelope
 
 
@@ -52,15 +51,6 @@ def test_columns_and_extremes_are_those_of_the_whole_table(
             np.testing.assert_array_equal(np.concatenate([rows for _, rows in blocks]), whole)
             part = slice(1234, 5678)
             np.testing.assert_array_equal(results.column(name, 1, part), whole[part, 1])
-
-
-def test_a_table_is_the_same_whatever_its_blocks(
-    run_folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    with Results(run_folder) as results:
-        whole = csv_tables.pantographs_csv(results)
-        monkeypatch.setattr(csv_tables, "_ROWS", 777)
-        assert csv_tables.pantographs_csv(results) == whole
 
 
 def test_a_thinned_curve_keeps_every_peak() -> None:

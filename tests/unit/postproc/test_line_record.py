@@ -17,7 +17,7 @@ from catenary.solver.time_loop.views.channels import Train, line_channels_of_all
 
 N_STEPS, FLUSH = 3000, 400
 # A train on a line without stops, whose wires do not move along the track.
-USUAL = Train((1,), joints_in_loop=False)
+USUAL = Train((1,))
 WINDOW = (120.0, 80.0)
 
 

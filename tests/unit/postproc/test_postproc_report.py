@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import csv
-import io
 import json
 import re
 from html.parser import HTMLParser
@@ -18,7 +17,6 @@ import catenary.postproc.report.page
 from catenary.base.errors import InputError
 from catenary.postproc.evaluate.compare import compare
 from catenary.postproc.read.results import Results
-from catenary.postproc.report import csv_tables
 from catenary.postproc.report.pictures import line_pictures
 from catenary.postproc.report.report import write_report
 
@@ -190,19 +188,6 @@ def test_dropper_table_has_what_an_installer_cuts_by(report_folder: Path, march:
     assert float(tenth["position [m]"]) == 55.0
     upper, lower = march.mesh.points[march.mesh.droppers[9], 2]
     assert float(tenth["length [m]"]) == pytest.approx(upper - lower, abs=5e-5)
-
-
-def test_channels_as_csv(run_folder: Path, march: Any) -> None:
-    with Results(run_folder) as results:
-        rows = list(csv.reader(io.StringIO(csv_tables.pantographs_csv(results))))
-    assert rows[0][:3] == [
-        "time [s]",
-        "leading contact_position [m]",
-        "trailing contact_position [m]",
-    ]
-    assert len(rows) == 1 + 8001
-    force = rows[0].index("trailing contact_force [N]")
-    assert float(rows[101][force]) == pytest.approx(march.force(0.1)[1], rel=1e-8)
 
 
 def test_a_failed_criterion_is_named(tmp_path: Path, make_march: Any, record_run: Any) -> None:
