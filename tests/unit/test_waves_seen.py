@@ -66,6 +66,10 @@ def test_a_line_of_many_wires_has_a_line_of_speed_for_each() -> None:
     axes = pictures.space_time(travelling(0.5, 7.5), few, np.array([60.0])).axes[0]
     # Each speed runs both ways from the train, beside its own course and a support.
     assert len(axes.get_lines()) == 1 + 2 * len(few.speeds()) + 1
+    # Two tension sections have one speed, which is drawn once.
+    twice = WaveTheory(SPEED, 100.0, (*wires[:2], ("wire_0_next", 100.0)), 0.4, np.nan, np.nan,
+                       None, "")  # fmt: skip
+    assert twice.speeds() == [(100.0, "wire 0 as a string"), (101.0, "wire 1 as a string")]
     # What a line of many wires does not have is no row.
     names = {row["name"] for row in as_rows(theory)}
     assert "doppler_factor" in names and "amplification" not in names

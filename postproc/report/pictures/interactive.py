@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
-from matplotlib.colors import to_hex
+from matplotlib.colors import to_hex, to_rgba
 from matplotlib.container import BarContainer
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch, Rectangle
@@ -67,8 +67,8 @@ def as_json(figure: Figure) -> str:
     named: set[str] = set()
     if figure.legends:  # of all panels: an entry each, without points
         layout["legend"]["y"] = 1.0
-    for own in figure.legends:
-        for line, text in zip(own.get_lines(), own.get_texts(), strict=True):
+    for legend in figure.legends:
+        for line, text in zip(legend.get_lines(), legend.get_texts(), strict=True):
             entry = {"type": "scatter", "mode": "lines", "x": [None], "y": [None]}
             look = {"color": to_hex(line.get_color())}
             data.append(entry | {"name": text.get_text(), "line": look, "showlegend": True})
@@ -189,7 +189,7 @@ def _shapes(axes: Axes, own: str) -> Iterator[dict[str, Any]]:
             patch.get_x() + patch.get_width(), patch.get_y() + patch.get_height()
         )  # fmt: skip
         ends = _ends(axes, own, patch.get_data_transform(), low, high)
-        face = patch.get_facecolor()
+        face = to_rgba(patch.get_facecolor())
         yield {"type": "rect", "layer": "below", "fillcolor": to_hex(face), "opacity": face[3],
                "line": {"width": 0}, **ends, **_named(patch.get_label())}  # fmt: skip
     for line in axes.lines:

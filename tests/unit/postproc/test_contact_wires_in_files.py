@@ -127,7 +127,7 @@ def test_arms_and_droppers_of_several_wires_are_named(
         assert {row.upper for row in rows} == {"messenger_wire"}
     text = (tmp_path / "droppers.csv").read_text()
     assert text.splitlines()[0].endswith(",hangs from,carries") and f",{SECOND}" in text
-    assert "<th>and carries</th>" in (tmp_path / "report.html").read_text()
+    assert ">and carries</th>" in (tmp_path / "report.html").read_text()
 
 
 def test_the_span_that_is_shown_has_the_usual_wires() -> None:
@@ -196,4 +196,8 @@ def test_films_show_the_wire_that_is_touched(tmp_path: Path, usual: dict[str, An
         for profile in profiles.values()
     ]
     np.testing.assert_allclose(data.rest_height(x), np.min(each, axis=0), atol=1e-12)
+    lowest = data.lowest_contact_nodes()
+    at = data.points[lowest, 0]
+    assert np.all(np.diff(at) > 0.0) and (at[0], at[-1]) == (0.0, 48.0)
+    np.testing.assert_allclose(data.points[lowest, 2], data.rest_height(at), atol=1e-12)
     assert data.touched(16.0) == FIRST and data.touched(32.0) == SECOND

@@ -11,6 +11,7 @@ import html5lib
 import numpy as np
 import pytest
 from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
 
 from catenary.base.errors import InputError
 from catenary.postproc.evaluate import statistics
@@ -186,6 +187,25 @@ def test_a_picture_is_translated_for_plotly() -> None:
     assert (upright["x0"], upright["x1"], upright["line"]["dash"]) == (1.5, 1.5, "dash")
     assert found["layout"]["xaxis"]["range"] == [0.0, 3.0]
     assert found["layout"]["xaxis"]["title"]["text"] == "x [m]"
+
+
+def test_legends_and_looks_are_translated() -> None:
+    figure = figures.new_figure(3.0)
+    upper, lower = figure.subplots(2, 1)
+    for axes in (upper, lower):
+        axes.axvspan(0.0, 1.0, color="#0000ff", alpha=0.25, label="run-in")
+        axes.vlines([1.0, 2.0], 0.0, 1.0, label="support", transform=axes.get_xaxis_transform())
+    upper.plot([1.0], [2.0], "o", color="red", mfc="none", mec="green")
+    figure.legend(handles=[Line2D([], [], color="red", label="messenger wire")])
+    found = json.loads(interactive.as_json(figure))
+    of_all, point = found["data"]
+    assert (of_all["name"], of_all["showlegend"], of_all["x"]) == ("messenger wire", True, [None])
+    assert point["marker"]["symbol"] == "circle-open" and point["marker"]["color"] == "#008000"
+    shapes = found["layout"]["shapes"]
+    assert [shape["opacity"] for shape in shapes if shape["type"] == "rect"] == [0.25, 0.25]
+    # One entry of the legend for each name, which shows and hides all shapes that have it.
+    told = [(shape["name"], shape["legendgroup"]) for shape in shapes if shape["showlegend"]]
+    assert told == [("run-in", "run-in"), ("support", "support")] and len(shapes) == 6
 
 
 def test_a_picture_that_cannot_be_translated_stays_one() -> None:
