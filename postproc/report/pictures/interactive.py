@@ -100,6 +100,8 @@ def _axes(axes: Axes, own: str, panels: Sequence[Axes]) -> dict[str, Any]:
             "range": _numbers(ends),
             "showgrid": True,
             "zeroline": False,
+            # Powers of ten, not letters such as n for 1e-9.
+            "exponentformat": "power",
         }
         if isinstance(axis.get_major_locator(), FixedLocator):
             entry["tickvals"] = _numbers(axis.get_majorticklocs())
@@ -141,8 +143,9 @@ def _traces(axes: Axes) -> Iterator[dict[str, Any]]:
         yield {
             "type": "scatter",
             "mode": "+".join(modes),
-            "x": _numbers(line.get_xdata()),
-            "y": _numbers(line.get_ydata()),
+            # Plotly names nothing without a point in its legend.
+            "x": _numbers(line.get_xdata()) or [None],
+            "y": _numbers(line.get_ydata()) or [None],
             "opacity": line.get_alpha() or 1.0,
             "line": {"color": colour, "width": line.get_linewidth(),
                      "dash": _DASHES.get(str(style), "solid")},
@@ -175,7 +178,9 @@ def _shapes(axes: Axes, own: str) -> Iterator[dict[str, Any]]:
         )  # fmt: skip
         ends = _ends(axes, own, patch.get_data_transform(), low, high)
         colour = to_hex(patch.get_facecolor())
-        yield {"type": "rect", "layer": "below", "fillcolor": colour, "line": {"width": 0}, **ends}
+        name = _named(patch.get_label())
+        look = {"fillcolor": colour, "line": {"width": 0}, "showlegend": bool(name) and not own}
+        yield {"type": "rect", "layer": "below", **look, **name, **ends}
     for line in axes.lines:
         across = line.get_transform() in (axes.get_xaxis_transform(), axes.get_yaxis_transform())
         if across and line.get_linestyle() != "None":
@@ -225,8 +230,9 @@ def _annotations(axes: Axes, own: str) -> Iterator[dict[str, Any]]:
     font = {"size": 11}
     for text in axes.texts:
         x, y = _numbers(getattr(text, "xy", text.get_position()))
+        above = getattr(text, "xyann", (0.0, 0.0))[1] >= 0.0
         yield {"text": text.get_text(), "x": x, "y": y, "xref": f"x{own}", "yref": f"y{own}",
-               "showarrow": False, "yshift": 10, "font": font}  # fmt: skip
+               "showarrow": False, "yshift": 10 if above else -10, "font": font}  # fmt: skip
     title = axes.get_title(loc="left")
     if title:
         yield {"text": title, "x": 0.0, "y": 1.0, "xref": f"x{own} domain", "xanchor": "left",
