@@ -112,6 +112,8 @@ def _axes(axes: Axes, own: str, panels: Sequence[Axes]) -> dict[str, Any]:
             "range": _numbers(ends),
             "showgrid": True,
             "zeroline": False,
+            # Powers of ten, not letters such as n for 1e-9.
+            "exponentformat": "power",
         }
         if isinstance(axis.get_major_locator(), FixedLocator):
             entry["tickvals"] = _numbers(axis.get_majorticklocs())
@@ -155,8 +157,9 @@ def _traces(axes: Axes) -> Iterator[dict[str, Any]]:
         yield {
             "type": "scatter",
             "mode": "+".join(modes),
-            "x": _numbers(line.get_xdata()),
-            "y": _numbers(line.get_ydata()),
+            # Plotly names nothing without a point in its legend.
+            "x": _numbers(line.get_xdata()) or [None],
+            "y": _numbers(line.get_ydata()) or [None],
             "opacity": line.get_alpha() or 1.0,
             "line": {"color": colour, "width": line.get_linewidth(),
                      "dash": _DASHES.get(str(style), "solid")},
@@ -189,9 +192,10 @@ def _shapes(axes: Axes, own: str) -> Iterator[dict[str, Any]]:
             patch.get_x() + patch.get_width(), patch.get_y() + patch.get_height()
         )  # fmt: skip
         ends = _ends(axes, own, patch.get_data_transform(), low, high)
-        face = to_rgba(patch.get_facecolor())
-        yield {"type": "rect", "layer": "below", "fillcolor": to_hex(face), "opacity": face[3],
-               "line": {"width": 0}, **ends, **_named(patch.get_label())}  # fmt: skip
+        face, name = to_rgba(patch.get_facecolor()), _named(patch.get_label())
+        look = {"fillcolor": to_hex(face), "opacity": face[3], "line": {"width": 0}}
+        shown = {"showlegend": bool(name) and not own}
+        yield {"type": "rect", "layer": "below", **look, **shown, **name, **ends}
     for line in axes.lines:
         across = line.get_transform() in (axes.get_xaxis_transform(), axes.get_yaxis_transform())
         if across and line.get_linestyle() != "None":
@@ -240,8 +244,9 @@ def _annotations(axes: Axes, own: str) -> Iterator[dict[str, Any]]:
     font = {"size": 11}
     for text in axes.texts:
         x, y = _numbers(getattr(text, "xy", text.get_position()))
+        above = getattr(text, "xyann", (0.0, 0.0))[1] >= 0.0
         yield {"text": text.get_text(), "x": x, "y": y, "xref": f"x{own}", "yref": f"y{own}",
-               "showarrow": False, "yshift": 10, "font": font}  # fmt: skip
+               "showarrow": False, "yshift": 10 if above else -10, "font": font}  # fmt: skip
     title = axes.get_title(loc="left")
     if title:
         yield {"text": title.replace("\n", "<br>"), "x": 0.0, "y": 1.0, "xref": f"x{own} domain",
