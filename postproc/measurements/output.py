@@ -152,14 +152,10 @@ def write(folder: Path, found: Comparison) -> list[Path]:
 def _sections(found: Comparison) -> Iterator[Section]:
     errors = [Text(one.text, "bad", "Error: ") for one in found.findings]
     yield Section("Errors", [*errors, Text(WHOSE)] if errors else [Text(NO_ERRORS, "good")])
-    force = Picture(_FORCE, "Contact forces below the cut-off, on the run's places", _nothing)
+    force = Picture(_FORCE, "Contact forces below the cut-off, on the run's places")
     table = replace(figures_table(found), title="")
     yield Section("Figures", [table], [force] if found.overlays else [])
     if found.uplift is not None:
-        uplift = Picture(_UPLIFT, "Largest uplifts at supports", _nothing)
+        uplift = Picture(_UPLIFT, "Largest uplifts at supports")
         yield Section("Uplift", [replace(uplifts_table(found), title="")], [uplift])
     yield Section("Remarks", [Text(text, "remark") for text in found.remarks])
-
-
-def _nothing() -> None:
-    """Pictures are made before the page."""

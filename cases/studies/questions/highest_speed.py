@@ -305,10 +305,9 @@ def _holds(ended: _Marched, name: str, names: Sequence[str], directions: Sequenc
     rows = [row for one in failed.values() if (row := _row(one, name)) is not None]
     by = [(row["value"], row["limit"]) for row in rows if row["value"] is not None]
     stopped: list[str] = []
-    if name == ALL:
-        for way, one in failed.items():
-            missed = [n for n in names if not _is_held(ended, fails_at, [way], [n])]
-            stopped += missed if one.done else [one.outcome]
+    for one in failed.values() if name == ALL else ():
+        missed = [n for n in names if (row := _row(one, n)) is None or row["passed"] is not True]
+        stopped += missed if one.done else [one.outcome]
     known = (_row(one, name) for one in ended.values())
     unit = next((str(row["unit"]) for row in known if row is not None), "")
     return Holds(

@@ -272,10 +272,9 @@ def write(folder: Path, found: Differences) -> list[Path]:
 
 
 def _sections(found: Differences) -> Iterator[Section]:
-    # Pictures are made before the page.
     shown = [
-        Picture(_FORCE, "Contact force, 20 Hz low-pass, along the track", lambda: None),
-        Picture(_UPLIFT, "Largest uplift at each steady arm", lambda: None),
+        Picture(_FORCE, "Contact force, 20 Hz low-pass, along the track"),
+        Picture(_UPLIFT, "Largest uplift at each steady arm"),
     ]
     for table in (found.statistics, found.criteria, found.supports, found.droppers):
         pictures = shown if table is found.statistics else []

@@ -59,7 +59,7 @@ def write_judged(folder: Path, others: Sequence[Others]) -> list[Path]:
         own = replace(table, rows=judged(one.solution, one.figures), title="")
         blocks: list[Text | StudyTable] = [Text(one.solution.configuration.data), own]
         blocks += [Text(text, "remark") for text in one.remarks]
-        shown = [Picture(name, "Contact force, 20 Hz low-pass, along the track", _nothing)]
+        shown = [Picture(name, "Contact force, 20 Hz low-pass, along the track")]
         sections.append(Section(one.solution.configuration.words, blocks, shown))
     lead = f"{counts(rows)} {_BORROWED} {UNCOMPARED_SAYS}."
     content: dict[str, bytes | str] = {f"{name}.png": data for name, data in pictures.items()}
@@ -67,10 +67,6 @@ def write_judged(folder: Path, others: Sequence[Others]) -> list[Path]:
     content[f"{JUDGED}.json"] = _json({"figures": table.records(), "summary": counts(rows)})
     content[f"{JUDGED}.html"] = page("Beside the reference solutions", lead, sections, pictures)
     return write_all(folder, content)
-
-
-def _nothing() -> None:
-    """Pictures are made before the page."""
 
 
 def validation_text(found: Validation) -> str:

@@ -66,11 +66,11 @@ class Text(NamedTuple):
 
 class Picture(NamedTuple):
     """A picture: name of the file without its suffix, caption, and a function that draws the figure
-    or returns None."""
+    or returns None; without one it is made before the page."""
 
     name: str
     caption: str
-    draw: Callable[[], Figure | None]
+    draw: Callable[[], Figure | None] = lambda: None
 
 
 class Folded(NamedTuple):
