@@ -3,7 +3,8 @@
 xarray and other readers of netCDF-4 then show time, places and units. A dimension is a dataset of
 the root group, which HDF5 calls a dimension scale: with values where these are places, numbers or
 the time, else of its size alone. Everything is written with the head of the file: attached tables
-may grow, and no flush writes anything here. Not collective.
+may grow, and no flush writes anything here. Tables are handled by HDF5's identifiers: to make an
+object of h5py of each took half of the time. Not collective.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from typing import Any
 
 import h5py
 import numpy as np
-from h5py import h5ds
+from h5py import h5d, h5ds, h5s
 
 from catenary.postproc.files.hdf5.array_writes import set_attribute
 from catenary.postproc.files.hdf5.checked import create_checked
@@ -55,8 +56,8 @@ def describe(file: h5py.File, places: dict[str, np.ndarray]) -> None:
         Places along the track of the recorded columns, (recorded,), by what a column stands
         for [m].
     """
-    time = file["time"]
-    h5ds.set_scale(time.id, b"time")
+    time = _table(file, "time")
+    h5ds.set_scale(time, b"time")
     _describe(time, channels.TIME.unit, channels.TIME.meaning)
     for name, own in PLACES.items():
         if own in file:
@@ -67,38 +68,45 @@ def describe(file: h5py.File, places: dict[str, np.ndarray]) -> None:
     tables = constant_tables(file["line/wires"], file.get("line/breaks", ()))
     for path, table in {COMPLETE: COUNTS, **tables, **fact_tables()}.items():
         if path in file:
-            _attach(file[path], table.dimensions)
-            _describe(file[path], table.unit, table.meaning, table.coordinates)
+            dataset = _table(file, path)
+            _attach(file, dataset, table.dimensions)
+            _describe(dataset, table.unit, table.meaning, table.coordinates)
     for group, rows in _ROWS.items():
-        for name, dataset in file.get(group, {}).items():
-            channel = _channel(name)
-            columns = () if dataset.ndim == 1 else (COLUMNS[channel.per],)
-            _attach(dataset, (rows, *columns))
+        for name in file.get(group, ()):
+            dataset, channel = _table(file, f"{group}/{name}"), _channel(name)
+            columns = () if dataset.rank == 1 else (COLUMNS[channel.per],)
+            _attach(file, dataset, (rows, *columns))
             clock = "time" if rows != "time" and name != "time" else ""
             _describe(dataset, channel.unit, channel.meaning, clock)
 
 
-def describe_extremes(dataset: h5py.Dataset, name: str) -> None:
+def describe_extremes(file: h5py.File, dataset: h5d.DatasetID, name: str) -> None:
     """Name the dimensions of a new table (2, columns) of the extremes of a channel."""
     channel = _channel(name)
-    _attach(dataset, ("smallest_largest", ALL_COLUMNS[channel.per]))
+    _attach(file, dataset, ("smallest_largest", ALL_COLUMNS[channel.per]))
     _describe(dataset, channel.unit, f"extremes of the {channel.meaning}")
 
 
 def describe_filtered(dataset: h5py.Dataset) -> None:
     """Name the dimensions of a new table (n, n_pantographs) of filtered contact forces."""
     channel = _channel("contact_force")
-    _attach(dataset, ("time", COLUMNS[channel.per]))
+    _attach(dataset.file, dataset.id, ("time", COLUMNS[channel.per]))
     _describe(dataset, channel.unit, f"filtered {channel.meaning}", "time")
 
 
-def hide(dataset: h5py.Dataset) -> None:
-    """Let readers of netCDF-4 take a table of a state to continue from for a dimension alone.
+def hide(group: h5py.Group) -> None:
+    """Let readers of netCDF-4 take tables of a state to continue from for dimensions alone.
 
     They need a name for each dimension of each table; whatever else a state holds is not for them.
     """
-    if not h5ds.is_scale(dataset.id):
-        h5ds.set_scale(dataset.id, _SIZE % dataset.shape[0])
+    for name in group:
+        dataset = _table(group, name)
+        if dataset.rank and not h5ds.is_scale(dataset):
+            h5ds.set_scale(dataset, _SIZE % dataset.shape[0])
+
+
+def _table(group: h5py.Group, path: str) -> h5d.DatasetID:
+    return h5d.open(group.id, path.encode())
 
 
 def _channel(name: str) -> Channel:
@@ -106,7 +114,9 @@ def _channel(name: str) -> Channel:
     return known[name]
 
 
-def _describe(dataset: h5py.Dataset, unit: str, meaning: str, coordinates: str = "") -> None:
+def _describe(
+    dataset: h5py.Dataset | h5d.DatasetID, unit: str, meaning: str, coordinates: str = ""
+) -> None:
     """Unit and meaning under the names of CF, whose unit of a mere number is 1."""
     set_attribute(dataset, "units", "1" if unit == "-" else unit)
     set_attribute(dataset, "long_name", meaning)
@@ -120,21 +130,21 @@ def _add_places(file: h5py.File, name: str, x: np.ndarray) -> None:
     _describe(made, "m", f"position along the track of each {name.replace('_', ' ')}")
 
 
-def _attach(dataset: h5py.Dataset, names: tuple[str, ...]) -> None:
+def _attach(file: h5py.File, dataset: h5d.DatasetID, names: tuple[str, ...]) -> None:
     """Name the dimensions of a table; scales that are not there are made with its sizes."""
+    most = dataset.get_space().get_simple_extent_dims(True)
     for axis, name in enumerate(names):
-        size, most = dataset.shape[axis], dataset.maxshape[axis]
-        if name not in dataset.file:
-            _add(dataset.file, name, size, most)
-        h5ds.attach_scale(dataset.id, dataset.file[name].id, axis)
+        if name.encode() not in file.id:
+            _add(file, name, dataset.shape[axis], most[axis] == h5s.UNLIMITED)
+        h5ds.attach_scale(dataset, _table(file, name), axis)
 
 
-def _add(file: h5py.File, name: str, size: int, most: int | None) -> None:
+def _add(file: h5py.File, name: str, size: int, grows: bool) -> None:
     if name in _COUNTED:
         made = create_checked(file, name, np.arange(1, size + 1))
         h5ds.set_scale(made.id, name.encode())
         _describe(made, "-", _COUNTED[name])
         return
-    open_end: dict[str, Any] = {"maxshape": (None,), "chunks": (1,)} if most is None else {}
+    open_end: dict[str, Any] = {"maxshape": (None,), "chunks": (1,)} if grows else {}
     made = file.create_dataset(name, shape=(size,), dtype="f4", **open_end)
     h5ds.set_scale(made.id, _SIZE % size)

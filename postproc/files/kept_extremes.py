@@ -37,9 +37,9 @@ def store_extremes(file: h5py.File, n_rows: int, extremes: Mapping[str, np.ndarr
     arrays = {**extremes, ROWS: np.array(n_rows, dtype=np.int64)}
     for name, values in arrays.items():
         is_new = name not in place
-        put_array(place, name, values)
+        table = put_array(place, name, values)
         if is_new and name != ROWS:
-            describe_extremes(place[name], name)
+            describe_extremes(file, table, name)
     seal_arrays(place, arrays)
 
 

@@ -278,9 +278,7 @@ class ResultFile:
             for name in set(place) - set(state):  # of the line as it was before an incident
                 del place[name]
             put_sealed_arrays(place, state)
-            for array in place.values():
-                if array.ndim:
-                    dimensions.hide(array)
+            dimensions.hide(place)
             self._order_writes()
             set_attribute(group, "latest", slot)
         self._n_states += 1
@@ -365,7 +363,7 @@ def _write_head(
         create_checked(file, name, array)
     facts = file.create_group("facts")
     for name, value in header.facts.items():
-        dataset = h5py.Dataset(put_array(facts, name, value))
+        dataset = put_array(facts, name, value)
         set_attribute(dataset, "unit", FACTS[name].unit)
         set_attribute(dataset, "meaning", FACTS[name].meaning)
     seal_arrays(facts, header.facts)

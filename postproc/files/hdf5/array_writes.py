@@ -38,14 +38,14 @@ def put_array(group: h5py.Group, name: str, values: Any) -> h5d.DatasetID:
     return made
 
 
-def set_attribute(place: h5py.HLObject, name: str, value: Any) -> None:
+def set_attribute(place: h5py.HLObject | h5d.DatasetID, name: str, value: Any) -> None:
     """Store an attribute, text with a fixed length in UTF-8; one that is there is replaced so that
     no moment is without it.
 
     Parameters
     ----------
-    place : h5py.HLObject
-        File, group or dataset.
+    place : h5py.HLObject or h5py.h5d.DatasetID
+        File, group or dataset, or the latter's identifier.
     name : str
         Name of the attribute.
     value : object
@@ -60,10 +60,12 @@ def set_attribute(place: h5py.HLObject, name: str, value: Any) -> None:
         plain = array.dtype.kind in "fiu"
         stored = _number_type(array.dtype) if plain else h5t.py_create(array.dtype, logical=True)
     key = name.encode()
-    if h5a.exists(place.id, key):
-        place.attrs.create(name, array)
+    where = place.id if isinstance(place, h5py.HLObject) else place
+    if h5a.exists(where, key):
+        owner = place if isinstance(place, h5py.HLObject) else h5py.Dataset(place)
+        owner.attrs.create(name, array)
         return
-    h5a.create(place.id, key, stored, _space_of(array)).write(array)
+    h5a.create(where, key, stored, _space_of(array)).write(array)
 
 
 def _space_of(array: np.ndarray) -> h5s.SpaceID:

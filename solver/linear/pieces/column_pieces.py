@@ -12,6 +12,7 @@ from catenary.solver.linear.pieces.pieces import Piece
 from catenary.solver.linear.unit_responses import (
     FELT_AT_MOST,
     FeltFurther,
+    Places,
     ShortColumns,
     UnitResponses,
 )
@@ -90,7 +91,7 @@ class ColumnPieces:
             return
         columns, first = self.columns, piece.slot * self._room
         like = self._operators.like
-        places = self._places._make(part[which] for part in self._places)
+        places = Places(*(part[which] for part in self._places))
         try:
             # Room and reach are those of all pieces.
             at, data = self._responses.solve(places, like, columns.reach, FELT_AT_MOST)
