@@ -124,11 +124,11 @@ def _hardware(problem: Problem) -> Iterator[list[Any]]:
             (kind.by_radial_force, "vertical stiffness radial force over length"),
             (kind.stiffness, f"vertical stiffness {kind.stiffness:g} N/m"),
         ]
-        data = [said for value, said in known if value]
+        parts = [said for value, said in known if value]
         if kind.uplift_stop is not None:
             stop = f"stop at {1e3 * kind.uplift_stop:g} mm with {kind.stop_stiffness:g} N/m"
-            data.append(stop)
-        yield [f"steady arms on {_plain(arms.wire)}", len(arms.x), ", ".join(data)]
+            parts.append(stop)
+        yield [f"steady arms on {_plain(arms.wire)}", len(arms.x), ", ".join(parts)]
     for supports in line.supports:
         yield [
             f"supports of {_plain(supports.wire)}",
