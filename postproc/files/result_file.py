@@ -341,7 +341,7 @@ def _write_head(
         "Conventions": dimensions.CONVENTIONS,
         "created": datetime.now(UTC).isoformat(timespec="seconds"),
         "n_steps_planned": stage.n_steps,
-        "n_strips": list(stage.n_strips),
+        "n_strips": list(stage.train.n_strips),
         "line_record": record.as_table(),
     }
     for name, value in {**header.attributes, **fixed}.items():

@@ -260,6 +260,9 @@ def differentiate(set_up: Callable[[float], SetUp], now: SetUp, step: float, wha
             return StepChange(_NO_STEP, (), step)
         return StepChange(LinearStep(*map(np.ascontiguousarray, parts)), (), step)
 
+    def of_state(number: int) -> np.ndarray:
+        return of(lambda one: one.states[number])
+
     pantographs = range(len(now.heads))
     start, speed = or_none(of(lambda one: one.start)), float(of(lambda one: one.speed))
     if (start.size or speed) and now.follows_surface:
@@ -278,7 +281,7 @@ def differentiate(set_up: Callable[[float], SetUp], now: SetUp, step: float, wha
         links=or_none(of(lambda one: one.links)),
         weights=or_none(of(lambda one: one.weights)),
         heads=[of_head(number) for number in pantographs],
-        states=[of(lambda one, n=number: one.states[n]) for number in pantographs],
+        states=[of_state(number) for number in pantographs],
         drives=or_none(of(lambda one: one.drives)),
         law=or_none(of(lambda one: one.law)),
         hertz=or_none(of(lambda one: one.hertz)),

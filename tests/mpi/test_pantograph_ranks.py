@@ -46,7 +46,7 @@ class Watched(Observer):
         self.open: list[np.ndarray] = []
 
     def start(self, stage: Stage) -> None:
-        assert stage.joints_in_loop
+        assert stage.train.joints_in_loop
 
     def next_state(self, step: int) -> int:
         return step + 1

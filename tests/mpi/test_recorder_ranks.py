@@ -27,6 +27,7 @@ from catenary.postproc.record.recorder import Recorder
 from catenary.postproc.record.snapshots.blocks import RecordedLine
 from catenary.postproc.record.snapshots.field_layout import Course, FieldRecord
 from catenary.postproc.record.snapshots.fields import FieldRecorder
+from catenary.solver.time_loop.views.channels import Train
 from catenary.solver.time_loop.views.observers import NodeMotion, Stage, StepView, row_of
 
 COMM = MPI.COMM_WORLD
@@ -74,7 +75,7 @@ def make_header() -> Header | None:
 
 def make_stage(share: Share) -> Stage:
     return Stage(
-        n_pantographs=2,
+        train=Train((1, 1), joints_in_loop=False),
         dt=DT,
         start_time=0.0,
         n_steps=N_STEPS,

@@ -64,9 +64,9 @@ def test_reduced_pantograph_runs_as_all_its_bodies() -> None:
     check("sigma [N]", other.std(), force.std(), within=0.01 * force.std())
     check("mean [N]", other.mean(), force.mean(), within=0.01 * force.std())
     assert (force != other).any()
-    assert full.stage is not None and full.stage.joints_in_loop
+    assert full.stage is not None and full.stage.train.joints_in_loop
     assert 0.0 < violations(full).max() < 1e-9
-    assert reduced.stage is not None and not reduced.stage.joints_in_loop
+    assert reduced.stage is not None and not reduced.stage.train.joints_in_loop
     assert np.isnan(violations(reduced)).all()
 
 

@@ -90,7 +90,7 @@ class ColumnPieces:
             return
         columns, first = self.columns, piece.slot * self._room
         like = self._operators.like
-        places = self._places._make(part[which] for part in self._places)
+        places = type(self._places)(*(part[which] for part in self._places))
         try:
             # Room and reach are those of all pieces.
             at, data = self._responses.solve(places, like, columns.reach, FELT_AT_MOST)

@@ -22,11 +22,7 @@ class Stage:
 
     Attributes
     ----------
-    n_pantographs : number of pantographs
-    n_strips : of each pantograph in running order
-    joints_in_loop : whether a pantograph has joints that may open, all its bodies being moved
-    n_wires : number of contact wires
-    lateral, uplift_stops : whether wires move sideways, and whether steady arms have stops
+    train : the pantographs, as far as they decide which channels are recorded
     dt, start_time : time step and time of the initial state [s]
     n_steps : steps planned
     arm_x, dropper_x : positions of steady arms and droppers [m]
@@ -41,7 +37,7 @@ class Stage:
     n_places : how many numbers say where each pantograph's masses or bodies are; on rank 0
     """
 
-    n_pantographs: int
+    train: Train
     dt: float
     start_time: float
     n_steps: int
@@ -51,13 +47,8 @@ class Stage:
     owned_droppers: np.ndarray
     node_points: np.ndarray
     owned_nodes: np.ndarray
-    n_strips: tuple[int, ...] = ()
     unknowns: tuple[str, ...] = ("w", "theta_y")
     n_places: tuple[int, ...] = ()
-    joints_in_loop: bool = False
-    n_wires: int = 1
-    lateral: bool = False
-    uplift_stops: bool = False
     moving: MovingColumns = field(default_factory=MovingColumns)
     wire_ends: tuple[GaugePlace, ...] = ()
     owned_ends: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
@@ -71,13 +62,6 @@ class Stage:
             channels.DROPPER: (self.dropper_x, self.owned_droppers),
             channels.WIRE_END: (np.array([end.x for end in self.wire_ends]), self.owned_ends),
         }
-
-    @property
-    def train(self) -> Train:
-        """Train as far as it decides which channels are recorded."""
-        strips = self.n_strips or (1,) * self.n_pantographs
-        laws = self.lateral, self.uplift_stops, bool(self.wire_ends)
-        return Train(strips, self.joints_in_loop, self.n_wires, *laws)
 
 
 @dataclass

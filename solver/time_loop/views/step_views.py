@@ -24,6 +24,7 @@ from catenary.solver.statics.form_finding.equilibrium import Equilibrium
 from catenary.solver.time_loop.views.channels import (
     Energies,
     Sources,
+    Train,
     energies_follow_motion,
     energies_of,
 )
@@ -157,13 +158,20 @@ class Showing:
 
     def stage(self, dt: float, start_time: float, n_steps: int) -> Stage:
         """Description of the run, which its steps do not change."""
-        mesh, model_laws = self._model.mesh, self._model.simulated
+        mesh, pantographs = self._model.mesh, self._pantographs
         points = mesh.points.copy()
         points[:, 2] = self._form.height
         if self._form.lateral is not None:
             points[:, 1] = self._form.lateral.y
         return Stage(
-            n_pantographs=self._pantographs.n,
+            train=Train(
+                n_strips=pantographs.n_strips,
+                joints_in_loop=pantographs.joints_in_loop,
+                n_wires=pantographs.n_wires,
+                lateral=pantographs.lateral,
+                uplift_stops=self._model.simulated.uplift_stops,
+                moves_along=bool(self._gauges.places),
+            ),
             dt=dt,
             start_time=start_time,
             n_steps=n_steps,
@@ -173,13 +181,8 @@ class Showing:
             owned_droppers=self._owned_droppers,
             node_points=points,
             owned_nodes=self._owned_nodes,
-            n_strips=self._pantographs.n_strips,
             unknowns=self._model.unknowns,
-            n_places=tuple(places.size for places in self._pantographs.places()),
-            joints_in_loop=self._pantographs.joints_in_loop,
-            n_wires=self._pantographs.n_wires,
-            lateral=self._pantographs.lateral,
-            uplift_stops=model_laws.uplift_stops,
+            n_places=tuple(places.size for places in pantographs.places()),
             moving=self._moving,
             wire_ends=self._gauges.places,
             owned_ends=self._owned_gauges,

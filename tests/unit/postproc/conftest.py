@@ -25,6 +25,7 @@ from catenary.solver.problem.contact_laws import LinearLaw
 from catenary.solver.problem.problem import Damping, Numerics, Placement, Problem, Train
 from catenary.solver.statics.elasticity import Elasticity
 from catenary.solver.statics.form_finding.equilibrium import Equilibrium
+from catenary.solver.time_loop.views import channels
 from catenary.solver.time_loop.views.observers import Observer, Stage, StepView, row_of
 
 N_SPANS, SPAN = 16, 50.0
@@ -174,7 +175,7 @@ class March:
 
     def stage(self, first_step: int = 0) -> Stage:
         return Stage(
-            n_pantographs=len(self.separations),
+            train=channels.Train((1,) * len(self.separations), joints_in_loop=False),
             dt=self.dt,
             start_time=first_step * self.dt,
             n_steps=self.n_steps,

@@ -8,6 +8,7 @@ from mpi4py import MPI
 
 from catenary.postproc.channels.line_record import LineRecord
 from catenary.postproc.record.line_rows import LineGather
+from catenary.solver.time_loop.views.channels import Train
 from catenary.solver.time_loop.views.observers import Stage
 from catenary.solver.window.moving_columns import Columns, MovingColumns
 
@@ -18,7 +19,17 @@ X = np.arange(N) * 10.0
 def stage(moving: MovingColumns) -> Stage:
     columns = np.arange(N)
     return Stage(
-        1, 1.0, 0.0, 100, X, X, columns, columns, np.zeros((0, 3)), np.zeros(0), moving=moving
+        Train((1,), False),
+        1.0,
+        0.0,
+        100,
+        X,
+        X,
+        columns,
+        columns,
+        np.zeros((0, 3)),
+        np.zeros(0),
+        moving=moving,
     )
 
 

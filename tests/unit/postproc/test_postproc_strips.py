@@ -16,6 +16,7 @@ from catenary.postproc.read.results import Results
 from catenary.postproc.report import csv_tables
 from catenary.postproc.report.pictures import force_pictures
 from catenary.postproc.report.report import write_report
+from catenary.solver.time_loop.views.channels import Train
 
 
 @pytest.fixture
@@ -24,7 +25,7 @@ def with_strips(make_march: Any) -> Any:
 
     class Striped(make_march):  # type: ignore[misc]
         def stage(self, first_step: int = 0) -> Any:
-            return replace(super().stage(first_step), n_strips=(1, 2))
+            return replace(super().stage(first_step), train=Train((1, 2), joints_in_loop=False))
 
         def more(self, step: int) -> Any:
             leading, trailing = self.force(step * self.dt)
