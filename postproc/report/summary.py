@@ -67,6 +67,7 @@ def summarise(
                 strict=True,
             )
         ],
+        "histograms": [_histogram(p) for p in statistics.pantographs if not p.complaint],
         "lateral": as_lateral_table(list(statistics.lateral)),
         "supports": _supports(statistics, results.arm_wires()),
         "defects": attributes.get("defects", []),
@@ -138,17 +139,15 @@ def _pantograph(
         "loss_percent": p.loss_percent,
         "arcing_percent": p.arcing_percent,
         "contact_height_range_mm": 1e3 * p.contact_height_range,
-        "histogram": _histogram(p),
         "max_constraint_violation_m": violation,
     }
 
 
-def _histogram(p: PantographStatistics) -> dict[str, Any] | None:
+def _histogram(p: PantographStatistics) -> dict[str, Any]:
     """Share of time of the filtered force in bins of one width from ``from_N`` up."""
     edges = p.histogram_edges
-    if not p.histogram_percent.size:
-        return None
-    return {"from_N": edges[0], "bin_N": edges[1] - edges[0], "percent": p.histogram_percent}
+    own = {"from_N": edges[0], "bin_N": edges[1] - edges[0]}
+    return {"name": p.name, **own, "percent": p.histogram_percent}
 
 
 def _supports(statistics: RunStatistics, wires: list[str]) -> dict[str, Any]:

@@ -144,6 +144,11 @@ def test_the_same_call_completes_histories(
         np.testing.assert_array_equal(again[name], table)
 
 
+def test_histories_of_a_lost_process_are_waited_for(tmp_path: Path) -> None:
+    KeptHistories(tmp_path, ["contact_force"], "sweep").join([], {tmp_path / "lost.h5": 4})
+    assert not list(tmp_path.iterdir())
+
+
 def test_histories_that_there_are_not_are_refused(scene: catenary.Scene, tmp_path: Path) -> None:
     vary = {"train.speed_km_h": [240, 250]}
     for out, more, words in (

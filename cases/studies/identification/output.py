@@ -98,6 +98,11 @@ def as_text(found: Identification) -> str:
     lines += _correlated(found)
     lines += ["", *(_sentence(name, one) for name, one in found.judged.items())]
     lines.append(verdict(found))
+    if len(found.sums) > 1:
+        sums = ", ".join(f"{one:.1f}" for one in found.sums)
+        lines.append(
+            f"Sums of squares of {len(found.sums)} searches, of which the first is told: {sums}"
+        )
     if not found.has_converged:
         lines.append(f"The search has not converged after {found.n_marches} marches.")
     return "\n".join(lines)
@@ -191,6 +196,7 @@ def summary_of(found: Identification) -> dict[str, Any]:
         "converged": found.has_converged,
         "n_marches": found.n_marches,
         "n_jacobians": found.n_jacobians,
+        "sums_of_squares": found.sums,
     }
 
 

@@ -17,9 +17,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
-from scipy.optimize import least_squares
+from scipy.optimize import OptimizeResult, least_squares
 
-from catenary.base.errors import InputError
+from catenary.base.errors import CatenaryError, InputError
 from catenary.cases.scene.problem import problem_of
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.identification.fitted_march import FittedMarch
@@ -40,7 +40,8 @@ from catenary.postproc.evaluate.filters import check_sampling
 # by less than this part. What is left of the sum is the squared distance to the best parameters in
 # posterior deviations: some 0.01 of n = 100.
 _TOLERANCE = 1e-4
-_MOST_MARCHES = 60
+_MOST_MARCHES = 60  # of a search
+_SEED = 0  # of the draws from which further searches start
 
 
 class Unknown(NamedTuple):
@@ -73,6 +74,7 @@ class Identification:
     modelled : of each signal the samples (n,) of the march that was found, without biases
     judged : the residuals of each signal and of "all"
     n_marches, n_jacobians : how many were made
+    sums : least sum of squares of each search that came to an end, the best first
     has_converged : whether the search ended by itself
     """
 
@@ -85,6 +87,7 @@ class Identification:
     judged: dict[str, Judged]
     n_marches: int
     n_jacobians: int
+    sums: list[float]
     has_converged: bool
 
     @property
@@ -188,17 +191,8 @@ def identify(
     unknowns += biases
     march = FittedMarch(scenes, parameters, measurement, comm, progress)
     compared = _Compared(march, measurement.signals, unknowns, offsets)
-    m = len(unknowns)
-    found = least_squares(
-        lambda at: np.concatenate([compared.residual(at), at]),
-        np.zeros(m),
-        lambda at: np.concatenate([-compared.jacobian(at), np.eye(m)]),
-        method="lm",
-        ftol=_TOLERANCE,
-        xtol=_TOLERANCE,
-        gtol=_TOLERANCE,
-        max_nfev=_MOST_MARCHES,
-    )
+    searches = _searches(compared, len(unknowns), task.starts, progress)
+    found = searches[0]
     residual, jacobian = compared.residual(found.x), compared.jacobian(found.x)
     n = measurement.place.size
     return Identification(
@@ -215,8 +209,41 @@ def identify(
         ),
         compared.n_marches,
         compared.n_jacobians,
+        [2.0 * one.cost for one in searches],
         bool(found.status > 0),
     )
+
+
+def _searches(
+    compared: _Compared, m: int, starts: int, progress: Callable[[str], None]
+) -> list[OptimizeResult]:
+    """Searches for m unknowns from the priors' means and from draws of the priors, the best first.
+
+    Droppers that slacken make kinks, between which a search may be caught. A draw whose line cannot
+    hang, or whose march breaks, is left out.
+    """
+    rng, found = np.random.default_rng(_SEED), []
+    for number in range(starts):
+        start = rng.normal(size=m) if number else np.zeros(m)
+        try:
+            one = least_squares(
+                lambda at: np.concatenate([compared.residual(at), at]),
+                start,
+                lambda at: np.concatenate([-compared.jacobian(at), np.eye(m)]),
+                method="lm",
+                ftol=_TOLERANCE,
+                xtol=_TOLERANCE,
+                gtol=_TOLERANCE,
+                max_nfev=_MOST_MARCHES,
+            )
+        except CatenaryError as error:
+            if not number:
+                raise
+            progress(f"search {number + 1} of {starts} broke: {error}")
+            continue
+        progress(f"search {number + 1} of {starts}: sum of squares {2.0 * one.cost:.1f}")
+        found.append(one)
+    return sorted(found, key=lambda one: float(one.cost))
 
 
 def _measurement(scene: Scene, measured: Path | pd.DataFrame, task: Task) -> Measurement:

@@ -34,9 +34,11 @@ class Droppers(Table):
 
 
 class Task(Table):
-    """The whole file."""
+    """The whole file; ``starts`` is the number of searches, the first from the means of the priors,
+    others from draws of them, of which the best is taken."""
 
     measured: Measured
+    starts: Annotated[int, Field(ge=1, le=100)] = 1
     parameters: Annotated[list[Sought], Field(max_length=1000)] = []
     droppers: Droppers | None = None
 

@@ -41,10 +41,10 @@ def force_histograms(ended: Sequence[Ended]) -> ForceHistograms | None:
     above 10 kN, that their bins are wider than others.
     """
     known = [
-        (one.variant.name, pantograph["name"], own)
+        (one.variant.name, own["name"], own)
         for one in ended
-        for pantograph in one.summary.get("pantographs", [])
-        if (own := pantograph.get("histogram")) and own["bin_N"] == HISTOGRAM_BIN
+        for own in one.summary.get("histograms", [])
+        if own["bin_N"] == HISTOGRAM_BIN
     ]
     if not known:
         return None

@@ -112,6 +112,8 @@ class KeptHistories(KeptRows):
     def join(self, variants: Sequence[Variant], pieces: Mapping[Path, int]) -> None:
         """Make one file of those of the pieces, and remove these. Not collective.
 
+        Where one is missing, of a process that was lost, they wait for the same command.
+
         Parameters
         ----------
         variants : of all pieces, in their order
@@ -123,6 +125,8 @@ class KeptHistories(KeptRows):
             If the disk refuses.
         """
         if not self._is_joined():
+            if not all(piece.is_file() for piece in pieces):
+                return
             shapes = [shape for piece in pieces for shape in _shapes(piece)]
             n_steps, n = np.max(shapes, axis=0, initial=1).tolist()
             try:

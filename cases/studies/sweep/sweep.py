@@ -16,7 +16,6 @@ from catenary.cases.studies.sweep.jobs import (
     RunOptions,
     check_histories,
     in_order,
-    interrupted,
     jobs_and_refused,
 )
 from catenary.cases.studies.sweep.variants import Variant
@@ -113,8 +112,8 @@ def run_sweep(
         files = on_root(
             comm, lambda: output.write(out, name, ended, show, histogram), takes_long=True
         )
-    if sweep.ensemble is not None and sweep.ensemble.histories and not interrupted(ended):
-        files.append(out / "histories.h5")
+    if sweep.ensemble is not None and sweep.ensemble.histories:
+        files += [path for path in (out / "histories.h5",) if path.is_file()]
     return ended, files
 
 

@@ -29,7 +29,7 @@ from catenary.postproc.files.run_schema import DONE, INTERRUPTED
 # that was stopped may go on with more.
 _MOST, _LEAST, _PIECES = 64, 4, 16
 # What a sweep's table needs of a summary.
-_KEPT = ("pantographs", "droppers", "acceptance", "not_judged", "passed", "remarks")
+_KEPT = ("pantographs", "histograms", "droppers", "acceptance", "not_judged", "passed", "remarks")
 
 
 class Ensemble(NamedTuple):
