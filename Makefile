@@ -36,10 +36,10 @@ endif
 # The targets share .venv and two cores: one after the other, also under make -j.
 .NOTPARALLEL:
 .PHONY: help setup setup-newest update-versions run check test test-studies test-unit \
-    test-verification test-regression test-mpi test-ranks bench long-runs fuzz test-paraview test-readers docs sanitize lint types mypy links format clean
+    test-verification test-regression test-mpi test-ranks bench long-runs fuzz test-paraview test-readers docs sanitize aarch64 lint types mypy links format clean
 
 help: ## list the targets
-	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 20
+	@sed -n 's/^\([a-z0-9-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 20
 
 setup: ## install what is needed, system packages included; quick when all is there
 	@PYTHONPATH="$(PYTHONPATH)" bash .setup/setup.sh
@@ -138,6 +138,13 @@ sanitize: setup ## tests with kernels that check memory and arithmetic; SANITIZE
 	    ASAN_OPTIONS=detect_leaks=0 UBSAN_OPTIONS=print_stacktrace=1 \
 	    LD_PRELOAD="$$(g++ -print-file-name=libasan.so) $$(g++ -print-file-name=libstdc++.so)" \
 	    $(PYTEST) -p no:benchmark --capture=sys --timeout=3000 $(SANITIZED_TESTS)
+
+# No test runs there; a compiler sees at least that nothing takes an x86 processor for granted.
+AARCH64 := aarch64-linux-gnu-g++
+aarch64: ## whether a compiler for ARM takes the kernels, without Python (Debian: g++-aarch64-linux-gnu)
+	@command -v $(AARCH64) >/dev/null || { echo "aarch64 needs $(AARCH64): apt-get install g++-aarch64-linux-gnu"; exit 1; }
+	$(AARCH64) -std=c++20 -fsyntax-only -Wall -Wextra -Wno-psabi -Werror -Isolver/kernels \
+	    $(filter-out solver/kernels/python/%,$(filter %.cpp,$(KERNELS)))
 
 # Material for MkDocs warns of what a next major version of MkDocs will change; the bounds hold that off.
 docs: setup links ## the documentation as a site, build/site/index.html; warnings are errors

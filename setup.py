@@ -29,10 +29,9 @@ PARTS = ("meshgen", "solver", "mbs", "postproc", "cases")
 PLACED = {"catenary": "cases/api", "catenary.base": "solver/base"}
 KERNELS = "solver/kernels"
 # Sources that take longest to compile, by how they begin.
-LONGEST = tuple(
-    f"{KERNELS}/{begin}"
-    for begin in ("stations/avx2", "stations/baseline", "stations/scenes", "python/")
-)
+BINDINGS = f"{KERNELS}/python/"
+LONGEST = (*(f"{KERNELS}/stations/{of}" for of in ("avx2", "baseline", "scenes")), BINDINGS)
+OBJECTS, SANITIZED_OBJECTS = "build/kernels", "build/sanitized/objects"
 
 # No target is named: a wheel runs on every processor of its architecture, and a source that has
 # loops for a newer one says so itself, by pragmas. Pybind11Extension adds -fvisibility=hidden and
@@ -42,9 +41,10 @@ FLAGS = [
     *("-Wall", "-Wextra", "-Wno-psabi", "-MMD"),
 ]
 SANITIZED = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
-# Python's own flags let integers wrap around, which would pass for wanted.
+# Python's own flags let integers wrap around, which would pass for wanted. Reports name functions
+# and lines (-g1); where variables are takes long to work out.
 SANITIZED_FLAGS = [
-    *("-O1", "-g", "-fno-omit-frame-pointer", "-fstrict-overflow", "-U_FORTIFY_SOURCE"),
+    *("-O1", "-g1", "-fno-omit-frame-pointer", "-fstrict-overflow", "-U_FORTIFY_SOURCE"),
     *("-D_GLIBCXX_ASSERTIONS", "-DCATENARY_CHECKS"),
     *SANITIZED,
 ]
@@ -79,7 +79,7 @@ class BuildKernels(build_ext):
     def finalize_options(self) -> None:
         """Choose the folder of the objects; ``compile_or_link`` says which are made anew."""
         super().finalize_options()
-        folder = "build/sanitized/objects" if self.sanitize else "build/kernels"
+        folder = SANITIZED_OBJECTS if self.sanitize else OBJECTS
         self.build_temp = f"{folder}/{sysconfig.get_platform()}-{sys.implementation.cache_tag}"
         self.force = True
 
@@ -87,14 +87,15 @@ class BuildKernels(build_ext):
         """Run compiler and linker by ``compile_or_link``."""
         if self.sanitize:
             for extension in self.extensions:
-                extension.extra_compile_args += SANITIZED_FLAGS
                 extension.extra_link_args += SANITIZED
         # setuptools 84 calls one, earlier ones the other.
         self.compiler.call = self.compiler.spawn = self.compile_or_link
-        # It sorts sources by name: a long one that begins last leaves the other cores idle.
+        # It sorts sources by name: a long one that begins last leaves the other cores idle. But of
+        # functions that several objects have the linker takes the first, which is to be checked.
         compile_all = self.compiler.compile
+        last = BINDINGS if self.sanitize else ()
         self.compiler.compile = lambda sources, **how: compile_all(
-            sorted(sources, key=lambda source: not source.startswith(LONGEST)), **how
+            sorted(sources, key=lambda of: (of.startswith(last), not of.startswith(LONGEST))), **how
         )
         super().build_extensions()
 
@@ -105,11 +106,22 @@ class BuildKernels(build_ext):
         return os.path.join(folder, "libcatenary.so") if file.startswith("libcatenary.") else name
 
     def compile_or_link(self, command: list[str], **_: object) -> None:
-        """Run the linker, or the compiler unless its object is there and up to date."""
-        if any(word.startswith(f"{KERNELS}/python/") for word in command):
-            command = [*command, "-O1"]  # they call what the others compute: a third of the time
-        if self.sanitize and any(word.startswith(f"{KERNELS}/stations/") for word in command):
-            command = [*command, *SANITIZED_STATIONS]
+        """Run the linker, or the compiler unless its object is there and up to date.
+
+        Bindings call what the others compute: they are compiled with less care, in a third of the
+        time, and without checks, so that their objects are those of the ordinary build.
+        """
+        if self.sanitize:
+            own, ordinary = f"{SANITIZED_OBJECTS}/", f"{OBJECTS}/"
+            command = [
+                word.replace(own, ordinary) if f"/{BINDINGS}" in word else word for word in command
+            ]
+        if any(word.startswith(BINDINGS) for word in command):
+            command = [*command, "-O1"]
+        elif self.sanitize and "-c" in command:
+            command = [*command, *SANITIZED_FLAGS]
+            if any(word.startswith(f"{KERNELS}/stations/") for word in command):
+                command += SANITIZED_STATIONS
         words = shlex.join(command)
         target = Path(command[command.index("-o") + 1])
         if "-c" not in command:
@@ -119,6 +131,7 @@ class BuildKernels(build_ext):
         warnings = target.with_suffix(".warnings")
         if not is_current(target, words):
             written = target.with_suffix(".command")
+            target.parent.mkdir(parents=True, exist_ok=True)
             written.unlink(missing_ok=True)
             begin = time.time_ns()
             with warnings.open("w", encoding="utf-8") as file:

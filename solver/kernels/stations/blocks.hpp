@@ -52,7 +52,8 @@ struct GivenMasks {
 
 // Vectors up to which a kernel that finds masks at run time adds each block in its place. Where
 // processors differ much the oldest is spared the code: compiling it took a sixth of all the time.
-#if defined(CATENARY_GENERAL_ONLY)
+// So are builds that check each access.
+#if defined(CATENARY_GENERAL_ONLY) || defined(CATENARY_CHECKS)
 constexpr int kInPlace = 1;
 #else
 constexpr int kInPlace = 3;

@@ -99,6 +99,16 @@ constexpr Shipped kShipped[] = {
     dense(12),
 };
 
+/// Whether builds that check each access have kernels of their own for one of them: with checks
+/// they take long to compile, and their source is the same for all. Other builds have all.
+constexpr bool is_checked([[maybe_unused]] const Shipped& of) {
+#if defined(CATENARY_CHECKS)
+    return of.rows == shipped(4, {0, 1, 2}).rows;  // two wires with droppers
+#else
+    return true;
+#endif
+}
+
 /// The layout of the least products among those that kernels were compiled for which has all of a
 /// layout's: stations without kernels of their own take twice as long as with some that make as
 /// many products. If there is none its own squares, of which general kernels make all at once.

@@ -136,20 +136,12 @@ class SceneKernels final : public Kernels {
     Blocks blocks_;
 };
 
-// As of one scene: with checks those of wide stations take too long to compile.
-#if defined(CATENARY_CHECKS)
-constexpr int kWidestOfScenes = 4;
-#else
-constexpr int kWidestOfScenes = kMostUnknowns;
-#endif
-
 /// Kernels of L scenes that were compiled for rows and factors, or null.
 template <int L, int K = 0>
 std::unique_ptr<Kernels> make_for_scenes(const Layout& rows, const Layout& factors) {
     if constexpr (K < std::size(kShipped)) {
         constexpr Shipped s = kShipped[K];
-        if constexpr (s.rows.unknowns <= kWidestOfScenes && s.rows.unknowns * L <= kMostNumbers &&
-                      s.is_for_scenes)
+        if constexpr (is_checked(s) && s.rows.unknowns * L <= kMostNumbers && s.is_for_scenes)
             if (rows == s.rows && factors == s.factors)
                 return std::make_unique<SceneKernels<SceneBlocks<K, L>>>(rows, factors);
         return make_for_scenes<L, K + 1>(rows, factors);

@@ -17,22 +17,21 @@ std::unique_ptr<Kernels> make_general(const Layout& rows, const Layout& factors)
         return nullptr;
 }
 
-// Where processors differ much the oldest has the general kernels only.
+/// Whether kernels are compiled for one of the shipped lines.
+constexpr bool is_compiled([[maybe_unused]] const Shipped& of) {
 #if defined(CATENARY_GENERAL_ONLY)
-constexpr int kWidestKnown = 0;
-#elif defined(CATENARY_CHECKS)
-// Products of wide stations, each written out, with checks take a quarter of an hour to compile.
-constexpr int kWidestKnown = 4;
+    return false;  // where processors differ much the oldest has the general kernels only
 #else
-constexpr int kWidestKnown = kMostUnknowns;
+    return is_checked(of);
 #endif
+}
 
 /// Kernels that were compiled for both, or null.
 template <int K = 0>
 std::unique_ptr<Kernels> make_quick(const Layout& rows, const Layout& factors) {
     if constexpr (K < std::size(kShipped)) {
         constexpr Shipped s = kShipped[K];
-        if constexpr (s.rows.unknowns <= kWidestKnown) {
+        if constexpr (is_compiled(s)) {
             using Known = Blocks<s.rows.unknowns, KnownMasks<K>>;
             if (rows == s.rows && factors == s.factors)
                 return std::make_unique<QuickKernels<Known, s.is_mixed>>(
