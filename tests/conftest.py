@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -39,3 +41,13 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Put ``FIRST`` first; the others keep their order."""
     first = [Path(__file__).parent / name for name in FIRST]
     items.sort(key=lambda item: first.index(item.path) if item.path in first else len(first))
+
+
+@pytest.fixture(autouse=True)
+def _log_as_before() -> Iterator[None]:
+    """Verbs that a test calls in this process send the program's log where they want it."""
+    root = logging.getLogger("catenary")
+    handlers, level, passed_on = root.handlers[:], root.level, root.propagate
+    yield
+    root.handlers[:], root.propagate = handlers, passed_on
+    root.setLevel(level)

@@ -80,8 +80,9 @@ def test_a_mesh_given_back_gives_the_same_forces(line: Path, made: Path, tmp_pat
     differences = largest_differences(out, made)
     # The file holds 16 digits, so that only the order of sums may differ: round-off, 1e-16 a step,
     # over 2000 steps, and a hundred times that for droppers that slacken.
-    print(f"{differences}, allowed 1e-11")
-    assert max(differences.values()) < 1e-11
+    # Elements that rounding tells apart share the matrices of the first: 4e-12 of each.
+    print(f"{differences}, allowed 2e-10")
+    assert max(differences.values()) < 2e-10
 
 
 def test_a_mesh_of_another_program_gives_nearly_the_same_forces(

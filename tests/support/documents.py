@@ -190,4 +190,4 @@ def _with_key(text: str, table: str, line: str) -> str:
 
 def make_targets(makefile: Path) -> set[str]:
     """Targets that a Makefile explains."""
-    return set(re.findall(r"^([a-z-]+):.*##", makefile.read_text(), re.M))
+    return set(re.findall(r"^([a-z0-9-]+):.*##", makefile.read_text(), re.M))

@@ -91,9 +91,12 @@ def test_an_effect_with_nothing_to_act_on_is_refused(name: str) -> None:
     # A requirement that lacks data itself would be told in its place.
     words += WINDY if "wind" in effect.requires else []
     words += RIGID if name == "contact_loss" else []
-    load_scene("en50318_2002", words)
+    case = "en50318_2002"
+    if name == "dropper_slackening":  # that line has droppers
+        case, words = "conductor_rail", []
+    load_scene(case, words)
     with pytest.raises(InputError) as refused:
-        load_scene("en50318_2002", [*words, f"effects.{name}=true"])
+        load_scene(case, [*words, f"effects.{name}=true"])
     if name in OWN_SENTENCE:
         assert str(refused.value).startswith(OWN_SENTENCE[name])
     else:

@@ -76,9 +76,9 @@ class Direction(StrEnum):
 
 @verb(
     "speed",
-    help="Find the highest speed at which the criteria hold in both directions. All acceptance "
-    "criteria together and each by itself: an ensemble over speeds, then bisection. The same "
-    "command continues one that was stopped.",
+    help="Find the highest speed at which the criteria hold. They hold if they do in both "
+    "directions, all together and each by itself: an ensemble over speeds, then bisection. The "
+    "same command continues one that was stopped.",
     epilog="Example: catenary speed en50318_2002 -o results/highest --from 200 --to 360",
 )
 def speed(
