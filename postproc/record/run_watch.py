@@ -132,8 +132,8 @@ class RunWatch(Observer):
         self._rotations = [name for name in _ROTATIONS if name in stage.unknowns]
         self._arm_length = self._run.arm_length[stage.owned_arms]
         self._arm_x = stage.arm_x[stage.owned_arms]
-        self._lost_since = np.full(len(stage.train.n_strips), np.nan)
-        self._lost_at = np.zeros(len(stage.train.n_strips))
+        self._lost_since = np.full(stage.n_pantographs, np.nan)
+        self._lost_at = np.zeros(stage.n_pantographs)
 
     def next_state(self, step: int) -> int:
         """The step of the next look; rows of others will do."""
@@ -311,7 +311,7 @@ class StripWatch(Observer):
         """Begin to watch a march."""
         ends = stage.train.n_wires * np.cumsum([0, *stage.train.n_strips])
         self._contacts = [slice(*pair) for pair in zip(ends[:-1], ends[1:], strict=True)]
-        self._warned = [False] * len(stage.train.n_strips)
+        self._warned = [False] * stage.n_pantographs
 
     def next_state(self, step: int) -> int:
         """Rows are enough."""
