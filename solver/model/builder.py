@@ -71,7 +71,7 @@ class ModelBuilder:
         """Springs from nodes to the ground [N/m], without force in the equilibrium."""
         values = np.broadcast_to(np.asarray(stiffness, dtype=float), nodes.shape)
         dofs = self.model.dofs(nodes, unknown)[:, None]
-        self.add_elements(component, dofs, stiffness=values[:, None, None])
+        self.add_block(Block.of_elements(component, dofs, stiffness=values[:, None, None]))
 
     def add_masses(
         self,
@@ -87,7 +87,7 @@ class ModelBuilder:
         """
         values = np.broadcast_to(np.asarray(mass, dtype=float), nodes.shape)
         dofs = self.model.dofs(nodes, unknown)
-        self.add_elements(component, dofs[:, None], mass=values[:, None, None])
+        self.add_block(Block.of_elements(component, dofs[:, None], mass=values[:, None, None]))
         for name in _LEVEL if unknown == "w" else ():
             there = self.model.numbering.has(nodes, name)
             if there.any():
@@ -101,7 +101,7 @@ class ModelBuilder:
         """Point masses (n,) [kg] at places of wires in the vertical plane, which they weigh on."""
         unknowns, weights = places
         matrices = mass[:, None, None] * weights[:, :, None] * weights[:, None, :]
-        self.add_elements(component, unknowns, mass=matrices)
+        self.add_block(Block.of_elements(component, unknowns, mass=matrices))
         self.model.hanging.append(Hanging(unknowns, mass[:, None] * weights))
 
     def add_links(
@@ -128,7 +128,9 @@ class ModelBuilder:
                 raise ValueError(f"links of one sign need a name of their own, not {component}")
         model.links.append(links)
         stiffness = links.stiffness_matrices
-        self.add_elements(component, direction.unknowns, stiffness=stiffness, of_shape=of_shape)
+        self.add_block(
+            Block.of_elements(component, direction.unknowns, stiffness=stiffness, of_shape=of_shape)
+        )
         return links
 
     def add_droppers(self) -> None:
@@ -144,7 +146,9 @@ class ModelBuilder:
         for number, group in enumerate(self.problem.line.droppers):
             mine = mesh.dropper_group == number
             unknowns = model.droppers.direction.unknowns[mine]
-            self.add_elements(group.name, unknowns, stiffness=matrices[mine], of_shape=True)
+            self.add_block(
+                Block.of_elements(group.name, unknowns, stiffness=matrices[mine], of_shape=True)
+            )
             if self.problem.slack_dampers_act and slack[mine].any():
                 self._add_dampers(group.name, mine & slack)
 
@@ -156,27 +160,15 @@ class ModelBuilder:
         kept = (model.dropper_damping - model.released_damping)[which]
         lacking = (1.0 - model.simulated.kept_ratio) * kept
         damping = lacking[:, None, None] * weights[:, :, None] * weights[:, None, :]
-        self.add_elements(component, unknowns, damping=damping)
+        self.add_block(Block.of_elements(component, unknowns, damping=damping))
 
     def add_load(self, load: Load) -> None:
         """A load in time, of one of the kinds in ``model/loads.py``."""
         self.model.loads.append(load)
         self._n_terms += len(load.unknowns)
 
-    def add_elements(
-        self,
-        component: str,
-        dofs: np.ndarray,
-        mass: np.ndarray | None = None,
-        stiffness: np.ndarray | None = None,
-        damping: np.ndarray | None = None,
-        of_shape: bool = False,
-    ) -> None:
-        """Elements with a matrix each, see ``Block.of_elements``; masses carry no weight."""
-        self.add_block(Block.of_elements(component, dofs, mass, stiffness, damping, of_shape))
-
     def add_block(self, block: Block) -> None:
-        """Elements of which like ones share matrices already; masses carry no weight."""
+        """Element matrices of any kind; masses carry no weight."""
         dofs, kind = (part.astype(np.int32, copy=False) for part in (block.dofs, block.kind))
         self.model.blocks.append(replace(block, dofs=dofs, kind=kind))
         self._n_terms += block.dofs.shape[0]

@@ -74,7 +74,11 @@ def _add_pendulums(builder: ModelBuilder) -> None:
     matrices = stiffness[:, None, None] * weights[:, :, None] * weights[:, None, :]
     for number, droppers in enumerate(line.droppers):
         mine = mesh.dropper_group == number
-        builder.add_elements(droppers.name, unknowns[mine], stiffness=matrices[mine], of_shape=True)
+        builder.add_block(
+            Block.of_elements(
+                droppers.name, unknowns[mine], stiffness=matrices[mine], of_shape=True
+            )
+        )
     for number, arms in enumerate(line.steady_arms):
         if model.simulated.lateral:
             continue  # bars, which swing along the track as well
@@ -131,7 +135,7 @@ def _add_friction(builder: ModelBuilder, ends: list[wire_ends.WireEnd]) -> None:
         ]
     ).T
     damping = 0.5 * (high - low) / CREEP
-    builder.add_elements(TENSIONERS, unknowns, damping=damping[:, None, None])
+    builder.add_block(Block.of_elements(TENSIONERS, unknowns, damping=damping[:, None, None]))
     outwards = np.array([[float(end.outwards)] for end in ends])
     x = builder.mesh.x(nodes)
     # A wire that pulls more than the band allows moves inwards, one that pulls less outwards.

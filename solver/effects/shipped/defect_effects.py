@@ -12,6 +12,7 @@ from catenary.meshgen.line import Line
 from catenary.solver.effects.effect import Effect, register
 from catenary.solver.effects.shipped import irregularity_effects  # noqa: F401  (built before)
 from catenary.solver.model.link_directions import at_places
+from catenary.solver.model.model import Block
 from catenary.solver.problem.defects import (
     HardSpot,
     Kink,
@@ -54,7 +55,7 @@ def _hard_spots(builder: ModelBuilder) -> None:
             builder.add_masses_at(spot.wire, place, np.array([spot.mass]))
         if spot.stiffness:
             spring = spot.stiffness * place.weights[:, :, None] * place.weights[:, None, :]
-            builder.add_elements(spot.wire, place.unknowns, stiffness=spring)
+            builder.add_block(Block.of_elements(spot.wire, place.unknowns, stiffness=spring))
 
 
 def _kinks(laws: Simulated, problem: Problem) -> Simulated:

@@ -94,7 +94,9 @@ def _lines_beyond(builder: ModelBuilder) -> None:
                     f"{error}, as where nothing holds a wire"
                 ) from error
     for end in ends:  # once both are found, as these are no part of what goes on
-        builder.add_elements(_BEYOND, end.unknowns[None], end.mass[None], end.stiffness[None])
+        builder.add_block(
+            Block.of_elements(_BEYOND, end.unknowns[None], end.mass[None], end.stiffness[None])
+        )
         builder.add_load(MemoryLoad(end.unknowns, numerics.dt, steps_of(problem), end.memory))
 
 

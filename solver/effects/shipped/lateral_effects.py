@@ -11,6 +11,7 @@ from catenary.solver.effects.effect import Effect, register
 from catenary.solver.effects.shipped import vertical_effects  # noqa: F401  (built before)
 from catenary.solver.model.link_directions import between_nodes, sideways_of_droppers
 from catenary.solver.model.links import Direction, law
+from catenary.solver.model.model import Block
 
 if TYPE_CHECKING:
     from catenary.meshgen.hardware import SteadyArms
@@ -46,7 +47,7 @@ def _pendulums(builder: ModelBuilder) -> None:
         mine = builder.mesh.dropper_group == number
         unknowns, weights = direction.unknowns[mine], direction.weights[mine]
         springs = stiffness[mine, None, None] * weights[:, :, None] * weights[:, None, :]
-        builder.add_elements(group.name, unknowns, stiffness=springs, of_shape=True)
+        builder.add_block(Block.of_elements(group.name, unknowns, stiffness=springs, of_shape=True))
 
 
 def _bars(builder: ModelBuilder, arms: SteadyArms, mine: np.ndarray) -> None:
@@ -67,10 +68,10 @@ def _bars(builder: ModelBuilder, arms: SteadyArms, mine: np.ndarray) -> None:
     builder.add_links(name, Direction(unknowns, -unit), laws, of_shape=True)
     across = np.eye(len(names)) - unit[:, :, None] * unit[:, None, :]
     pull = (tension / length)[:, None, None]
-    builder.add_elements(name, unknowns, stiffness=pull * across, of_shape=True)
+    builder.add_block(Block.of_elements(name, unknowns, stiffness=pull * across, of_shape=True))
     if swings and not slewed:
         along = model.dofs(nodes, "u")[:, None]
-        builder.add_elements(name, along, stiffness=pull, of_shape=True)
+        builder.add_block(Block.of_elements(name, along, stiffness=pull, of_shape=True))
 
 
 register(
