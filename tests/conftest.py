@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 import os
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -44,10 +43,9 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 @pytest.fixture(autouse=True)
-def _log_as_before() -> Iterator[None]:
-    """Verbs that a test calls in this process send the program's log where they want it."""
-    root = logging.getLogger("catenary")
-    handlers, level, passed_on = root.handlers[:], root.level, root.propagate
-    yield
-    root.handlers[:], root.propagate = handlers, passed_on
-    root.setLevel(level)
+def _log_without_handlers() -> None:
+    """Verbs that tests and their fixtures call in this process send the program's log elsewhere."""
+    log = logging.getLogger("catenary")
+    log.handlers.clear()
+    log.propagate = True
+    log.setLevel(logging.NOTSET)

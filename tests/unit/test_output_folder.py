@@ -138,7 +138,6 @@ def test_a_very_large_run_asks_for_force(
     with pytest.raises(InputError, match="give --force to run it all the same") as caught:
         check_size(tmp_path, size, force=False)
     assert words in str(caught.value) and "1000000.0 GB are free" in str(caught.value)
-    logging.getLogger("catenary").propagate = True
     with caplog.at_level(logging.INFO, logger="catenary.run"):
         check_size(tmp_path, size, force=True)
     assert words in caplog.text
