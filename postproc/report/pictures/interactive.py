@@ -194,8 +194,7 @@ def _shapes(axes: Axes, own: str) -> Iterator[dict[str, Any]]:
         ends = _ends(axes, own, patch.get_data_transform(), low, high)
         face, name = to_rgba(patch.get_facecolor()), _named(patch.get_label())
         look = {"fillcolor": to_hex(face), "opacity": face[3], "line": {"width": 0}}
-        shown = {"showlegend": bool(name) and not own}
-        yield {"type": "rect", "layer": "below", **look, **shown, **name, **ends}
+        yield {"type": "rect", "layer": "below", **look, **name, **ends}
     for line in axes.lines:
         across = line.get_transform() in (axes.get_xaxis_transform(), axes.get_yaxis_transform())
         if across and line.get_linestyle() != "None":
