@@ -25,6 +25,7 @@ from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.problem import problem_of, resolved
 from catenary.cases.scene.run.case import rule_entries
 from catenary.cases.scene.scene import Scene
+from catenary.cases.studies.sweep.variants import OF_THE_TRAIN
 from catenary.postproc.channels.facts import facts_of
 from catenary.postproc.channels.header import Header, static_datasets
 from catenary.postproc.evaluate import statistics as stats
@@ -88,8 +89,6 @@ class Keeper(Observer):
         return self._extremes
 
 
-# Tables of a scene that its line, and how that is stepped, do not depend on.
-_OF_THE_TRAIN = ("case", "train", "pantographs", "contact", "evaluation", "output", "test")
 # What changes the line at rest, but not how it moves about that.
 _OF_THE_REST = "dropper_lengths"
 # Lanes have no watch of energies and motions. A march by itself is watched, and is made of scenes
@@ -217,7 +216,7 @@ class Marches:
 
 def _key_of_line(scene: Scene) -> str:
     """What the line of a scene depends on but for errors of the droppers' lengths, as text."""
-    tables = {name: own for name, own in resolved(scene).items() if name not in _OF_THE_TRAIN}
+    tables = {name: own for name, own in resolved(scene).items() if name not in OF_THE_TRAIN}
     if _OF_THE_REST in tables.get("irregularities", {}):
         tables["irregularities"] = {**tables["irregularities"], _OF_THE_REST: "some"}
     return json.dumps(tables, sort_keys=True)

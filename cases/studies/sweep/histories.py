@@ -109,15 +109,15 @@ class KeptHistories(KeptRows):
         assert record is not None
         return record.with_suffix(".h5")
 
-    def join(self, variants: Sequence[Variant], pieces: Mapping[Path, int]) -> None:
+    def join(self, variants: Sequence[Variant], pieces: Mapping[Path, Sequence[int]]) -> None:
         """Make one file of those of the pieces, and remove these. Not collective.
 
         Where one is missing, of a process that was lost, they wait for the same command.
 
         Parameters
         ----------
-        variants : of all pieces, in their order
-        pieces : the file of each, and its number of variants
+        variants : of all pieces
+        pieces : the file of each, and the places of its variants among all
 
         Raises
         ------
@@ -132,10 +132,8 @@ class KeptHistories(KeptRows):
             try:
                 with appears_whole(self._path) as partial, opened(partial, "w") as file:
                     _describe(file, variants, self._names, (len(variants), n_steps, n))
-                    row = 0
-                    for piece, size in pieces.items():
-                        _copy(piece, size, file, row)
-                        row += size
+                    for piece, rows in pieces.items():
+                        _copy(piece, rows, file)
                     file.attrs[_SWEEP] = self._sweep
             except OSError as error:
                 raise unwritten(self._path, error) from error
@@ -158,14 +156,14 @@ def _shapes(piece: Path) -> list[tuple[int, int]]:
         return [group[_POSITION].shape for group in file.values()]
 
 
-def _copy(piece: Path, n: int, file: h5py.File, first: int) -> None:
-    """Copy the variants of a piece to the rows from ``first`` on."""
+def _copy(piece: Path, rows: Sequence[int], file: h5py.File) -> None:
+    """Copy the variants of a piece to their rows."""
     with open_own(piece) as source:
-        for number in range(n):
+        for number, row in enumerate(rows):
             if str(number) not in source:
                 continue  # a variant that broke
             for name, table in source[str(number)].items():
-                place = (first + number, *(slice(0, size) for size in table.shape))
+                place = (row, *(slice(0, size) for size in table.shape))
                 file[name][place] = table[...]
 
 

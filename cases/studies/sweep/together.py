@@ -20,8 +20,15 @@ from catenary.cases.scene.input.faults import UnfitScene
 from catenary.cases.scene.load import Draft
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.records import KeptRows
-from catenary.cases.studies.sweep.jobs import Ended, Part, RunOptions, interrupted, scene_of
-from catenary.cases.studies.sweep.variants import Variant
+from catenary.cases.studies.sweep.jobs import (
+    Ended,
+    Part,
+    RunOptions,
+    in_order,
+    interrupted,
+    scene_of,
+)
+from catenary.cases.studies.sweep.variants import DIRECTION, OF_THE_TRAIN, Variant
 from catenary.postproc.files.run_schema import DONE, INTERRUPTED
 
 # Variants of a piece of work at most: some seconds, that a stop may cost. Of few variants pieces
@@ -86,7 +93,8 @@ def run_ensemble(
     part : of the pieces of work, all if None
     """
     size = max(_LEAST, min(_MOST, -(-len(ensemble.variants) // _PIECES)))
-    pieces = [ensemble.variants[at : at + size] for at in range(0, len(ensemble.variants), size)]
+    by_line = sorted(ensemble.variants, key=_of_the_line)
+    pieces = [by_line[at : at + size] for at in range(0, len(by_line), size)]
     if part is not None:
         pieces = part.of(pieces)
     variants = [variant for piece in pieces for variant in piece]
@@ -133,11 +141,22 @@ def run_ensemble(
             )
     except Interrupted:
         ended.append(Ended(variants[len(ended)], INTERRUPTED))
-        return ended
+        return in_order(variants, ended, ())
     if histories is not None and part is None:
-        sizes = {file: len(piece) for file, piece in zip(files, pieces, strict=True) if file}
-        on_root(comm, lambda: histories.join(variants, sizes), takes_long=True)
-    return ended
+        row_of = {variant.name: row for row, variant in enumerate(ensemble.variants)}
+        rows_of = {
+            file: [row_of[variant.name] for variant in piece]
+            for file, piece in zip(files, pieces, strict=True)
+            if file
+        }
+        on_root(comm, lambda: histories.join(ensemble.variants, rows_of), takes_long=True)
+    return in_order(ensemble.variants, ended, ())
+
+
+def _of_the_line(variant: Variant) -> list[str]:
+    """What changes the line of a variant: its direction and assignments."""
+    changes = [one for one in variant.assignments if one.split(".")[0] not in OF_THE_TRAIN]
+    return [variant.varied.get(DIRECTION, ""), *changes]
 
 
 @dataclass
