@@ -177,6 +177,16 @@ def test_second_order_indices_of_ishigamis_function() -> None:
         check(f"S2 of {one} and {other}", value, known, within=0.1)
 
 
+def test_an_index_of_what_happens_once_has_no_bounds() -> None:
+    """Base samples that differ by rounding alone have no variance to compare with."""
+    table, sampling = ishigami_table(n=16, method="saltelli")
+    values = np.where(np.arange(len(table.frame)) // sampling.block % 2, 0.1 + 0.2, 0.3)
+    values[1] = 0.1
+    table.frame["std_N"] = values
+    widths = [row[name] for row in evaluate(table).sensitivity for name in ("S1_conf", "ST_conf")]
+    assert any(map(math.isnan, widths)) and not any(width > 10 for width in widths)
+
+
 @pytest.mark.parametrize("method", ["sobol", "latin_hypercube", "random"])
 def test_indices_from_given_data_of_ishigamis_function(method: str) -> None:
     table, _ = ishigami_table(n=4000, method=method)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator
 from itertools import combinations
 from typing import Any
@@ -26,14 +27,16 @@ _FEWEST, _MANY = 100, 500
 _HARMONICS = 4, 10
 # Resamples for bounds, of up to _MOST runs and of more: those have small bounds, at a greater cost.
 _RESAMPLES, _MOST = (100, 25), 5000
+# Half width beyond which a bound of an index, a number from 0 to 1, is none.
+_WIDEST = 10.0
 
 
 def indices(table: RunTable) -> tuple[str, list[dict[str, Any]], list[str]]:
     """Sensitivity indices of all statistics: their method, rows, and notes on what is left out.
 
     Rows have ``statistic``, ``pantograph``, ``key``, ``S1``, ``S1_conf`` (half width of the 95 %
-    interval) and, with Saltelli's samples, ``ST``, ``ST_conf``, or, of a second-order index,
-    ``with``, ``S2``, ``S2_conf``. ``rank_correlation`` is Spearman's.
+    interval, NaN if there is none) and, with Saltelli's samples, ``ST``, ``ST_conf``, or, of a
+    second-order index, ``with``, ``S2``, ``S2_conf``. ``rank_correlation`` is Spearman's.
     """
     sampling = table.sampling
     if sampling is not None and sampling.method == SALTELLI:
@@ -60,7 +63,8 @@ def _sobol(table: RunTable, sampling: SamplingTable) -> tuple[list[dict[str, Any
                 notes[f"{lost} of {sampling.n} base samples are incomplete and left out"] = None
             if np.ptp(whole) == 0.0:
                 continue  # nothing varies
-            with np.errstate(divide="ignore", invalid="ignore"):  # resamples without variance
+            with np.errstate(divide="ignore", invalid="ignore"), warnings.catch_warnings():
+                warnings.simplefilter("ignore", UserWarning)  # resamples without variance
                 found = sobol.analyze(
                     problem_of(sampling.columns),
                     whole.ravel(),
@@ -71,7 +75,7 @@ def _sobol(table: RunTable, sampling: SamplingTable) -> tuple[list[dict[str, Any
             here = {"statistic": statistic, "pantograph": pantograph}
             for i, key in enumerate(sampling.columns):
                 row = {name: float(found[name][i]) for name in ("S1", "S1_conf", "ST", "ST_conf")}
-                rows.append({**here, "key": key, **row})
+                rows.append({**here, "key": key, **_with_bounds(row)})
             if sampling.second_order:
                 rows += _interactions(here, sampling, found)
     return rows, list(notes)
@@ -82,7 +86,13 @@ def _interactions(
 ) -> Iterator[dict[str, Any]]:
     for (i, key), (j, other) in combinations(enumerate(sampling.columns), 2):
         row = {name: float(found[name][i, j]) for name in ("S2", "S2_conf")}
-        yield {**here, "key": key, "with": other, **row}
+        yield {**here, "key": key, "with": other, **_with_bounds(row)}
+
+
+def _with_bounds(row: dict[str, float]) -> dict[str, float]:
+    """NaN for half widths that say nothing: of resamples that hardly vary."""
+    empty = {name: np.nan for name in row if name.endswith("_conf") and row[name] > _WIDEST}
+    return row | empty
 
 
 def ranked_inputs(table: RunTable) -> list[str]:
