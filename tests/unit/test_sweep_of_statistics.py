@@ -17,6 +17,7 @@ from catenary.cases.studies.records import FOLDER
 from catenary.cases.studies.sweep.force_histograms import force_histograms
 from catenary.cases.studies.sweep.histories import KeptHistories
 from catenary.cases.studies.sweep.jobs import HISTORIES, Ended
+from catenary.cases.studies.sweep.together import pieces_of_work
 from catenary.cases.studies.sweep.variants import Variant
 
 VARY: dict[str, list[Any]] = {
@@ -40,6 +41,22 @@ def same(one: pd.DataFrame, other: pd.DataFrame) -> None:
     pd.testing.assert_frame_equal(
         one.drop(columns="wall_s"), other.drop(columns="wall_s"), rtol=0.0, atol=1e-8
     )
+
+
+def test_pieces_of_work_have_one_line_and_stay_when_more_variants_come() -> None:
+    def variants(n: int, n_lines: int) -> list[Variant]:
+        keys = [(f"train.speed_km_h={200 + i}", f"line.n_spans={i % n_lines}") for i in range(n)]
+        return [Variant(str(i), assignments) for i, assignments in enumerate(keys)]
+
+    # 4 lines have 10 variants each: two full pieces of 4, and 2 variants that share a piece.
+    few, more = (pieces_of_work(variants(n, 4), 4) for n in (40, 80))
+    n_lines = [len({one.assignments[1] for one in piece}) for piece in few]
+    assert n_lines == [1] * 8 + [2, 2]
+    assert all(piece in more for piece in few[:8])
+    assert sorted(int(one.name) for piece in few for one in piece) == list(range(40))
+    # Of lines with a variant each, pieces are in the order of the variants.
+    few, more = (pieces_of_work(variants(n, 100), 4) for n in (40, 80))
+    assert few == more[:10]
 
 
 def test_the_table_is_that_of_whole_runs(scene: catenary.Scene, table: pd.DataFrame) -> None:

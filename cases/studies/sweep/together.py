@@ -8,6 +8,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import chain
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -93,8 +94,7 @@ def run_ensemble(
     part : of the pieces of work, all if None
     """
     size = max(_LEAST, min(_MOST, -(-len(ensemble.variants) // _PIECES)))
-    by_line = sorted(ensemble.variants, key=_of_the_line)
-    pieces = [by_line[at : at + size] for at in range(0, len(by_line), size)]
+    pieces = pieces_of_work(ensemble.variants, size)
     if part is not None:
         pieces = part.of(pieces)
     variants = [variant for piece in pieces for variant in piece]
@@ -153,10 +153,27 @@ def run_ensemble(
     return in_order(ensemble.variants, ended, ())
 
 
-def _of_the_line(variant: Variant) -> list[str]:
+def pieces_of_work(variants: Sequence[Variant], size: int) -> list[list[Variant]]:
+    """Pieces of at most ``size`` variants each, those of a line together.
+
+    Variants that come to these leave pieces as they are that are full and have one line, and those
+    of lines with one variant each.
+    """
+    whole, begun = list[list[Variant]](), dict[tuple[str, ...], list[Variant]]()
+    for variant in variants:
+        own = begun.setdefault(_of_the_line(variant), [])
+        own.append(variant)
+        if len(own) == size:
+            whole.append(own.copy())
+            own.clear()
+    left = list(chain.from_iterable(begun.values()))
+    return whole + [left[at : at + size] for at in range(0, len(left), size)]
+
+
+def _of_the_line(variant: Variant) -> tuple[str, ...]:
     """What changes the line of a variant: its direction and assignments."""
-    changes = [one for one in variant.assignments if one.split(".")[0] not in OF_THE_TRAIN]
-    return [variant.varied.get(DIRECTION, ""), *changes]
+    changes = (one for one in variant.assignments if one.split(".")[0] not in OF_THE_TRAIN)
+    return (variant.varied.get(DIRECTION, ""), *changes)
 
 
 @dataclass
