@@ -22,10 +22,10 @@ from catenary.cases.run.describe.pantographs import header_words
 from catenary.cases.run.header import header_of
 from catenary.cases.run.planning.plan import effect_rows
 from catenary.cases.run.scene_mesh import mesh_of
+from catenary.cases.scene.keys.keys import OF_THE_TRAIN
 from catenary.cases.scene.problem import problem_of, resolved
 from catenary.cases.scene.run.case import rule_entries
 from catenary.cases.scene.scene import Scene
-from catenary.cases.studies.sweep.variants import OF_THE_TRAIN
 from catenary.postproc.channels.facts import facts_of
 from catenary.postproc.channels.header import Header, static_datasets
 from catenary.postproc.evaluate import statistics as stats

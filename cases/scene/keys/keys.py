@@ -19,6 +19,8 @@ from catenary.solver.effects import all_effects as effects
 # Stands for an index into a list of tables or for a name that the scene chooses.
 ANY = "*"
 # A longer key is no misspelt one.
+# Tables of a scene that its line, and how that is stepped, do not depend on.
+OF_THE_TRAIN = ("case", "train", "pantographs", "contact", "evaluation", "output", "test")
 _LONGEST = 200
 
 

@@ -18,6 +18,7 @@ from catenary.cases.process.interrupts import Interrupted
 from catenary.cases.process.petsc_options import start_petsc
 from catenary.cases.process.workers import WorkerLost, at_once
 from catenary.cases.scene.input.faults import UnfitScene
+from catenary.cases.scene.keys.keys import OF_THE_TRAIN
 from catenary.cases.scene.load import Draft
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.records import KeptRows
@@ -29,7 +30,7 @@ from catenary.cases.studies.sweep.jobs import (
     interrupted,
     scene_of,
 )
-from catenary.cases.studies.sweep.variants import DIRECTION, OF_THE_TRAIN, Variant
+from catenary.cases.studies.sweep.variants import DIRECTION, Variant
 from catenary.postproc.files.run_schema import DONE, INTERRUPTED
 
 # Variants of a piece of work at most: some seconds, that a stop may cost. Of few variants pieces

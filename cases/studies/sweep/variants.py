@@ -27,8 +27,6 @@ _LONGEST_SLUG = 100  # folder names may have 255 bytes; room for what a user put
 # direction of the train, whose scene is turned for the one backward.
 NAMES, DIRECTION = "variant", "direction"
 _OPENING, _CLOSING, _QUOTES = "[{", "]}", "\"'"
-# Tables of a scene that its line, and how that is stepped, do not depend on.
-OF_THE_TRAIN = ("case", "train", "pantographs", "contact", "evaluation", "output", "test")
 
 
 @dataclass(frozen=True)
