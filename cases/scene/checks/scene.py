@@ -62,7 +62,6 @@ def faults_of(scene: Scene) -> list[Fault]:
         found.collect(of_tables, scene)
     if found.collect(_pantograph_names, scene):
         found.collect(pantographs.check_pantographs, scene)
-        found.collect(numerics.check_scheme, scene)
         found.collect(pantographs.check_laws, scene)
     # What is too large is not made, and what follows from a wrong unit is not reported.
     sound = not whole or found.collect(mesh_size.size_faults, scene)
