@@ -100,6 +100,7 @@ def faults_of(scene: Scene) -> list[Fault]:
             found.collect(numerics.check_window, scene)
     if not found.faults:
         # They ask the problem, which is made of a sound scene only.
+        found.collect(effects.check_damped, scene)
         found.collect(effects.check_chosen_act, scene)
         found.collect(effects.check_twins, scene)
     return found.faults
