@@ -17,12 +17,11 @@ STEP_PER_UNKNOWN = 2.6e-9  # [s]
 # wires that stretch, in three planes: no two of their stations are alike, and answers are long.
 STATION_COST = {2: 0.6, 4: 1.0, 6: 1.8, 8: 2.2, 10: 7.1, 12: 5.6, 16: 8.0}
 # What stations of several types take more than as many of one.
-SEVERAL_MAKE_UPS = 1.25
+SEVERAL_TYPES = 1.25
 # Gusts on wires [s an unknown], measured with the case windy_viaduct.
 GUSTS_PER_UNKNOWN = 4e-9
-# The fixed-point scheme repeats the solve, and PETSc's TSALPHA2 factors anew in every iteration:
-# 240 and 1800 us were measured with the same case.
-SCHEME_FACTOR = {"one_solve": 1.0, "fixed_point": 9.0, "ts_alpha2": 70.0}
+# The fixed-point scheme repeats the solve: 240 us were measured with the same case.
+SCHEME_FACTOR = {"one_solve": 1.0, "fixed_point": 9.0}
 # A substep of a pantograph with all its bodies: 0.21 to 0.38 ms were measured with the paper's
 # seven, by the way of keeping joints.
 ALL_BODIES_SUBSTEP = 3.0e-4  # [s]
@@ -73,7 +72,7 @@ def cost_of_stations(stations: Mapping[int, int]) -> float:
     of stations of four."""
     sizes, counts = np.array(list(stations)), np.array(list(stations.values()))
     costs = np.interp(sizes, list(STATION_COST), list(STATION_COST.values()))
-    several = SEVERAL_MAKE_UPS if sizes.size > 1 else 1.0
+    several = SEVERAL_TYPES if sizes.size > 1 else 1.0
     return float(several * 4.0 * (counts @ costs) / (counts @ sizes))
 
 

@@ -72,9 +72,16 @@ def animate(
 
     Parameters
     ----------
-    records : what ``guard.examined`` found in the result file
-    progress : whether a bar shows how far it is, if standard error is a terminal
-    shapes : of the pantographs, None for schematics
+    folder : Path
+        Result folder; the films are written there.
+    wish : Wish
+        Times, line and size of the pictures.
+    records : Records or None
+        Findings of ``guard.examined`` in the result file.
+    progress : bool
+        Whether a bar shows how far it is, if standard error is a terminal.
+    shapes : sequence of Shape, optional
+        Shapes of the pantographs, None for schematics.
 
     Raises
     ------
@@ -134,9 +141,12 @@ def times_of_pictures(shown: np.ndarray, speed: float, every: float) -> np.ndarr
 
     Parameters
     ----------
-    shown : times of the snapshots [s]
-    speed : of the train [m/s]
-    every : travel of the train between two pictures [m]
+    shown : ndarray, shape (n,)
+        Times of the snapshots [s].
+    speed : float
+        Speed of the train [m/s].
+    every : float
+        Travel of the train between two pictures [m].
     """
     apart = speed * float(np.diff(shown).mean())
     if speed == 0.0 or apart > SMOOTH_UP_TO:

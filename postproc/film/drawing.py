@@ -207,11 +207,16 @@ class Drawing:
 
         Parameters
         ----------
-        row : record at that time
-        moved : (n_nodes, 3) how far the line's nodes have moved, NaN where it is not known [m]
-        beside : the parts beside the line, see `Scenery.beside`
-        forces : (n_droppers,) of droppers [N], zero of those that are slack; None if not recorded
-        span : line in the picture, from and to [m]
+        row : int
+            Record at that time.
+        moved : ndarray, shape (n_nodes, 3)
+            Displacements of the line's nodes [m], NaN where they are not known.
+        beside : dict
+            Parts beside the line, see `Scenery.beside`.
+        forces : ndarray, shape (n_droppers,), or None
+            Forces of the droppers [N], zero if slack; None if not recorded.
+        span : tuple of float
+            Line in the picture, from and to [m].
         """
         # What is not known is beyond the picture, or at rest.
         moved = np.nan_to_num(moved)

@@ -57,8 +57,12 @@ class Projection:
 
         Parameters
         ----------
-        rest, moved : (n, 3) along the track, to the left and upward [m]
-        eye : place along the track from where it is looked at from behind [m]
+        rest : ndarray, shape (n, 3)
+            Points at rest: along the track, to the left and upward [m].
+        moved : ndarray, shape (n, 3), or float, optional
+            Displacements of these points [m].
+        eye : float, optional
+            Place along the track of the observer of the view from behind [m].
         """
         moved = np.broadcast_to(moved, rest.shape)
         aside, up = (self.scale.size * rest[:, 1:] + self.scale.motion * moved[:, 1:]).T
@@ -123,9 +127,13 @@ class Picture:
 
         Parameters
         ----------
-        extremes : (2, 3) of the motion [m], see `Snapshots.extremes`
-        motion : the factor of motions if it is given; otherwise the largest motion fills a share
-            of the room between the wires, and nothing is drawn larger that hardly moves
+        data : FilmData
+            Data of the film.
+        extremes : ndarray, shape (2, 3)
+            Smallest and largest motion [m], see `Snapshots.extremes`.
+        motion : float or None
+            Factor of motions; if None, the largest motion fills a share of the room between the
+            wires, and nothing is drawn larger that hardly moves.
         """
         plan = self.view is View.PLAN
         axes = {View.SIDE: [2], View.PLAN: [1]}.get(self.view, [1, 2])

@@ -191,14 +191,17 @@ class Scenery:
         return View.SIDE
 
     def beside(self, time: float, frame: Frame) -> dict[str, Places]:
-        """Where the parts beside the line are at a time [s].
+        """Where the parts beside the line are at a time.
 
         A head that presses on a wire is drawn where the wire is, which is drawn between its nodes;
         the arms below it give way in proportion.
 
         Parameters
         ----------
-        frame : the line at that time
+        time : float
+            Time [s].
+        frame : Frame
+            The line at that time.
         """
         data, row = self.data, self.data.row_at(time)
         position, height = data.position[row], data.rest_height(data.position[row])
@@ -262,7 +265,8 @@ def coaches(position: np.ndarray) -> np.ndarray:
 
     Parameters
     ----------
-    position : of the pantographs [m]
+    position : ndarray, shape (n_pantographs,)
+        Places of the pantographs along the track [m].
     """
     front = float(position.max()) + AHEAD
     n = 1 + int((front - float(position.min())) // (COACH + GAP))

@@ -190,12 +190,13 @@ class Snapshots:
         places = np.split(row[n:], np.cumsum(self._sizes)[:-1]) if n else []
         return list(zip(row[:n].tolist(), places, strict=True))
 
-    def need_whole(self, for_what: str) -> None:
-        """Raise InputError unless each snapshot shows all nodes, as ``for_what`` needs."""
+    def need_whole(self) -> None:
+        """Raise InputError unless each snapshot shows all nodes, as a space-time picture needs."""
         if not self.whole:
             raise InputError(
-                f"{self._path} shows a part of the line only, and {for_what} needs all of it; run "
-                "the scene again without output.field_window_m, field_spans and field_parts"
+                f"{self._path} shows a part of the line only, and a space-time picture needs all "
+                "of it; run the scene again without output.field_window_m, field_spans and "
+                "field_parts"
             )
 
     def extremes(
@@ -208,8 +209,11 @@ class Snapshots:
 
         Parameters
         ----------
-        numbers : of the snapshots
-        seen : (n_nodes,) which nodes count in a snapshot, one at least; None for all
+        numbers : ndarray of int
+            Numbers of the snapshots.
+        seen : callable, optional
+            Mask (n_nodes,) of the nodes that count in a snapshot of a number, one at least; None
+            for all nodes.
         """
         some = numbers[:: max(1, numbers.size // _SAMPLED)].tolist()
         moved = [self.displacement(one) for one in some]

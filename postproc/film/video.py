@@ -36,11 +36,16 @@ def write(
 
     Parameters
     ----------
-    pictures : (height, width, 4) uint8 each
-    size : width and height [px], both even
-    rate : pictures a second of the MP4
-    mp4, gif : files, replaced when the new ones are whole
-    colours : that pictures have; the GIF takes its 256 from these and from the first picture
+    pictures : iterable of ndarray, shape (height, width, 4), dtype uint8
+        Pictures of the film.
+    size : tuple of int
+        Width and height [px], both even.
+    rate : float
+        Pictures a second of the MP4 [1/s].
+    mp4, gif : Path
+        Files, replaced when the new ones are whole.
+    colours : sequence of str, optional
+        Colours of the pictures; the GIF takes its 256 from these and from the first picture.
 
     Raises
     ------

@@ -87,11 +87,6 @@ class ColumnGather:
         return whole
 
 
-def next_flush(step: int, flush_every: int) -> int:
-    """The next step after ``step`` at which files are written: the last of ``flush_every``."""
-    return step + flush_every - (step + 1) % flush_every
-
-
 def _check_partition(parts: list[np.ndarray], n_columns: int) -> None:
     claimed = np.sort(np.concatenate(parts))
     if not np.array_equal(claimed, np.arange(n_columns)):

@@ -14,23 +14,22 @@ from typing import Any
 import numpy as np
 
 from catenary.base.errors import RunBroken
-from catenary.base.parallel import on_root
 from catenary.postproc.channels.header import Header
 from catenary.postproc.channels.line_record import LineRecord
 from catenary.postproc.files.disk import Elsewhere, NoRoom, broken_write
 from catenary.postproc.files.filtered_force import ForceFilter
 from catenary.postproc.files.result_file import LineRows, ResultFile
 from catenary.postproc.files.run_schema import DONE, INTERRUPTED
-from catenary.postproc.record.column_gather import next_flush
+from catenary.postproc.record.file_observer import FileObserver
 from catenary.postproc.record.line_rows import LineGather
 from catenary.solver.time_loop.views import channels
-from catenary.solver.time_loop.views.observers import NEVER, Observer, Stage, StepView
+from catenary.solver.time_loop.views.observers import NEVER, Stage, StepView
 
 # Single steps of which the line's channels are taken in together.
 _WAITING = 16
 
 
-class Recorder(Observer):
+class Recorder(FileObserver[ResultFile]):
     """Observer that writes ``run.h5``.
 
     Collective, like all its methods except ``observe`` between flushes. Call ``close`` after
@@ -66,18 +65,15 @@ class Recorder(Observer):
     ) -> None:
         if comm.rank == 0 and header is None:
             raise ValueError("rank 0 needs the head of the result file")
-        self._comm = comm
+        super().__init__(comm, flush_every)
         self._path = Path(path)
         self._header = header
-        self._flush_every = flush_every
         self._energy_every = energy_every
         self._record = record or LineRecord()
         self._resume = resume
         self._on_begun = on_begun
         self._force_filter = force_filter
         self._is_done = False
-        self._file: ResultFile | None = None
-        self._broken = False
         self._view: StepView | None = None
         # Parts of a row of a view by channel, and the buffers that they go to.
         self._kept: dict[str, tuple[slice, np.ndarray]] = {}
@@ -111,9 +107,9 @@ class Recorder(Observer):
         self._energies_follow_motion = channels.energies_follow_motion()
         self._time = np.zeros(rows)
         self._names = [channel.name for channel in channels.train_channels(stage.train)]
-        self._guarded(lambda: self._open(stage))
+        self._guarded(lambda: self._open(stage), self._failed)
         if self._resume:
-            self._guarded(self._read_extremes)
+            self._guarded(self._read_extremes, self._failed)
             self._line.restore(self._comm.bcast(self._extremes, root=0))
 
     def observe(self, view: StepView) -> None:
@@ -142,7 +138,7 @@ class Recorder(Observer):
         """The step of the next flush, or record of energies that need more than the motion."""
         if not self._flushed_once:
             return step + 1
-        following = next_flush(step, self._flush_every)
+        following = super().next_state(step)
         if not self._energies_follow_motion:
             following = min(following, self._next_energies(step))
         return following
@@ -164,7 +160,7 @@ class Recorder(Observer):
             return
         if self._kept:
             self._flush(self._view if outcome in (DONE, INTERRUPTED) else None)
-        self._guarded(lambda: self._open_file.conclude(outcome))
+        self._guarded(lambda: self._open_file.conclude(outcome), self._failed)
         self._is_done = outcome == DONE
 
     def close(self, performance: Mapping[str, Any] | None = None) -> None:
@@ -177,14 +173,14 @@ class Recorder(Observer):
             which rank 0 alone needs.
         """
         if not self._broken:
-            self._guarded(lambda: self._close(performance or {}))
+            self._guarded(lambda: self._close(performance or {}), self._failed)
 
     def _flush(self, view: StepView | None) -> None:
         """Gather the buffers, append them, and store the state of ``view``. Collective."""
         self._take_waiting()
         line = self._line()
         state = view.state() if view is not None else None
-        self._guarded(lambda: self._append(self._blocks(), line, state))
+        self._guarded(lambda: self._append(self._blocks(), line, state), self._failed)
         self._rows = self._n_taken = 0
         self._energies.clear()
         self._flushed_once = True
@@ -225,26 +221,15 @@ class Recorder(Observer):
 
     # ---- rank 0 ------------------------------------------------------------------------------
 
-    def _guarded(self, work: Callable[[], None]) -> None:
-        """Run ``work`` on rank 0; if it fails, all ranks raise RunBroken. Collective."""
-
-        def attempt() -> None:
-            try:
-                work()
-            except (OSError, RuntimeError) as error:  # h5py raises both when a disk is full
-                broken = broken_write(self._path, self._last_time, error, self.begun)
-                if isinstance(error, (NoRoom, Elsewhere)) and self._file is not None:
-                    self._file.conclude(str(broken))
-                    self._file.close({})
-                elif self._file is not None:
-                    self._file.abandon()
-                raise broken from error
-
-        try:
-            on_root(self._comm, attempt)
-        except RunBroken:
-            self._broken = True
-            raise
+    def _failed(self, error: Exception) -> RunBroken:
+        """The error for the user; the file is closed with it, or abandoned."""
+        broken = broken_write(self._path, self._last_time, error, self.begun)
+        if isinstance(error, (NoRoom, Elsewhere)) and self._file is not None:
+            self._file.conclude(str(broken))
+            self._file.close({})
+        elif self._file is not None:
+            self._file.abandon()
+        return broken
 
     def _open(self, stage: Stage) -> None:
         assert self._header is not None
@@ -289,9 +274,3 @@ class Recorder(Observer):
             table = np.array(self._energies)
             blocks.update({f"energy/{n}": table[:, i] for i, n in enumerate(channels.ENERGIES)})
         return {**blocks, "time": self._time[: self._rows]}
-
-    @property
-    def _open_file(self) -> ResultFile:
-        if self._file is None:
-            raise RuntimeError("the recorder was not started")
-        return self._file

@@ -85,7 +85,7 @@ def watched(at_rest: LineAtRest, has_train: bool = True) -> Watched:
     static = sum(place.static_force**2 for place in train.placements)
     outer = any(not isinstance(load, MemoryLoad) for load in model.loads)
     steady = not outer and not model.simulated.incidents
-    summed = numerics.scheme != "ts_alpha2" and numerics.adaptive_tolerance is None
+    summed = numerics.adaptive_tolerance is None
     return Watched(
         static_energy=0.5 * static * float(np.max(at_rest.lift.lift, initial=0.0)),
         counts_energy=steady and summed,

@@ -56,6 +56,8 @@ class Effect:
     applies : whether the problem holds anything for it to act on
     instead : why it does not act on what a problem holds for it, "" if it acts or there is none
     build : adds matrices, weights, held unknowns and loads in time to the model
+    components : names of what ``build`` adds beside wires and groups of the line, which damping
+        may be given for
     law : the record of laws with the fields that the effect sets. Effects are applied in building
         order, so that an effect may change what one that it requires has set
     of_form : whether ``build`` reads the shape at rest, ``Model.form``
@@ -77,6 +79,7 @@ class Effect:
     applies: Callable[[Problem], bool] = lambda problem: True
     instead: Callable[[Problem], str] = lambda problem: ""
     build: Callable[[ModelBuilder], None] | None = None
+    components: tuple[str, ...] = ()
     law: Callable[[Simulated, Problem], Simulated] | None = None
     lifts: tuple[Limit, ...] = ()
     data: str = ""

@@ -90,9 +90,8 @@ class Numerics:
     ``generalized_alpha`` with ``spectral_radius``; ``beta`` and ``gamma`` are also those of the
     pantographs, which step by Newmark's method always.
 
-    ``scheme`` is ``one_solve``, ``ts_alpha2`` (PETSc's own stepper on the whole system) or
-    ``fixed_point`` (paper eqs. 2.4-2.7); ``eps_d`` [m] and ``eps_v`` [m/s] end its iteration, at
-    most ``max_iterations`` times a step.
+    ``scheme`` is ``one_solve`` or ``fixed_point`` (paper eqs. 2.4-2.7); ``eps_d`` [m] and
+    ``eps_v`` [m/s] end its iteration, at most ``max_iterations`` times a step.
     ``coupling`` of ``one_solve`` is ``implicit``, ``iterated`` (until contact forces change by
     less than ``eps_force`` [N], at most ``max_iterations`` times) or ``explicit``. ``iterations``
     of ``fixed_point`` are done in every step whatever they reach; None iterates until it agrees.

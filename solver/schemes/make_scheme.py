@@ -1,6 +1,6 @@
 """All that steps a line and its train with steps of one size, made from a problem.
 
-Schemes but the usual one are imported where they are wanted.
+Schemes are entries of ``SCHEMES``; all but the usual one are imported where they are wanted.
 """
 
 from __future__ import annotations
@@ -106,12 +106,7 @@ class SchemeFactory:
         )
         if problem.window.moves:
             self._open_window(problem, model, line, interaction, pantographs)
-        scheme_of: dict[str, Callable[[Problem, Model, ForcesOnLine, Pantographs], Scheme]] = {
-            "one_solve": own._one_solve,
-            "fixed_point": own._fixed_point,
-            "ts_alpha2": own._ts_alpha2,
-        }
-        scheme = scheme_of[problem.numerics.scheme](problem, model, interaction, pantographs)
+        scheme = SCHEMES[numerics.scheme](own, problem, model, interaction, pantographs)
         return Parts(line, interaction, pantographs, scheme)
 
     def _open_window(
@@ -140,34 +135,36 @@ class SchemeFactory:
         )
         line.open_window(window)
 
-    def _one_solve(
-        self, problem: Problem, model: Model, interaction: ForcesOnLine, pantographs: Pantographs
-    ) -> Scheme:
-        links = interaction.link_coupling
-        coupled = no_links() if links is None else links.coupled
-        law = law_in_steps(problem, model.simulated, pantographs.n_contacts)
-        coupling = make_coupling(law, coupled, problem.numerics)
-        return OneSolve(self.comm, interaction, pantographs, coupling)
 
-    def _fixed_point(
-        self, problem: Problem, model: Model, interaction: ForcesOnLine, pantographs: Pantographs
-    ) -> Scheme:
-        from catenary.solver.schemes.fixed_point import FixedPoint
+def _one_solve(
+    factory: SchemeFactory,
+    problem: Problem,
+    model: Model,
+    interaction: ForcesOnLine,
+    pantographs: Pantographs,
+) -> Scheme:
+    links = interaction.link_coupling
+    coupled = no_links() if links is None else links.coupled
+    law = law_in_steps(problem, model.simulated, pantographs.n_contacts)
+    coupling = make_coupling(law, coupled, problem.numerics)
+    return OneSolve(factory.comm, interaction, pantographs, coupling)
 
-        return FixedPoint(
-            self.comm,
-            interaction,
-            pantographs,
-            problem.numerics,
-            law_in_steps(problem, model.simulated, pantographs.n_contacts),
-        )
 
-    def _ts_alpha2(
-        self, problem: Problem, model: Model, interaction: ForcesOnLine, pantographs: Pantographs
-    ) -> Scheme:
-        from catenary.solver.schemes.monolithic_system import WholeSystem
-        from catenary.solver.schemes.ts_alpha2 import TSAlpha2
+def _fixed_point(
+    factory: SchemeFactory,
+    problem: Problem,
+    model: Model,
+    interaction: ForcesOnLine,
+    pantographs: Pantographs,
+) -> Scheme:
+    from catenary.solver.schemes.fixed_point import FixedPoint
 
-        loads = interaction.line.loads
-        system = WholeSystem(problem, model, self.form, self.nominal_height, loads)
-        return TSAlpha2(self.comm, interaction, pantographs, system, problem.numerics)
+    law = law_in_steps(problem, model.simulated, pantographs.n_contacts)
+    return FixedPoint(factory.comm, interaction, pantographs, problem.numerics, law)
+
+
+# What makes the scheme of each ``Numerics.scheme``.
+SCHEMES: dict[str, Callable[[SchemeFactory, Problem, Model, ForcesOnLine, Pantographs], Scheme]] = {
+    "one_solve": _one_solve,
+    "fixed_point": _fixed_point,
+}

@@ -23,7 +23,6 @@ from mpi4py import MPI
 from catenary.base.errors import CatenaryError, InputError, RunBroken
 from catenary.base.freed_memory import give_back
 from catenary.base.petsc import PETSc
-from catenary.meshgen.wires import Role
 from catenary.solver.contact.contact_wire import ContactWires
 from catenary.solver.contact.train.pantographs import Pantographs, nominal_height_rule
 from catenary.solver.effects.all_effects import simulated
@@ -103,16 +102,6 @@ class March:
     ) -> None:
         self._comm = comm
         self._problem = problem
-        if problem.numerics.scheme == "ts_alpha2" and comm.size > 1:
-            raise InputError(
-                f"numerics.scheme is ts_alpha2, which runs on one rank only, not on {comm.size}: "
-                'take "one_solve", or start it without mpirun'
-            )
-        if problem.numerics.scheme == "ts_alpha2" and len(problem.line.wires_of(Role.CONTACT)) > 1:
-            raise InputError(
-                "numerics.scheme is ts_alpha2, for one contact wire only, and this line has "
-                'several: take "one_solve"'
-            )
         if problem is not model.problem:
             # The same line under other laws: a contact, a train, a damping of its own.
             model = replace(model, problem=problem, simulated=simulated(problem))

@@ -27,7 +27,7 @@ from catenary.postproc.record.recorder import Recorder
 from catenary.postproc.record.snapshots.blocks import RecordedLine
 from catenary.postproc.record.snapshots.field_layout import Course, FieldRecord
 from catenary.postproc.record.snapshots.fields import FieldRecorder
-from catenary.solver.time_loop.views.channels import Train
+from catenary.solver.time_loop.views.channels import TrainLayout
 from catenary.solver.time_loop.views.observers import NodeMotion, Stage, StepView, row_of
 
 COMM = MPI.COMM_WORLD
@@ -75,7 +75,7 @@ def make_header() -> Header | None:
 
 def make_stage(share: Share) -> Stage:
     return Stage(
-        train=Train((1, 1)),
+        train=TrainLayout((1, 1)),
         dt=DT,
         start_time=0.0,
         n_steps=N_STEPS,
@@ -200,8 +200,8 @@ def test_fields_reach_the_file(folder: Path, share: Share) -> None:
         RecordedLine(wires, np.array([[35, 5], [45, 15]])),
         every=20,
         record=FieldRecord(("uplift", "velocity", "tension")),
-        snapshots_per_flush=3,
     )
+    recorder.most_kept = 3
     recorder.start(make_stage(share))
     for step in range(N_STEPS + 1):
         recorder.observe(make_view(step, share))
@@ -232,8 +232,8 @@ def test_a_window_gathers_what_it_shows(folder: Path, share: Share) -> None:
         RecordedLine({"contact_wire": nodes}),
         every=20,
         record=FieldRecord(("uplift", "velocity"), window=(4.0, 6.0), course=course),
-        snapshots_per_flush=3,
     )
+    recorder.most_kept = 3
     recorder.start(make_stage(share))
     for step in range(N_STEPS + 1):
         view = make_view(step, share)

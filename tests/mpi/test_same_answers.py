@@ -11,10 +11,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from mpi4py import MPI
-from rank_histories import histories, largest_difference
+from rank_histories import largest_difference
 from small_lines import bare_wires
 
-from catenary.base.errors import InputError
 from catenary.base.parallel import on_root
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.load import load_scene
@@ -106,14 +105,6 @@ def test_steps_that_adapt_do_so_on_all_ranks(case: tuple[Problem, LineMesh], sch
     train = replace(problem.train, end=problem.train.start + 20.0, raise_time=0.15)
     found = largest_difference(replace(problem, numerics=numerics, train=train), mesh)
     assert max(found.values()) < TOLERANCE
-
-
-@pytest.mark.skipif(MPI.COMM_WORLD.size == 1, reason="one rank is what the scheme asks for")
-def test_a_scheme_for_one_rank_is_refused_on_all(case: tuple[Problem, LineMesh]) -> None:
-    problem, mesh = case
-    numerics = replace(problem.numerics, scheme="ts_alpha2")
-    with pytest.raises(InputError, match="runs on one rank only"):
-        histories(MPI.COMM_WORLD, replace(problem, numerics=numerics), mesh)
 
 
 def test_damping_by_component_in_parallel(case: tuple[Problem, LineMesh]) -> None:

@@ -227,15 +227,13 @@ def check_wide(made: RandomScene) -> str:
         check_end(scene, run)
         return "stopped"
     assert run.time.size == N_STEPS + 1
-    # The work of a pantograph's force is that of one strip; TSALPHA2's forces are those between two
-    # steps. With numerical damping the balance is that of a line without incidents. Work in halved
-    # steps is not seen, nor that of gusts.
+    # The work of a pantograph's force is that of one strip. With numerical damping the balance is
+    # that of a line without incidents. Work in halved steps is not seen, nor that of gusts.
     excess, more = numerics.newmark_gamma - 0.5, numerics.newmark_beta - numerics.newmark_gamma / 2
     newmark = numerics.integrator == "newmark" and more <= 4.0 * excess**2
     newmark = newmark and (excess == 0.0 or not rest.problem.incidents)
     strips = max(scene.pantographs[p.name].strips.number for p in scene.train.pantographs)
-    balanced = newmark and strips == 1 and numerics.scheme != "ts_alpha2"
-    balanced = balanced and numerics.adaptive_tolerance_N is None
+    balanced = newmark and strips == 1 and numerics.adaptive_tolerance_N is None
     if balanced and not switches_by_itself(rest, run):
         # In other planes matrices are about the rest that the changed line comes to, so that an
         # incident may add to the energy of a line that has not come to the rest before.
@@ -253,7 +251,7 @@ def check_end(scene: Scene, run: Watched) -> None:
         assert "wires may be slack there" in run.outcome and "\n" not in run.outcome
         return
     assert (
-        numerics.scheme in ("fixed_point", "ts_alpha2")
+        numerics.scheme == "fixed_point"
         or numerics.coupling in ("iterated", "explicit")
         or scene.contact.law == "kinematic"
     ), run.outcome

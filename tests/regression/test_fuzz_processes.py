@@ -49,8 +49,6 @@ def drawn(kind: str, seed: int, n_steps: int) -> tuple[random.Random, RandomScen
     while True:
         made = wide_scene(rng.randrange(10**9), n_steps)
         scene = load_scene(made.base, made.assignments)
-        if scene.numerics.scheme == "ts_alpha2":
-            continue  # runs on one rank only, and cannot be continued
         try:
             run = hard_runs.run(hard_runs.at_rest(scene, MPI.COMM_SELF), MPI.COMM_SELF)
         except InputError:

@@ -37,8 +37,7 @@ def several(seed: int) -> tuple[random.Random, RandomScene]:
         made = wide_scene(rng.randrange(10**9))
         scene = load_scene(made.base, made.assignments)
         lowers = any(incident.type == "lowering" for incident in scene.incidents)
-        plain = scene.numerics.scheme != "ts_alpha2" and not lowers
-        if len(scene.train.pantographs) > 1 and plain:
+        if len(scene.train.pantographs) > 1 and not lowers:
             return rng, made
 
 

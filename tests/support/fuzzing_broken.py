@@ -45,7 +45,6 @@ _KINEMATIC = (
     "numerics.newmark_beta=0.28",
 )
 _HHT = ("numerics.integrator=hht", "numerics.spectral_radius=0.8")
-_ALPHA2 = ("incidents=", "numerics.scheme=ts_alpha2")
 
 
 class Way(NamedTuple):
@@ -149,7 +148,6 @@ def _cannot_be(rng: random.Random, n_steps: int, dt: float, train: str) -> Way:
                 ),
                 "incidents.0.type",
             ),
-            Way(("numerics.scheme=ts_alpha2",), "incidents.0.type"),
         )
     )
 
@@ -185,21 +183,5 @@ def _contradiction(rng: random.Random, n_steps: int, dt: float, train: str) -> W
                 "iterations",
             ),
             Way(("numerics.scheme=fixed_point", "numerics.coupling=explicit"), "coupling"),
-            Way((*_ALPHA2, "numerics.coupling=implicit"), "coupling"),
-            Way((*_ALPHA2, f"numerics.iterations={number}"), "iterations"),
-            Way(
-                (*_ALPHA2, "numerics.newmark_gamma=0.6", "numerics.newmark_beta=0.31"),
-                "newmark_gamma",
-            ),
-            Way((*_ALPHA2, "contact.law=hertz"), "contact.law"),
-            Way(
-                (
-                    *_ALPHA2,
-                    "effects.vehicle_motion=true",
-                    "vehicle.vertical.amplitude_m=0.01",
-                    "vehicle.vertical.frequency_hz=1.0",
-                ),
-                "effects.vehicle_motion",
-            ),
         )
     )

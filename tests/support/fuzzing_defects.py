@@ -8,22 +8,19 @@ import re
 Words = dict[str, object]
 
 
-def put_defects(
-    rng: random.Random, words: Words, droppers: list[int], length: float, smooth: bool
-) -> None:
+def put_defects(rng: random.Random, words: Words, droppers: list[int], length: float) -> None:
     """Some of each, in a scene that is valid and stays so; incidents stand in it already.
 
     Parameters
     ----------
     droppers : how many stand in each span
     length : of the line [m]
-    smooth : whether its wires must have no running surface of their own
     """
     if rng.random() < 0.5 and any(droppers):
         words["irregularities.dropper_lengths.standard_deviation_mm"] = 10 ** rng.uniform(-1, 1.5)
         words["irregularities.dropper_lengths.seed"] = rng.randrange(2**31)
     for name, shortest in (("contact_wire_height", 10.0), ("running_surface", 0.3)):
-        if rng.random() < 0.4 and not (smooth and name == "running_surface"):
+        if rng.random() < 0.4:
             least = rng.uniform(1.0, 3.0) * shortest
             key = f"irregularities.{name}"
             words[f"{key}.standard_deviation_mm"] = 10 ** rng.uniform(-2.0, 1.0)
@@ -52,7 +49,7 @@ def put_defects(
         elif kind == "hard_spot":
             entry |= {"at_m": rng.uniform(0.0, length), "mass_kg": 10 ** rng.uniform(-2, 1.5)}
             entry["stiffness_N_per_m"] = rng.choice([0.0, 10 ** rng.uniform(0.0, 5.0)])
-        elif smooth or words.get("line.contact_wire.bending_stiffness_N_m2") == 0.0:
+        elif words.get("line.contact_wire.bending_stiffness_N_m2") == 0.0:
             continue
         else:
             entry |= {"at_m": rng.uniform(0.0, length), "angle_deg": rng.uniform(-2.0, 2.0)}

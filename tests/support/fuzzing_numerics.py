@@ -7,41 +7,16 @@ import random
 Words = dict[str, object]
 
 
-def put_numerics(rng: random.Random, words: Words, with_second_opinion: bool = True) -> None:
+def put_numerics(rng: random.Random, words: Words) -> None:
     """A scheme with its coupling or iterations, and an integrator.
 
-    With a kinematic contact all stays as it is. ``with_second_opinion``: PETSc's stepper may be
-    drawn, where it knows all of the scene.
+    With a kinematic contact all stays as it is.
     """
     if words.get("contact.law") == "'kinematic'":
-        return
-    plain = with_second_opinion and _is_plain(words)
-    if plain and rng.random() < 0.2:
-        words["numerics.scheme"] = "'ts_alpha2'"
-        rng.choice((_average, _hht, _generalized_alpha))(rng, words)
         return
     rng.choice((_implicit, _implicit, _exchanging, _correcting))(rng, words)
     integrators = (_average, _average, _numerically_damped, _hht, _generalized_alpha)
     rng.choice(integrators)(rng, words)
-
-
-def is_second_opinion(words: Words) -> bool:
-    """Whether the scheme is PETSc's, which knows no incidents and runs on one rank only."""
-    return words.get("numerics.scheme") == "'ts_alpha2'"
-
-
-def _is_plain(words: Words) -> bool:
-    return not any(
-        key in words
-        for key in (
-            "contact.law",
-            "pantographs.reference.strips.number",
-            "effects.head_roll",
-            "effects.vehicle_motion",
-            "pantographs.reference.laws",
-            "pantographs.reference.regulation.measures",
-        )
-    )
 
 
 # ---- schemes ------------------------------------------------------------------------------------

@@ -18,7 +18,7 @@ from fuzzing_line import (
     wind,
     wires,
 )
-from fuzzing_numerics import is_second_opinion, put_numerics
+from fuzzing_numerics import put_numerics
 from fuzzing_train import air, nonlinear_laws, regulation, second_kind, strips, vehicle
 from fuzzing_words import NOW_AND_THEN, Words, as_assignments
 
@@ -59,14 +59,14 @@ def put_more(rng: random.Random, words: Words, span: float, room: float, n_steps
     put_numerics(rng, words)
     if rng.random() < NOW_AND_THEN and words.get("contact.law") != "'kinematic'":
         words["train.start_below_m"] = 5.0 * rng.random() ** 3
-    if rng.random() < 2 * NOW_AND_THEN and not is_second_opinion(words):
+    if rng.random() < 2 * NOW_AND_THEN:
         placed = str(words["train.pantographs"]).count("name=")
         put_incidents(rng, words, n_steps, droppers_by_span(words), placed)
     if rng.random() < 2 * NOW_AND_THEN:
         # Of spans of two lengths this is the shorter one.
         length = 0.99 * span * int(str(words["line.n_spans"]))
         counts = droppers_by_span(words)
-        put_defects(rng, words, counts, length, smooth=is_second_opinion(words))
+        put_defects(rng, words, counts, length)
 
 
 def mechanism(rng: random.Random, n_steps: int) -> tuple[str, ...]:
@@ -101,7 +101,7 @@ def mechanism(rng: random.Random, n_steps: int) -> tuple[str, ...]:
         words["pantographs.seven_body.constraint_handling"] = f"'{way_kept}'"
         words["pantographs.seven_body.substeps"] = rng.randint(1, 4)
     rng.choice((linear, damped, hertz, impact))(rng, words)
-    put_numerics(rng, words, with_second_opinion=False)
+    put_numerics(rng, words)
     if rng.random() < 2 * NOW_AND_THEN:
         put_incidents(rng, words, n_steps, [_DROPPERS_OF_MECHANISM] * n_spans, 1, deepest_m=0.3)
     words["line.dropper.slack_damping"] = rng.choice(SLACK_DAMPINGS)

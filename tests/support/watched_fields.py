@@ -16,9 +16,10 @@ from catenary.postproc.record.snapshots.fields import FieldRecorder
 BLOCKS = (CONTACT_WIRE, MESSENGER_WIRE, DROPPERS, ARMS, MASTS)
 
 
-def watch(march: Any, path: Path, **options: Any) -> FieldRecorder:
-    known = {"every": 50, "snapshots_per_flush": 4, **options}
-    return FieldRecorder(march.comm, path, march.recorded, **known)
+def watch(march: Any, path: Path, most_kept: int = 4, **options: Any) -> FieldRecorder:
+    recorder = FieldRecorder(march.comm, path, march.recorded, **{"every": 50, **options})
+    recorder.most_kept = most_kept
+    return recorder
 
 
 def times_in(path: Path) -> list[float]:

@@ -114,7 +114,6 @@ OF_OTHERS = {
     "catenary.solver.integrators.generalized_alpha",
     "catenary.solver.schemes.adaptive_steps",
     "catenary.solver.schemes.fixed_point",
-    "catenary.solver.schemes.ts_alpha2",
 }
 
 

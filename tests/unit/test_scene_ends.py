@@ -52,7 +52,6 @@ def test_a_line_may_go_on_where_no_dropper_breaks() -> None:
             r"reaches to 420 m, into the evaluated stretch \(evaluation.from_m = 360\)",
         ),
         ([PERIODIC, f"{END}.spans=4"], "takes spans with kind absorbing_layer, not with periodic"),
-        ([PERIODIC, "numerics.scheme=ts_alpha2"], "not with ts_alpha2"),
         ([PERIODIC, "numerics.adaptive_tolerance_N=1"], "adaptive_tolerance_N must not be given"),
         (
             [PERIODIC, "line.transition.n_spans_end=2"],

@@ -110,16 +110,3 @@ def test_a_mechanism_with_all_its_bodies_has_none() -> None:
     with pytest.raises(InputError) as refused:
         load_scene("ambrosio2012", [laws, "pantographs.seven_body.motion=all_bodies"])
     assert "reduced to tables only" in str(refused.value)
-
-
-def test_the_second_opinion_refuses_what_is_not_linear() -> None:
-    words = ["numerics.scheme=ts_alpha2", f"{KIND}.laws=[{{type='friction',force_N=3}}]"]
-    with pytest.raises(InputError) as refused:
-        load(*words)
-    assert str(refused.value) == (
-        f"{KIND}.laws on the command line (--set) is not linear; numerics.scheme ts_alpha2 knows "
-        "only linear pantographs: write effects.pantograph_laws = false"
-    )
-    rough = ["irregularities.running_surface.standard_deviation_mm=0.1", words[0]]
-    with pytest.raises(InputError, match=r"running_surface on the command line .* is not smooth"):
-        load(*rough)

@@ -4,12 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from measuring import matrix_of
 
+from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.input.faults import SceneError
 from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.problem import line_of, problem_of
 from catenary.meshgen.wires import Role
+from catenary.solver.model.switching_links import switching_links
 from catenary.solver.problem.incidents import TensionLoss
+from catenary.solver.problem.watched_links import UPLIFT_STOPS
+from catenary.solver.statics.form_finding.equilibrium import find_form
 
 CASES = ("ac_simple", "re330_stitched", "shinkansen_compound", "dc_twin", "tramway")
 # What befalls a single part moves twin wires relative to each other.
@@ -32,6 +37,43 @@ def test_any_part_of_the_line_may_have_damping_of_its_own(case: str) -> None:
         assert found[name] == (1e-3, 0.02)
 
 
+STOPPED = ("line.steady_arm.uplift_stop_m=0.05",)
+
+
+def test_what_an_effect_adds_may_have_damping_of_its_own() -> None:
+    """Stops above arms are open links, whose damper is alpha times their stiffness."""
+    mesh = mesh_of(load_scene("ac_simple", STOPPED))
+    for words, alpha in (((), None), ((damped("arm_stops"),), 1e-3)):
+        problem = problem_of(load_scene("ac_simple", [*STOPPED, *words]))
+        model, form = find_form(problem, mesh)
+        (stops,) = (links for links in model.links if links.component == UPLIFT_STOPS)
+        followed = switching_links(model, form.dropper_force).arrays.law
+        own = followed[followed["carried"] == 0.0]  # the stops, open at rest
+        assert own.size == stops.law.size > 0
+        expected = problem.damping.alpha if alpha is None else alpha
+        np.testing.assert_allclose(
+            np.abs(own["damping"]), expected * np.abs(own["stiffness"]), rtol=1e-12
+        )
+
+
+def test_tensioners_may_have_damping_of_their_own() -> None:
+    """beta times the inertia of the weights stands in C at the ends of the wires."""
+    words = (
+        "effects.axial_motion=true", "line.contact_wire.axial_stiffness_N=1.5e7",
+        "line.messenger_wire.axial_stiffness_N=1.2e7", "line.ends.start.along=tensioner",
+    )  # fmt: skip
+    problem = problem_of(load_scene("ac_simple", words))
+    own = problem_of(load_scene("ac_simple", [*words, damped("tensioners")]))
+    mesh = mesh_of(load_scene("ac_simple", words))
+    usual, other = (find_form(one, mesh)[0] for one in (problem, own))
+    more = (matrix_of(other, damping=1.0) - matrix_of(usual, damping=1.0)).diagonal()
+    tensioner = problem.along.tensioner
+    inertia = [tensioner.inertia(w.name, w, problem.gravity) for w in problem.line.wires]
+    changed = more[np.abs(more) > 1e-9 * max(inertia)]
+    expected = (0.02 - problem.damping.beta) * np.array(inertia)
+    np.testing.assert_allclose(np.sort(changed), np.sort(expected), rtol=1e-9)
+
+
 @pytest.mark.parametrize("case", CASES)
 def test_any_wire_of_the_line_may_lose_tension(case: str) -> None:
     for wire in line_of(load_scene(case, [])).wires:
@@ -44,6 +86,8 @@ def test_any_wire_of_the_line_may_lose_tension(case: str) -> None:
     [
         (damped("stich_wire"), "did you mean stitch_wire? the line has contact_wire, stitch_wire"),
         (damped("auxiliary_wire"), "the line has contact_wire, stitch_wire, messenger_wire"),
+        (damped("arm_stops"), "the line has contact_wire, stitch_wire, messenger_wire"),
+        (damped("tensioners"), "the line has contact_wire, stitch_wire, messenger_wire"),
         (lost("messenger"), "did you mean messenger_wire?"),
         (lost("droppers"), "the line has contact_wire, stitch_wire, messenger_wire"),
     ],

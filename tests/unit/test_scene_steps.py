@@ -25,7 +25,6 @@ def test_keys_reach_the_problem() -> None:
         ((GIVEN[0], "numerics.smallest_dt_s=6e-4"), "from dt_s / 4096 to dt_s / 2"),
         ((GIVEN[0], "numerics.smallest_dt_s=2e-7"), "from dt_s / 4096 to dt_s / 2"),
         (("numerics.adaptive_tolerance_N=0",), "greater than 0"),
-        ((*GIVEN, "numerics.scheme=ts_alpha2"), "no step can be repeated"),
         (
             (*GIVEN, "contact.law=kinematic", "contact.stiffness_N_per_m=",
              "numerics.newmark_gamma=0.55", "numerics.newmark_beta=0.28"),

@@ -14,7 +14,7 @@ from catenary.cases.run.planning.needs import needs_with_mesh
 from catenary.cases.run.planning.plan import make_plan, plan_text
 from catenary.cases.run.scene_mesh import mesh_of as mesh_of_scene
 from catenary.cases.scene.cost_model import (
-    SEVERAL_MAKE_UPS,
+    SEVERAL_TYPES,
     STATION_COST,
     STEP_OVERHEAD,
     STEP_PER_UNKNOWN,
@@ -87,7 +87,7 @@ def test_estimates_know_the_unknowns_of_stations() -> None:
     assert cost_of_stations({8: 3}) == pytest.approx(0.5 * STATION_COST[8])
     # Half of the stations have six: ten unknowns on two stations.
     both = (1.0 + STATION_COST[6]) * 4.0 / 10.0
-    assert cost_of_stations({4: 7, 6: 7}) == pytest.approx(SEVERAL_MAKE_UPS * both)
+    assert cost_of_stations({4: 7, 6: 7}) == pytest.approx(SEVERAL_TYPES * both)
     step = [estimate_march(n, 1, "one_solve", 0, {size: 1}) for n, size in ((4000, 4), (12000, 12))]
     empty = estimate_march(0, 1, "one_solve")
     assert np.diff(np.array(step) - empty)[0] > 0

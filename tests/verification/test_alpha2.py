@@ -1,10 +1,10 @@
 """PETSc's TSALPHA2 as an independent second implementation of the same equations.
 
-What the scheme ``ts_alpha2`` shares with the default one are the matrices M, C and K alone. It
-takes line and pantographs as one nonlinear system (`solver/schemes/monolithic_system.py`), solves
-it by Newton's method with the generalized-alpha scheme, and knows neither of predictors,
-compliances nor of an inner problem. Both methods are of order 2, so their difference must fall
-with order 2.
+What the scheme ``ts_alpha2`` (`tests/support/ts_alpha2.py`) shares with the default one are the
+matrices M, C and K alone. It takes line and pantographs as one nonlinear system
+(`tests/support/monolithic_system.py`), solves it by Newton's method with the generalized-alpha
+scheme, and knows neither of predictors, compliances nor of an inner problem. Both methods are of
+order 2, so their difference must fall with order 2.
 """
 
 from __future__ import annotations
@@ -14,7 +14,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from measuring import check, march, print_table, start_march
+from measuring import check, march, print_table
+from monolithic_system import WholeSystem
 from small_lines import (
     EN_PANTOGRAPH,
     WHOLE,
@@ -24,12 +25,11 @@ from small_lines import (
     problem_of,
     train,
 )
+from ts_alpha2 import TS_ALPHA2
 
-from catenary.base.errors import InputError
 from catenary.meshgen.mesh import CONTACT_WIRE, LineMesh
 from catenary.solver.problem.contact_laws import LinearLaw
 from catenary.solver.problem.problem import Damping, Problem
-from catenary.solver.schemes.monolithic_system import WholeSystem
 from catenary.solver.statics.form_finding.equilibrium import find_form
 
 NOMINAL_HEIGHT = 5.52
@@ -63,7 +63,7 @@ def test_tsalpha2_integrates_the_same_model_to_the_same_forces(ours: dict[str, A
     of_contact, of_droppers = [], []
     for dt in steps:
         own = march(replace(problem, numerics=numerics(dt, **ours)), mesh)
-        second = march(replace(problem, numerics=numerics(dt, "ts_alpha2", **ALPHA)), mesh)
+        second = march(replace(problem, numerics=numerics(dt, TS_ALPHA2, **ALPHA)), mesh)
         stride = round(every / dt)
         apart = (second["contact_force"] - own["contact_force"])[::stride]
         of_contact.append(float(np.sqrt((apart**2).mean())))
@@ -129,7 +129,7 @@ def test_both_schemes_simulate_the_same_effects(changes: dict[str, Any]) -> None
     for dt in (0.5e-3, 0.25e-3):
         runs = [
             march(replace(problem, numerics=numerics(dt, scheme, **ALPHA)), mesh)
-            for scheme in ("one_solve", "ts_alpha2")
+            for scheme in ("one_solve", TS_ALPHA2)
         ]
         found = {}
         for channel in ("contact_force", "head_height", "wire_height", "arm_uplift"):
@@ -176,14 +176,3 @@ def test_the_jacobian_is_the_derivative_of_the_residual() -> None:
         # Piecewise linear, so that only round-off of forces of up to 1e6 N is left.
         scale = np.abs(ahead).max()
         check("directional derivative [N]", 0.5 * (ahead - behind), product, within=1e-9 * scale)
-
-
-def test_a_run_cannot_be_continued() -> None:
-    problem, mesh = problem_and_mesh(numerics=numerics(1e-3, "ts_alpha2", **ALPHA))
-    run, _ = start_march(problem, mesh)
-    last = {}
-    checkpoints = march(problem, mesh, lambda view: last.update(view.checkpoint()))
-    assert len(checkpoints.time) > 10 and last
-    with pytest.raises(InputError, match="cannot be continued"):
-        run.restore(last)
-    run.destroy()

@@ -13,10 +13,9 @@ import numpy as np
 import pytest
 from contact_wires import STIFFNESS, one_wire, overlap, problem_on, twins
 from dense_line import DenseLine
-from measuring import History, check, march, start_march
+from measuring import History, check, march
 from small_lines import WHOLE, mesh_of, numerics, train
 
-from catenary.base.errors import InputError
 from catenary.mbs.head.flexure import Flexure
 from catenary.mbs.head.strips import Strips, Suspension, Turning
 from catenary.mbs.head.wire_crossing import LateralPath, SeveralPaths
@@ -180,12 +179,6 @@ def test_an_overlap_passes_the_force_without_a_jump_and_keeps_the_energy() -> No
     largest = energy.max()
     check("energy [J]", energy - energy[0], work, within=1e-7 * largest)
     assert largest > 0.1
-
-
-def test_a_scheme_of_one_contact_wire_refuses_several() -> None:
-    problem = problem_on(twins(0.5), numerics=numerics(1e-3, "ts_alpha2"))
-    with pytest.raises(InputError, match="ts_alpha2, for one contact wire only"):
-        start_march(problem, mesh_of(problem.line, 2))
 
 
 def test_a_wire_beside_the_strip_is_not_touched() -> None:

@@ -22,6 +22,7 @@ from small_lines import (
     problem_of,
     train,
 )
+from ts_alpha2 import TS_ALPHA2
 
 from catenary.meshgen.mesh import CONTACT_WIRE
 from catenary.solver.effects.effect import Effect
@@ -116,7 +117,7 @@ def test_a_harmonic_load_follows_its_integrals() -> None:
     check("order", observed[-1], 2, within=(6 * np.pi * steps[1]) ** 2 / 12 + 0.02)
 
 
-@pytest.mark.parametrize("scheme", ["one_solve", "fixed_point", "ts_alpha2"])
+@pytest.mark.parametrize("scheme", ["one_solve", "fixed_point", TS_ALPHA2])
 def test_a_harmonic_load_on_one_mode_follows_its_oscillator(scheme: str) -> None:
     """q sin(pi x / L) cos(p t): w = q / rho (cos p t - cos o t) / (o^2 - p^2) sin(pi x / L)."""
     p = 2 * np.pi * 2.0

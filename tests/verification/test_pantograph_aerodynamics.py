@@ -9,6 +9,7 @@ import paper_pantograph as paper
 import pytest
 from measuring import check, march
 from small_lines import EN_PANTOGRAPH, WHOLE, en50318_line, mesh_of, numerics, problem_of, train
+from ts_alpha2 import TS_ALPHA2
 
 from catenary.mbs.air import Airflow, Polynomial, Tunnel, Uplift
 from catenary.mbs.build import Operation, make_pantograph, steady_forces
@@ -153,7 +154,7 @@ def test_a_tunnel_raises_the_force_of_a_march_where_it_begins() -> None:
 def test_schemes_agree_about_the_air() -> None:
     """PETSc's stepper takes its own way through masses and springs of the head."""
     data = replace(EN_PANTOGRAPH, uplift=UPLIFT)
-    found, second = run(data), run(data, "ts_alpha2")
+    found, second = run(data), run(data, TS_ALPHA2)
     # Both are of second order: 1.2 N at 1 ms without air, 2 N with it; 0.3 and 0.6 N at 0.5 ms.
     spread = np.abs(found["contact_force"] - second["contact_force"])[400:].max()
     print(f"largest difference after the raising {spread:.3f} N")

@@ -14,6 +14,7 @@ import pytest
 from dense_line import DenseLine
 from measuring import COMM, History, check, march, matrix_of, start_march
 from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of, train
+from ts_alpha2 import TS_ALPHA2
 
 from catenary.meshgen.mesh import CONTACT_WIRE, LineMesh
 from catenary.meshgen.topologies.line_data import LineData
@@ -249,7 +250,7 @@ def test_petsc_steps_the_same_law() -> None:
                 ),
                 mesh,
             )
-            for scheme in ("one_solve", "ts_alpha2")
+            for scheme in ("one_solve", TS_ALPHA2)
         )  # fmt: skip
         apart = (own["contact_force"] - second["contact_force"])[:: round(5e-4 / dt)]
         errors.append(float(np.sqrt((apart**2).mean())))

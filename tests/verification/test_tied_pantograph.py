@@ -7,15 +7,20 @@ as `docs/pantographs.md` says, or as it stood before: then the chain starts pres
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 import pytest
-from measuring import check
+from measuring import check, march
 from program import catenary
 from scipy import linalg, signal
+from ts_alpha2 import TS_ALPHA2
 
+from catenary.cases.run.scene_mesh import mesh_of
+from catenary.cases.scene.load import load_scene
+from catenary.cases.scene.problem import problem_of
 from catenary.postproc.read.results import Results
 
 SPAN, N_SPANS, MASS, BENDING, TENSION = 8.5, 30, 7.1, 2.7e5, 100.0
@@ -185,20 +190,19 @@ def test_what_a_chain_pressed_against_its_base_does_is_no_property_of_the_line()
     check("means of both bases [N]", raised[0], soft[0], within=2.0)
 
 
-def test_the_second_opinion_raises_the_base_as_well(tmp_path: Path) -> None:
+def test_the_second_opinion_raises_the_base_as_well() -> None:
     """TSALPHA2 on line and chain as one system, which has its own equations of the chain.
 
     Both are of order 2: a step of 0.25 ms at 20 Hz is wrong by (w dt)^2 / 12 = 8e-5 of 120 N at
     most; pressed against a base that stands the chain is off by more than 100 N.
     """
-    found = []
-    for scheme in ("one_solve", "ts_alpha2"):
-        done = catenary(
-            "run", "conductor_rail", "--set", "line.n_spans=12", "train.end_m=34",
-            "train.raise_time_s=0.1", "evaluation.from_m=25", "evaluation.to_m=34",
-            "numerics.dt_s=2.5e-4", f"numerics.scheme={scheme}", "-o", scheme, cwd=tmp_path,
-        )  # fmt: skip
-        assert done.code == 0, done.stderr
-        with Results(tmp_path / scheme / "run.h5") as results:
-            found.append(results.channel("contact_force")[:, 0])
+    words = (
+        "line.n_spans=12", "train.end_m=34", "train.raise_time_s=0.1", "evaluation.from_m=25",
+        "evaluation.to_m=34", "numerics.dt_s=2.5e-4",
+    )  # fmt: skip
+    scene, found = load_scene("conductor_rail", words), []
+    problem, mesh = problem_of(scene), mesh_of(scene)
+    for scheme in ("one_solve", TS_ALPHA2):
+        run = march(replace(problem, numerics=replace(problem.numerics, scheme=scheme)), mesh)
+        found.append(run["contact_force"][:, 0])
     check("contact force [N]", found[1], found[0], within=0.02)

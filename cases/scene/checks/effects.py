@@ -278,6 +278,19 @@ def needs_relative_motion(problem: Problem, effect: str) -> bool:
     return effect not in _ALIKE and bool(effects.move_together(problem))
 
 
+def check_damped(scene: Scene) -> Iterator[Fault]:
+    """Damping of components that neither the line has nor an effect adds."""
+    given = scene.line.damping.per_component
+    if not given:
+        return
+    problem = problem_of(scene)
+    added = (name for effect in effects.active(problem) for name in effect.components)
+    known = (*problem.line.components, *added)
+    for name in given:
+        key = f"line.damping.per_component.{name}"
+        yield from scene.among(key, known, "the line has", name=name)
+
+
 def check_twins(scene: Scene) -> Iterator[Fault]:
     """Scenes without the relative motion of twin wires in which they would move differently."""
     if scene.switches()[RELATIVE_MOTION]:

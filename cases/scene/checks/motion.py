@@ -267,8 +267,6 @@ def _goes_on(scene: Scene, line: LineData, side: str) -> Iterator[Fault]:
         return scene.refused(key, why)
 
     numerics, n = scene.numerics, line.n_spans
-    if numerics.scheme == "ts_alpha2":
-        yield refused("it acts with numerics.scheme one_solve or fixed_point, not with ts_alpha2")
     if numerics.adaptive_tolerance_N is not None:
         yield refused(
             "it remembers steps of one size, so that numerics.adaptive_tolerance_N must not be "

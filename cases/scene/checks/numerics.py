@@ -1,4 +1,4 @@
-"""Whether contact law, scheme, iterations and window of a scene fit together."""
+"""Whether contact law, iterations and window of a scene fit together."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from catenary.cases.scene.keys.table import TAKE_AWAY
 from catenary.cases.scene.problem import problem_of
 from catenary.cases.scene.run.contact import HERTZ, WITH_RESTITUTION
 from catenary.cases.scene.scene import Scene
-from catenary.cases.scene.train.pantograph import LumpedTable
 from catenary.solver.problem.integrator_parameters import NEWMARK
 from catenary.solver.window.where_possible import why_no_window
 
@@ -95,59 +94,6 @@ def _kinematic(scene: Scene) -> Iterator[Fault]:
             f"contact.law kinematic needs at least {KINEMATIC_GAMMA:g}, with "
             "numerics.newmark_beta at least 0.28: without numerical damping its force alternates",
         )
-
-
-def check_scheme(scene: Scene) -> Iterator[Fault]:
-    """Parts of a scene that its scheme cannot simulate.
-
-    The names of its pantographs must be known.
-    """
-    if scene.numerics.scheme != "ts_alpha2":
-        return
-    knows = "numerics.scheme ts_alpha2 knows only"
-    if scene.contact.law != "linear":
-        yield scene.refused("contact.law", f"{knows} law linear")
-    for key in ("twin", "overlap"):
-        if getattr(scene.line, key) is not None:
-            why = f"{knows} one contact wire: take one_solve or fixed_point"
-            yield Fault(f"line.{key}", f"line.{key} {scene.origin.of(f'line.{key}')}; {why}")
-    switches = scene.switches()
-    for i, incident in enumerate(scene.incidents):
-        if switches[incident.type]:
-            why = f"{knows} lines and pantographs that stay what they are"
-            yield scene.refused(f"incidents.{i}.type", why)
-    for i, defect in enumerate(scene.defects):
-        if defect.type == "kink" and switches["kink"]:
-            yield scene.refused(f"defects.{i}.type", f"{knows} smooth wires")
-    if scene.irregularities.running_surface is not None and switches["running_surface"]:
-        key = "irregularities.running_surface"
-        why = f"{knows} smooth wires: write effects.running_surface = false"
-        yield scene.fault(key, f"is not smooth; {why}")
-    for name in ("head_roll", "vehicle_motion"):
-        if switches[name]:
-            yield scene.refused(
-                f"effects.{name}",
-                f"{knows} heads and bases that move along a vertical: switch it off",
-            )
-    for name in {place.name: None for place in scene.train.pantographs}:
-        table = scene.pantographs[name]
-        if not isinstance(table, LumpedTable):
-            key = f"pantographs.{name}.type"
-            yield scene.refused(key, f"{knows} type lumped")
-            continue
-        switches_of = {"laws": "pantograph_laws", "regulation": "regulated_lift"}
-        for part, effect in switches_of.items():
-            if getattr(table, part) and switches[effect]:
-                key = f"pantographs.{name}.{part}"
-                why = f"{knows} linear pantographs: write effects.{effect} = false"
-                yield scene.fault(key, f"is not linear; {why}")
-        key = f"pantographs.{name}.strips"
-        if table.strips.number != 1:
-            yield scene.refused(f"{key}.number", f"{knows} one strip")
-        if table.strips.stiffness_N_per_m is not None:
-            yield scene.refused(
-                f"{key}.stiffness_N_per_m", f"{knows} strips that are fixed to the head"
-            )
 
 
 _CORRECTED = 'scheme = "fixed_point"'

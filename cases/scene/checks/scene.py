@@ -62,7 +62,6 @@ def faults_of(scene: Scene) -> list[Fault]:
         found.collect(of_tables, scene)
     if found.collect(_pantograph_names, scene):
         found.collect(pantographs.check_pantographs, scene)
-        found.collect(numerics.check_scheme, scene)
         found.collect(pantographs.check_laws, scene)
     # What is too large is not made, and what follows from a wrong unit is not reported.
     sound = not whole or found.collect(mesh_size.size_faults, scene)
@@ -101,6 +100,7 @@ def faults_of(scene: Scene) -> list[Fault]:
             found.collect(numerics.check_window, scene)
     if not found.faults:
         # They ask the problem, which is made of a sound scene only.
+        found.collect(effects.check_damped, scene)
         found.collect(effects.check_chosen_act, scene)
         found.collect(effects.check_twins, scene)
     return found.faults

@@ -64,12 +64,8 @@ def check_parts(scene: Scene, line: LineData) -> Iterator[Fault]:
 
 
 def check_names(scene: Scene, line: LineData) -> Iterator[Fault]:
-    """Names of parts of the line in other tables: damping by component, wires of incidents."""
-    made = make_line(line)
-    for name in scene.line.damping.per_component:
-        key = f"line.damping.per_component.{name}"
-        yield from scene.among(key, made.components, "the line has", name=name)
-    wires = tuple(wire.name for wire in made.wires)
+    """Names of wires in other tables: incidents, defects, fittings."""
+    wires = tuple(wire.name for wire in make_line(line).wires)
     for i, table in enumerate(scene.incidents):
         if isinstance(table, TensionLossTable):
             yield from scene.among(f"incidents.{i}.wire", wires, "the line has")

@@ -33,7 +33,8 @@ class DampingTable(ProportionalDamping):
     per_component: Annotated[dict[str, ProportionalDamping], BeforeValidator(_given)] = Field(
         default_factory=dict,
         description="damping of single components by name, in place of the line's: a wire or a "
-        "group, such as contact_wire, messenger_wire, droppers, steady_arms, supports",
+        "group, such as contact_wire, messenger_wire, droppers, steady_arms, supports, or what an "
+        "effect adds: arm_stops, tensioners, tensioner_stops_down, tensioner_stops_up",
     )
     lateral: ProportionalDamping | None = Field(
         None,

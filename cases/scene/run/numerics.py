@@ -54,10 +54,8 @@ class NumericsTable(Table):
     """Time stepping."""
 
     dt_s: float = Field(1e-3, ge=1e-6, description="time step")
-    scheme: Literal["one_solve", "fixed_point", "ts_alpha2"] = Field(
-        "one_solve",
-        description="one solve a step, the paper's fixed-point correction, or PETSc's TSALPHA2 on "
-        "line and pantographs as one system",
+    scheme: Literal["one_solve", "fixed_point"] = Field(
+        "one_solve", description="one solve a step, or the paper's fixed-point correction"
     )
     coupling: Literal["implicit", "iterated", "explicit"] | None = Field(
         None,
@@ -155,11 +153,6 @@ class NumericsTable(Table):
                     + TAKE_AWAY
                 )
             return
-        if self.scheme == "ts_alpha2":
-            raise ValueError(
-                "must not give adaptive_tolerance_N with scheme ts_alpha2, in which PETSc keeps a "
-                "part of the state to itself, so that no step can be repeated" + TAKE_AWAY
-            )
         if smallest is not None and not self.dt_s / MOST_DIVIDED <= smallest <= 0.5 * self.dt_s:
             raise ValueError(
                 f"must have smallest_dt_s from dt_s / {MOST_DIVIDED} to dt_s / 2, which is from "
@@ -169,12 +162,6 @@ class NumericsTable(Table):
     def _has_its_spectral_radius(self) -> None:
         radius = self.spectral_radius
         own = (self.newmark_beta, self.newmark_gamma)
-        if self.scheme == "ts_alpha2" and own != AVERAGE_ACCELERATION[:2]:
-            raise ValueError(
-                "must not give newmark_beta and newmark_gamma with scheme ts_alpha2, which takes "
-                "average acceleration, or integrators hht and generalized_alpha by their "
-                "spectral_radius" + TAKE_AWAY
-            )
         if self.integrator == NEWMARK:
             if radius is not None:
                 raise ValueError(

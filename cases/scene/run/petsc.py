@@ -72,12 +72,6 @@ class PetscTable(Table):
     march_sub_pc_factor_levels: _Levels = _on_rank(_LEVELS)
     march_sub_pc_factor_fill: _Fill = _on_rank(_FILL)
     march_sub_pc_factor_shift_type: _Shift = _on_rank(_SHIFT)
-    march_alpha2_snes_atol: float | None = _option(
-        "scheme ts_alpha2: residual that ends a step", gt=0, le=1
-    )
-    march_alpha2_snes_max_it: int | None = _option(
-        "scheme ts_alpha2: most iterations of Newton's method", ge=1, le=1000
-    )
 
     def given(self) -> dict[str, Any]:
         """The options that the scene gives, by name."""

@@ -358,9 +358,6 @@ def _schemes(scene: Scene) -> list[Level]:
     alphas = [("generalized_alpha", radius) for radius in (0.9, 0.8, 0.5, 0.0)]
     one, paper = _one_solve(scene), (*_PAPER, *_without_tolerances(scene, ("eps_force_N",)))
     times = (*paper, "numerics.max_iterations=")
-    # PETSc's own stepper, which runs on one rank and takes plain scenes only.
-    petsc = ("numerics.coupling=", "numerics.iterations=", "numerics.scheme=ts_alpha2",
-             *_without_tolerances(scene))  # fmt: skip
     return [
         _newmark(scene, "average_acceleration", 0.5, 0.25, True),
         _newmark(scene, "newmark_0.55", 0.55, 0.28, True),
@@ -369,7 +366,6 @@ def _schemes(scene: Scene) -> list[Level]:
             _level(f"{name}_{radius:g}", *one, *_dissipating(name, radius))
             for name, radius in (*alphas, ("hht", 0.9), ("hht", 0.8))
         ),
-        _level("ts_alpha2_0.8", *petsc, *_dissipating("generalized_alpha", 0.8)),
         *(
             _level(f"corrected_{n}_times", *times, f"numerics.iterations={n}")
             for n in (1, 2, 4, 6, 10, 20)

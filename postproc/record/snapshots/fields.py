@@ -5,26 +5,25 @@ Warp by the vector ``displacement`` to see the motion; the geometry is the line 
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from catenary.base.errors import RunBroken
-from catenary.base.parallel import on_root
 from catenary.postproc.files.disk import broken_write
-from catenary.postproc.record.column_gather import ColumnGather, next_flush
+from catenary.postproc.record.column_gather import ColumnGather
+from catenary.postproc.record.file_observer import FileObserver
 from catenary.postproc.record.snapshots.blocks import Block, RecordedLine, blocks_of
 from catenary.postproc.record.snapshots.field_layout import FieldRecord
 from catenary.postproc.record.snapshots.field_values import FieldValues, Gathered
 from catenary.postproc.record.snapshots.fields_file import FieldsFile
-from catenary.solver.time_loop.views.observers import Observer, Stage, StepView
+from catenary.solver.time_loop.views.observers import Stage, StepView
 
 _MAX_BUFFER = 32 * 1024 * 1024
 
 
-class FieldRecorder(Observer):
+class FieldRecorder(FileObserver[FieldsFile]):
     """Observer that writes ``fields.xdmf`` and the ``.h5`` beside it.
 
     Collective, like all its methods except ``observe`` between flushes. Both files are valid after
@@ -40,10 +39,15 @@ class FieldRecorder(Observer):
     record : which part of it is recorded
     flush_every : steps after which what is kept in memory is written; if it is the ``Recorder``'s,
         which is to follow in the list of observers, a killed run can be continued without a gap
-    snapshots_per_flush : most snapshots kept in memory
     resume : continue the files: snapshots from the stage's start time on are replaced
     wait : keep new files under another name, and others as they are, until ``publish`` is called
+
+    Attributes
+    ----------
+    most_kept : snapshots after which what is kept in memory is written, if that is not large
     """
+
+    most_kept = 50
 
     def __init__(
         self,
@@ -54,22 +58,17 @@ class FieldRecorder(Observer):
         every: int,
         record: FieldRecord | None = None,
         flush_every: int = 500,
-        snapshots_per_flush: int = 50,
         resume: bool = False,
         wait: bool = False,
     ) -> None:
-        self._comm = comm
+        super().__init__(comm, flush_every)
         self._xdmf = Path(path_xdmf)
         self._line, self._every = line, every
         self._record = record or FieldRecord()
-        self._flush_every = flush_every
-        self._capacity = snapshots_per_flush
         self._resume, self._wait = resume, wait
         self._buffered: list[float] = []
         self._tension: list[np.ndarray] = []
         self._pantographs: list[np.ndarray] = []
-        self._file: FieldsFile | None = None
-        self._broken = False
         kinds = self._record.kinds
         self._wants_tension = any(kind.name == "tension" for kind in kinds)
         self._wants_droppers = any(kind.of_droppers for kind in kinds)
@@ -87,7 +86,7 @@ class FieldRecorder(Observer):
         motions = sorted({motion for of_kind in wanted for motion in of_kind})
         n_nodes = int(stage.node_points.shape[0])
         n_bytes = 8 * n_nodes * max(1, len(motions))
-        self._capacity = max(1, min(self._capacity, _MAX_BUFFER // n_bytes))
+        self._capacity = max(1, min(self.most_kept, _MAX_BUFFER // n_bytes))
         self._owned_nodes, self._apart = stage.owned_nodes, self._every * stage.dt
         # Of a part of the line its nodes alone are kept; a window's change from flush to flush.
         self._among: np.ndarray | None = None
@@ -105,11 +104,9 @@ class FieldRecorder(Observer):
             owned, n = stage.owned_droppers, int(stage.dropper_x.size)
             self._droppers = ColumnGather(self._comm, owned, n, self._capacity)
             self._force = np.zeros((self._capacity, self._droppers.n_owned))
-        self._guarded(lambda: self._open(stage), stage.start_time)
-
-    def next_state(self, step: int) -> int:
-        """The step of the next flush."""
-        return next_flush(step, self._flush_every)
+        self._guarded(
+            lambda: self._open(stage), lambda error: self._failed(error, stage.start_time)
+        )
 
     def next_motion(self, step: int) -> int:
         """The step of the next snapshot."""
@@ -175,25 +172,11 @@ class FieldRecorder(Observer):
         known = Gathered(motions, force, self._tension, places)
         self._buffered.clear()
         if times:
-            self._guarded(lambda: self._open_file.append(times, known), times[-1])
+            self._guarded(
+                lambda: self._open_file.append(times, known),
+                lambda error: self._failed(error, times[-1]),
+            )
         self._tension, self._pantographs = [], []
-
-    def _guarded(self, work: Callable[[], None], time: float) -> None:
-        """Run ``work`` on rank 0; if it fails, all ranks raise RunBroken. Collective."""
-
-        def attempt() -> None:
-            try:
-                work()
-            except (OSError, RuntimeError) as error:
-                path = self._xdmf.with_suffix(".h5")
-                begun = self._resume or (self._file is not None and self._file.is_published)
-                raise broken_write(path, time, error, begun) from error
-
-        try:
-            on_root(self._comm, attempt)
-        except RunBroken:
-            self._broken = True
-            raise
 
     # ---- rank 0 ------------------------------------------------------------------------------
 
@@ -213,8 +196,6 @@ class FieldRecorder(Observer):
         if self._resume or not self._wait:
             file.publish()
 
-    @property
-    def _open_file(self) -> FieldsFile:
-        if self._file is None:
-            raise RuntimeError("the recorder was not started")
-        return self._file
+    def _failed(self, error: Exception, time: float) -> RunBroken:
+        begun = self._resume or (self._file is not None and self._file.is_published)
+        return broken_write(self._xdmf.with_suffix(".h5"), time, error, begun)

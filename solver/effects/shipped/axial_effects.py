@@ -183,6 +183,7 @@ register(
         applies=_has_tensioner,
         data="line.ends or line.overlap with along = tensioner, and effects.axial_motion",
         build=_tensioners,
+        components=(TENSIONERS, _LOWEST, _HIGHEST),
         law=lambda laws, p: replace(laws, tensioner=p.along.tensioner),
     )
 )

@@ -49,6 +49,7 @@ register(
         data="line.steady_arm.uplift_stop_m",
         applies=lambda p: any(arms.kind.uplift_stop is not None for arms in p.line.steady_arms),
         build=_stops,
+        components=(UPLIFT_STOPS,),
         law=lambda laws, p: replace(laws, uplift_stops=True),
     )
 )

@@ -105,14 +105,6 @@ ASSIGNMENTS = {
         ["effects.gravity=false", "effects.pre_sag=false", "effects.dropper_slackening=false"],
         "requires effects.gravity",
     ),
-    "a second opinion on kinks": (
-        ["numerics.scheme=ts_alpha2", f"{SURFACE}="],
-        'defects.5.type is "kink"',
-    ),
-    "a second opinion on waves": (
-        ["numerics.scheme=ts_alpha2", "effects.kink=false"],
-        "write effects.running_surface = false",
-    ),
     "surface beyond the line": (
         [f"{SURFACE}.by_place=[[1310, 0], [1330, 0.001]]"],
         f"{SURFACE}.by_place.1.0 is 1330 on the command line (--set); the line runs from 0 to 1320",

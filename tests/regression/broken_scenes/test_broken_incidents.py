@@ -92,10 +92,6 @@ ASSIGNMENTS = {
         ],
         "a line that does not hang has no balance to lose",
     ),
-    "a second opinion": (
-        ["numerics.scheme=ts_alpha2"],
-        "ts_alpha2 knows only lines and pantographs that stay what they are",
-    ),
     "key of another kind": (["incidents.0.share=0.5"], "does not belong to type dropper_break"),
     "misspelt key": (["incidents.0.droper=5"], "did you mean incidents.0.dropper?"),
     "no list": (["incidents=3"], "must be a list"),

@@ -12,7 +12,7 @@ ASSIGNMENTS = {
     "no contact stiffness": (["contact.stiffness_N_per_m=0"], "greater than 0 [N/m]"),
     "step above 20 Hz": (["numerics.dt_s=0.03"], "20 Hz"),
     "step of nothing": (["numerics.dt_s=0"], "at least 1e-06 [s]"),
-    "unknown scheme": (["numerics.scheme=newton"], "one_solve, fixed_point or ts_alpha2"),
+    "unknown scheme": (["numerics.scheme=newton"], "one_solve or fixed_point"),
     "unstable Newmark": (["numerics.newmark_gamma=0.7"], "2 newmark_beta >= newmark_gamma"),
     "unknown integrator": (["numerics.integrator=rk4"], "newmark, hht or generalized_alpha"),
     "spectral radius of Newmark": (
@@ -39,48 +39,6 @@ ASSIGNMENTS = {
             "numerics.newmark_beta=0.28",
         ],
         "belong to integrator newmark",
-    ),
-    "TSALPHA2 with another contact law": (
-        ["numerics.scheme=ts_alpha2", "contact.law=hertz"],
-        "ts_alpha2 knows only law linear",
-    ),
-    "TSALPHA2 under two contact wires": (
-        ["numerics.scheme=ts_alpha2", "line.topology=twin", "line.twin={spacing_m=0.1}"],
-        "ts_alpha2 knows only one contact wire",
-    ),
-    "TSALPHA2 in an overlap": (
-        [
-            "numerics.scheme=ts_alpha2",
-            "line.overlap={first_span=8,n_spans=3,rise_m=0.3,distance_m=0.4}",
-        ],
-        "ts_alpha2 knows only one contact wire",
-    ),
-    "TSALPHA2 with a moving base": (
-        [
-            "numerics.scheme=ts_alpha2",
-            "effects.vehicle_motion=true",
-            "vehicle.vertical={amplitude_m=0.01,frequency_hz=1.5}",
-        ],
-        "ts_alpha2 knows only heads and bases that move along a vertical",
-    ),
-    "TSALPHA2 with two strips": (
-        [
-            "numerics.scheme=ts_alpha2",
-            "pantographs.reference.strips={number=2,spacing_m=0.6}",
-        ],
-        "ts_alpha2 knows only one strip",
-    ),
-    "TSALPHA2 by Newmark's parameters": (
-        [
-            "numerics.scheme=ts_alpha2",
-            "numerics.newmark_gamma=0.55",
-            "numerics.newmark_beta=0.28",
-        ],
-        "with scheme ts_alpha2, which takes average acceleration",
-    ),
-    "TSALPHA2 with a coupling": (
-        ["numerics.scheme=ts_alpha2", "numerics.coupling=implicit"],
-        "must not give coupling",
     ),
     "kinematic contact by another method": (
         [

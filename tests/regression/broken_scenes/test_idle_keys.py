@@ -40,9 +40,9 @@ IDLE = {
     ),
     "corrections that are none": (
         SOUND,
-        ["numerics.max_iterations=9", "numerics.scheme=ts_alpha2"],
-        "nothing reads it with scheme ts_alpha2; take numerics.scheme = \"fixed_point\" or "
-        'numerics.coupling = "iterated"',
+        ["numerics.max_iterations=9", "numerics.coupling=explicit"],
+        "nothing reads it with scheme one_solve and coupling explicit; take "
+        'numerics.scheme = "fixed_point" or numerics.coupling = "iterated"',
     ),
     "mass of an arm without length": (
         SOUND,

@@ -55,7 +55,7 @@ def test_the_text_is_well_formed_after_each_write_of_a_flush(
         found.append(len(times_in(path)))
 
     monkeypatch.setattr(growing_xdmf, "write_at", watched)
-    watcher = watch(march, path, snapshots_per_flush=3)
+    watcher = watch(march, path, most_kept=3)
     watcher.start(march.stage())
     for step in range(420):
         watcher.observe(march.view(step))
@@ -81,7 +81,7 @@ def test_a_flush_writes_as_much_of_the_text_however_long_it_is(
     )
     for n_steps in (200, 1000):
         march = make_march(n_steps=n_steps)
-        march.drive(watch(march, tmp_path / f"{n_steps}.xdmf", every=10, snapshots_per_flush=5))
+        march.drive(watch(march, tmp_path / f"{n_steps}.xdmf", every=10, most_kept=5))
     # Two writes for each of 1 + 20 / 5 flushes, and of 1 + 9 + 1 + 10 + 1 with one at step 499.
     assert set(sizes) == {9} and len(sizes) == 2 * len(BLOCKS) * (5 + 22)
 

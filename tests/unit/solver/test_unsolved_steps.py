@@ -10,9 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from measuring import History, start_march
-from petsc4py import PETSc
-from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of, train
+from small_lines import WHOLE, en50318_line, mesh_of, problem_of
 
 from catenary.base.errors import InputError, NotConverged, RunBroken
 from catenary.solver.contact.followed_links import no_links
@@ -27,9 +25,7 @@ from catenary.solver.contact_problem.law_tangents import (
     LinearInSteps,
 )
 from catenary.solver.problem.contact_laws import HertzLaw, LinearLaw
-from catenary.solver.problem.problem import Problem
 from catenary.solver.statics.form_finding.equilibrium import find_form
-from catenary.solver.time_loop.march import Outcome
 
 LINE = en50318_line(2)
 
@@ -91,39 +87,6 @@ def test_a_kinematic_contact_that_would_pull_is_told() -> None:
         RunBroken, match=r"contact 2 would have to pull with 50 N.*take contact\.law"
     ):
         law.accept(0.6, zero, zero, np.array([100.0, -50.0]))
-
-
-def ended(problem: Problem, **options: str) -> tuple[Outcome, History]:
-    """The march of a problem under PETSc options."""
-    given = PETSc.Options()
-    for name, value in options.items():
-        given[name] = value
-    try:
-        run, _ = start_march(problem, mesh_of(LINE, 1))
-        with run:
-            history = History()
-            return run.run([history]), history
-    finally:
-        for name in options:
-            del given[name]
-
-
-def test_petsc_s_newton_that_may_not_iterate_ends_the_run() -> None:
-    """One iteration is not enough where a head leaves the wire in a step."""
-    problem = problem_of(
-        LINE,
-        train=train(70.0, 50.0, 52.1, raise_time=0.0, static_force=300.0),
-        numerics=numerics(1e-3, "ts_alpha2"),
-    )
-    outcome, history = ended(problem, march_alpha2_snes_max_it="1")
-    told = outcome.outcome
-    assert (
-        "TSALPHA2 finds no solution within 1 iteration of" in told
-        and '; take numerics.scheme = "one_solve"' in told
-    )
-    assert f"the step to t = {1e-3 * len(history.time):.4f} s with the train at 5" in told
-    assert outcome.counters["unconverged_steps"] == 1
-    assert outcome.n_steps == len(history.time) - 1 < 30
 
 
 def test_a_line_whose_droppers_find_no_length_is_refused() -> None:

@@ -1,7 +1,9 @@
 """A second opinion on every step: PETSc's TSALPHA2 on line and pantographs as one system.
 
 Every step is a nonlinear system of all unknowns, solved by Newton's method with a Jacobian that is
-factored anew each time. It is slow, and shares nothing with the default scheme but the model.
+factored anew each time. It is slow, and shares nothing with the default scheme but the model. This
+file makes it a scheme of marches, ``TS_ALPHA2``: of lumped pantographs with one strip that is fixed
+to the head, on one contact wire, under the linear law, on one rank.
 """
 
 from __future__ import annotations
@@ -10,15 +12,17 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from monolithic_system import WholeSystem
 
-from catenary.base.errors import InputError, NotConverged
+from catenary.base.errors import NotConverged
 from catenary.base.petsc import PETSc
 from catenary.solver.contact.forces_on_line import ForcesOnLine
 from catenary.solver.contact.train.pantographs import Pantographs
 from catenary.solver.linear.petsc_solvers import PREFIX
+from catenary.solver.model.model import Model
 from catenary.solver.problem.integrator_parameters import GENERALIZED_ALPHA, NEWMARK, integration_of
-from catenary.solver.problem.problem import Numerics
-from catenary.solver.schemes.monolithic_system import WholeSystem
+from catenary.solver.problem.problem import Numerics, Problem
+from catenary.solver.schemes.make_scheme import SCHEMES, SchemeFactory
 from catenary.solver.schemes.scheme import Counters, find_crossings
 
 # Norm of what may be left of the forces [N], and what short steps add to it by round-off of
@@ -27,6 +31,8 @@ _TOLERANCE = 1e-7
 _ROUND_OFF = 100.0 * np.finfo(float).eps
 _MOST_ITERATIONS = 50
 _OWN_PREFIX = f"{PREFIX}alpha2_"
+# The scheme's name in ``Numerics.scheme``.
+TS_ALPHA2 = "ts_alpha2"
 
 
 @dataclass
@@ -103,32 +109,20 @@ class TSAlpha2:
         except PETSc.Error as error:
             if self._ts.getSNES().getConvergedReason() >= 0:
                 raise  # not for want of a solution
-            raise self._broken() from error
-        if not np.isfinite(self._u).all():
-            raise self._broken()
+            raise NotConverged("PETSc's TSALPHA2 finds no solution") from error
+        assert np.isfinite(self._u).all()
         # Its own times are sums of steps, which drift.
         self._ts.setTime(time)
         self._publish(time)
         return not stop
-
-    def _broken(self) -> NotConverged:
-        most = self._ts.getSNES().getTolerances()[3]  # which an option may have set
-        often = "1 iteration" if most == 1 else f"{most} iterations"
-        return NotConverged(
-            f"PETSc's TSALPHA2 finds no solution within {often} of Newton's method; take "
-            'numerics.scheme = "one_solve" or a smaller numerics.dt_s'
-        )
 
     def state(self) -> np.ndarray:
         """Nothing: the method's own acceleration is out of reach."""
         return np.zeros(0)
 
     def restore(self, state: np.ndarray) -> None:
-        """Raise InputError: a run cannot be continued."""
-        raise InputError(
-            'a run with numerics.scheme = "ts_alpha2" cannot be continued, as PETSc keeps a part '
-            "of the state to itself: run it again with --force"
-        )
+        """Not possible, as PETSc keeps a part of the state to itself."""
+        raise NotImplementedError
 
     @property
     def traffic(self) -> None:
@@ -193,7 +187,7 @@ class TSAlpha2:
 
 
 def _integration(numerics: Numerics) -> tuple[float, float, float, float]:
-    """The parameters of the numerics' integrator, of order two.
+    """Parameters of the numerics' integrator, of order two.
 
     Average acceleration is taken as generalized-alpha of radius 1, which it is for linear systems:
     in its usual form PETSc 3.18 starts it from twice the acceleration.
@@ -201,3 +195,19 @@ def _integration(numerics: Numerics) -> tuple[float, float, float, float]:
     radius = 1.0 if numerics.integrator == NEWMARK else numerics.spectral_radius
     method = GENERALIZED_ALPHA if radius == 1.0 else numerics.integrator
     return integration_of(method, radius)
+
+
+def _make(
+    factory: SchemeFactory,
+    problem: Problem,
+    model: Model,
+    interaction: ForcesOnLine,
+    pantographs: Pantographs,
+) -> TSAlpha2:
+    assert factory.comm.size == 1
+    loads = interaction.line.loads
+    system = WholeSystem(problem, model, factory.form, factory.nominal_height, loads)
+    return TSAlpha2(factory.comm, interaction, pantographs, system, problem.numerics)
+
+
+SCHEMES[TS_ALPHA2] = _make
