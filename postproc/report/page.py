@@ -1,14 +1,11 @@
-"""A page of sections as one HTML file that needs no network, with its pictures in it; the same as
-PDF."""
+"""A page of sections as one HTML file that needs no network, with its pictures in it."""
 
 from __future__ import annotations
 
 import base64
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
-from catenary.base.errors import InputError
 from catenary.postproc.report.sections.section import Section
 
 _TEMPLATES = Path(__file__).parent / "templates"
@@ -64,37 +61,3 @@ def page(
 def _data_uri(data: bytes) -> str:
     kind = "png" if data.startswith(b"\x89PNG") else "svg+xml"
     return f"data:image/{kind};base64," + base64.b64encode(data).decode("ascii")
-
-
-def pdf(html: str) -> bytes:
-    """A page as PDF on A4, with page numbers and bookmarks. Not collective.
-
-    Parameters
-    ----------
-    html : what ``page`` returned; what is folded away there is printed in full
-
-    Raises
-    ------
-    InputError
-        If the package WeasyPrint or a library that it needs is missing.
-    """
-    HTML, URLFetcher = _weasyprint()
-    fetcher = URLFetcher(allowed_protocols=["data"])  # pictures are in the page
-    return bytes(HTML(string=html, url_fetcher=fetcher).write_pdf())
-
-
-def refuse_without_pdf() -> None:
-    """Raise `InputError` if no PDF can be written. Not collective."""
-    _weasyprint()
-
-
-def _weasyprint() -> tuple[Any, Any]:
-    try:
-        from weasyprint import HTML
-        from weasyprint.urls import URLFetcher
-    except (ImportError, OSError) as error:  # OSError: of Pango, which is no package of Python
-        raise InputError(
-            f"--pdf needs the package weasyprint and the library Pango ({error}): pip install "
-            "'catenary[report]', and on Debian apt-get install libpango-1.0-0 libpangoft2-1.0-0"
-        ) from error
-    return HTML, URLFetcher

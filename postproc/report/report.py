@@ -21,7 +21,8 @@ from catenary.postproc.files.own_files import REPORT_FILES
 from catenary.postproc.read.records import Records
 from catenary.postproc.read.results import Results
 from catenary.postproc.report import csv_tables
-from catenary.postproc.report.page import page, pdf, refuse_without_pdf
+from catenary.postproc.report.page import page
+from catenary.postproc.report.paper import pdf, refuse_without_pdf
 from catenary.postproc.report.sections import acceptance as acceptance_section
 from catenary.postproc.report.sections import contact_force, dynamics, line, run_facts
 from catenary.postproc.report.sections.section import (

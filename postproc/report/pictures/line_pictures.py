@@ -46,7 +46,7 @@ def arm_uplift(results: Results, statistics: RunStatistics, limit: float | None)
     ``limit`` is the allowed uplift [m], None for none.
     """
     supports = statistics.supports
-    figure, (passing, along) = stacked(5.6, 2)
+    figure, (passing, along) = stacked(4.8, 2)
     _passing_train(passing, results, statistics)
 
     mark_line(along, results, float(supports.x.min(initial=0)), float(supports.x.max(initial=1)))
@@ -116,7 +116,7 @@ def dropper_force(results: Results, statistics: RunStatistics) -> Figure:
     """Forces of the worst dropper and of a mid-span one, and the range of every dropper."""
     droppers = statistics.droppers
     x, evaluated = droppers.x, np.flatnonzero(droppers.evaluated)
-    figure, (history, along) = stacked(5.6, 2)
+    figure, (history, along) = stacked(4.8, 2)
 
     masts, span = results.line("support_x"), results.reference_span
     middle = int(np.argmin(np.abs(x - 0.5 * (masts[span] + masts[span + 1]))))
@@ -162,7 +162,7 @@ def static_line(results: Results) -> Figure:
     """
     at, lift = results.static("elasticity_x"), results.static("elasticity")
     masts, span = results.line("support_x"), results.span_at_rest
-    figure, (profile, compliance) = stacked(5.2, 2)
+    figure, (profile, compliance) = stacked(4.6, 2)
 
     start, end = masts[max(span - 1, 0)], masts[min(span + 2, masts.size - 1)]
     profiles = results.contact_profiles()
@@ -240,7 +240,7 @@ def plan_view(results: Results) -> Figure | None:
     registration = results.registration()
     if registration is None or not results.has_static("contact_y"):
         return None
-    figure, (plan, forces) = stacked(5.2, 2)
+    figure, (plan, forces) = stacked(4.6, 2)
     profiles = results.contact_profiles()
     for number, (name, wire) in enumerate(profiles.items()):
         assert wire.y is not None
