@@ -6,6 +6,7 @@ import base64
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
+from catenary.postproc.evaluate.wording import with_minus
 from catenary.postproc.report.sections.section import Section
 
 _TEMPLATES = Path(__file__).parent / "templates"
@@ -44,6 +45,7 @@ def page(
         trim_blocks=True,
         lstrip_blocks=True,
     )
+    environment.filters["minus"] = lambda value: with_minus(str(value))
     made = list(sections)
     uris = {name: _data_uri(data) for name, data in pictures.items()}
     return environment.get_template("page.html.j2").render(

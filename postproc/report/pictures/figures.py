@@ -26,6 +26,7 @@ from matplotlib.transforms import ScaledTranslation
 from PIL import Image
 
 from catenary.base.errors import CatenaryError
+from catenary.postproc.evaluate.wording import with_minus
 
 logger = logging.getLogger("catenary.pictures")
 
@@ -263,6 +264,7 @@ def fitted(figure: Figure) -> Figure:
 def _prepared(figure: Figure) -> FigureCanvasAgg:
     """The canvas of a figure whose legends have room and whose texts are no formulas."""
     for text in _texts(figure):
+        text.set_text(with_minus(text.get_text()))
         if "$" in text.get_text():
             text.set_parse_math(False)
     canvas = figure.canvas
