@@ -30,11 +30,18 @@ def page(
 
     Parameters
     ----------
-    title, lead : above the sections
-    pictures : PNG or SVG files by name; sections show those that are there
-    names : of the sections, as their anchors and for a list of contents; none without both
-    plots : pictures of Plotly in JSON by name, which stand in the place of others
-    script : the program of Plotly
+    title, lead : str
+        Heading of the page, and the sentence below it.
+    sections : iterable of Section
+        Sections in their order.
+    pictures : mapping
+        PNG or SVG files by name; sections show those that are there.
+    names : sequence of str, optional
+        Names of the sections, as their anchors and for a list of contents; none without both.
+    plots : mapping, optional
+        Pictures of Plotly in JSON by name, which stand in the place of others.
+    script : str, optional
+        Program of Plotly.
     """
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 

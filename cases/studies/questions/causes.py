@@ -149,8 +149,8 @@ class Causes:
             )
         if any(name == "gusts" for name, *_ in self._results.attributes.get("effects_on", [])):
             said.append(
-                "gusts blow; one run does not tell which share of sigma is theirs, catenary what-if "
-                "CASE --set effects.gusts=false does"
+                "gusts blow; one run does not tell which share of sigma is theirs, catenary "
+                "what-if CASE --set effects.gusts=false does"
             )
         return said
 

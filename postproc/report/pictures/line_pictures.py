@@ -43,7 +43,14 @@ _MOST_ARMS = 60
 def arm_uplift(results: Results, statistics: RunStatistics, limit: float | None) -> Figure:
     """Uplift at the evaluated arms as the train passes, and the largest uplift of every arm.
 
-    ``limit`` is the allowed uplift [m], None for none.
+    Parameters
+    ----------
+    results : Results
+        Results of the run.
+    statistics : RunStatistics
+        Its statistics.
+    limit : float or None
+        Largest uplift that is allowed [m]; None without a limit.
     """
     supports = statistics.supports
     figure, (passing, along) = stacked(4.8, 2)
@@ -277,7 +284,15 @@ _ALLOWED = 10.0
 
 @own_style()
 def draw_temperatures(rests: Sequence[LineAtTemperature], path: Path) -> None:
-    """Write the picture as PNG or SVG, by the file's suffix. Not collective."""
+    """Write a picture of a line at several temperatures. Not collective.
+
+    Parameters
+    ----------
+    rests : sequence of LineAtTemperature
+        Line at rest at each temperature.
+    path : Path
+        PNG or SVG file, by its suffix.
+    """
     found = [rest for rest in rests if not rest.why_not]
     names = [wire.name for wire in found[0].wires if wire.ends] if found else []
     figure = new_figure(2.6 * (len(names) + 1))
