@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 
 # Stands behind a limit that was not compared with the text of its standard, and explains itself.
 UNCOMPARED = "*"
@@ -13,6 +14,11 @@ def fixed(value: float, digits: int) -> str:
     """``value`` with so many decimals, without a sign where it is rounded to zero."""
     text = f"{value:.{digits}f}"
     return text.removeprefix("-") if not text.strip("-0.") else text
+
+
+def with_minus(text: str) -> str:
+    """``text`` with a minus sign before its negative numbers, where it had a hyphen."""
+    return re.sub(r"(?<!\S)-(?=\d)", "\u2212", text)
 
 
 def capital(text: str) -> str:

@@ -113,12 +113,18 @@ def align(
 
     Parameters
     ----------
-    place : (n,) ascending, as the file has them [m]
-    force : (n,) below the cut-off, by the file or by us [N]
-    run : the force of the run
-    stretch : begin and end of what is compared [m]
-    cut_off : bandwidth of both [Hz]
-    is_filtered : whether the file's values should have passed its filter already
+    place : ndarray, shape (n,)
+        Ascending places of the measured force, as the file has them [m].
+    force : ndarray, shape (n,)
+        Measured force below the cut-off, filtered by the file or here [N].
+    run : RunForce
+        Force of the run.
+    stretch : tuple of float
+        Begin and end of what is compared [m].
+    cut_off : float
+        Bandwidth of both forces [Hz].
+    is_filtered : bool
+        Whether the file's values should have passed its filter already.
     """
     fit = _Fit(place, force, run, stretch, cut_off, is_filtered)
     stated = cut_off if is_filtered else None

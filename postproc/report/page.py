@@ -1,14 +1,12 @@
-"""A page of sections as one HTML file that needs no network, with its pictures in it; the same as
-PDF."""
+"""A page of sections as one HTML file that needs no network, with its pictures in it."""
 
 from __future__ import annotations
 
 import base64
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
-from catenary.base.errors import InputError
+from catenary.postproc.evaluate.wording import with_minus
 from catenary.postproc.report.sections.section import Section
 
 _TEMPLATES = Path(__file__).parent / "templates"
@@ -32,11 +30,18 @@ def page(
 
     Parameters
     ----------
-    title, lead : above the sections
-    pictures : PNG or SVG files by name; sections show those that are there
-    names : of the sections, as their anchors and for a list of contents; none without both
-    plots : pictures of Plotly in JSON by name, which stand in the place of others
-    script : the program of Plotly
+    title, lead : str
+        Heading of the page, and the sentence below it.
+    sections : iterable of Section
+        Sections in their order.
+    pictures : mapping
+        PNG or SVG files by name; sections show those that are there.
+    names : sequence of str, optional
+        Names of the sections, as their anchors and for a list of contents; none without both.
+    plots : mapping, optional
+        Pictures of Plotly in JSON by name, which stand in the place of others.
+    script : str, optional
+        Program of Plotly.
     """
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
@@ -47,6 +52,7 @@ def page(
         trim_blocks=True,
         lstrip_blocks=True,
     )
+    environment.filters["minus"] = lambda value: with_minus(str(value))
     made = list(sections)
     uris = {name: _data_uri(data) for name, data in pictures.items()}
     return environment.get_template("page.html.j2").render(
@@ -64,37 +70,3 @@ def page(
 def _data_uri(data: bytes) -> str:
     kind = "png" if data.startswith(b"\x89PNG") else "svg+xml"
     return f"data:image/{kind};base64," + base64.b64encode(data).decode("ascii")
-
-
-def pdf(html: str) -> bytes:
-    """A page as PDF on A4, with page numbers and bookmarks. Not collective.
-
-    Parameters
-    ----------
-    html : what ``page`` returned; what is folded away there is printed in full
-
-    Raises
-    ------
-    InputError
-        If the package WeasyPrint or a library that it needs is missing.
-    """
-    HTML, URLFetcher = _weasyprint()
-    fetcher = URLFetcher(allowed_protocols=["data"])  # pictures are in the page
-    return bytes(HTML(string=html, url_fetcher=fetcher).write_pdf())
-
-
-def refuse_without_pdf() -> None:
-    """Raise `InputError` if no PDF can be written. Not collective."""
-    _weasyprint()
-
-
-def _weasyprint() -> tuple[Any, Any]:
-    try:
-        from weasyprint import HTML
-        from weasyprint.urls import URLFetcher
-    except (ImportError, OSError) as error:  # OSError: of Pango, which is no package of Python
-        raise InputError(
-            f"--pdf needs the package weasyprint and the library Pango ({error}): pip install "
-            "'catenary[report]', and on Debian apt-get install libpango-1.0-0 libpangoft2-1.0-0"
-        ) from error
-    return HTML, URLFetcher

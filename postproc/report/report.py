@@ -21,7 +21,8 @@ from catenary.postproc.files.own_files import REPORT_FILES
 from catenary.postproc.read.records import Records
 from catenary.postproc.read.results import Results
 from catenary.postproc.report import csv_tables
-from catenary.postproc.report.page import page, pdf, refuse_without_pdf
+from catenary.postproc.report.page import page
+from catenary.postproc.report.paper import pdf, refuse_without_pdf
 from catenary.postproc.report.sections import acceptance as acceptance_section
 from catenary.postproc.report.sections import contact_force, dynamics, line, run_facts
 from catenary.postproc.report.sections.section import (
@@ -86,15 +87,25 @@ def write_report(
 
     Parameters
     ----------
-    result_path : result file or its folder
-    out_dir : folder that exists
-    records : what ``evaluate.guard`` found in the file, None to check it here
-    entries : the sections, None for those of ``quick_sections``
-    beside : texts of further files by name
-    measured : errors of quantities that a study measured, and the study, as ``EvaluatedRun``
-    vector : pictures are SVG files instead of PNG files, which are removed
-    on_paper : write ``report.pdf`` too
-    interactive : write ``report_interactive.html`` too, whose pictures are Plotly's
+    result_path : Path or str
+        Result file or its folder.
+    out_dir : Path or str
+        Folder that exists.
+    records : Records, optional
+        What ``evaluate.guard`` found in the file; without it the file is checked here.
+    entries : sequence of SectionEntry, optional
+        Sections; those of ``quick_sections`` without it.
+    beside : mapping, optional
+        Texts of further files by name.
+    measured : tuple, optional
+        Errors of quantities that a study measured, in their units, and the study, as
+        ``EvaluatedRun`` has them.
+    vector : bool, optional
+        Whether pictures are SVG files instead of PNG files, which are removed.
+    on_paper : bool, optional
+        Whether ``report.pdf`` is written too.
+    interactive : bool, optional
+        Whether ``report_interactive.html`` is written too, whose pictures are Plotly's.
 
     Raises
     ------
@@ -151,6 +162,13 @@ def write_report(
 def write_summary(result_path: Path | str, out_dir: Path | str) -> bool | None:
     """Write ``summary.json`` of a run alone; returns the verdict as ``Report``. Not collective.
 
+    Parameters
+    ----------
+    result_path : Path or str
+        Result file or its folder.
+    out_dir : Path or str
+        Folder that exists.
+
     Raises
     ------
     InputError
@@ -166,7 +184,15 @@ def write_summary(result_path: Path | str, out_dir: Path | str) -> bool | None:
 
 
 def drawings(results: Results, statistics: RunStatistics) -> Iterator[Picture]:
-    """What makes each picture of a run, in their order."""
+    """What makes each picture of a run, in their order. Not collective.
+
+    Parameters
+    ----------
+    results : Results
+        Results of the run.
+    statistics : RunStatistics
+        Its statistics.
+    """
     run = EvaluatedRun(results, statistics, criteria_of(results, statistics))
     for entry in SECTIONS:
         if entry.applies(run):

@@ -88,10 +88,14 @@ def write_study(
 
     Parameters
     ----------
-    study : what was found
-    out_dir : folder that exists
-    rows : figures of every run, for ``study.json``
-    facts : what is said of the study as a whole, such as its run time
+    study : Study
+        What was found.
+    out_dir : Path
+        Folder that exists.
+    rows : sequence of mapping
+        Figures of every run, for ``study.json``, with their units in their names.
+    facts : mapping
+        What is said of the study as a whole, such as its run time.
     """
     pictures: dict[str, bytes] = {}
     for one in study.figures:

@@ -146,7 +146,19 @@ def texts_table(
     title: str = "",
     note: str = "",
 ) -> StudyTable:
-    """A table of texts for people, with the columns ``right`` at the right."""
+    """A table of texts for people.
+
+    Parameters
+    ----------
+    heads : sequence of str
+        Heads of the columns, with units in brackets.
+    rows : sequence of sequence
+        Texts of the cells.
+    right : collection of int, optional
+        Numbers of the columns that stand at the right, from 0.
+    title, note : str, optional
+        What stands above the table.
+    """
     columns = [
         Column(str(number), head or " ", ">" if number in right else "")
         for number, head in enumerate(heads)
@@ -169,10 +181,12 @@ def write_files(folder: Path, content: Mapping[str, Content]) -> list[Path]:
 
     Parameters
     ----------
-    folder : made if it is not there
-    content : by names of files. A table, or rows with the same keys, become CSV, a mapping JSON,
+    folder : Path
+        Folder, which is made if it is not there.
+    content : mapping
+        Content by names of files. A table, or rows with the same keys, become CSV, a mapping JSON,
         and what a function draws a picture; no rows, and a picture that there is none of or that
-        fails, are left out; texts and bytes are written as they are
+        fails, are left out; texts and bytes are written as they are.
 
     Raises
     ------
@@ -210,7 +224,8 @@ def remark_lines(runs: Iterable[tuple[str, Sequence[str]]]) -> list[str]:
 
     Parameters
     ----------
-    runs : the name of each run, and its remarks
+    runs : iterable of tuple
+        Name of each run, and its remarks.
     """
     told = list(runs)
     names: dict[str, list[str]] = {}

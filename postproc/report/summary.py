@@ -31,7 +31,16 @@ def summarise(
 ) -> dict[str, Any]:
     """The content of ``summary.json``: plain Python values, NaN as None. Not collective.
 
-    ``indicators`` are those of the run, None to find them here.
+    Parameters
+    ----------
+    results : Results
+        Results of the run.
+    statistics : RunStatistics
+        Its statistics.
+    criteria : list of Criterion
+        Judged criteria.
+    indicators : Indicators, optional
+        Estimated errors of the run; found here without them.
     """
     attributes = results.attributes
     indicators = indicate(results) if indicators is None else indicators

@@ -105,7 +105,10 @@ def gust_loads(model: Model, wind: Wind) -> list[FieldLoad]:
     assert gusts is not None
     x = model.mesh.points[:, 0]
     points = gust_points(gusts.spacing, float(x.min()), float(x.max()))
-    pressures = {VERTICAL: _vertical(model, wind, points), LATERAL: _lateral(model, wind, points)}
+    pressures = {
+        VERTICAL: upward_pressure(model, wind, points),
+        LATERAL: _lateral(model, wind, points),
+    }
     found = []
     for plane, (interval, fill) in pressures.items():
         parts = [
@@ -123,8 +126,26 @@ def gust_loads(model: Model, wind: Wind) -> list[FieldLoad]:
 _Fill = tuple[float, Callable[[int, slice, np.ndarray], None]]
 
 
-def _vertical(model: Model, wind: Wind, points: np.ndarray) -> _Fill:
-    """Upward force of gusts over diameter times drag coefficient [N/m2]."""
+def upward_pressure(model: Model, wind: Wind, points: np.ndarray) -> _Fill:
+    """Upward force of gusts over diameter times drag coefficient [N/m2]. Not collective.
+
+    Parameters
+    ----------
+    model : Model
+        Discrete line.
+    wind : Wind
+        Wind with gusts.
+    points : ndarray, shape (n,)
+        Places along the track, even and ascending [m].
+
+    Returns
+    -------
+    interval : float
+        Time between slices, between which the force is linear [s].
+    fill : callable
+        ``fill(first, part, slices)`` fills ``slices`` (m, k) at the k points of ``part`` and at the
+        times (first + i) ``interval``.
+    """
     mean = across_at(wind, model.problem.tunnels, points)
     exposed = exposure(wind, points, model.problem.tunnels)
     upward = GustField(wind, UPWARD, points, _apart(points))

@@ -10,8 +10,9 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from catenary.cases.studies.full_report.scene_of_run import SceneOfRun
-from catenary.cases.studies.questions.causes import Causes, elasticity_along
+from catenary.cases.studies.questions.causes import Causes
 from catenary.cases.studies.questions.worst import Passage, Spot, WorstPlaces, worst_places
+from catenary.cases.studies.questions.worst_output import NONE
 from catenary.postproc.evaluate import filters
 from catenary.postproc.read.results import Results
 from catenary.postproc.report.pictures.figures import (
@@ -30,7 +31,6 @@ from catenary.postproc.report.study_table import StudyTable, texts_table
 
 # What is shown to both sides of an arm or a dropper [m], and how many places tables have.
 _BESIDE, _MOST = 30.0, 5
-_NO_CAUSE = "no cause found"
 
 
 def section(scene: SceneOfRun | None, run: EvaluatedRun) -> Section:
@@ -38,11 +38,10 @@ def section(scene: SceneOfRun | None, run: EvaluatedRun) -> Section:
 
     Parameters
     ----------
-    scene : of the run, for the elasticity of its line; None if it is not known
+    scene : of the run, for the elasticity of its line and its gusts; None if it is not known
     """
     results, places = run.results, worst_places(run.results)
-    along = None if scene is None else elasticity_along(scene.at_rest, *results.evaluation)
-    causes = Causes(results, places.passages, along)
+    causes = Causes(results, places.passages, None if scene is None else scene.at_rest)
     return Section("Worst places", _blocks(results, places, causes), _pictures(results, places))
 
 
@@ -56,12 +55,12 @@ def _blocks(results: Results, places: WorstPlaces, causes: Causes) -> Iterator[T
             f"{one.minimum:.0f} to {one.maximum:.0f} N{_out(one.stands_out)}.",
             "note",
             "Worst span:",
-            causes.of_passage(one) or [_NO_CAUSE],
+            causes.of_passage(one) or _no_cause(one.stands_out),
         )
     for first, spots, words in _KINDS:
         for spot in spots(places)[:1]:
             said = words.format(at=spot.place, v=spot.value, m=spot.median)
-            items = causes.at(spot.x) or [_NO_CAUSE]
+            items = causes.at(spot.x) or _no_cause(spot.stands_out)
             yield Text(f"{said}{_out(spot.stands_out)}.", "note", first, items)
     everywhere = causes.of_line()
     if everywhere:
@@ -85,6 +84,11 @@ _KINDS: tuple[tuple[str, Callable[[WorstPlaces], Sequence[Spot]], str], ...] = (
     ("Worst dropper:", lambda p: p.forces, "{at}, up to {v:.0f} N (median {m:.0f} N)"),
     ("Longest slack:", lambda p: p.slack, "dropper at {at}, {v:.2f} s (median {m:.2f} s)"),
 )
+
+
+def _no_cause(is_out: bool | None) -> list[str]:
+    """What stands in the place of candidates; one like the others needs none."""
+    return [] if is_out is False else [NONE]
 
 
 def _out(is_out: bool | None) -> str:
@@ -121,7 +125,7 @@ def _span(results: Results, passage: Passage) -> Figure:
     p = passage.pantograph
     position = results.column("contact_position", p)
     rows = slice(*np.searchsorted(position, (low, high)).tolist())
-    figure, (force, height) = stacked(6.0, 2)
+    figure, (force, height) = stacked(4.8, 2)
     raw = results.column("contact_force", p)
     filtered = filters.contact_force(results, p)[rows]
     for axes in (force, height):

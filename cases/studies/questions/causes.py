@@ -11,8 +11,11 @@ import numpy as np
 from catenary.cases.studies.questions.worst import Passage, dropper_likes, spans_in_stretch
 from catenary.meshgen.wires import Role
 from catenary.postproc.read.results import Results
+from catenary.solver.effects.all_effects import simulated
 from catenary.solver.statics.elasticity import elasticity
 from catenary.solver.statics.line_at_rest import LineAtRest
+from catenary.solver.wind.drag import upward_pressure
+from catenary.solver.wind.wind_at import drag_width, gust_points
 
 # Frequencies so close are near each other, lengths so far apart differ [-].
 _NEAR, _LONGER = 0.1, 0.05
@@ -24,6 +27,8 @@ _SOFTER, _HIGHER, _HEAVIER = 0.1, 5e-3, 0.5
 # Lift under a unit force below which a contact wire is held [m/N].
 _ANCHORED = 1e-9
 _POINTS = 101  # at which profiles of spans are compared
+# Gusts so long before a pantograph comes still move the span, a period of its own motion [s].
+_BEFORE = 1.0
 _FEWEST = 3
 
 
@@ -50,6 +55,42 @@ def elasticity_along(rest: LineAtRest, start: float, end: float) -> tuple[np.nda
     return found.x, (found.pressed(height, force) - np.nanmin(height, axis=1)) / force
 
 
+def gust_forces(rest: LineAtRest, when: Sequence[tuple[float, float, float, float]]) -> list[float]:
+    """Largest upward or downward force of gusts on the wires of stretches [N]. Not collective.
+
+    Parameters
+    ----------
+    rest : LineAtRest
+        Line at rest, with its wind.
+    when : sequence of tuple of float
+        Start and end of each stretch [m], and from and to of the time that is looked at [s].
+
+    Returns
+    -------
+    list of float
+        Sums over all wires and the length of each stretch; none where no gusts are simulated.
+    """
+    wind, mesh = simulated(rest.problem).wind, rest.mesh
+    if wind is None or wind.gusts is None:
+        return []
+    x = mesh.points[:, 0]
+    points = gust_points(wind.gusts.spacing, float(x.min()), float(x.max()))
+    interval, fill = upward_pressure(rest.model, wind, points)
+    found = []
+    for start, end, begin, stop in when:
+        first, last = np.searchsorted(points, (start, end)).tolist()
+        low, high = max(round(begin / interval), 0), round(stop / interval)
+        slices = np.zeros((high - low + 1, last - first))
+        fill(low, slice(first, last), slices)
+        area = 0.0
+        for wire in rest.problem.line.wires:
+            for nodes in mesh.pieces(wire.name):
+                ends = np.clip(mesh.x(nodes)[[0, -1]], start, end)
+                area += drag_width(wire) * float(ends[1] - ends[0])
+        found.append(area * float(np.abs(slices.mean(axis=1)).max()))
+    return found
+
+
 class Causes:
     """Looks for causes in what a result file says of its line.
 
@@ -57,16 +98,14 @@ class Causes:
     ----------
     results : of the run, open
     passages : of all spans of the evaluated stretch
-    elasticity : what `elasticity_along` finds for the stretch; None if it is not known
+    rest : the line at rest, for its elasticity and its gusts; None if it is not known
     """
 
     def __init__(
-        self,
-        results: Results,
-        passages: Sequence[Passage],
-        elasticity: tuple[np.ndarray, np.ndarray] | None,
+        self, results: Results, passages: Sequence[Passage], rest: LineAtRest | None
     ) -> None:
-        self._results, self._passages, self._elasticity = results, passages, elasticity
+        self._results, self._passages, self._rest = results, passages, rest
+        self._elasticity = None if rest is None else elasticity_along(rest, *results.evaluation)
         self._masts = results.line("support_x")
 
     def of_passage(self, passage: Passage) -> list[str]:
@@ -79,6 +118,7 @@ class Causes:
             *self._elastic(passage.span),
             *self._profile(passage.span),
             *self._droppers_at_rest(passage.start, passage.end),
+            *self._gusts(passage.span, passage.pantograph),
         ]
 
     def at(self, x: float) -> list[str]:
@@ -89,6 +129,7 @@ class Causes:
             *self._near(x - reach, x + reach),
             *self._elastic(span),
             *self._droppers_at_rest(x - reach, x + reach),
+            *self._gusts(span, 0),
         ]
 
     def of_line(self) -> list[str]:
@@ -105,6 +146,11 @@ class Causes:
             said.append(
                 f"spans are passed at {speed / span:.2f} Hz, near their lowest natural frequency "
                 f"c / 2 L = {wave / (2.0 * span):.2f} Hz"
+            )
+        if any(name == "gusts" for name, *_ in self._results.attributes.get("effects_on", [])):
+            said.append(
+                "gusts blow; one run does not tell which share of sigma is theirs, catenary "
+                "what-if CASE --set effects.gusts=false does"
             )
         return said
 
@@ -239,6 +285,32 @@ class Causes:
                     f"the dropper at {x[number]:.1f} m carries {force[number]:.0f} N at rest, "
                     f"usual are {usual:.0f} N"
                 )
+
+    def _gusts(self, span: int, pantograph: int) -> Iterator[str]:
+        """Force of the gusts on a span when a pantograph comes, beside that on the others."""
+        found = self._gust_forces.get(pantograph, {})
+        if span in found:
+            usual = float(np.median(list(found.values())))
+            yield (
+                f"gusts press or lift the wires of the span by up to {found[span]:.0f} N as it is "
+                f"passed, median of all spans {usual:.0f} N"
+            )
+
+    @cached_property
+    def _gust_forces(self) -> dict[int, dict[int, float]]:
+        """Force of the gusts on each span of the stretch by pantograph [N], none without gusts."""
+        if self._rest is None:
+            return {}
+        when = []
+        for one in self._passages:
+            position = self._results.column("contact_position", one.pantograph)
+            rows = np.searchsorted(position, (one.start, one.end)).tolist()
+            come, gone = map(self._results.time_at, rows)
+            when.append((one.start, one.end, come - _BEFORE, gone))
+        found: dict[int, dict[int, float]] = {}
+        for one, force in zip(self._passages, gust_forces(self._rest, when), strict=False):
+            found.setdefault(one.pantograph, {})[one.span] = force
+        return found
 
     @cached_property
     def _likes(self) -> np.ndarray:

@@ -11,7 +11,7 @@ from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.input.faults import Origin
 from catenary.cases.scene.load import scene_from
 from catenary.cases.scene.problem import problem_of
-from catenary.cases.studies.questions.causes import Causes, elasticity_along
+from catenary.cases.studies.questions.causes import Causes
 from catenary.cases.studies.questions.worst import Passage, Spot, WorstPlaces, worst_places
 from catenary.postproc.read.results import Results
 from catenary.postproc.report.study_table import Column, StudyTable, write_files
@@ -38,8 +38,7 @@ def answer_of(results: Results, count: int) -> Answer:
     count : places of each kind in the text
     """
     places = worst_places(results)
-    along, unknown = _elasticity(results)
-    causes = Causes(results, places.passages, along)
+    causes, unknown = _causes(results, places.passages)
     names = results.pantograph_names()
     lines = [_head(results)]
     if not places.passages:
@@ -55,7 +54,7 @@ def answer_of(results: Results, count: int) -> Answer:
     if everywhere:
         lines += ["", "Of the line as a whole:", *(f"  {text}" for text in everywhere)]
     if unknown:
-        lines += ["", f"Elasticity along the line is not known: {unknown}"]
+        lines += ["", f"Elasticity and gusts along the line are not known: {unknown}"]
     text = "\n".join([*lines, "", "Candidates are near in place or frequency; none is proved."])
     return Answer(
         _spans_table(places.passages, causes, names),
@@ -73,15 +72,14 @@ def _head(results: Results) -> str:
     )
 
 
-def _elasticity(results: Results) -> tuple[Any, str]:
-    """Elasticity along the evaluated stretch from the scene of a run, and why it is not known."""
+def _causes(results: Results, passages: Sequence[Passage]) -> tuple[Causes, str]:
+    """Candidates by the scene that a run recorded, and why that gives no line at rest."""
     try:
         origin = Origin(str(results.path), recorded=True)
         scene = scene_from(results.attributes["config"], origin)
-        at_rest = line_at_rest(problem_of(scene), mesh_of(scene))
-        return elasticity_along(at_rest, *results.evaluation), ""
+        return Causes(results, passages, line_at_rest(problem_of(scene), mesh_of(scene))), ""
     except CatenaryError as error:
-        return None, str(error)
+        return Causes(results, passages, None), str(error)
 
 
 def _of_spans(
@@ -99,7 +97,7 @@ def _of_spans(
             f"median {one.median:.1f} N, force {one.minimum:.0f} to {one.maximum:.0f} N"
             f"{_out(one.stands_out)}"
         )
-        lines += _told(causes.of_passage(one))
+        lines += _told(causes.of_passage(one), one.stands_out)
     return lines
 
 
@@ -108,13 +106,14 @@ def _of_spots(title: str, spots: Sequence[Spot], words: str, causes: Causes) -> 
     for one in spots:
         said = words.format(at=one.place, v=one.value, m=one.median)
         lines.append(f"  {said}{_out(one.stands_out)}")
-        lines += _told(causes.at(one.x))
+        lines += _told(causes.at(one.x), one.stands_out)
     return lines
 
 
-def _told(said: Sequence[str]) -> list[str]:
-    """Lines for the candidates of a place."""
-    lines = [f"    {text}" for text in said[:_MOST_CAUSES] or [NONE]]
+def _told(said: Sequence[str], is_out: bool | None) -> list[str]:
+    """Lines for the candidates of a place; one like the others needs none."""
+    none = [] if is_out is False else [NONE]
+    lines = [f"    {text}" for text in said[:_MOST_CAUSES] or none]
     more = len(said) - _MOST_CAUSES
     return [*lines, f"    and {more} more (-o)"] if more > 0 else lines
 

@@ -16,7 +16,8 @@ def thinned(y: np.ndarray) -> np.ndarray | slice:
 
     Parameters
     ----------
-    y : (n,) in order; NaN leaves a gap where all values of a bin are
+    y : ndarray, shape (n,)
+        Values of the curve in order; NaN leaves a gap where all values of a bin are NaN.
     """
     return slice(None) if y.size <= MOST_POINTS else _extremes(y)
 

@@ -26,6 +26,7 @@ from matplotlib.transforms import ScaledTranslation
 from PIL import Image
 
 from catenary.base.errors import CatenaryError
+from catenary.postproc.evaluate.wording import with_minus
 
 logger = logging.getLogger("catenary.pictures")
 
@@ -95,7 +96,8 @@ def new_figure(height: float) -> Figure:
 
     Parameters
     ----------
-    height : [inch]
+    height : float
+        Height of the figure [inch].
     """
     figure = Figure(figsize=(WIDTH, height), dpi=_RESOLUTION, layout="constrained")
     FigureCanvasAgg(figure)
@@ -110,10 +112,13 @@ def stacked(height: float, n: int, *, shared: bool = False) -> tuple[Figure, lis
 
     Parameters
     ----------
-    height : of the figure [inch]
-    n : number of panels, at least 1
-    shared : whether the panels have one x axis, whose labels stand below the last one, and one
-        scale of y
+    height : float
+        Height of the figure [inch].
+    n : int
+        Number of panels, at least 1.
+    shared : bool, optional
+        Whether the panels have one x axis, whose labels stand below the last one, and one scale of
+        y.
     """
     figure = Figure(figsize=(WIDTH, height), dpi=_RESOLUTION)
     FigureCanvasAgg(figure)
@@ -151,13 +156,41 @@ def curve(
     width: float = 1.2,
     **how: Any,
 ) -> None:
-    """A curve with the colour of a number; ``look`` is Matplotlib's format of markers and line."""
+    """Draw a curve with the colour of a number.
+
+    Parameters
+    ----------
+    axes : Axes
+        Panel.
+    x, y : array_like, shape (n,)
+        Points of the curve, in the units of the panel.
+    number : int
+        Number of the pantograph or curve, which has its colour.
+    label : str, optional
+        Entry of the legend; none without it.
+    look : str, optional
+        Matplotlib's format of markers and line.
+    width : float, optional
+        Width of the line [pt].
+    **how : dict
+        Further properties of Matplotlib's line, which win.
+    """
     usual: dict[str, Any] = {"color": colour(number), "linewidth": width, "ms": 3.5, "label": label}
     axes.plot(x, y, look, **(usual | how))
 
 
 def tidy(axes: Axes, x_label: str, y_label: str, title: str = "") -> None:
-    """Labels, light grid, few ticks and no box."""
+    """Give a panel labels, a light grid, few ticks and no box.
+
+    Parameters
+    ----------
+    axes : Axes
+        Panel.
+    x_label, y_label : str
+        Quantity of each axis, with its unit in brackets.
+    title : str, optional
+        Title above the panel, at its left.
+    """
     for axis, most in zip((axes.xaxis, axes.yaxis), _MOST_TICKS, strict=True):
         if isinstance(axis.get_major_locator(), AutoLocator):
             axis.set_major_locator(FewTicks(most, steps=_STEPS))
@@ -185,6 +218,13 @@ def legend_above(axes: Axes, columns: int = 5) -> Legend:
     """Legend above the axes at the right, where no curve can pass.
 
     Where it is too long to stand beside the title, ``png`` makes room for it.
+
+    Parameters
+    ----------
+    axes : Axes
+        Panel, whose curves have labels.
+    columns : int, optional
+        Entries side by side, at most.
     """
     return axes.legend(
         loc="lower right",
@@ -207,8 +247,10 @@ def painted(name: str, draw: Callable[[], Figure | None]) -> dict[str, bytes]:
 
     Parameters
     ----------
-    name : of the file, with its suffix
-    draw : makes the figure, None if there is nothing to show
+    name : str
+        Name of the file, with its suffix.
+    draw : callable
+        Makes the figure, or returns None if there is nothing to show.
     """
     try:
         with own_style():
@@ -263,6 +305,7 @@ def fitted(figure: Figure) -> Figure:
 def _prepared(figure: Figure) -> FigureCanvasAgg:
     """The canvas of a figure whose legends have room and whose texts are no formulas."""
     for text in _texts(figure):
+        text.set_text(with_minus(text.get_text()))
         if "$" in text.get_text():
             text.set_parse_math(False)
     canvas = figure.canvas
@@ -302,9 +345,7 @@ def _make_room_for_legends(figure: Figure, canvas: FigureCanvasAgg) -> None:
 def _room_above(axes: Axes, legend: Legend, canvas: FigureCanvasAgg, room: float) -> float:
     """Height that the legend of a panel needs beyond a line [inch]; its title moves above it.
 
-    Parameters
-    ----------
-    room : width of the panel [px]
+    ``room`` is the width of the panel [px].
     """
     title = axes.get_title(loc="left")
     labels = [text.get_text() for text in legend.get_texts()]

@@ -84,10 +84,13 @@ def force_spectrum(results: Results, lengths: Mapping[str, float]) -> Figure:
 
     Parameters
     ----------
-    lengths : by which the line repeats [m], by name; the speed over each is a frequency
+    results : Results
+        Results of the run.
+    lengths : mapping
+        Lengths by which the line repeats [m], by name; the speed over each is a frequency.
     """
     start, end = results.evaluation
-    figure, (axes,) = stacked(3.8, 1)
+    figure, (axes,) = stacked(3.4, 1)
     speed = results.fact("speed")
     for p, name in enumerate(results.pantograph_names()):
         position = results.column("contact_position", p)
@@ -129,9 +132,13 @@ def contact_height(
 
     Parameters
     ----------
-    heights : places [m], heights [m] and gradients [-], (n,) each, by name of the pantograph
+    results : Results
+        Results of the run.
+    heights : mapping
+        Places [m], heights [m] and gradients [-], ndarrays of shape (n,), by name of the
+        pantograph.
     """
-    figure, (height, gradient) = stacked(5.6, 2)
+    figure, (height, gradient) = stacked(4.8, 2)
     start, end = travelled(results)
     for axes, number, factor, label in (
         (height, 1, 1.0, "height above rail [m]"),

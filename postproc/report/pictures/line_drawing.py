@@ -25,9 +25,9 @@ _COLOUR = {
 }
 # Exaggerations of heights and lateral places, and sizes of figure and panels [inch].
 _FACTORS = (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000)
-_WIDTH, _HEIGHT = 12.0, 8.1
-_LEFT, _LONG, _CROSS = 0.95, 7.5, 2.7
-_SIDE, _PLAN, _LOW, _GAP = 3.9, 1.75, 0.6, 0.8
+_WIDTH, _HEIGHT = 9.0, 6.7
+_LEFT, _LONG, _CROSS = 0.8, 5.6, 1.75
+_SIDE, _PLAN, _LOW, _GAP = 3.0, 1.5, 0.55, 0.75
 _LEAST = 0.5  # least width and height that a drawing shows [m]
 _MARGIN = 0.08  # of a range, on both sides
 _MOST_NAMED = 12  # marks that have a number and a line below
@@ -55,9 +55,18 @@ def draw_line(
 
     Parameters
     ----------
-    stretch : from and to of side view and plan view [m]
-    half_head : half of the working length of the pan head, None if it is not known [m]
-    marks : what is to be seen besides, such as defects
+    line : Line
+        Line as an engineer describes it.
+    mesh : LineMesh
+        Its mesh.
+    form : Equilibrium
+        Its shape at rest.
+    stretch : tuple of float
+        From and to of side view and plan view [m].
+    half_head : float, optional
+        Half of the working length of the pan head [m]; None if it is not known.
+    marks : sequence of Mark, optional
+        What is to be seen besides, such as defects.
     """
     marks = sorted(mark for mark in marks if stretch[0] <= mark.x <= stretch[1])
     below = _LINE * len(marks[:_MOST_NAMED])

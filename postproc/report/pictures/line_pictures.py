@@ -43,10 +43,17 @@ _MOST_ARMS = 60
 def arm_uplift(results: Results, statistics: RunStatistics, limit: float | None) -> Figure:
     """Uplift at the evaluated arms as the train passes, and the largest uplift of every arm.
 
-    ``limit`` is the allowed uplift [m], None for none.
+    Parameters
+    ----------
+    results : Results
+        Results of the run.
+    statistics : RunStatistics
+        Its statistics.
+    limit : float or None
+        Largest uplift that is allowed [m]; None without a limit.
     """
     supports = statistics.supports
-    figure, (passing, along) = stacked(5.6, 2)
+    figure, (passing, along) = stacked(4.8, 2)
     _passing_train(passing, results, statistics)
 
     mark_line(along, results, float(supports.x.min(initial=0)), float(supports.x.max(initial=1)))
@@ -116,7 +123,7 @@ def dropper_force(results: Results, statistics: RunStatistics) -> Figure:
     """Forces of the worst dropper and of a mid-span one, and the range of every dropper."""
     droppers = statistics.droppers
     x, evaluated = droppers.x, np.flatnonzero(droppers.evaluated)
-    figure, (history, along) = stacked(5.6, 2)
+    figure, (history, along) = stacked(4.8, 2)
 
     masts, span = results.line("support_x"), results.reference_span
     middle = int(np.argmin(np.abs(x - 0.5 * (masts[span] + masts[span + 1]))))
@@ -162,7 +169,7 @@ def static_line(results: Results) -> Figure:
     """
     at, lift = results.static("elasticity_x"), results.static("elasticity")
     masts, span = results.line("support_x"), results.span_at_rest
-    figure, (profile, compliance) = stacked(5.2, 2)
+    figure, (profile, compliance) = stacked(4.6, 2)
 
     start, end = masts[max(span - 1, 0)], masts[min(span + 2, masts.size - 1)]
     profiles = results.contact_profiles()
@@ -240,7 +247,7 @@ def plan_view(results: Results) -> Figure | None:
     registration = results.registration()
     if registration is None or not results.has_static("contact_y"):
         return None
-    figure, (plan, forces) = stacked(5.2, 2)
+    figure, (plan, forces) = stacked(4.6, 2)
     profiles = results.contact_profiles()
     for number, (name, wire) in enumerate(profiles.items()):
         assert wire.y is not None
@@ -277,7 +284,15 @@ _ALLOWED = 10.0
 
 @own_style()
 def draw_temperatures(rests: Sequence[LineAtTemperature], path: Path) -> None:
-    """Write the picture as PNG or SVG, by the file's suffix. Not collective."""
+    """Write a picture of a line at several temperatures. Not collective.
+
+    Parameters
+    ----------
+    rests : sequence of LineAtTemperature
+        Line at rest at each temperature.
+    path : Path
+        PNG or SVG file, by its suffix.
+    """
     found = [rest for rest in rests if not rest.why_not]
     names = [wire.name for wire in found[0].wires if wire.ends] if found else []
     figure = new_figure(2.6 * (len(names) + 1))

@@ -45,10 +45,18 @@ def panels_along_track(
 
     Parameters
     ----------
-    shown : by number of the pantograph, name and column of each curve
-    label : of the channel, with its unit
-    low_pass : take the part below 20 Hz, unless the record is sampled too slowly
-    dashed : dash the second of two curves, which may lie on each other
+    results : Results
+        Results of the run.
+    channel : str
+        Name of the channel.
+    shown : mapping
+        Name and column of each curve, by number of the pantograph.
+    label : str
+        Quantity of the channel, with its unit in brackets.
+    low_pass : bool, optional
+        Take the part below 20 Hz, unless the record is sampled too slowly.
+    dashed : bool, optional
+        Dash the second of two curves, which may lie on each other.
     """
     start, end = travelled(results)
     figure, panels = stacked(0.7 + 2.7 * len(shown), len(shown), shared=True)

@@ -23,8 +23,10 @@ def forces(
 
     Parameters
     ----------
-    panels : name of each pantograph, and curves [N]
-    evaluated : stretch that is shaded, from and to [m]
+    panels : sequence of tuple
+        Name of each pantograph, and its curves of forces [N].
+    evaluated : tuple of float, optional
+        From and to of the stretch that is shaded [m].
     """
     if not panels:
         return None
@@ -48,8 +50,10 @@ def uplifts(curves: Sequence[Curve], evaluated: tuple[float, float] | None = Non
 
     Parameters
     ----------
-    curves : of uplifts [m]
-    evaluated : stretch that is shaded, from and to [m]
+    curves : sequence of Curve
+        Curves of uplifts, positive upward [m].
+    evaluated : tuple of float, optional
+        From and to of the stretch that is shaded [m].
     """
     if not curves:
         return None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -116,30 +116,63 @@ def _margin(one: Criterion) -> str:
 
 
 def nearest_limit(run: EvaluatedRun) -> Iterator[str]:
-    """Sentences on the smallest margin, and on verdicts that an estimated error could turn."""
+    """Sentences on the smallest margin, and on verdicts that errors and the start could turn.
+
+    Parameters
+    ----------
+    run : EvaluatedRun
+        Run with its criteria.
+    """
     judged = [
         (one, label)
         for one, label in zip(run.criteria, labels(run.criteria), strict=True)
         if one.passed is not None
     ]
-    shares = [pair for pair in judged if pair[0].limit != 0.0]
+    shares = [(one, label) for one, label in judged if one.passed and one.limit != 0.0]
     if shares:
         one, label = min(shares, key=lambda pair: abs(_distance(pair[0]) / pair[0].limit))
         share = 100.0 * _distance(one) / abs(one.limit)
+        which = "" if all(other.passed for other, _ in judged) else ", of those that passed"
         yield (
-            f"Nearest to its limit: {label}, with a margin of {_margin(one)} {one.unit} "
+            f"Nearest to its limit{which}: {label}, with a margin of {_margin(one)} {one.unit} "
             f"({number(share, decimals_that_tell(share, 0.0, 1))} %)."
         )
     errors, what = errors_of(run), _SOURCES[bool(run.measured)]
-    turned = [
+    turned = _turned(judged, errors)
+    if turned:
+        yield f"The {what} could turn the verdict on: {turned}."
+    elif any(np.isfinite(_error_of(one, errors)) for one, _ in judged):
+        yield f"The {what} turns no verdict: where it is known, it is smaller than the margin."
+    left = _turned(judged, _start_up(run))
+    if left:
+        yield (
+            f"What the start of the run leaves in the evaluated stretch could turn the verdict on: "
+            f"{left}. A longer run-in leaves less."
+        )
+
+
+def _turned(
+    judged: Sequence[tuple[Criterion, str]], errors: Mapping[str, Mapping[str, float]]
+) -> str:
+    """Criteria whose errors exceed their margins, with both."""
+    return "; ".join(
         f"{label} (margin {_margin(one)} {one.unit}, error {_error(one, errors)} {one.unit})"
         for one, label in judged
         if abs(_distance(one)) <= _error_of(one, errors)
-    ]
-    if turned:
-        yield f"The {what} could turn the verdict on: {'; '.join(turned)}."
-    elif any(np.isfinite(_error_of(one, errors)) for one, _ in judged):
-        yield f"The {what} turns no verdict: where it is known, it is smaller than the margin."
+    )
+
+
+def _start_up(run: EvaluatedRun) -> dict[str, dict[str, float]]:
+    """What the start of the run leaves by quantity and pantograph [N], as estimated.
+
+    It is an rms error of the force history, as that of the time step is.
+    """
+    facts = run.results.attributes.get("arrivals", {}).get("pantographs", [])
+    found: dict[str, dict[str, float]] = {}
+    for one, fact in zip(run.statistics.pantographs, facts, strict=False):
+        for quantity, factor in _TIMES_RMS.items():
+            found.setdefault(quantity, {})[one.name] = factor * fact["start_share_of_std"] * one.std
+    return found
 
 
 def section(run: EvaluatedRun) -> Section:

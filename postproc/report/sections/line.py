@@ -72,7 +72,7 @@ def _of_rest(results: Results) -> Iterator[Text | StudyTable]:
         start, end = results.static("elasticity_x")[[0, -1]]
         yield Text(
             f"Elasticity in span {span}, {start:.6g} to {end:.6g} m, in the middle of the line: "
-            f"{low:.3g} to {high:.3g} mm/N (non-uniformity "
+            f"{low:#.3g} to {high:#.3g} mm/N (non-uniformity "
             f"{number(100 * (high - low) / (high + low))} %)."
         )
     own = [row for row in csv_tables.dropper_table(results) if row.span == span]

@@ -67,8 +67,11 @@ def effects(run: EvaluatedRun, costs: tuple[Mapping[str, str], str] = ({}, "")) 
 
     Parameters
     ----------
-    costs : by names of effects a sentence on what each costs and changes, and the study that
-        measured them
+    run : EvaluatedRun
+        Run.
+    costs : tuple, optional
+        By names of effects a sentence on what each costs and changes, and the study that measured
+        them.
     """
     about, (told, study) = run.results.attributes, costs
     heads = ["effect", "", "what it is", "why", *(["what it costs and changes"] if told else [])]
@@ -98,7 +101,10 @@ def signatures(text: str | None, run: EvaluatedRun) -> Section:
 
     Parameters
     ----------
-    text : what stands in ``INPUT``, None if there is no such file
+    text : str or None
+        What stands in ``INPUT``, None if there is no such file.
+    run : EvaluatedRun
+        Run.
     """
     about = run.results.attributes
     name, version = next(iter(about["versions"].items()))

@@ -68,11 +68,13 @@ def criterion(value: float, limit: float, relation: str, quantity: str) -> Crite
     return Criterion(*words, quantity=quantity, pantograph="pantograph")
 
 
-def told(error: float, *criteria: Criterion) -> str:
+def told(error: float, *criteria: Criterion, start_share: float = 0.0) -> str:
+    arrivals = {"pantographs": [{"start_share_of_std": start_share}]}
     run: Any = SimpleNamespace(
+        results=SimpleNamespace(attributes={"arrivals": arrivals}),
         criteria=criteria,
         measured={},
-        statistics=SimpleNamespace(pantographs=[SimpleNamespace(name="pantograph")]),
+        statistics=SimpleNamespace(pantographs=[SimpleNamespace(name="pantograph", std=30.0)]),
         indicators=SimpleNamespace(force_error=np.array([error])),
     )
     return " ".join(acceptance.nearest_limit(run))
@@ -99,12 +101,33 @@ def test_an_error_larger_than_the_margin_could_turn_a_verdict() -> None:
     assert "turn" not in told(np.nan, mean) and "smaller" not in told(np.nan, mean)
 
 
+def test_what_the_start_leaves_is_told_where_it_could_turn_a_verdict() -> None:
+    """10 % of a deviation of 30 N are 3 N in the history, and three times that in extremes."""
+    spread = criterion(42.0, 45.5, "<=", "force_std")
+    assert "start" not in told(0.1, spread, start_share=0.1)
+    near = criterion(43.0, 45.5, "<=", "force_std")
+    assert (
+        "What the start of the run leaves in the evaluated stretch could turn the verdict on: "
+        "force_std of the run (margin 2.5 N, error 3.00 N)."
+    ) in told(0.1, near, start_share=0.1)
+    largest = criterion(342.0, 350.0, "<=", "force_max")
+    assert "force_max of the run (margin 8.0 N, error 9.00 N)" in told(
+        0.1, spread, largest, start_share=0.1
+    )
+    assert "start" not in told(0.1, near, largest, start_share=0.01)
+
+
 def test_the_nearest_limit_is_the_smallest_share() -> None:
     mean = criterion(147.0, 150.0, "<=", "mean_force")  # 2 %
     largest = criterion(346.5, 350.0, "<=", "force_max")  # 1 %
     zero = criterion(1.0, 0.0, ">", "force_min")  # no share of zero
     assert told(0.1, mean, largest, zero).startswith(
         "Nearest to its limit: force_max of the run, with a margin of 3.5 N (1.0 %)."
+    )
+    # One that failed has no margin.
+    failed = criterion(150.1, 150.0, "<=", "mean_force")
+    assert told(0.1, failed, largest).startswith(
+        "Nearest to its limit, of those that passed: force"
     )
 
 

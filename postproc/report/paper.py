@@ -1,0 +1,95 @@
+"""A page of a report as PDF on A4, whose figures fill the sheets."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from catenary.base.errors import InputError
+
+# A figure is printed this much smaller at most, where it then fits the rest of a sheet [-].
+_SMALLEST = 0.8
+# Height of a sheet between the margins that the style of the page has, less what rows and headings
+# leave that move to the next sheet; height of a caption, which keeps its size [px of CSS].
+_SHEET, _CAPTION = (297.0 - 15.0 - 18.0 - 3.0) * 96.0 / 25.4, 28.0
+# A sheet on which all of a report has room: it tells how high everything is.
+_ENDLESS = "<style>@page { size: 210mm 100000mm; }</style></head>"
+# A heading so close above a figure goes with it to the next sheet [px of CSS].
+_CLOSE = 60.0
+
+
+def pdf(html: str) -> bytes:
+    """A page as PDF on A4, with page numbers and bookmarks. Not collective.
+
+    A figure that just misses the rest of a sheet is printed smaller, and does not leave it white.
+
+    Parameters
+    ----------
+    html : str
+        What ``page`` returned; what is folded away there is printed in full.
+
+    Raises
+    ------
+    InputError
+        If the package WeasyPrint or a library that it needs is missing.
+    """
+    HTML, URLFetcher = _weasyprint()
+    fetcher = URLFetcher(allowed_protocols=["data"])  # pictures are in the page
+    cache: dict[str, Any] = {}  # of pictures, which are laid out twice
+    before, *figures = html.split("<figure>")
+    endless = before.replace("</head>", _ENDLESS, 1)
+    named = (f'<figure id="figure-{n}">{rest}' for n, rest in enumerate(figures))
+    layout = HTML(string="".join([endless, *named]), url_fetcher=fetcher).render(cache=cache)
+    tops = {name: (box[1], box[3]) for name, box in layout.pages[0].anchors.items()}
+    boxes = [tops.pop(f"figure-{n}") for n in range(len(figures))]
+    sized = (
+        f'<figure style="--share: {share:.3f}">{rest}'
+        for share, rest in zip(
+            shares(boxes, [top for top, _ in tops.values()]), figures, strict=True
+        )
+    )
+    sheets = HTML(string="".join([before, *sized]), url_fetcher=fetcher)
+    return bytes(sheets.write_pdf(cache=cache))
+
+
+def shares(figures: Sequence[tuple[float, float]], headings: Sequence[float]) -> list[float]:
+    """Size of each figure over its usual one, so that few sheets end early. Not collective.
+
+    Parameters
+    ----------
+    figures : sequence of tuple of float
+        Top and bottom of each figure in order, on an endless sheet that begins at the first heading
+        [px of CSS].
+    headings : sequence of float
+        Tops of the headings there [px of CSS].
+    """
+    found = []
+    at, last = 0.0, min(headings, default=0.0)  # on the sheet, on the endless one
+    for top, bottom in figures:
+        at = (at + top - last) % _SHEET
+        height, room = bottom - top, _SHEET - at
+        share = min((room - _CAPTION) / (height - _CAPTION), 1.0)
+        if share < _SMALLEST:
+            close = [top - heading for heading in headings if 0.0 < top - heading < _CLOSE]
+            at, share = min(close, default=0.0), 1.0
+        at += share * (height - _CAPTION) + _CAPTION
+        last = bottom
+        found.append(share)
+    return found
+
+
+def refuse_without_pdf() -> None:
+    """Raise `InputError` if no PDF can be written. Not collective."""
+    _weasyprint()
+
+
+def _weasyprint() -> tuple[Any, Any]:
+    try:
+        from weasyprint import HTML
+        from weasyprint.urls import URLFetcher
+    except (ImportError, OSError) as error:  # OSError: of Pango, which is no package of Python
+        raise InputError(
+            f"--pdf needs the package weasyprint and the library Pango ({error}): pip install "
+            "'catenary[report]', and on Debian apt-get install libpango-1.0-0 libpangoft2-1.0-0"
+        ) from error
+    return HTML, URLFetcher
