@@ -39,8 +39,7 @@ from catenary.solver.ensemble.marches import SceneHistory, march_side_by_side
 from catenary.solver.ensemble.shared_line import SharedLine, why_alone
 from catenary.solver.problem.problem import Problem
 from catenary.solver.statics.changed_line.rest_with_defects import errors_of_length
-from catenary.solver.statics.form_finding.equilibrium import sound_form
-from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest
+from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest, sound_line
 from catenary.solver.statics.stability_of_rest import refuse_lost_wire
 from catenary.solver.time_loop.march import March
 from catenary.solver.time_loop.views import channels
@@ -240,7 +239,7 @@ class _Line:
     ) -> None:
         self._mesh = mesh_of(scene)
         self._errors = problem.irregularities.lengths
-        self._sound = None if self._errors is None else sound_form(problem, self._mesh)
+        self._sound = None if self._errors is None else sound_line(problem, self._mesh)
         self._rest: LineAtRest | None = None
         at_rest = self.rest_of(problem)
         self._header = header_of(scene, problem, at_rest, ())
@@ -265,7 +264,7 @@ class _Line:
     def moves_alike(self, at_rest: LineAtRest) -> bool:
         """Whether a line at rest has the matrices of the shared one."""
         assert self.shared is not None
-        return at_rest.model is self.shared.at_rest.model or self.shared.takes(at_rest)
+        return self.shared.takes(at_rest)
 
     def destroy(self) -> None:
         """Free all PETSc objects."""

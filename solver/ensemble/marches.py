@@ -122,8 +122,8 @@ def _begin(shared: SharedLine, lane: Lane, number: int, at_rest: LineAtRest) -> 
     laws, train = model.simulated, problem.train
     air_speed = train.speed if laws.meets_air else None
     shared.hang(lane, at_rest)
-    height = nominal_height_rule(lane.wires, lift, air_speed, problem.contact)
-    pantographs = Pantographs(shared.comm, problem, laws, lane.wires, height)
+    height = nominal_height_rule(lane.wires_at_rest, lift, air_speed, problem.contact)
+    pantographs = Pantographs(shared.comm, problem, laws, lane.wires_at_rest, height)
     for one in pantographs.models:
         stepped_by_kernels(one)  # an error of another would end a step of all lanes
     interaction = ForcesOnLine(
@@ -231,6 +231,6 @@ def _ended(
         force,
         head,
         wire,
-        extremes.uplift[:, lane].copy(),
+        shared.uplift(shared.lanes[lane]),
         np.stack([extremes.least[:, lane], extremes.largest[:, lane]]),
     )

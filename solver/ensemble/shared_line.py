@@ -5,11 +5,16 @@ the same factors and the same answers to unit forces; those that differ in error
 lengths, too, rest otherwise but have the same factors and answers. Their motions stand in lanes:
 the numbers of an unknown in all scenes follow each other, so that a step reads each number of a
 factor once.
+
+Droppers that are slack at rest in some scenes are taut in the matrices, as those that slacken under
+way: in such a lane displacements are counted from the shape that the line would have if droppers
+could push, where matrices hold without compensations, and the line starts displaced from there.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,14 +24,18 @@ from catenary.meshgen.mesh import DROPPERS
 from catenary.solver.contact.contact_wire import ContactWires
 from catenary.solver.contact.followed_links import FollowedLinks
 from catenary.solver.contact.forces_on_line import ForceColumns
+from catenary.solver.effects.all_effects import needs_form
+from catenary.solver.effects.build_model import build
 from catenary.solver.integrators.line_state import LineState, Motion
 from catenary.solver.integrators.make_line import make_line
 from catenary.solver.integrators.two_pass_step import PassArrays, StationPasses
 from catenary.solver.kernels import aligned_arrays, native
-from catenary.solver.model.model import Model
+from catenary.solver.model.model import Model, same_matrices
 from catenary.solver.model.partition import distribute
 from catenary.solver.model.switching_links import LinkArrays, LinkTable, switching_links
 from catenary.solver.problem.problem import Problem
+from catenary.solver.model.rest_shape import Equilibrium
+from catenary.solver.statics.changed_line.rest_nearby import StiffLine
 from catenary.solver.statics.line_at_rest import LineAtRest
 
 N_LANES: int = native.SCENES
@@ -52,6 +61,24 @@ class LineExtremes(NamedTuple):
     largest: np.ndarray
 
 
+class TautLine(NamedTuple):
+    """A line at rest, counted from the shape that it would have if droppers could push.
+
+    Attributes
+    ----------
+    rest : the model of the line at rest, whose droppers may be slack
+    model, form : with all droppers taut, in the shape from which displacements count
+    moved : (n_dofs,) of the line at rest from there [m], [rad]
+    links : what is followed of it
+    """
+
+    rest: Model
+    model: Model
+    form: Equilibrium
+    moved: np.ndarray
+    links: LinkTable
+
+
 class Lane:
     """A scene's part of a shared line.
 
@@ -60,11 +87,13 @@ class Lane:
     number : of the lane
     motion : of the line in this scene
     links : those that are followed in it
-    at_rest, wires : the line at rest in the scene that is there, and its contact wires
+    taut : the line in the scene that is there
+    wires, wires_at_rest : its contact wires where displacements are zero, and at rest
     """
 
-    at_rest: LineAtRest
+    taut: TautLine | None = None
     wires: ContactWires
+    wires_at_rest: ContactWires
 
     def __init__(self, number: int, motion: LineState, links: FollowedLinks) -> None:
         self.number, self.motion, self.links = number, motion, links
@@ -75,7 +104,6 @@ class SharedLine:
 
     Attributes
     ----------
-    at_rest : LineAtRest, of one of the scenes
     steps_together : whether kernels step it in several scenes; there is nothing else if not
     columns, line : as a ``March`` has them
     lanes : one for each scene
@@ -90,8 +118,10 @@ class SharedLine:
 
     def __init__(self, at_rest: LineAtRest, range_of_run: tuple[float, float]) -> None:
         self.comm: Any = alone()
-        self.at_rest = at_rest
-        model, form = at_rest.model, at_rest.form
+        self._stiff: StiffLine | None = None
+        self._latest: TautLine | None = None
+        _, model, form, _, self._table = self._taut_of(at_rest)
+        self._model = model
         self.ownership = distribute(model, 1, 0)
         self.line = make_line(self.comm, model, self.ownership, at_rest.problem.numerics)
         passes = self.line.passes
@@ -104,7 +134,6 @@ class SharedLine:
         if passes is None or not self.steps_together:
             return
         self._wires = ContactWires(model, form, self.ownership)
-        self._table = switching_links(model, form.dropper_force)
         links = [FollowedLinks(self._table, self.line) for _ in range(N_LANES)]
         self.columns = ForceColumns(
             self.comm, model, self._wires, self.line, links[0], range_of_run
@@ -126,26 +155,73 @@ class SharedLine:
 
     def takes(self, at_rest: LineAtRest) -> bool:
         """Whether the matrices of a line are these, and the links that are followed."""
-        table = switching_links(at_rest.model, at_rest.form.dropper_force)
-        return _same_matrices(self.at_rest.model, at_rest.model) and _same_links(self._table, table)
+        taut = self._taut_of(at_rest)
+        return same_matrices(self._model, taut.model) and _same_links(self._table, taut.links)
 
     def hang(self, lane: Lane, at_rest: LineAtRest) -> None:
         """Put the line of a lane at rest: that of a scene whose matrices are these."""
         self.native.rest(lane.number)
-        links, extremes, number = lane.links, self.extremes, lane.number
-        if getattr(lane, "at_rest", None) is not at_rest:
-            lane.at_rest = at_rest
-            model, form = at_rest.model, at_rest.form
-            lane.wires = ContactWires(model, form, self.ownership)
+        links, extremes, number, taut = lane.links, self.extremes, lane.number, lane.taut
+        if taut is None or taut.rest is not at_rest.model:
+            lane.taut = taut = self._taut_of(at_rest)
+            model = taut.model
+            lane.wires = ContactWires(model, taut.form, self.ownership)
+            lane.wires_at_rest = ContactWires(model, at_rest.form, self.ownership)
             for name in ("begin", "at", "width"):
                 lane.wires.nodes[name] = self._wires.nodes[name]
-            table = switching_links(model, form.dropper_force)
-            links.take_law(table.arrays.law)
+            links.take_law(taut.links.arrays.law)
             self._rest[:, number] = links.links.law["rest"]
             extremes.rest[:, number] = links.shown(DROPPERS)[1].law["rest"]
-        force = extremes.rest[:, number] * extremes.droppers.law["carried"]
-        extremes.uplift[:, number] = 0.0
+        read = lane.motion.read
+        # Without velocity and acceleration displacements are a share of x.
+        read.x[::N_LANES] = taut.moved / read.shares[0]
+        extremes.uplift[:, number] = taut.moved[extremes.arms]
+        force = at_rest.form.dropper_force
         extremes.least[:, number] = extremes.largest[:, number] = force
+
+    def uplift(self, lane: Lane) -> np.ndarray:
+        """Largest displacement at arms from the line at rest (n_arms,) [m]."""
+        assert lane.taut is not None
+        extremes = self.extremes
+        return extremes.uplift[:, lane.number] - lane.taut.moved[extremes.arms]
+
+    def _taut_of(self, at_rest: LineAtRest) -> TautLine:
+        """A line with all its droppers taut, where matrices do not depend on its shape."""
+        model, form = at_rest.model, at_rest.form
+        if self._latest is not None and self._latest.rest is model:
+            return self._latest
+        taut, moved, gap = model, np.zeros(model.n_dofs), model.dropper_gap
+        if gap.any() and not (model.droppers_bend or needs_form(model.problem)):
+            cut = model.cut_lengths
+            taut = build(
+                model.problem,
+                model.mesh,
+                model.dropper_lengths,
+                model.broken,
+                form,
+                cut_lengths=cut,
+            )
+            assert taut.droppers is not None
+            unknowns, weights = taut.droppers.direction
+            lacks = taut.dropper_stiffness * gap
+            load, released = np.zeros(moved.size), 1.0 - taut.simulated.kept_ratio
+            np.add.at(load, unknowns, -released * lacks[:, None] * weights)
+            load[taut.constrained] = 0.0
+            if self._stiff is None:  # of other lines `takes` refuses what follows from it
+                self._stiff = StiffLine(taut)
+            moved = self._stiff.moved(load)
+            stretch = (weights * moved[unknowns]).sum(axis=1)
+            every = np.arange(model.mesh.n_nodes)
+            form = replace(
+                form,
+                height=form.height - moved[model.dofs(every)],
+                slope=form.slope - moved[model.dofs(every, "theta_y")],
+                dropper_force=np.where(gap > 0.0, -lacks, form.dropper_force)
+                - taut.dropper_stiffness * stretch,
+            )
+        links = switching_links(taut, form.dropper_force)
+        self._latest = TautLine(model, taut, form, moved, links)
+        return self._latest
 
     def destroy(self) -> None:
         """Free all PETSc objects."""
@@ -175,33 +251,6 @@ def _in_lanes(passes: StationPasses, motion: LineState) -> tuple[PassArrays, Seq
         read = Motion(x, y, z, given.motion.shares, N_LANES)
         motions.append(LineState.of(read, motion.gains))
     return arrays, motions
-
-
-def _same_matrices(one: Model, other: Model) -> bool:
-    """Whether M, C and K of two models on the same mesh are the same, number by number."""
-    if len(one.blocks) != len(other.blocks) or len(one.links) != len(other.links):
-        return False
-    pairs = zip(one.blocks, other.blocks, strict=True)
-    return (
-        all(
-            _equal(a.kind, b.kind)
-            and _equal(a.stiffness, b.stiffness)
-            and _equal(a.mass, b.mass)
-            and _equal(a.damping, b.damping)
-            for a, b in pairs
-        )
-        and all(
-            np.array_equal(a.law, b.law) and all(map(np.array_equal, a.direction, b.direction))
-            for a, b in zip(one.links, other.links, strict=True)
-        )
-        and np.array_equal(one.constrained, other.constrained)
-    )
-
-
-def _equal(one: np.ndarray | None, other: np.ndarray | None) -> bool:
-    if one is None or other is None:
-        return one is other
-    return np.array_equal(one, other)
 
 
 def _same_links(one: LinkTable, other: LinkTable) -> bool:

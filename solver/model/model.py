@@ -297,3 +297,32 @@ def wire_elements(
     first, second = model.mesh.elements(wire).T
     ends = [model.dofs(nodes, name) for nodes in (first, second) for name in unknowns]
     return np.stack(ends, axis=1), model.mesh.x(second) - model.mesh.x(first)
+
+
+def same_matrices(one: Model, other: Model) -> bool:
+    """Whether M, C and K of two models on the same mesh are the same, number by number."""
+    if one is other:
+        return True
+    if len(one.blocks) != len(other.blocks) or len(one.links) != len(other.links):
+        return False
+    pairs = zip(one.blocks, other.blocks, strict=True)
+    return (
+        all(
+            _equal(a.kind, b.kind)
+            and _equal(a.stiffness, b.stiffness)
+            and _equal(a.mass, b.mass)
+            and _equal(a.damping, b.damping)
+            for a, b in pairs
+        )
+        and all(
+            np.array_equal(a.law, b.law) and all(map(np.array_equal, a.direction, b.direction))
+            for a, b in zip(one.links, other.links, strict=True)
+        )
+        and np.array_equal(one.constrained, other.constrained)
+    )
+
+
+def _equal(one: np.ndarray | None, other: np.ndarray | None) -> bool:
+    if one is None or other is None:
+        return one is other
+    return np.array_equal(one, other)

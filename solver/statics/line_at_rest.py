@@ -13,10 +13,11 @@ from catenary.base.parallel import on_root
 from catenary.meshgen.mesh import LineMesh
 from catenary.solver.effects.all_effects import simulated, with_defects
 from catenary.solver.effects.build_model import build
-from catenary.solver.model.model import Model
+from catenary.solver.model.model import Model, same_matrices
 from catenary.solver.problem.problem import Problem
+from catenary.solver.statics.changed_line.rest_nearby import StiffLine
 from catenary.solver.statics.elasticity import Elasticity, elasticity, middle_span
-from catenary.solver.statics.form_finding.equilibrium import Equilibrium, find_form
+from catenary.solver.statics.form_finding.equilibrium import Equilibrium, find_form, sound_form
 from catenary.solver.statics.stability_of_rest import refuse_unstable
 
 
@@ -48,8 +49,35 @@ class LineAtRest(NamedTuple):
         return LineAtRest(own, model, self.form, self.lift)
 
 
+class SoundLine(NamedTuple):
+    """The line for which droppers are cut; lines that differ in errors of their lengths alone share
+    it.
+
+    Attributes
+    ----------
+    model, form : the discrete line, and its shape at rest
+    stiff : its stiffness, factored
+    lift : elasticity as that of a ``LineAtRest``
+    """
+
+    model: Model
+    form: Equilibrium
+    stiff: StiffLine
+    lift: Elasticity
+
+
+def sound_line(problem: Problem, mesh: LineMesh) -> SoundLine:
+    """The sound line of a problem. Not collective; raises InputError as ``line_at_rest``."""
+    model, form = sound_form(problem, mesh)
+    return SoundLine(model, form, StiffLine(model), _lift_of(model))
+
+
+def _lift_of(model: Model) -> Elasticity:
+    return elasticity(model, *middle_span(model.problem.line))
+
+
 def stable_form(
-    problem: Problem, mesh: LineMesh, sound: tuple[Model, Equilibrium] | None = None
+    problem: Problem, mesh: LineMesh, sound: SoundLine | None = None
 ) -> tuple[Model, Equilibrium]:
     """``find_form``, of a rest that is stable. Not collective.
 
@@ -58,17 +86,17 @@ def stable_form(
     InputError
         As ``find_form``, and if the rest is unstable.
     """
-    model, form = find_form(problem, mesh, sound)
+    model, form = find_form(problem, mesh, None if sound is None else sound[:3])
     refuse_unstable(model)
     return model, form
 
 
 def line_at_rest(
-    problem: Problem, mesh: LineMesh, sound: tuple[Model, Equilibrium] | None = None
+    problem: Problem, mesh: LineMesh, sound: SoundLine | None = None
 ) -> LineAtRest:
     """The line of a problem at rest, found by this process. Not collective.
 
-    ``sound`` is as for ``find_form``.
+    ``sound`` is that of a problem that differs in errors of length alone.
 
     Raises
     ------
@@ -77,7 +105,9 @@ def line_at_rest(
     """
     model, form = stable_form(problem, mesh, sound)
     give_back()
-    return LineAtRest(model.problem, model, form, elasticity(model, *middle_span(problem.line)))
+    is_sound = sound is not None and same_matrices(sound.model, model)
+    lift = sound.lift if sound is not None and is_sound else _lift_of(model)
+    return LineAtRest(model.problem, model, form, lift)
 
 
 def line_at_rest_on_all(

@@ -98,11 +98,13 @@ def as_text(found: Identification) -> str:
     lines += _correlated(found)
     lines += ["", *(_sentence(name, one) for name, one in found.judged.items())]
     lines.append(verdict(found))
+    sums = ", ".join(f"{one:.1f}" for one in found.sums)
     if len(found.sums) > 1:
-        sums = ", ".join(f"{one:.1f}" for one in found.sums)
         lines.append(
             f"Sums of squares of {len(found.sums)} searches, of which the first is told: {sums}"
         )
+    else:
+        lines.append(f"One search was made, to a sum of squares of {sums}; it may not be the least.")
     if not found.has_converged:
         lines.append(f"The search has not converged after {found.n_marches} marches.")
     return "\n".join(lines)

@@ -82,6 +82,8 @@ def posterior_of(jacobian: np.ndarray) -> Posterior:
 
 # Less probable residuals are called wrong.
 RARE = 1e-3
+# Less probable ones are worth another search.
+_DOUBTFUL = 0.05
 _MOST_LAGS, _SAMPLES_A_LAG = 12, 5
 
 
@@ -152,6 +154,14 @@ def judge(innovations: np.ndarray, signals: Mapping[str, slice]) -> dict[str, Ju
     """
     found = {name: _judged(innovations[own], True) for name, own in signals.items()}
     return found | {"all": _judged(innovations, False)}
+
+
+def is_doubtful(judged: Mapping[str, Judged]) -> bool:
+    """Whether residuals, of all together by size and of each signal by colour, are ones that a
+    right model leaves in one passage of ten at most: the search may have come to another minimum
+    than the least."""
+    colours = [one.whiteness_probability for name, one in judged.items() if name != "all"]
+    return judged["all"].probability < _DOUBTFUL or min(colours) < _DOUBTFUL / len(colours)
 
 
 def _judged(own: np.ndarray, is_series: bool) -> Judged:

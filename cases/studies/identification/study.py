@@ -28,6 +28,7 @@ from catenary.cases.studies.identification.posterior import (
     Judged,
     Posterior,
     innovations_of,
+    is_doubtful,
     judge,
     posterior_of,
 )
@@ -42,6 +43,7 @@ from catenary.postproc.evaluate.filters import check_sampling
 _TOLERANCE = 1e-4
 _MOST_MARCHES = 60  # of a search
 _SEED = 0  # of the draws from which further searches start
+_SEARCHES_IN_DOUBT = 3  # where the task names no number and the first leaves an unlikely residual
 
 
 class Unknown(NamedTuple):
@@ -134,6 +136,14 @@ class _Compared:
             self._latest = at.tobytes(), self._made_jacobian(at)
         return self._latest[1]
 
+    def judged(self, found: OptimizeResult) -> dict[str, Judged]:
+        """Residuals of each signal and of "all" where a search came to."""
+        n = len(found.fun) - self._n
+        own = n // len(self._signals)
+        moved = innovations_of(found.fun[:n], -found.jac[:n], found.x)
+        names = {one.name: slice(k * own, (k + 1) * own) for k, one in enumerate(self._signals)}
+        return judge(moved, names)
+
     def _made_jacobian(self, at: np.ndarray) -> np.ndarray:
         found = self._march.derivatives(self._by(at)) if self._offsets.size else []
         rows, bias = [], self._offsets.size
@@ -193,20 +203,16 @@ def identify(
     compared = _Compared(march, measurement.signals, unknowns, offsets)
     searches = _searches(compared, len(unknowns), task.starts, progress)
     found = searches[0]
-    residual, jacobian = compared.residual(found.x), compared.jacobian(found.x)
-    n = measurement.place.size
+    compared.residual(found.x)  # the march that was found
     return Identification(
         unknowns,
         np.array([one.mean for one in unknowns])
         + found.x * np.array([one.deviation for one in unknowns]),
-        posterior_of(jacobian),
+        posterior_of(compared.jacobian(found.x)),
         measurement.place,
         measurement.signals,
         compared.modelled,
-        judge(
-            innovations_of(residual, jacobian, found.x),
-            {one.name: slice(k * n, (k + 1) * n) for k, one in enumerate(measurement.signals)},
-        ),
+        compared.judged(found),
         compared.n_marches,
         compared.n_jacobians,
         [2.0 * one.cost for one in searches],
@@ -215,35 +221,39 @@ def identify(
 
 
 def _searches(
-    compared: _Compared, m: int, starts: int, progress: Callable[[str], None]
+    compared: _Compared, m: int, starts: int | None, progress: Callable[[str], None]
 ) -> list[OptimizeResult]:
     """Searches for m unknowns from the priors' means and from draws of the priors, the best first.
 
     Droppers that slacken make kinks, between which a search may be caught. A draw whose line cannot
     hang, or whose march breaks, is left out.
     """
-    rng, found = np.random.default_rng(_SEED), []
-    for number in range(starts):
-        start = rng.normal(size=m) if number else np.zeros(m)
+    rng, found = np.random.default_rng(_SEED), [_search(compared, np.zeros(m))]
+    if starts is None:
+        starts = _SEARCHES_IN_DOUBT if is_doubtful(compared.judged(found[0])) else 1
+    if starts > 1:
+        progress(f"search 1 of {starts}: sum of squares {2.0 * found[0].cost:.1f}")
+    for number in range(2, starts + 1):
         try:
-            one = least_squares(
-                lambda at: np.concatenate([compared.residual(at), at]),
-                start,
-                lambda at: np.concatenate([-compared.jacobian(at), np.eye(m)]),
-                method="lm",
-                ftol=_TOLERANCE,
-                xtol=_TOLERANCE,
-                gtol=_TOLERANCE,
-                max_nfev=_MOST_MARCHES,
-            )
+            found.append(_search(compared, rng.normal(size=m)))
         except CatenaryError as error:
-            if not number:
-                raise
-            progress(f"search {number + 1} of {starts} broke: {error}")
+            progress(f"search {number} of {starts} broke: {error}")
             continue
-        progress(f"search {number + 1} of {starts}: sum of squares {2.0 * one.cost:.1f}")
-        found.append(one)
+        progress(f"search {number} of {starts}: sum of squares {2.0 * found[-1].cost:.1f}")
     return sorted(found, key=lambda one: float(one.cost))
+
+
+def _search(compared: _Compared, start: np.ndarray) -> OptimizeResult:
+    return least_squares(
+        lambda at: np.concatenate([compared.residual(at), at]),
+        start,
+        lambda at: np.concatenate([-compared.jacobian(at), np.eye(start.size)]),
+        method="lm",
+        ftol=_TOLERANCE,
+        xtol=_TOLERANCE,
+        gtol=_TOLERANCE,
+        max_nfev=_MOST_MARCHES,
+    )
 
 
 def _measurement(scene: Scene, measured: Path | pd.DataFrame, task: Task) -> Measurement:

@@ -35,10 +35,11 @@ class Droppers(Table):
 
 class Task(Table):
     """The whole file; ``starts`` is the number of searches, the first from the means of the priors,
-    others from draws of them, of which the best is taken."""
+    others from draws of them, of which the best is taken. None: one, and two more if that leaves a
+    residual that is unlikely."""
 
     measured: Measured
-    starts: Annotated[int, Field(ge=1, le=100)] = 1
+    starts: Annotated[int, Field(ge=1, le=100)] | None = None
     parameters: Annotated[list[Sought], Field(max_length=1000)] = []
     droppers: Droppers | None = None
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -100,6 +101,36 @@ class Rest(NamedTuple):
     gap: np.ndarray
 
 
+class StiffLine:
+    """A line's stiffness, factored. Not collective.
+
+    Attributes
+    ----------
+    model : with droppers as it has them
+    matrix : K (n_dofs, n_dofs), held unknowns with a unit diagonal
+    """
+
+    def __init__(self, model: Model) -> None:
+        # PETSc is not loaded by a check of a sound line.
+        from catenary.solver.model.matrices import stiffness_matrix
+
+        self.model, self.matrix = model, stiffness_matrix(model)
+
+    def moved(self, load: np.ndarray) -> np.ndarray:
+        """Displacement (n_dofs,) under a load (n_dofs,) that is zero on held unknowns [m], [rad].
+
+        Raises
+        ------
+        RuntimeError
+            If the matrix is singular.
+        """
+        return np.asarray(self._factor.solve(load))
+
+    @cached_property
+    def _factor(self) -> sparse_linalg.SuperLU:
+        return sparse_linalg.splu(self.matrix)
+
+
 class RestNearby:
     """The search for a rest near a known one. Not collective.
 
@@ -108,16 +139,24 @@ class RestNearby:
     potential : of the line as it is now about the known rest
     load : (n_dofs,) what it has to carry beside the former line's loads [N], [N m]
     ends_stay : whether ends that are held along the track at the known rest stay so
+    stiff : a line with the same matrices, if there is one; of a line whose matrices depend on its
+        shape none is of use
     """
 
-    def __init__(self, potential: Potential, load: np.ndarray, ends_stay: bool = False) -> None:
+    def __init__(
+        self,
+        potential: Potential,
+        load: np.ndarray,
+        ends_stay: bool = False,
+        stiff: StiffLine | None = None,
+    ) -> None:
         self._potential, self._load = potential, load
         self._model = model = potential.model
         self._ends: list[TensionedEnd] = []
         if model.simulated.tensioner is not None and not ends_stay:
             self._ends = [TensionedEnd(model, end) for end in tensioned_ends(model)]
         self._bends = effects.needs_form(model.problem)
-        self._matrix: sparse.csc_matrix | None = None
+        self._stiff = stiff
         self._lost = 1.0 - model.simulated.kept_ratio if model.simulated.slackening else 0.0
         self._switches = ~model.broken & (self._lost > 0.0)
 
@@ -226,14 +265,12 @@ class RestNearby:
 
         Infinite where that is singular.
         """
-        # PETSc is not loaded by a check of a sound line.
-        from catenary.solver.model.matrices import stiffness_matrix
-
-        if self._matrix is None or self._bends:
-            self._matrix = stiffness_matrix(about)
-        matrix = self._matrix
+        if self._stiff is None or self._bends:
+            self._stiff = StiffLine(about)
         changed = softer != 0.0
-        if changed.any():
+        try:
+            if not changed.any():
+                return self._stiff.moved(lacks)
             assert about.droppers is not None
             unknowns, weights = (part[changed] for part in about.droppers.direction)
             rows = np.repeat(np.arange(len(unknowns)), unknowns.shape[1])
@@ -243,9 +280,8 @@ class RestNearby:
             free[about.constrained] = 0.0
             spread = spread @ sparse.diags(free)
             gone = sparse.diags(softer[changed])
-            matrix = (matrix - spread.T @ gone @ spread).tocsc()
-        try:
-            return np.asarray(sparse_linalg.splu(matrix.tocsc()).solve(lacks))
+            matrix = (self._stiff.matrix - spread.T @ gone @ spread).tocsc()
+            return np.asarray(sparse_linalg.splu(matrix).solve(lacks))
         except RuntimeError:  # of SuperLU: the matrix is singular
             return np.full(about.n_dofs, np.inf)
 

@@ -5,17 +5,20 @@ from __future__ import annotations
 import numpy as np
 
 from catenary.base.errors import InputError
-from catenary.solver.effects.all_effects import simulated
+from catenary.solver.effects import all_effects as effects
 from catenary.solver.effects.build_model import build
-from catenary.solver.model.model import Model
+from catenary.solver.model.link_directions import dropper_directions
+from catenary.solver.model.model import Model, same_matrices
 from catenary.solver.model.rest_shape import Equilibrium
 from catenary.solver.problem.problem import Problem
 from catenary.solver.statics.changed_line.potential import Potential
-from catenary.solver.statics.changed_line.rest_nearby import RestNearby, where
+from catenary.solver.statics.changed_line.rest_nearby import RestNearby, StiffLine, where
 from catenary.solver.statics.rest_loads import dead_loads
 
 
-def hang(problem: Problem, cut: Model, form: Equilibrium) -> tuple[Model, Equilibrium]:
+def hang(
+    problem: Problem, cut: Model, form: Equilibrium, stiff: StiffLine | None = None
+) -> tuple[Model, Equilibrium]:
     """The model of a line as it hangs, and its equilibrium. Not collective.
 
     Parameters
@@ -26,6 +29,8 @@ def hang(problem: Problem, cut: Model, form: Equilibrium) -> tuple[Model, Equili
         Model of the line for which droppers were cut.
     form : Equilibrium
         Its equilibrium; droppers that push there slacken, and others take their part.
+    stiff : StiffLine, optional
+        Factors that serve if the line has the matrices of theirs.
 
     Raises
     ------
@@ -44,15 +49,23 @@ def hang(problem: Problem, cut: Model, form: Equilibrium) -> tuple[Model, Equili
     wanted = cut.dropper_lengths
     model = build(problem, mesh, length, form=form, cut_lengths=wanted)
     potential = Potential(cut, model, form, form.dropper_length + errors)
-    rest = RestNearby(potential, dead_loads(model) - dead_loads(cut)).find()
+    if stiff is not None and not same_matrices(stiff.model, model):
+        stiff = None
+    load = dead_loads(model) - dead_loads(cut)
+    rest = RestNearby(potential, load, stiff=stiff).find()
     _refuse_slack_wires(model, rest.form)
+    if not (effects.needs_form(problem) or model.droppers_bend or rest.gap.any()):
+        model.form = rest.form
+        assert model.droppers is not None
+        if all(map(np.array_equal, dropper_directions(model), model.droppers.direction)):
+            return model, rest.form  # no matrix depends on the shape
     hung = build(problem, mesh, length, form=rest.form, gap=rest.gap, cut_lengths=wanted)
     return hung, rest.form
 
 
 def errors_of_length(problem: Problem, cut: Model) -> np.ndarray:
     """Errors of the droppers' lengths, (n_droppers,) [m]."""
-    errors, n = simulated(problem).length_errors, cut.dropper_lengths.size
+    errors, n = effects.simulated(problem).length_errors, cut.dropper_lengths.size
     if errors is None:
         return np.zeros(n)
     found = errors.of(n)

@@ -23,6 +23,7 @@ from catenary.solver.model.model import Model
 from catenary.solver.model.rest_shape import Equilibrium as Equilibrium
 from catenary.solver.model.rest_shape import LateralShape
 from catenary.solver.problem.problem import Problem
+from catenary.solver.statics.changed_line.rest_nearby import StiffLine
 from catenary.solver.statics.changed_line.rest_with_defects import errors_of_length, hang
 from catenary.solver.statics.form_finding.banded_factors import BandedFactors
 from catenary.solver.statics.form_finding.lateral_equilibrium import lateral_shape
@@ -47,7 +48,9 @@ _FORCE_TOLERANCE = 2e-11
 
 
 def find_form(
-    problem: Problem, mesh: LineMesh, sound: tuple[Model, Equilibrium] | None = None
+    problem: Problem,
+    mesh: LineMesh,
+    sound: tuple[Model, Equilibrium, StiffLine] | None = None,
 ) -> tuple[Model, Equilibrium]:
     """The model of a line and its equilibrium under its own weight. Not collective.
 
@@ -61,7 +64,8 @@ def find_form(
     mesh : LineMesh
         Mesh of the line.
     sound : tuple, optional
-        Result of ``sound_form`` for a problem that differs in errors of length alone.
+        Result of ``sound_form`` for a problem that differs in errors of length alone, and the
+        stiffness of its model.
 
     Raises
     ------
