@@ -117,7 +117,7 @@ class KeptHistories(KeptRows):
         Parameters
         ----------
         variants : of all pieces
-        pieces : the file of each, and the places of its variants among all
+        pieces : the file of each, and its variants
 
         Raises
         ------
@@ -132,8 +132,9 @@ class KeptHistories(KeptRows):
             try:
                 with appears_whole(self._path) as partial, opened(partial, "w") as file:
                     _describe(file, variants, self._names, (len(variants), n_steps, n))
-                    for piece, rows in pieces.items():
-                        _copy(piece, rows, file)
+                    row_of = {variant.name: row for row, variant in enumerate(variants)}
+                    for piece, own in pieces.items():
+                        _copy(piece, [row_of[variant.name] for variant in own], file)
                     file.attrs[_SWEEP] = self._sweep
             except OSError as error:
                 raise unwritten(self._path, error) from error

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import chain
@@ -16,7 +16,7 @@ from catenary.base.errors import CatenaryError, InputError
 from catenary.base.parallel import on_root
 from catenary.cases.process.interrupts import Interrupted
 from catenary.cases.process.petsc_options import start_petsc
-from catenary.cases.process.workers import WorkerLost, at_once
+from catenary.cases.process.workers import Outcome, WorkerLost, at_once
 from catenary.cases.scene.input.faults import UnfitScene
 from catenary.cases.scene.keys.keys import OF_THE_TRAIN
 from catenary.cases.scene.load import Draft
@@ -98,7 +98,6 @@ def run_ensemble(
     pieces = pieces_of_work(ensemble.variants, size)
     if part is not None:
         pieces = part.of(pieces)
-    variants = [variant for piece in pieces for variant in piece]
     told = json.dumps(ensemble.draft.table(), sort_keys=True, default=str)
     case = hashlib.sha256(told.encode()).hexdigest()
 
@@ -118,7 +117,6 @@ def run_ensemble(
     n_at_once = at_once(options.n_jobs, comm)
     if comm.size > 1:  # a march is one rank's: all without -j would do the same
         n_at_once = comm.size
-    begin, ended = time.perf_counter(), list[Ended]()
     outcomes = kept.each(
         _March(ensemble),
         list(zip(pieces, files, strict=True)),
@@ -127,6 +125,21 @@ def run_ensemble(
         comm,
         partial(start_petsc, list(options.petsc)),
     )
+    ended = _ended(outcomes, pieces, options.progress)
+    if histories is not None and part is None and not interrupted(ended):
+        own = {file: piece for file, piece in zip(files, pieces, strict=True) if file}
+        on_root(comm, lambda: histories.join(ensemble.variants, own), takes_long=True)
+    return in_order(ensemble.variants, ended, ())
+
+
+def _ended(
+    outcomes: Iterable[Outcome],
+    pieces: Sequence[Sequence[Variant]],
+    progress: Callable[[str], None],
+) -> list[Ended]:
+    """How the variants of all pieces ended, as these are done; the last one says if a signal came."""
+    variants, ended = list(chain.from_iterable(pieces)), list[Ended]()
+    begin = time.perf_counter()
     try:
         for outcome in outcomes:
             piece = pieces[outcome.number]
@@ -136,22 +149,13 @@ def run_ensemble(
                 rows = outcome.get()
                 ended += [Ended(v, *row) for v, row in zip(piece, rows, strict=True)]
             spent, n_left = time.perf_counter() - begin, len(variants) - len(ended)
-            options.progress(
+            progress(
                 f"[{len(ended)}/{len(variants)}] {spent:.0f} s gone, about "
                 f"{spent / len(ended) * n_left:.0f} s left"
             )
     except Interrupted:
         ended.append(Ended(variants[len(ended)], INTERRUPTED))
-        return in_order(variants, ended, ())
-    if histories is not None and part is None:
-        row_of = {variant.name: row for row, variant in enumerate(ensemble.variants)}
-        rows_of = {
-            file: [row_of[variant.name] for variant in piece]
-            for file, piece in zip(files, pieces, strict=True)
-            if file
-        }
-        on_root(comm, lambda: histories.join(ensemble.variants, rows_of), takes_long=True)
-    return in_order(ensemble.variants, ended, ())
+    return ended
 
 
 def pieces_of_work(variants: Sequence[Variant], size: int) -> list[list[Variant]]:
