@@ -109,7 +109,7 @@ class KeptHistories(KeptRows):
         assert record is not None
         return record.with_suffix(".h5")
 
-    def join(self, variants: Sequence[Variant], pieces: Mapping[Path, Sequence[int]]) -> None:
+    def join(self, variants: Sequence[Variant], pieces: Mapping[Path, Sequence[Variant]]) -> None:
         """Make one file of those of the pieces, and remove these. Not collective.
 
         Where one is missing, of a process that was lost, they wait for the same command.

@@ -137,7 +137,7 @@ def _ended(
     pieces: Sequence[Sequence[Variant]],
     progress: Callable[[str], None],
 ) -> list[Ended]:
-    """How the variants of all pieces ended, as these are done; the last one says if a signal came."""
+    """How the variants of all pieces ended, as these are done; the last one tells of a signal."""
     variants, ended = list(chain.from_iterable(pieces)), list[Ended]()
     begin = time.perf_counter()
     try:
