@@ -140,6 +140,21 @@ def test_histories_are_those_of_whole_runs(
                 assert np.isnan(found[own][row, n:]).all()
 
 
+def test_histories_of_several_lines_are_in_the_order_of_the_variants(
+    scene: catenary.Scene, table: pd.DataFrame, tmp_path: Path
+) -> None:
+    """Variants of a line are marched together, here every other one."""
+    catenary.sweep(scene, VARY, tmp_path, only_statistics=True, histories=["filtered_force"])
+    with h5py.File(tmp_path / "histories.h5") as file:
+        assert file["variant"].asstr()[...].tolist() == table["variant"].tolist()
+        position, force = file["position"][..., 0], file["filtered_force"][..., 0]
+    first, last = scene["evaluation.from_m"], scene["evaluation.to_m"]
+    for row, deviation in enumerate(table["std_N"]):
+        own = force[row, (position[row] >= first) & (position[row] <= last)]
+        # Single precision leaves 1e-5 N of a deviation, which of no two variants here is so near.
+        assert own.std() == pytest.approx(deviation, abs=1e-4)
+
+
 def test_the_same_call_completes_histories(
     scene: catenary.Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
