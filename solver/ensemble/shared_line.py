@@ -32,9 +32,9 @@ from catenary.solver.integrators.two_pass_step import PassArrays, StationPasses
 from catenary.solver.kernels import aligned_arrays, native
 from catenary.solver.model.model import Model, same_matrices
 from catenary.solver.model.partition import distribute
+from catenary.solver.model.rest_shape import Equilibrium
 from catenary.solver.model.switching_links import LinkArrays, LinkTable, switching_links
 from catenary.solver.problem.problem import Problem
-from catenary.solver.model.rest_shape import Equilibrium
 from catenary.solver.statics.changed_line.rest_nearby import StiffLine
 from catenary.solver.statics.line_at_rest import LineAtRest
 

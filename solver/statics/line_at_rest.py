@@ -91,9 +91,7 @@ def stable_form(
     return model, form
 
 
-def line_at_rest(
-    problem: Problem, mesh: LineMesh, sound: SoundLine | None = None
-) -> LineAtRest:
+def line_at_rest(problem: Problem, mesh: LineMesh, sound: SoundLine | None = None) -> LineAtRest:
     """The line of a problem at rest, found by this process. Not collective.
 
     ``sound`` is that of a problem that differs in errors of length alone.

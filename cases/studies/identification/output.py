@@ -104,7 +104,9 @@ def as_text(found: Identification) -> str:
             f"Sums of squares of {len(found.sums)} searches, of which the first is told: {sums}"
         )
     else:
-        lines.append(f"One search was made, to a sum of squares of {sums}; it may not be the least.")
+        lines.append(
+            f"One search was made, to a sum of squares of {sums}; it may not be the least."
+        )
     if not found.has_converged:
         lines.append(f"The search has not converged after {found.n_marches} marches.")
     return "\n".join(lines)

@@ -104,7 +104,8 @@ def run_ensemble(
         from catenary.cases.studies.sweep.histories import KeptHistories
 
         sweep = hashlib.sha256(json.dumps(list(map(depends_on, pieces))).encode()).hexdigest()
-        kept = histories = KeptHistories(out, ensemble.histories, sweep, options.force)
+        folder = None if part is None else part.folder
+        kept = histories = KeptHistories(out, ensemble.histories, sweep, options.force, folder)
         files = [histories.file_of(depends_on(piece)) for piece in pieces]
     n_at_once = at_once(options.n_jobs, comm)
     if comm.size > 1:  # a march is one rank's: all without -j would do the same
@@ -134,7 +135,7 @@ def run_ensemble(
     except Interrupted:
         ended.append(Ended(variants[len(ended)], INTERRUPTED))
         return ended
-    if histories is not None and part is None:
+    if histories is not None:
         sizes = {file: len(piece) for file, piece in zip(files, pieces, strict=True) if file}
         on_root(comm, lambda: histories.join(variants, sizes), takes_long=True)
     return ended
