@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from pydantic import BaseModel
 
 from catenary.base.errors import InputError
 from catenary.cases.studies.sampling.tables import SamplingTable
+from catenary.cases.studies.sweep.histories import FILE as HISTORIES
+from catenary.cases.studies.sweep.histories import merge_histories
 from catenary.cases.studies.sweep.output import RECORD, table_files
 from catenary.cases.studies.uncertainty import output
 from catenary.cases.studies.uncertainty.evaluation import Uncertainty
@@ -22,8 +24,23 @@ _DONE = "done"
 _OWN = ("wall_s", "remarks")
 
 
-def merge(folders: Sequence[Path]) -> tuple[dict[str, Any], SamplingTable | None]:
-    """The record of a sweep that has the variants of several ones, and their sampling.
+class Merged(NamedTuple):
+    """Several sweeps as one.
+
+    Attributes
+    ----------
+    record : that of a sweep with the variants of all
+    sampling : that of all, None if there is none
+    folders : of each variant the folder that its figures are from
+    """
+
+    record: dict[str, Any]
+    sampling: SamplingTable | None
+    folders: dict[str, Path]
+
+
+def merge(folders: Sequence[Path]) -> Merged:
+    """Several sweeps as one.
 
     Variants may be disjoint or in several folders. A variant that broke in one folder and was run
     to its end in another is taken as done. Not collective.
@@ -74,20 +91,30 @@ def merge(folders: Sequence[Path]) -> tuple[dict[str, Any], SamplingTable | None
         ],
         "rows": [row for name in order for row in rows[name][0]],
     }
-    return merged, sampling
+    return Merged(merged, sampling, {name: rows[name][1] for name in order})
 
 
-def write(
-    out: Path, record: dict[str, Any], sampling: SamplingTable | None
-) -> tuple[list[Path], Uncertainty | None]:
-    """Write the table of merged sweeps, of samples with their evaluation. Not collective."""
-    rows = record["rows"]
+class Written(NamedTuple):
+    """What was written of merged sweeps: files, the evaluation of samples, and why there are no
+    histories, empty if there are or nobody has some."""
+
+    files: list[Path]
+    found: Uncertainty | None
+    lacks: str
+
+
+def write(out: Path, merged: Merged) -> Written:
+    """Write the table of merged sweeps, their histories, and of samples the evaluation. Not
+    collective."""
+    rows, found = merged.record["rows"], None
     table = StudyTable([Column(name) for name in rows[0]], rows)
-    files = write_files(out, table_files(record, table))
-    if sampling is None:
-        return files, None
-    found, more = output.write_evaluated(out, rows, sampling)
-    return [*files, *more], found
+    files = write_files(out, table_files(merged.record, table))
+    lacks = merge_histories(out / HISTORIES, merged.folders)
+    files += [path for path in (out / HISTORIES,) if path.is_file()]
+    if merged.sampling is not None:
+        found, more = output.write_evaluated(out, rows, merged.sampling)
+        files += more
+    return Written(files, found, lacks)
 
 
 class _Variant(BaseModel):

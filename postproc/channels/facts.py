@@ -24,6 +24,7 @@ from catenary.solver.wind.spectra import PEAK
 if TYPE_CHECKING:
     from catenary.meshgen.mesh import LineMesh
     from catenary.solver.problem.problem import Problem
+    from catenary.solver.problem.simulated import Simulated
 
 # Of each contact wire, in the order of the line.
 WIRE = "contact wire"
@@ -33,11 +34,13 @@ NONE = float("nan")
 
 
 class Derivation(NamedTuple):
-    """Sources of facts: the problem, its mesh, and the droppers' lengths (n,) [m]."""
+    """Sources of facts: the problem, its mesh, the droppers' lengths (n,) [m], and the laws that
+    its effects set."""
 
     problem: Problem
     mesh: LineMesh
     dropper_length: np.ndarray
+    laws: Simulated
 
 
 class Fact(NamedTuple):
@@ -74,7 +77,7 @@ def facts_of(problem: Problem, mesh: LineMesh, dropper_length: np.ndarray) -> di
     dropper_length : ndarray, shape (n_droppers,)
         Length of droppers at rest [m].
     """
-    source = Derivation(problem, mesh, dropper_length)
+    source = Derivation(problem, mesh, dropper_length, simulated(problem))
     return {name: np.asarray(fact.of(source), dtype=float) for name, fact in FACTS.items()}
 
 
@@ -108,7 +111,7 @@ def _of_contacts(of: Callable[[Derivation, Wire], float]) -> Callable[[Derivatio
 
 
 def _damping(source: Derivation, component: str) -> tuple[float, float]:
-    own = simulated(source.problem).damping
+    own = source.laws.damping
     return own.per_component.get(component, (own.alpha, own.beta))
 
 
@@ -140,7 +143,7 @@ def _stiffness_under(law: ContactLaw, force: float) -> float:
 
 def _strongest_gust(source: Derivation) -> float:
     """Of gusts whose drag is linearised, over the mean wind."""
-    wind = simulated(source.problem).wind
+    wind = source.laws.wind
     if wind is None or wind.gusts is None or wind.quadratic:
         return NONE
     return PEAK * wind.intensity
@@ -282,7 +285,7 @@ FACTS: dict[str, Fact] = {
         "the part of that alpha which is numerical damping of droppers stiff for the step",
         lambda source: max(
             (
-                simulated(source.problem).added_alpha.get(group.name, 0.0)
+                source.laws.added_alpha.get(group.name, 0.0)
                 for group in source.problem.line.droppers
             ),
             default=0.0,
@@ -291,7 +294,7 @@ FACTS: dict[str, Fact] = {
     "slack_stiffness_share": Fact(
         "-",
         "share of its stiffness that a pushed dropper keeps, 1 where droppers do not slacken",
-        lambda source: simulated(source.problem).kept_ratio,
+        lambda source: source.laws.kept_ratio,
         high=1.0,
     ),
     "periodic_start": Fact(

@@ -21,7 +21,12 @@ from catenary.base.errors import InputError
 from catenary.cases.cli.main import app
 from catenary.cases.scene.load import load_scene
 from catenary.cases.studies.identification.measurement import Measurement, Whitening, correlation
-from catenary.cases.studies.identification.posterior import innovations_of, judge, posterior_of
+from catenary.cases.studies.identification.posterior import (
+    innovations_of,
+    is_doubtful,
+    judge,
+    posterior_of,
+)
 from catenary.cases.studies.identification.task import Task
 from catenary.cases.studies.measured.description import Measured
 from catenary.cases.studies.measured.table_file import read_table
@@ -139,6 +144,19 @@ def test_residuals_are_called_wrong_as_rarely_as_said() -> None:
         seen = [getattr(one["force"], name) for one in found]
         assert stats.kstest(seen, "uniform").pvalue > 1e-4, name
     assert np.isnan(found[0]["all"].whiteness) and not found[0]["all"].is_coloured
+
+
+def test_a_right_model_is_doubted_once_in_ten_passages_at_most() -> None:
+    """1000 models of two signals; 4 deviations of a share of one in ten. What is larger than noise
+    by a tenth, 2.8 deviations of chi-square, mostly is doubted, long before it is called wrong."""
+    rng, n, trials = np.random.default_rng(10), 200, 1000
+    of = {"force": slice(0, n), "head height": slice(n, 2 * n)}
+    right = [judge(rng.normal(size=2 * n), of) for _ in range(trials)]
+    spread = np.sqrt(0.1 * 0.9 / trials)
+    assert 0.05 < np.mean([is_doubtful(one) for one in right]) < 0.1 + 4.0 * spread
+    large = [judge(1.1 * rng.normal(size=2 * n), of) for _ in range(100)]
+    doubted = np.mean([is_doubtful(one) for one in large])
+    assert doubted > 0.8 > np.mean([one["all"].is_too_large for one in large])
 
 
 def test_wrong_residuals_are_told_by_size_and_by_colour() -> None:
@@ -315,7 +333,7 @@ def test_the_verb_finds_a_force_and_writes_its_tables_once(files: Path) -> None:
     out = files / "out"
     result = invoke(files, "-o", str(out))
     assert result.exit_code == 0, result.output
-    assert "The model fits" in result.output
+    assert "The model fits" in result.output and "One search was made, to" in result.output
     table = pd.read_csv(out / "parameters.csv").set_index("parameter")
     assert table.index.tolist() == [FORCE, "bias of head height"]
     row = table.loc[FORCE]

@@ -10,15 +10,19 @@ import h5py
 import numpy as np
 import pandas as pd
 import pytest
+from mpi4py import MPI
 
 import catenary
 from catenary.base.errors import InputError
+from catenary.cases.scene.load import Draft, read_draft
+from catenary.cases.studies import merged_sweeps
 from catenary.cases.studies.records import FOLDER
 from catenary.cases.studies.sweep.force_histograms import force_histograms
 from catenary.cases.studies.sweep.histories import KeptHistories
-from catenary.cases.studies.sweep.jobs import HISTORIES, Ended
+from catenary.cases.studies.sweep.jobs import AS_USUAL, HISTORIES, Ended, Part
+from catenary.cases.studies.sweep.sweep import run_part, run_sweep, sweep_of
 from catenary.cases.studies.sweep.together import pieces_of_work
-from catenary.cases.studies.sweep.variants import Variant
+from catenary.cases.studies.sweep.variants import Variant, parse_vary, product
 
 VARY: dict[str, list[Any]] = {
     "train.speed_km_h": [230, 240, 250],
@@ -174,6 +178,59 @@ def test_the_same_call_completes_histories(
     assert joined.stat().st_mtime_ns != made
     for name, table in whole.items():
         np.testing.assert_array_equal(again[name], table)
+
+
+def test_histories_of_parts_are_merged(scene: catenary.Scene, tmp_path: Path) -> None:
+    """Two machines make a part each; merged they are the histories of the whole sweep."""
+    kept, words = tuple(HISTORIES), ("train.speed_km_h=200,240,250,260,270",)
+    draft = read_draft("en50318_2002", shortened=True)
+    variants = product([parse_vary(word) for word in words], {})
+    whole = {
+        name: table[...]
+        for name, table in _tables_of(draft, variants, tmp_path / "whole", None, kept).items()
+    }
+    folders = []
+    for number in (1, 2):
+        out = tmp_path / str(number)
+        part = Part(number, 2)
+        _tables_of(draft, variants, out, part, kept)
+        folders.append(out / part.folder)
+    merged = merged_sweeps.merge(folders[::-1])
+    written = merged_sweeps.write(tmp_path / "all", merged)
+    assert tmp_path / "all" / "histories.h5" in written.files and not written.lacks
+    with h5py.File(tmp_path / "all" / "histories.h5") as file:
+        assert set(file) == set(whole)
+        order = [list(file["variant"].asstr()).index(one.name) for one in variants]
+        for name, table in whole.items():
+            found = file[name][...]
+            rows = found[order] if name not in ("step", "pantograph") else found
+            if name != "variant":
+                assert rows.dtype == table.dtype
+                # Scenes stand in lanes of other groups, which round-off tells apart.
+                np.testing.assert_allclose(rows, table, rtol=0.0, atol=1e-4)
+    (folders[0] / "histories.h5").unlink()
+    written = merged_sweeps.write(tmp_path / "less", merged_sweeps.merge(folders))
+    assert written.lacks == f"histories are left out, as {folders[0]} has none"
+    assert not (tmp_path / "less" / "histories.h5").exists()
+
+
+def _tables_of(
+    draft: Draft,
+    variants: list[Variant],
+    out: Path,
+    part: Part | None,
+    kept: tuple[str, ...],
+) -> dict[str, np.ndarray]:
+    """Histories of a sweep, or of a part of it."""
+    sweep = sweep_of(draft, variants, out, only_statistics=True, histories=kept)
+    if part is None:
+        run_sweep(sweep, out, MPI.COMM_SELF, AS_USUAL, "a test", None)
+        folder = out
+    else:
+        run_part(sweep, part, out, MPI.COMM_SELF, AS_USUAL)
+        folder = out / part.folder
+    with h5py.File(folder / "histories.h5") as file:
+        return {name: table[...] for name, table in file.items()}
 
 
 def test_histories_of_a_lost_process_are_waited_for(tmp_path: Path) -> None:

@@ -168,7 +168,7 @@ def test_what_is_no_table_of_runs_is_one_sentence(tmp_path: Path) -> None:
 
 
 def merged(*folders: Path) -> dict[str, Any]:
-    record, _ = merged_sweeps.merge(folders)
+    record = merged_sweeps.merge(folders).record
     return record
 
 
@@ -180,7 +180,7 @@ def test_disjoint_and_common_samples_merge_into_the_table_of_all(tmp_path: Path)
     record = merged(rest, odd)
     assert record["rows"] == json.loads((whole / "sweep.json").read_text())["rows"]
     assert len(record["variants"]) == 30
-    files, found = merged_sweeps.write(tmp_path / "all", *merged_sweeps.merge([odd, rest]))
+    files, found, _ = merged_sweeps.write(tmp_path / "all", merged_sweeps.merge([odd, rest]))
     assert found == evaluate(read_run_table(whole))
     assert (tmp_path / "all" / "sweep.csv").read_text() == (whole / "sweep.csv").read_text()
     assert {path.name for path in files} >= {"sweep.csv", "sweep.json", "uncertainty.json"}

@@ -9,12 +9,15 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
 import pytest
 
 import catenary
 from catenary.base.errors import InputError
+from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.input.toml_input import REMOVED
 from catenary.cases.scene.load import read_draft
+from catenary.cases.scene.problem import problem_of
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies import ensemble as scenes_on_lines
 from catenary.cases.studies.ensemble import Marched, Marches
@@ -22,6 +25,7 @@ from catenary.postproc.files.disk import plain
 from catenary.solver.ensemble import marches
 from catenary.solver.ensemble.shared_line import N_LANES
 from catenary.solver.kernels import native
+from catenary.solver.statics.line_at_rest import line_at_rest
 
 # What an own run times and counts, and a watch of its energies, which lanes do without.
 LEFT_OUT = {
@@ -119,6 +123,27 @@ def test_lines_with_other_errors_of_dropper_lengths_share_matrices() -> None:
             differences(plain(found[number].summary), own_run("en50318_2002", changes[number]))
             == []
         )
+
+
+def test_lines_with_other_slack_droppers_at_rest_share_lanes(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Own runs hold a slack dropper open, lanes taut with a compensation from the start."""
+    key = "irregularities.dropper_lengths"
+    changes = [{f"{key}.standard_deviation_mm": 12.0, f"{key}.seed": seed} for seed in range(1, 5)]
+    scenes = scenes_of("en50318_2002", changes)
+    slack = [
+        np.flatnonzero(line_at_rest(problem_of(one), mesh_of(one)).model.dropper_gap).tolist()
+        for one in scenes
+    ]
+    assert sum(map(bool, slack)) > 1 and len(set(map(tuple, slack))) > 2
+    monkeypatch.setattr(scenes_on_lines, "_alone", None)
+    found, together = marched(scenes)
+    assert together
+    for number, own in enumerate(slack):
+        if own:
+            summary = plain(found[number].summary)
+            assert differences(summary, own_run("en50318_2002", changes[number])) == []
 
 
 def test_scenes_with_loads_march_one_by_one() -> None:

@@ -71,10 +71,11 @@ def identified(
     priors: dict[str, float],
     spans: Sequence[int] = (),
     filtered: bool = True,
-    starts: int = 1,
+    starts: int | None = None,
 ) -> Identification:
     """What is found of these."""
-    task = read_task({**task_with(priors, spans, filtered), "starts": starts}, Task)
+    own = {} if starts is None else {"starts": starts}
+    task = read_task(task_with(priors, spans, filtered) | own, Task)
     return identify(scene, file, task, MPI.COMM_SELF)
 
 
@@ -230,15 +231,16 @@ def test_widths_are_right_in_repeated_passages(tmp_path: Path) -> None:
 
 @pytest.mark.study
 @pytest.mark.timeout(3600)
-def test_further_searches_leave_a_sum_that_is_not_the_least(tmp_path: Path) -> None:
+def test_an_unlikely_residual_is_left_by_further_searches(tmp_path: Path) -> None:
     """The twelfth of the passages above: from the means of the priors the search is caught between
-    kinks, at a sum of squares of 245 and 68 from the truth. The truth itself has 185."""
+    kinks, at a sum of squares of 245 of 202 samples and 68 from the truth, which itself has 185. A
+    task that names no number of searches leaves it."""
     rng = np.random.default_rng(24)
     for _ in range(12):
         twin, truth = planted(SMALL, FEW, [3], rng)
         write_measurement(tmp_path / "passage.csv", twin, rng, FORCE_NOISE, HEIGHT_NOISE)
     scene = load_scene(CASE, SMALL)
-    found = identified(scene, tmp_path / "passage.csv", FEW, [3], starts=3)
+    found = identified(scene, tmp_path / "passage.csv", FEW, [3])
     print(f"sums of squares: {np.round(found.sums, 1)}")
     assert found.sums == sorted(found.sums) and found.sums[-1] > 1.3 * found.sums[0]
     assert "Sums of squares of 3 searches" in as_text(found)

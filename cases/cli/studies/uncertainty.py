@@ -55,7 +55,8 @@ def uncertainty(
 @serial_verb(
     "merge",
     help="Join sweeps of one case that ran in several folders. Folders such as the parts of "
-    "--part become one table; those that contradict each other are refused.",
+    "--part become one table, with their histories if all have some; those that contradict each "
+    "other are refused.",
     epilog="Example: catenary merge results/part_1 results/part_2 -o results/tolerances",
 )
 def merge(
@@ -71,10 +72,11 @@ def merge(
     if len(folders) < 2:
         raise InputError(f"there is only {folders[0]} to merge: name at least two folders")
     refuse_table(out / RECORD, force)
-    record, sampling = merged_sweeps.merge(folders)
-    files, found = merged_sweeps.write(out, record, sampling)
+    merged = merged_sweeps.merge(folders)
+    files, found, lacks = merged_sweeps.write(out, merged)
     if found is not None:
         console.say(output.as_text(found) + "\n")
-    n = len({row["variant"] for row in record["rows"]})
-    console.say(f"{n} variants of {record['case']}")
+    if lacks:
+        console.say(lacks)
+    console.say(f"{len(merged.folders)} variants of {merged.record['case']}")
     console.say("\n".join(str(path) for path in files))

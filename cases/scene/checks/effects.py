@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import functools
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 from catenary.cases.scene.input.faults import Fault, shown
 from catenary.cases.scene.keys.table import TAKE_AWAY
@@ -40,8 +40,9 @@ def check_effect_names(scene: Scene) -> Iterator[Fault]:
 
 def check_requirements_of_chosen(scene: Scene) -> Iterator[Fault]:
     """Effects that the scene switches on without the effects that they require."""
+    switches = scene.switches()
     for name in scene.effects:
-        yield from _requirements(scene, name, "on", f"effects.{name}")
+        yield from _requirements(scene, switches, name, "on", f"effects.{name}")
 
 
 def check_chosen_act(scene: Scene) -> Iterator[Fault]:
@@ -73,17 +74,18 @@ def _calmed(scene: Scene) -> set[str]:
 
 def check_requirements_of_defaults(scene: Scene) -> Iterator[Fault]:
     """Of effects that are on by default, unless the scene holds nothing for them to act on."""
-    problem = functools.cache(lambda: problem_of(scene))
+    problem, switches = functools.cache(lambda: problem_of(scene)), scene.switches()
     for name, effect in effects.registry().items():
         if name in scene.effects:
             continue
-        for fault in _requirements(scene, name, "on by default", ""):
+        for fault in _requirements(scene, switches, name, "on by default", ""):
             if effect.applies(problem()):
                 yield fault
 
 
-def _requirements(scene: Scene, name: str, how: str, key: str) -> Iterator[Fault]:
-    switches = scene.switches()
+def _requirements(
+    scene: Scene, switches: Mapping[str, bool], name: str, how: str, key: str
+) -> Iterator[Fault]:
     for required in effects.registry()[name].requires if switches.get(name) else ():
         if not switches[required]:
             at = key or f"effects.{required}"

@@ -15,7 +15,6 @@ from catenary.cases.studies.scene_sets.evaluation import (
     OF_EACH_PANTOGRAPH,
     Evaluation,
     Wanted,
-    identity,
 )
 from catenary.cases.studies.scene_sets.scene_set import (
     ErrorSamples,
@@ -204,16 +203,3 @@ def trap(rows: Sequence[Row]) -> str:
         f"it was searched in the direction {seen[0].direction} alone: std_N changes there by "
         f"{100 * here:+.1f} % at most, and in the other direction by {100 * there:+.1f} %"
     )
-
-
-def one_sided(scenes: SceneSet, values: Mapping[str, Any]) -> bool:
-    """Whether the line differs from its mirror image after a change, for the first scene."""
-    member = scenes.members[0]
-    try:
-        here, there = (
-            identity(scenes.scene(member._replace(direction=direction), values))
-            for direction in DIRECTIONS
-        )
-    except InputError:
-        return True
-    return here != there

@@ -13,14 +13,13 @@ from catenary.cases.process.workers import Pool
 from catenary.cases.scene.input.toml_input import REMOVED
 from catenary.cases.scene.load import Draft
 from catenary.cases.scene.scene import Scene
-from catenary.cases.scene.turned import FORWARD
+from catenary.cases.scene.turned import FORWARD, has_mirrored_line, turned
 from catenary.cases.studies.optimise.checks import (
     Check,
     Row,
     checks_of,
     compare,
     not_improved,
-    one_sided,
     trap,
 )
 from catenary.cases.studies.optimise.droppers import dropper_table
@@ -140,10 +139,16 @@ def _narrow(task: OptimiseTask, scenes: SceneSet, variables: Variables) -> list[
 
 
 def _may_lean(scenes: SceneSet, variables: Variables) -> bool:
-    """Whether some change within bounds makes a line that differs from its mirror image."""
+    """Whether some change within bounds makes a line that differs from its mirror image, or has
+    none."""
     random = np.random.default_rng(1).uniform(0.0, 0.1, variables.low.size)
     change = random * np.where(variables.high > 0.0, variables.high, variables.low)
-    return one_sided(scenes, variables.values(change))
+    member = scenes.members[0]._replace(direction=FORWARD)
+    try:
+        scene = scenes.scene(member, variables.values(change))
+        return not has_mirrored_line(scene, turned(scene))
+    except InputError:
+        return True
 
 
 def optimise(

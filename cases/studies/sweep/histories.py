@@ -1,14 +1,15 @@
 """Histories of an ensemble's variants in one HDF5 file, padded with NaN to the longest.
 
 A piece of work leaves those of its variants in a file beside its record; when all are done they
-are joined, a variant at a time, and the files of the pieces go. Names, units and dimensions are
+are joined, a variant at a time, and the files of the pieces go. Those of several sweeps are merged
+into one file of the same kind. Names, units and dimensions are
 those of netCDF-4 and CF, so that xarray opens the file by names.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -56,18 +57,14 @@ def piece_file(path: Path | None, names: Sequence[str]) -> Iterator[Put]:
     if path is None:
         yield lambda number, tables: None
         return
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with appears_whole(path) as partial, opened(partial, "w") as file:
+    with _written(path) as file:
 
-            def put(number: int, tables: Mapping[str, np.ndarray]) -> None:
-                group = file.create_group(str(number))
-                for name, values in _chosen(tables, names).items():
-                    group.create_dataset(name, data=values)
+        def put(number: int, tables: Mapping[str, np.ndarray]) -> None:
+            group = file.create_group(str(number))
+            for name, values in _chosen(tables, names).items():
+                group.create_dataset(name, data=values)
 
-            yield put
-    except OSError as error:
-        raise unwritten(path, error) from error
+        yield put
 
 
 def _chosen(tables: Mapping[str, np.ndarray], names: Sequence[str]) -> dict[str, np.ndarray]:
@@ -92,11 +89,21 @@ class KeptHistories(KeptRows):
     names : which histories, out of ``HISTORIES``
     sweep : digest that names the sweep
     force : forget what is there
+    part : folder within ``out`` of the part of the sweep that these pieces are, None of all
     """
 
-    def __init__(self, out: Path, names: Sequence[str], sweep: str, force: bool = False) -> None:
+    def __init__(
+        self,
+        out: Path,
+        names: Sequence[str],
+        sweep: str,
+        force: bool = False,
+        part: str | None = None,
+    ) -> None:
         super().__init__(out, force)
-        self._path, self._names, self._sweep, self._force = out / FILE, names, sweep, force
+        self._path = out / (part or "") / FILE
+        self._names, self._sweep, self._force = names, sweep, force
+        self._is_whole = part is None
 
     def get(self, depends_on: Any) -> Any:
         """Rows that are there and have their histories. Not collective."""
@@ -110,7 +117,7 @@ class KeptHistories(KeptRows):
         return record.with_suffix(".h5")
 
     def join(self, variants: Sequence[Variant], pieces: Mapping[Path, Sequence[Variant]]) -> None:
-        """Make one file of those of the pieces, and remove these. Not collective.
+        """Make one file of those of the pieces; those of a whole sweep go. Not collective.
 
         Where one is missing, of a process that was lost, they wait for the same command.
 
@@ -129,16 +136,15 @@ class KeptHistories(KeptRows):
                 return
             shapes = [shape for piece in pieces for shape in _shapes(piece)]
             n_steps, n = np.max(shapes, axis=0, initial=1).tolist()
-            try:
-                with appears_whole(self._path) as partial, opened(partial, "w") as file:
-                    _describe(file, variants, self._names, (len(variants), n_steps, n))
-                    row_of = {variant.name: row for row, variant in enumerate(variants)}
-                    for piece, own in pieces.items():
-                        _copy(piece, [row_of[variant.name] for variant in own], file)
-                    file.attrs[_SWEEP] = self._sweep
-            except OSError as error:
-                raise unwritten(self._path, error) from error
-        for piece in pieces:
+            keys = dict.fromkeys(key for one in variants for key in one.varied if key != NAMES)
+            varied = {key: _numbers([one.varied.get(key, "") for one in variants]) for key in keys}
+            row_of = {one.name: row for row, one in enumerate(variants)}
+            with _written(self._path) as file:
+                _describe(file, list(row_of), varied, self._names, (n_steps, n))
+                for piece, own in pieces.items():
+                    _copy(piece, [row_of[one.name] for one in own], file)
+                file.attrs[_SWEEP] = self._sweep
+        for piece in pieces if self._is_whole else ():
             piece.unlink(missing_ok=True)
 
     def _is_joined(self) -> bool:
@@ -168,21 +174,99 @@ def _copy(piece: Path, rows: Sequence[int], file: h5py.File) -> None:
                 file[name][place] = table[...]
 
 
+@contextmanager
+def _written(path: Path) -> Iterator[h5py.File]:
+    """A new file that appears whole at the end of a context. Not collective; RunBroken if the disk
+    refuses."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with appears_whole(path) as partial, opened(partial, "w") as file:
+            yield file
+    except OSError as error:
+        raise unwritten(path, error) from error
+
+
+def merge_histories(path: Path, folders: Mapping[str, Path]) -> str:
+    """Join histories of several sweeps in a file; returns why there is none, empty if there is.
+    Not collective.
+
+    Parameters
+    ----------
+    path : of the new file
+    folders : by the name of each variant, in their order, the folder of the sweep that has its
+        history
+
+    Raises
+    ------
+    RunBroken
+        If the disk refuses.
+    """
+    with ExitStack() as stack:
+        sources: dict[Path, h5py.File] = {}
+        for folder in dict.fromkeys(folders.values()):
+            try:
+                sources[folder] = stack.enter_context(open_own(folder / FILE))
+            except HDF5_ERRORS:
+                continue
+        if not sources:
+            return ""
+        first = next(iter(sources.values()))
+        tables = [name for name in first if name not in _DIMENSIONS]
+        for folder in folders.values():
+            if folder not in sources:
+                return f"histories are left out, as {folder} has none"
+            if [name for name in sources[folder] if name not in _DIMENSIONS] != tables:
+                return f"histories are left out, as those of {folder} have other names"
+        rows = {folder: _rows(file) for folder, file in sources.items()}
+        at = [(sources[folder], rows[folder][name]) for name, folder in folders.items()]
+        varied = {key: _joined(key, at) for key in tables if first[key].ndim == 1}
+        names = [name for name in tables if name in HISTORIES]
+        sizes = [file[_POSITION].shape[1:] for file in sources.values()]
+        with _written(path) as file:
+            _describe(file, list(folders), varied, names, tuple(np.max(sizes, axis=0).tolist()))
+            for row, (source, own) in enumerate(at):
+                for name in (_TIME, _POSITION, *names):
+                    table = source[name][own]
+                    file[name][(row, *(slice(0, size) for size in table.shape))] = table
+    return ""
+
+
+def _rows(file: h5py.File) -> dict[str, int]:
+    """The row of each variant."""
+    return {name: row for row, name in enumerate(file[_VARIANT].asstr()[...])}
+
+
+def _joined(key: str, at: Sequence[tuple[h5py.File, int]]) -> Any:
+    """Values of a varied key at rows of files: numbers, if all are some, else texts."""
+    values = [file[key][row] for file, row in at]
+    return _numbers([one.decode() if isinstance(one, bytes) else str(one) for one in values])
+
+
 def _describe(
-    file: h5py.File, variants: Sequence[Variant], names: Sequence[str], shape: tuple[int, int, int]
+    file: h5py.File,
+    variants: Sequence[str],
+    varied: Mapping[str, Any],
+    names: Sequence[str],
+    sizes: tuple[int, ...],
 ) -> None:
-    """Make tables of NaN with their dimensions and units, and the varied keys of each variant."""
+    """Make tables of NaN with their dimensions and units, and the varied keys of each variant.
+
+    Parameters
+    ----------
+    variants : their names
+    varied : values of each key by variants
+    names : of the histories
+    sizes : numbers of steps and of pantographs
+    """
+    shape = (len(variants), *sizes)
     file.attrs["Conventions"] = CONVENTIONS
-    file.create_dataset(_VARIANT, data=[one.name for one in variants], dtype=h5py.string_dtype())
-    for name, size in zip(_DIMENSIONS[1:], shape[1:], strict=True):
+    file.create_dataset(_VARIANT, data=list(variants), dtype=h5py.string_dtype())
+    for name, size in zip(_DIMENSIONS[1:], sizes, strict=True):
         file.create_dataset(name, data=np.arange(size) + (name == "pantograph"))
     for name in _DIMENSIONS:
         file[name].make_scale(name)
-    varied = dict.fromkeys(key for one in variants for key in one.varied if key != NAMES)
-    for key in varied:
-        table = file.create_dataset(
-            key, data=_numbers([one.varied.get(key, "") for one in variants])
-        )
+    for key, values in varied.items():
+        table = file.create_dataset(key, data=values)
         table.dims[0].attach_scale(file[_VARIANT])
     for name in (_TIME, _POSITION, *names):
         n = 2 if name == _TIME else 3

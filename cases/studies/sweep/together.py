@@ -112,7 +112,8 @@ def run_ensemble(
         from catenary.cases.studies.sweep.histories import KeptHistories
 
         sweep = hashlib.sha256(json.dumps(list(map(depends_on, pieces))).encode()).hexdigest()
-        kept = histories = KeptHistories(out, ensemble.histories, sweep, options.force)
+        folder = None if part is None else part.folder
+        kept = histories = KeptHistories(out, ensemble.histories, sweep, options.force, folder)
         files = [histories.file_of(depends_on(piece)) for piece in pieces]
     n_at_once = at_once(options.n_jobs, comm)
     if comm.size > 1:  # a march is one rank's: all without -j would do the same
@@ -125,11 +126,12 @@ def run_ensemble(
         comm,
         partial(start_petsc, list(options.petsc)),
     )
-    ended = _ended(outcomes, pieces, options.progress)
-    if histories is not None and part is None and not interrupted(ended):
+    ended = in_order(ensemble.variants, _ended(outcomes, pieces, options.progress), ())
+    if histories is not None and not interrupted(ended):
+        variants = [one.variant for one in ended]
         own = {file: piece for file, piece in zip(files, pieces, strict=True) if file}
-        on_root(comm, lambda: histories.join(ensemble.variants, own), takes_long=True)
-    return in_order(ensemble.variants, ended, ())
+        on_root(comm, lambda: histories.join(variants, own), takes_long=True)
+    return ended
 
 
 def _ended(
