@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from catenary.base.errors import InputError
+from catenary.postproc.evaluate.span_differences import STATISTICS, differences, span_sums
 from catenary.postproc.measurements.alignment import CERTAIN, Alignment, align, correlation_time
 from catenary.postproc.measurements.passage import (
     MeasuredForce,
@@ -33,6 +34,8 @@ _MORE_THAN_NOISE = 1.3
 _LEAST_PERIODS = 20
 # A range is widened by noise of deviation 1 by up to so much.
 _WIDENED = 6.0
+# A span is whole if the record ends this near its masts [m].
+_NEAR_MAST = 1.0
 # A support is that of the run if it is this near [m].
 _NEAR_SUPPORT = 10.0
 LINE_TEST = "comparison with a line test, EN 50318"
@@ -397,6 +400,22 @@ class _Comparing:
             if key == "std" and "std" in self._passage.tolerances:
                 usual = self._passage.tolerances["std"] * values[1]
             self._figure(label, name, "N", key, values, usual)
+        self._beyond_chance(name, at, force, run.below(self._passage.cut_off)(at))
+
+    def _beyond_chance(
+        self, name: str, at: np.ndarray, measured: np.ndarray, modelled: np.ndarray
+    ) -> None:
+        """Tell how sure differences of mean and deviation are, by the spread from span to span:
+        samples within a span depend on each other, spans hardly do."""
+        masts = self._results.line("support_x")
+        whole = masts[(masts >= at[0] - _NEAR_MAST) & (masts <= at[-1] + _NEAR_MAST)]
+        sums = (span_sums(at, force, whole) for force in (measured, modelled))
+        for what, one in zip(STATISTICS, differences(*sums, paired=True) or (), strict=False):
+            chance = "more than chance" if one.is_certain else "within chance"
+            self.remarks.append(
+                f"{name}: {what}, run - measured, {one.value:+.2f} N with a 95 % interval from "
+                f"{one.low:+.2f} to {one.high:+.2f} N: {chance}"
+            )
 
     def _heights(
         self, own: MeasuredForce, valid: slice, within: np.ndarray, at: np.ndarray, dt: float

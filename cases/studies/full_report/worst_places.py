@@ -29,7 +29,7 @@ from catenary.postproc.report.pictures.marks import mark_line
 from catenary.postproc.report.sections.section import EvaluatedRun, Picture, Section, Text, number
 from catenary.postproc.report.study_table import StudyTable, texts_table
 
-# What is shown to both sides of an arm or a dropper [m], and how many places tables have.
+# What is shown beside an arm or a dropper and its extreme [m], and how many places tables have.
 _BESIDE, _MOST = 30.0, 5
 
 
@@ -141,6 +141,7 @@ def _span(results: Results, passage: Passage) -> Figure:
         force.annotate(
             f"{word} {filtered[at]:.0f} N at {x[at]:.1f} m", (x[at], filtered[at]),
             xytext=offset, textcoords="offset points", fontsize=8,
+            bbox={"facecolor": "white", "alpha": 0.7, "edgecolor": "none", "pad": 1.0},
         )  # fmt: skip
         force.plot(x[at], filtered[at], "o", color=LIMIT, ms=4)
     force.axhline(0.0, color=LIMIT, linewidth=0.9)
@@ -160,7 +161,8 @@ def _passage(results: Results, channel: str, spot: Spot) -> Figure:
     leader = int(np.argmax(results.first_position))
     place = results.column("contact_position", leader)[:: results.line_record.every]
     behind = results.first_position[leader] - results.first_position
-    reach = spot.x - _BESIDE, spot.x + float(behind.max()) + _BESIDE
+    most = place[int(np.nanargmax(results.column(channel, spot.number)))]
+    reach = min(spot.x, most) - _BESIDE, max(spot.x + float(behind.max()), most) + _BESIDE
     rows = slice(*np.clip(np.searchsorted(place, reach), 0, results.n_rows(channel)).tolist())
     values = results.column(channel, spot.number, rows)
     is_uplift = channel == "arm_uplift"
