@@ -18,7 +18,12 @@ _FIT = 0.01
 
 
 def make_mesh(
-    line: Line, elements_per_gap: int, path: Path | None = None, *, support_refinement: int = 1
+    line: Line,
+    elements_per_gap: int,
+    path: Path | None = None,
+    *,
+    support_refinement: int = 1,
+    grading: float = 1.0,
 ) -> LineMesh:
     """Mesh ``line``, in a file with Gmsh. Not collective: call it on one rank.
 
@@ -34,6 +39,8 @@ def make_mesh(
         Path of the mesh file to be kept; None to keep none.
     support_refinement : int, optional
         Factor on the number of elements in the gaps next to a mast.
+    grading : float, optional
+        How many times longer elements are amid a gap than at its cuts.
 
     Raises
     ------
@@ -45,12 +52,14 @@ def make_mesh(
         from catenary.meshgen.gmsh_lines import write_mesh
         from catenary.meshgen.reader import read_mesh
 
-        write_mesh(line, elements_per_gap, path, support_refinement=support_refinement)
+        write_mesh(
+            line, elements_per_gap, path, support_refinement=support_refinement, grading=grading
+        )
         return read_mesh(path, names_of(line))
     check_counts(elements_per_gap, support_refinement)
     cuts = find_cuts(line)
     divisions = divisions_of(cuts, elements_per_gap, support_refinement)
-    return assemble(divide(line, cuts, divisions), names_of(line), "the line")
+    return assemble(divide(line, cuts, divisions, grading), names_of(line), "the line")
 
 
 def use_mesh(line: Line, path: Path) -> LineMesh:

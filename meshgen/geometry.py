@@ -123,7 +123,7 @@ def divisions_of(cuts: Cuts, elements_per_gap: int, support_refinement: int) -> 
     return elements_per_gap * np.where(near_mast, support_refinement, 1)
 
 
-def divide(line: Line, cuts: Cuts, divisions: np.ndarray) -> Groups:
+def divide(line: Line, cuts: Cuts, divisions: np.ndarray, grading: float = 1.0) -> Groups:
     """Nodes and elements of all wires, droppers and hardware of a line. Not collective.
 
     Parameters
@@ -134,6 +134,8 @@ def divide(line: Line, cuts: Cuts, divisions: np.ndarray) -> Groups:
         Places at which each wire is cut.
     divisions : ndarray
         Elements between neighbouring cuts, see ``divisions_of``.
+    grading : float
+        How many times longer elements are amid a gap than at its cuts, at least 1.
     """
     parts: list[np.ndarray] = []
     elements: dict[str, list[np.ndarray]] = {wire.name: [] for wire in line.wires}
@@ -144,7 +146,7 @@ def divide(line: Line, cuts: Cuts, divisions: np.ndarray) -> Groups:
     for piece in reversed(cuts.pieces):
         last = piece.first + len(piece.points) - 1
         counts = divisions[piece.first : last]
-        points = _between(piece.points, counts)
+        points = _between(piece.points, counts, grading)
         nodes = n + np.concatenate([[0], np.cumsum(counts)])
         at_cut[piece.wire][piece.first : last + 1] = nodes
         numbers = n + np.arange(len(points))
@@ -164,10 +166,16 @@ def divide(line: Line, cuts: Cuts, divisions: np.ndarray) -> Groups:
     return Groups(np.concatenate(parts), lines, nodes_of)
 
 
-def _between(points: np.ndarray, counts: np.ndarray) -> np.ndarray:
-    """Points (m, 3) that divide the straight lines between ``points`` (n, 3) evenly."""
+def _between(points: np.ndarray, counts: np.ndarray, grading: float) -> np.ndarray:
+    """Points (m, 3) that divide the straight lines between ``points`` (n, 3).
+
+    Graded ones lie by a hyperbolic tangent, shortest at both ends, as Gmsh's law ``Bump`` has it.
+    """
     gap = np.repeat(np.arange(counts.size), counts)
     step = np.arange(gap.size) - np.repeat(np.cumsum(counts) - counts, counts)
-    share = (step / counts[gap])[:, None]
-    inside = points[gap] + share * (points[gap + 1] - points[gap])
+    share = step / counts[gap]
+    if grading > 1.0:
+        steepness = np.arccosh(np.sqrt(grading))
+        share = 0.5 + 0.5 * np.tanh(steepness * (2.0 * share - 1.0)) / np.tanh(steepness)
+    inside = points[gap] + share[:, None] * (points[gap + 1] - points[gap])
     return np.concatenate([inside, points[-1:]])

@@ -18,12 +18,17 @@ from catenary.meshgen.mesh import ANCHORS
 
 
 def write_mesh(
-    line: Line, elements_per_gap: int, path: Path, *, support_refinement: int = 1
+    line: Line,
+    elements_per_gap: int,
+    path: Path,
+    *,
+    support_refinement: int = 1,
+    grading: float = 1.0,
 ) -> None:
     """Write the mesh of ``line`` to ``path``, a Gmsh file (MSH 2.2, ASCII).
 
     Not collective: call it on one rank. All wires are cut at every mast, dropper and end of a wire
-    and divided evenly in between; a dropper is one element. Heights are wanted or estimated ones;
+    and divided in between; a dropper is one element. Heights are wanted or estimated ones;
     form finding corrects them.
 
     Parameters
@@ -36,6 +41,8 @@ def write_mesh(
         File to write, its name ends in ``.msh``.
     support_refinement : int, optional
         Factor on the number of elements in the gaps next to a mast.
+    grading : float, optional
+        How many times longer elements are amid a gap than at its cuts; 1 divides evenly.
 
     Raises
     ------
@@ -48,7 +55,7 @@ def write_mesh(
         raise InputError(f"the mesh file {path} must have a name that ends in .msh")
     cuts = find_cuts(line)
     with _session(path.stem):
-        _describe(line, cuts, elements_per_gap, support_refinement)
+        _describe(line, cuts, divisions_of(cuts, elements_per_gap, support_refinement), grading)
         gmsh.model.mesh.generate(1)
         # meshio reads 2.2 ten times faster than 4.1 when there is a curve for each gap.
         gmsh.option.setNumber("Mesh.MshFileVersion", 2.2)
@@ -80,16 +87,15 @@ def _session(name: str) -> Iterator[None]:
                 gmsh.finalize()
 
 
-def _describe(line: Line, cuts: Cuts, elements_per_gap: int, support_refinement: int) -> None:
+def _describe(line: Line, cuts: Cuts, divisions: np.ndarray, grading: float) -> None:
     """Geometry, divisions and physical groups in the current model."""
-    divisions = divisions_of(cuts, elements_per_gap, support_refinement)
     points = {wire.name: np.zeros(cuts.x.size, dtype=np.int64) for wire in line.wires}
     curves: dict[str, list[int]] = {wire.name: [] for wire in line.wires}
     ends: list[int] = []
     # From the topmost wire down, which is the order of the tags.
     for piece in reversed(cuts.pieces):
         last = piece.first + len(piece.points) - 1
-        tags, between = _add_wire(piece.points, divisions[piece.first : last])
+        tags, between = _add_wire(piece.points, divisions[piece.first : last], grading)
         points[piece.wire][piece.first : last + 1] = tags
         curves[piece.wire] += between
         ends += [tags[end] for end, held in zip((0, -1), piece.ends, strict=True) if held]
@@ -122,11 +128,14 @@ def _add_droppers(group: Droppers, points: dict[str, np.ndarray], cuts: Cuts) ->
     return curves
 
 
-def _add_wire(points: np.ndarray, divisions: np.ndarray) -> tuple[list[int], list[int]]:
-    """Tags of the points and of the straight lines between them, divided evenly."""
+def _add_wire(
+    points: np.ndarray, divisions: np.ndarray, grading: float
+) -> tuple[list[int], list[int]]:
+    """Tags of the points and of the straight lines between them, divided."""
     geo = gmsh.model.geo
     tags = [geo.addPoint(*point) for point in points.tolist()]
     curves = [geo.addLine(left, right) for left, right in zip(tags[:-1], tags[1:], strict=True)]
+    law = ("Bump", 1.0 / grading) if grading > 1.0 else ()
     for curve, count in zip(curves, divisions.tolist(), strict=True):
-        geo.mesh.setTransfiniteCurve(curve, count + 1)
+        geo.mesh.setTransfiniteCurve(curve, count + 1, *law)
     return tags, curves

@@ -47,6 +47,7 @@ def mesh_of(scene: Scene, path: Path | None = None) -> LineMesh:
         scene.mesh.elements_per_gap,
         path,
         support_refinement=scene.mesh.support_refinement,
+        grading=scene.mesh.grading,
     )
 
 

@@ -199,13 +199,21 @@ def rows(spacing: float) -> str:
     return "\n".join(["place_m,pantograph_N", *lines, ""])
 
 
+def stretch(force: str) -> str:
+    """A constant force all along the evaluated stretch."""
+    return "\n".join(["place_m,pantograph_N", *(f"{x},{force}" for x in range(540, 1111)), ""])
+
+
 @pytest.mark.parametrize(
     ("content", "of", "sentence"),
     [
         ("place_m,pantograph_N\n1,2\n2,3\n", None, "name the configuration of its forces"),
         ("place_m,pantograph_N\n1,2\n2,3\n", "ac_simple_275", "did you mean ac_simple_275_"),
         ("place_m,force\n1,2\n2,3\n", ONE, "has no column pantograph_N"),
-        ("x,pantograph_N\n1,2\n2,3\n", ONE, "neither a column place_m nor time_s"),
+        ("place_m,pantograph_kN\n1,2\n2,3\n", ONE, "it has place_m, pantograph_kN"),
+        ("x,pantograph_N\n1,2\n2,3\n", ONE, "nor quantity, as statistics have: it has x, pant"),
+        ("configuration,mean_N,std_N\na,1,2\n", None, "neither a column place_m"),
+        (stretch("0.15"), ONE, "gives 0.15 for mean_N of pantograph, where ac_simple_275_one has"),
         ("place_m,pantograph_N\n" + 20 * "1,2\n", ONE, "equidistant samples in ascending order"),
         (rows(1.0), ONE, "covers 1.0 to 20.0 m"),
         ("place_m,pantograph_N\n", ONE, "has 0 rows; at least 20 are needed"),
@@ -214,6 +222,15 @@ def rows(spacing: float) -> str:
             rows(1.0).replace("\n2,2", "\n2,"),
             ONE,
             'in row 2 of column "pantograph_N"',
+        ),
+        (rows(1.0).replace("\n2,2", "\n2,nan"), ONE, "no finite number"),
+        ("of,quantity\nline,max_uplift_mm\n", ONE, 'has no column "value"'),
+        ("of,quantity,value\nline,max_uplift_mm,nan\n", ONE, 'row 1 of column "value" no finite'),
+        ("of,quantity,value\nline,max_uplift_mm,0.07\n", ONE, "gives 0.07 for max_uplift_mm"),
+        (
+            "of,quantity,value\nline,max_uplift_mm,70\nline,max_uplift_mm,71\n",
+            ONE,
+            "more than once",
         ),
         ("of,quantity,value\nline,uplift,2\n", ONE, 'has "uplift" of "line"'),
         ("of,quantity,value\nroof,std_N,2\n", ONE, "has figures of pantograph, line"),

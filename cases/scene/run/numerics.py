@@ -30,6 +30,13 @@ class MeshTable(Table):
     support_refinement: int = Field(
         1, ge=1, le=16, description="factor by which the gaps next to supports are meshed finer"
     )
+    grading: float = Field(
+        1.0,
+        ge=1,
+        le=100,
+        description="how many times longer elements are midway between neighbouring droppers than "
+        "beside them, where wires bend over some centimetres",
+    )
     file: str | None = Field(
         None,
         min_length=1,
@@ -38,7 +45,7 @@ class MeshTable(Table):
 
     @model_validator(mode="after")
     def _consistent(self) -> MeshTable:
-        ignored = self.model_fields_set & {"elements_per_gap", "support_refinement"}
+        ignored = self.model_fields_set & {"elements_per_gap", "support_refinement", "grading"}
         if self.file is not None and ignored:
             raise ValueError(f"takes file or {sorted(ignored)[0]}, but both are given{TAKE_AWAY}")
         return self

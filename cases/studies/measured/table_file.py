@@ -39,6 +39,11 @@ def read_table(path: Path) -> pd.DataFrame:
         raise InputError(f"{path} is no table of CSV: {plain(why, 200)}") from error
 
 
+def columns_in(table: pd.DataFrame) -> str:
+    """Names of the first columns of a table, for a sentence."""
+    return ", ".join(plain(str(column), 40) for column in table.columns[:12])
+
+
 def column_of(table: pd.DataFrame, path: str, name: str, may_lack: bool = False) -> np.ndarray:
     """The numbers (n,) of a column in the file's unit.
 
@@ -53,8 +58,7 @@ def column_of(table: pd.DataFrame, path: str, name: str, may_lack: bool = False)
         If there is no such column, or a cell without a number.
     """
     if name not in table:
-        there = ", ".join(plain(str(column), 40) for column in table.columns[:12])
-        raise InputError(f'{path} has no column "{plain(name, 100)}": it has {there}')
+        raise InputError(f'{path} has no column "{plain(name, 100)}": it has {columns_in(table)}')
     values = pd.to_numeric(table[name], errors="coerce").to_numpy(dtype=float, copy=True)
     wrong = np.flatnonzero(~np.isfinite(values))
     if wrong.size and not may_lack:

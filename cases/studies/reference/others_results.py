@@ -13,13 +13,23 @@ from scipy.interpolate import CubicSpline
 from catenary.base.errors import InputError
 from catenary.cases.scene.input.plain_text import plain
 from catenary.cases.scene.problem import problem_of
-from catenary.cases.studies.measured.table_file import column_of, evened_out, read_table
+from catenary.cases.studies.measured.table_file import (
+    column_of,
+    columns_in,
+    evened_out,
+    read_table,
+)
 from catenary.cases.studies.reference.convergence import HISTORY, OF_FORCE, rms
 from catenary.cases.studies.reference.solutions import PLACE, Solution, read
 from catenary.postproc.evaluate import filters
 from catenary.postproc.evaluate.statistics import contact_statistics
 
 TIME = "time_s"
+# Figures of which no sound result is a hundredth of the reference, or a hundred times as large.
+_FAR_FROM_ZERO = (
+    "mean_N", "std_N", "max_uplift_mm", "contact_height_range_mm", "elasticity_max_mm_per_N",
+    "elasticity_min_mm_per_N",
+)  # fmt: skip
 _QUANTITY, _VALUE, _OF, _CONFIGURATION = "quantity", "value", "of", "configuration"
 # Spacing at which extremes of a curve below 20 Hz are looked for [m].
 _FINE = 0.02
@@ -74,6 +84,11 @@ def read_results(
         table, name = read_table(path), str(path)
         if _QUANTITY in table:
             _add_statistics(found, table, name, configuration)
+        elif not {PLACE, TIME} & set(table):
+            raise InputError(
+                f"{name} has neither a column {PLACE} [m] or {TIME} [s], as forces have, nor "
+                f"{_QUANTITY}, as statistics have: it has {columns_in(table)}"
+            )
         else:
             if configuration is None:
                 raise InputError(
@@ -106,7 +121,20 @@ def _add_statistics(
                 f'{name} has "{plain(quantity, 60)}" of "{plain(of, 60)}": {own} has '
                 + (f"of it {known}" if known else f"figures of {places}")
             )
+        if (of, quantity) in one.figures:
+            raise InputError(f"{name} has {quantity} of {of} for {own} more than once")
+        _check_unit(one.solution, of, quantity, value, name)
         one.figures[of, quantity] = value
+
+
+def _check_unit(solution: Solution, of: str, quantity: str, value: float, name: str) -> None:
+    """Raise InputError if a figure is a hundred times off, as one in another unit is."""
+    reference, _ = solution.figures[of, quantity]
+    if quantity in _FAR_FROM_ZERO and not 0.01 < value / reference < 100.0:
+        raise InputError(
+            f"{name} gives {value:g} for {quantity} of {of}, where {solution.configuration.name} "
+            f"has {reference:g}: numbers are in the unit that ends the name of a column or quantity"
+        )
 
 
 def _add_forces(one: Others, table: pd.DataFrame, name: str, is_filtered: bool) -> None:
@@ -115,7 +143,7 @@ def _add_forces(one: Others, table: pd.DataFrame, name: str, is_filtered: bool) 
     if not there:
         raise InputError(
             f"{name} has no column {' or '.join(f'{of}_N' for of in solution.forces)}, the forces "
-            f"of {solution.configuration.name}"
+            f"of {solution.configuration.name} [N]: it has {columns_in(table)}"
         )
     for of in there:
         place, dt = _places_of(solution, of, table, name)
@@ -140,6 +168,7 @@ def _add_forces(one: Others, table: pd.DataFrame, name: str, is_filtered: bool) 
             found = contact_statistics(of, place, force, np.zeros_like(force), dt, solution.stretch)
             own = {key: getattr(found, word) for key, word in _FROM_STATISTICS.items()}
             curve = CubicSpline(place, filters.low_pass(force, dt))
+        _check_unit(solution, of, "mean_N", own["mean_N"], name)
         one.figures |= {(of, column.name): own[column.name] for column in OF_FORCE
                         if column.name in own}  # fmt: skip
         one.forces[of] = curve(solution.place)
@@ -153,12 +182,10 @@ def _places_of(
     train = problem_of(solution.configuration.scene()).train
     if PLACE in table:
         place = column_of(table, name, PLACE)
-    elif TIME in table:
+    else:
         number = list(solution.forces).index(of)
         start = train.start - train.placements[number].behind
         place = start + train.speed * column_of(table, name, TIME)
-    else:
-        raise InputError(f"{name} has neither a column {PLACE} nor {TIME}")
     place = evened_out(place, name)
     spacing = place[1] - place[0]
     dt = spacing / train.speed

@@ -56,6 +56,21 @@ def test_every_gap_holds_the_elements_asked_for(
     assert mesh.anchors.shape == (4,)
 
 
+def test_graded_elements_are_shortest_at_the_cuts(make_line: Callable[..., LineData]) -> None:
+    line = make_line()
+    mesh = make_mesh(line_from(line), 200, grading=5.0)
+    cuts = cuts_of(line)
+    for wire in (CONTACT_WIRE, MESSENGER_WIRE):
+        x = mesh.x(mesh.wires[wire])
+        np.testing.assert_allclose(x[::200], cuts, atol=PLACE)
+        length = np.diff(x).reshape(-1, 200)
+        # Mean lengths of the first and of the middle elements: the law's ends lie half an element
+        # further out, by which sizes change by 1.3 %.
+        ratio = length[:, 99] / length[:, 0]
+        np.testing.assert_allclose(ratio, 5.0, rtol=0.02)
+        np.testing.assert_allclose(length, length[:, ::-1], atol=PLACE)
+
+
 def test_refinement_multiplies_the_gaps_next_to_masts_only(
     make_line: Callable[..., LineData],
 ) -> None:
@@ -163,16 +178,23 @@ def test_any_spans_and_droppers_are_meshed_as_described(
     assert mesh.steady_arms.size == mesh.supports.size == n - 1
 
 
-@pytest.mark.parametrize("refinement", [1, 2])
+# Gmsh places graded nodes by quadrature, to 1e-8 of a gap of some metres.
+@pytest.mark.parametrize(
+    ("refinement", "grading", "within"), [(1, 1.0, PLACE), (2, 1.0, PLACE), (1, 6.0, 3e-7)]
+)
 def test_a_mesh_without_a_file_is_that_of_the_file(
-    make_line: Callable[..., LineData], tmp_path: Path, refinement: int
+    make_line: Callable[..., LineData],
+    tmp_path: Path,
+    refinement: int,
+    grading: float,
+    within: float,
 ) -> None:
     line = line_from(make_line())
     written, made = (
-        make_mesh(line, 3, path, support_refinement=refinement)
+        make_mesh(line, 7, path, support_refinement=refinement, grading=grading)
         for path in (tmp_path / "line.msh", None)
     )
-    np.testing.assert_allclose(made.points, written.points, rtol=0, atol=PLACE)
+    np.testing.assert_allclose(made.points, written.points, rtol=0, atol=within)
     for name, nodes in written.wires.items():
         np.testing.assert_array_equal(made.wires[name], nodes)
     for name in ("droppers", "steady_arms", "supports", "anchors", "dropper_group"):
