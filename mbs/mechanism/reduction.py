@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -298,22 +297,38 @@ class _Raised:
 
 
 def _refined(raised: _Raised, more: float, places: list[_Place], tolerance: float) -> list[_Place]:
-    """The same with further heights in between where splines miss the lift, such as at stops."""
-    doubtful = list(pairwise(places))
+    """The same with further heights in between where splines miss the lift, such as at stops.
+
+    Splines through every second place are compared at the others, which costs no further place; one
+    through all of them misses less. Where that is too much, places are put in between.
+    """
+    doubtful = _beside(_missed(raised, more, places[::2], places[1::2], tolerance), places)
     while doubtful:
-        lift = CubicSpline([p.height for p in places], [raised.lift(p, more) for p in places])
         wide = [(low, high) for low, high in doubtful if high.height - low.height > 2.0 * FINEST]
         between = [raised.from_near(0.5 * (low.height + high.height), low) for low, high in wide]
-        expected = lift([place.height for place in between])
-        missed = [
-            place
-            for place, value in zip(between, expected, strict=True)
-            if abs(value - raised.lift(place, more)) > tolerance
-        ]
+        missed = _missed(raised, more, places, between, tolerance)
         places = sorted([*places, *missed], key=lambda place: place.height)
-        # A new height changes the spline next to it and, by a quarter, one interval on.
-        heights = {place.height for place in missed}
-        new = [k for k, place in enumerate(places) if place.height in heights]
-        near = {i for k in new for i in range(max(k - 2, 0), min(k + 2, len(places) - 1))}
-        doubtful = [(places[i], places[i + 1]) for i in sorted(near)]
+        doubtful = _beside(missed, places)
     return places
+
+
+def _missed(
+    raised: _Raised, more: float, places: list[_Place], others: list[_Place], tolerance: float
+) -> list[_Place]:
+    """Those of ``others`` whose lift a spline through ``places`` misses by more than tolerated."""
+    lift = CubicSpline([p.height for p in places], [raised.lift(p, more) for p in places])
+    expected = lift([place.height for place in others])
+    return [
+        place
+        for place, value in zip(others, expected, strict=True)
+        if abs(value - raised.lift(place, more)) > tolerance
+    ]
+
+
+def _beside(missed: list[_Place], places: list[_Place]) -> list[tuple[_Place, _Place]]:
+    """Neighbours among ``places`` between which places that were missed change the spline: next to
+    them and, by a quarter, one interval on."""
+    heights = {place.height for place in missed}
+    new = [k for k, place in enumerate(places) if place.height in heights]
+    near = {i for k in new for i in range(max(k - 2, 0), min(k + 2, len(places) - 1))}
+    return [(places[i], places[i + 1]) for i in sorted(near)]

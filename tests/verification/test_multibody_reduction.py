@@ -9,12 +9,13 @@ from body_mechanics import acceleration, equivalent_mass
 from constraint_handling import Baumgarte
 from measuring import check
 from scipy.integrate import solve_ivp
+from scipy.interpolate import CubicSpline
 from variable_steps import integrate
 
 from catenary.base.errors import InputError, RunBroken
-from catenary.mbs.mechanism.reduction import reduce_mechanism
+from catenary.mbs.mechanism.reduction import FINEST, reduce_mechanism
 from catenary.mbs.rigid.bodies import SPACE, Body
-from catenary.mbs.rigid.forces import Gravity, SpringDamper
+from catenary.mbs.rigid.forces import BumpStop, Gravity, SpringDamper
 from catenary.mbs.rigid.joints import Constant, PrescribedPoint, Revolute
 from catenary.mbs.rigid.kinematics import point
 from catenary.mbs.rigid.system import System
@@ -55,6 +56,41 @@ def test_lever_in_closed_form() -> None:
     check("acceleration [m/s^2]", acceleration(found, at, speed, push), expected, within=within)
     with pytest.raises(RunBroken, match="1.2 m above its base, .* between -0.5 m and 1 m only"):
         acceleration(found, 1.2, 0.0)
+
+
+@pytest.mark.parametrize("engages", [0.413, 0.5, 0.52, 0.987])
+def test_heights_are_put_in_where_a_stop_engages(engages: float) -> None:
+    """A rod that rests on a hinge, with a stop above its end: lift - m g / 2 - k (h - h_0).
+
+    Heights are 0.02 m apart. The kink is within an interval, on a height, or near the end.
+    """
+    length, mass, stiffness, far, tolerance = 2.0, 3.0, 1e5, 1e6, 0.2
+    moment = mass * length**2 / 12
+    end = (length / 2, 0, 0)
+    system = System(
+        (Body("rod", mass, (1e-3 * moment, moment, moment), (length / 2, 0, 0)),),
+        (Revolute("hinge", SPACE, "rod", at_j=(-length / 2, 0, 0)),),
+        (
+            Gravity((mass,), G),
+            BumpStop(
+                "stop", SPACE, "rod", (length, 0, far), end, far - engages, stiffness=stiffness
+            ),
+        ),
+    )
+    heights = np.arange(0.0, 1.001, 0.02)
+    dense = np.linspace(0.0, 1.0, 4001)
+    expected = -mass * G / 2 - stiffness * np.maximum(dense - engages, 0.0)
+    refined = reduce_mechanism(system, "rod", heights, end, tolerance=tolerance)
+    as_given = reduce_mechanism(system, "rod", heights, end)
+    assert as_given.heights.size == heights.size < refined.heights.size
+    missed = np.abs(CubicSpline(refined.heights, refined.lifts)(dense) - expected)
+    # Where no closer heights are put in, a spline rounds a kink off by k spacing / 8 at most, over
+    # two intervals; elsewhere it keeps to the tolerance.
+    kink = np.abs(dense - engages) < 4 * FINEST
+    check("lift away from the stop [N]", missed[~kink].max(), 0.0, within=2 * tolerance)
+    check("lift where it engages [N]", missed.max(), 0.0, within=stiffness * 2 * FINEST / 8)
+    coarse = np.abs(CubicSpline(as_given.heights, as_given.lifts)(dense) - expected)
+    assert coarse[~kink].max() > 20 * tolerance
 
 
 def test_frame_of_the_paper_rises_like_all_its_bodies() -> None:
