@@ -16,7 +16,7 @@ import signal
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
@@ -74,9 +74,7 @@ def examined(folder: Path) -> Iterator[Finding]:
     yield _mpi()
     yield _compiler()
     yield _film()
-    yield _program(
-        "ParaView", ("paraview",), "install it, from paraview.org or as a package, to open runs"
-    )
+    yield _paraview()
     yield _folder(folder)
     yield _memory()
     yield _threads()
@@ -263,11 +261,11 @@ def _is_there(module: str) -> bool:
     return find_spec(module) is not None
 
 
-def _program(part: str, names: tuple[str, ...], remedy: str) -> Finding:
-    found: Callable[[str], str | None] = shutil.which
-    path = next((path for path in map(found, names) if path), None)
+def _paraview() -> Finding:
+    part, path = "ParaView", shutil.which("paraview")
     if path is None:
-        return Finding(part, MISSING, f"no {' or '.join(names)} in PATH", remedy)
+        remedy = "install it, from paraview.org or as a package, to open runs"
+        return Finding(part, MISSING, "no paraview in PATH", remedy)
     return Finding(part, OK, path)
 
 

@@ -25,6 +25,7 @@ from typing import Any
 from catenary.base.errors import InputError
 from catenary.base.parallel import on_root
 from catenary.cases.result_folder.lock_owner import Owner, myself, read_owner
+from catenary.postproc.evaluate.wording import duration
 from catenary.postproc.files.disk_errors import code_of, reason, remedy
 
 LOCK_FILE = ".catenary.lock"
@@ -259,7 +260,7 @@ def _dead(old: int, owner: Owner | None, me: Owner) -> bool:
 def _in_use(folder: Path, owner: Owner | None, silence: float) -> str:
     """The sentence for who is refused; ``silence`` since the last sign of life [s]."""
     lock = folder / LOCK_FILE
-    sign = f"its last sign of life is {_duration(silence)} old"
+    sign = f"its last sign of life is {duration(silence)} old"
     if owner is None:
         return (
             f"{folder} seems to be in use: {lock} names no process, {sign}; if no run is writing "
@@ -269,9 +270,3 @@ def _in_use(folder: Path, owner: Owner | None, silence: float) -> str:
     if silence > SILENT * HEARTBEAT:
         advice = f"if that process has ended, remove {lock}; else {advice}"
     return f"{folder} is in use by {owner.in_words}, {sign}: {advice}"
-
-
-def _duration(seconds: float) -> str:
-    if seconds < 120.0:
-        return f"{seconds:.0f} s"
-    return f"{seconds / 60.0:.0f} min" if seconds < 7200.0 else f"{seconds / 3600.0:.1f} h"

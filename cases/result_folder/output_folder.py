@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 from catenary.base.errors import InputError
 from catenary.cases.result_folder.folder_lock import refusal
+from catenary.postproc.evaluate.wording import duration
 from catenary.postproc.files.own_files import (
     FIELD_FILES,
     OWN_FILES,
@@ -240,10 +241,3 @@ def _is_hdf5(path: Path) -> bool:
 def volume(n_bytes: float) -> str:
     """A size in words: MB below one GB."""
     return f"{n_bytes / 1e9:.1f} GB" if n_bytes >= 1e9 else f"{n_bytes / 1e6:.1f} MB"
-
-
-def duration(seconds: float) -> str:
-    """A time in words: hours from one on."""
-    if seconds < 60.0:
-        return f"{seconds:.0f} s"
-    return f"{seconds / 60.0:.0f} min" if seconds < 3600.0 else f"{seconds / 3600.0:.1f} h"

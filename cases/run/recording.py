@@ -156,10 +156,10 @@ def recording_of(
     )
 
 
-def train_of(problem: Problem) -> channels.Train:
+def train_of(problem: Problem) -> channels.TrainLayout:
     """What decides which channels a run of a problem has. Not collective."""
     places = problem.train.placements
-    return channels.Train(
+    return channels.TrainLayout(
         tuple(len(place.data.strip_offsets) for place in places),
         any(has_joints(place.data) for place in places),
         len(problem.line.wires_of(Role.CONTACT)),

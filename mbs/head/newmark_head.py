@@ -228,13 +228,6 @@ def raised(time: float, raise_time: float) -> float:
     return float(_half_cosine(time, raise_time))
 
 
-def raising_rate(time: float, raise_time: float) -> float:
-    """Rate of the part of the lift that acts at ``time`` [1/s], see ``raised``."""
-    if not 0.0 < time < raise_time:
-        return 0.0
-    return float(0.5 * np.pi / raise_time * np.sin(np.pi * time / raise_time))
-
-
 def _half_cosine(time: Any, raise_time: float) -> Any:
     """From 0 to 1 over ``raise_time``, at one time or at several [s]."""
     return 0.5 * (1.0 - np.cos(np.pi * time / raise_time))

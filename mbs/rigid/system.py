@@ -29,6 +29,8 @@ from catenary.solver.kernels import native
 
 # A row of Phi_q that the rows before it explain but for this part of its length is redundant.
 DEPENDENT = 1e-8
+# Of Newton's method that closes joints.
+_MOST_ITERATIONS = 30
 
 
 class Miss(NamedTuple):
@@ -150,23 +152,16 @@ class System:
         return kinetic + sum(force.energy(motion) for force in self.forces)
 
     def accelerations(
-        self,
-        motion: Motion,
-        time: float,
-        rows: Quantity | None = None,
-        more_forces: np.ndarray | float = 0.0,
+        self, motion: Motion, time: float, more_forces: np.ndarray | float = 0.0
     ) -> Accelerations:
-        """Solve (3.6); ``rows`` replace those of the joints, gamma being minus their drift.
-
-        ``more_forces`` (6 n,) act besides those of the system.
+        """Solve (3.6) under forces of the system and ``more_forces`` (6 n,) [N, N m].
 
         Raises
         ------
         RunBroken
             Accelerations are not finite.
         """
-        if rows is None:
-            rows = self.constraints(motion, time)
+        rows = self.constraints(motion, time)
         force, softness = self.generalised_forces(motion, time) + more_forces, self.inverse_mass
         kept = independent_rows(rows.jacobian)
         jacobian = rows.jacobian[kept]
@@ -216,7 +211,6 @@ class System:
         motion: Motion,
         time: float = 0.0,
         tolerance: float = 1e-12,
-        max_iterations: int = 30,
     ) -> Motion:
         """Close all joints by the smallest displacements (position projection).
 
@@ -232,8 +226,6 @@ class System:
             Largest error of a row afterwards [m, cosine], relative to the largest
             distance of a body from the origin where that is above 1 m (what round-off
             allows).
-        max_iterations : int, optional
-            Most iterations of Newton's method.
 
         Raises
         ------
@@ -243,7 +235,7 @@ class System:
         if not self.joints:
             return motion
         limit = tolerance * max(1.0, float(np.abs(motion.position).max()))
-        for _ in range(max_iterations + 1):
+        for _ in range(_MOST_ITERATIONS + 1):
             rows = self.constraints(motion, time)
             if np.abs(rows.value).max() <= limit:
                 return motion

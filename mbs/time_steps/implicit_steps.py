@@ -124,9 +124,7 @@ class Stepper:
         self.motion, self.time = system.project_velocities(motion, time), time
         ways = self._ways(self.motion)
         self.forces = np.zeros(ways.shape[1]) if forces is None else np.array(forces, dtype=float)
-        self.acceleration = system.accelerations(
-            self.motion, time, more_forces=ways @ self.forces
-        ).acceleration
+        self.acceleration = system.accelerations(self.motion, time, ways @ self.forces).acceleration
         self._predicted = None
 
     def predict(self, time: float) -> Prediction:

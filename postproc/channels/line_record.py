@@ -47,7 +47,7 @@ class LineRecord:
             and set(self.names) >= set(channels.line_channels_of_all())
         )
 
-    def of(self, train: channels.Train) -> LineRecord:
+    def of(self, train: channels.TrainLayout) -> LineRecord:
         """The same of a run with this train, which may lack some of the channels."""
         there = channels.line_channels(train)
         return replace(self, names=tuple(name for name in self.names if name in there))

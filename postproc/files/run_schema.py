@@ -350,7 +350,7 @@ def fact_tables() -> dict[str, Table]:
 
 
 def growing_tables(
-    record: LineRecord, train: channels.Train | None = None
+    record: LineRecord, train: channels.TrainLayout | None = None
 ) -> tuple[dict[str, Channel], dict[str, Channel], dict[str, Channel]]:
     """Tables that grow by rows: of the steps, the energies and the line's channels, clocks first.
 
@@ -358,7 +358,7 @@ def growing_tables(
     ----------
     record : LineRecord
         Which of the line's channels are recorded.
-    train : channels.Train, optional
+    train : channels.TrainLayout, optional
         Train whose channels are recorded, None for all channels.
     """
     of_train = {f"channels/{c.name}": c for c in channels.train_channels(train)}

@@ -37,16 +37,13 @@ with file:
 """
 
 
-def examined(path: Path, limit: float | None = None) -> Records | None:
+def examined(path: Path) -> Records | None:
     """Which records of a result file are valid; None if there is no file.
 
     Parameters
     ----------
     path : Path
         Result file, or the folder that holds it as ``run.h5``.
-    limit : float, optional
-        Time after which the file counts as damaged [s], None for one that follows from its
-        size.
 
     Raises
     ------
@@ -57,8 +54,7 @@ def examined(path: Path, limit: float | None = None) -> Records | None:
     path = path / RESULT_FILE if path.is_dir() else path
     if not path.is_file():
         return None
-    if limit is None:
-        limit = LIMIT + path.stat().st_size / PER_SECOND
+    limit = LIMIT + path.stat().st_size / PER_SECOND
     try:
         done = _child(["-m", __name__, str(path)], limit)
     except subprocess.TimeoutExpired as error:

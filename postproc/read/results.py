@@ -263,7 +263,7 @@ class Results(TrainOfRun):
         channel = channels.CHANNELS[name]
         if not channel.of_line:
             n_wires = len(self.wires_of(Role.CONTACT))
-            return channel.n_columns(channels.Train(tuple(self.n_strips()), n_wires=n_wires))
+            return channel.n_columns(channels.TrainLayout(tuple(self.n_strips()), n_wires=n_wires))
         path = PLACES[ALL_COLUMNS[channel.per]]
         return int(self._file[path].shape[0]) if path in self._file else 0
 

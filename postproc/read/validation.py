@@ -17,11 +17,14 @@ from pydantic import BaseModel, ValidationError
 from catenary.postproc.files.hdf5.checked import ATTRIBUTE_SUMS, HDF5_ERRORS, broken_seals, text_of
 from catenary.postproc.files.run_schema import JSON, SIZES, Table
 
+# Faults of a file that one sentence names.
+_MOST_NAMED = 3
 
-def is_number(value: Any, low: float = -math.inf, high: float = math.inf) -> bool:
-    """Whether ``value`` is a finite number within bounds."""
+
+def is_number(value: Any, low: float = -math.inf) -> bool:
+    """Whether ``value`` is a finite number, of at least ``low``."""
     known = isinstance(value, (int, float)) and not isinstance(value, bool)
-    return known and math.isfinite(value) and low <= value <= high
+    return known and math.isfinite(value) and low <= value
 
 
 def is_there(file: h5py.File, path: str) -> bool:
@@ -156,7 +159,7 @@ def values_fault(values: np.ndarray, declared: Table, sizes: dict[str, int]) -> 
     return ""
 
 
-def listed(faults: Collection[str], most: int = 3) -> str:
-    """Faults as one clause; the first ``most`` are named, the others counted."""
-    shown, more = list(faults)[:most], len(faults) - most
+def listed(faults: Collection[str]) -> str:
+    """Faults as one clause; the first few are named, the others counted."""
+    shown, more = list(faults)[:_MOST_NAMED], len(faults) - _MOST_NAMED
     return "; ".join(shown) + (f"; and {more} more faults" if more > 0 else "")

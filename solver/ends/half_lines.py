@@ -21,6 +21,8 @@ from catenary.solver.kernels import native
 # Coupling over diagonal at which the rest of a half line is round-off, squared in another pass; and
 # the most passes: spans are 2^40 times as long then.
 _ROUND_OFF, _MOST_PASSES = 1e-9, 40
+# Unknowns that an element may join, twice a station's: four in lateral motion of six wires.
+_MOST_WIDE = 47
 
 
 class SpanMatrices(NamedTuple):
@@ -60,9 +62,7 @@ class Chain(NamedTuple):
     next: np.ndarray
 
 
-def span_matrices(
-    own: np.ndarray, joined: np.ndarray, shared: np.ndarray, most_wide: int
-) -> SpanMatrices:
+def span_matrices(own: np.ndarray, joined: np.ndarray, shared: np.ndarray) -> SpanMatrices:
     """A span in the form that is condensed.
 
     Parameters
@@ -73,8 +73,6 @@ def span_matrices(
         Rows of these with columns of the next span's.
     shared : ndarray, shape (m,)
         Unknowns that the span shares with the one before.
-    most_wide : int
-        Most unknowns that an element joins.
 
     Raises
     ------
@@ -87,7 +85,7 @@ def span_matrices(
     inner = own[:, others][:, :, others]
     rows, columns = np.nonzero(inner.any(axis=0))
     width = int(np.abs(rows - columns).max(initial=0))
-    if width > most_wide:
+    if width > _MOST_WIDE:
         raise InputError("its nodes do not stand side by side")
     bands = np.zeros((3, others.size, width + 1))
     for d in range(width + 1):

@@ -20,8 +20,6 @@ from catenary.solver.model.model import Model
 # where a line ends.
 _ALIKE = 0.02
 _TINY = 1e-6  # [m]
-# Unknowns that an element may join, twice a station's: four in lateral motion of six wires.
-_MOST_WIDE = 47
 
 # Unknowns that have the other sign in a mirror image.
 _LATERAL = ("v", "theta_z")
@@ -100,7 +98,7 @@ def line_beyond(model: Model, side: int, held: np.ndarray) -> LineBeyond:
                 own, joined = own * signs[:, None] * signs, joined * signs[:, None]
             else:
                 joined = joined * signs
-        span = span_matrices(own, joined, shared, _MOST_WIDE)
+        span = span_matrices(own, joined, shared)
         unknowns, everything = at_end + shared, at_end + joins
         if everything[-1] >= last or (_places(model, everything) != _places(model, start + joins)):
             raise InputError("wires end elsewhere than at its masts")
@@ -134,7 +132,7 @@ def span_between(model: Model, mast: float, following: float) -> tuple[np.ndarra
     whole[:, :, : end - first] = _matrices(model, first, last, first, end)
     own, joined = whole[:, :, : last - first], whole[:, :, last - first :]
     shared = np.flatnonzero(joined.any(axis=(0, 1)))
-    return first + shared, span_matrices(own, joined, shared, _MOST_WIDE)
+    return first + shared, span_matrices(own, joined, shared)
 
 
 def shared_at(model: Model, unknowns: np.ndarray) -> np.ndarray:

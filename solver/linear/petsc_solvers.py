@@ -67,7 +67,40 @@ class Wrapped(NamedTuple):
         self.vector.stateIncrease()
 
 
-class PartSolver:
+class KspSolver:
+    """A PETSc solver of the step operator. Collective on the communicator of its ``KSP``.
+
+    Attributes
+    ----------
+    matrix : the operator, as PETSc's
+    """
+
+    matrix: PETSc.Mat
+    _ksp: PETSc.KSP
+
+    def solve(self, right: Wrapped, solution: Wrapped) -> None:
+        """Solve A ``solution`` = ``right``. Collective."""
+        right.tell_petsc()
+        solution.tell_petsc()
+        self._ksp.solve(right.vector, solution.vector)
+
+    @property
+    def is_direct(self) -> bool:
+        """Whether one application of the preconditioner is all of a solve."""
+        return bool(self._ksp.getType() == PETSc.KSP.Type.PREONLY)
+
+    @property
+    def failure(self) -> int:
+        """PETSc's reason why the last solve did not converge; 0 if it did."""
+        return min(0, self._ksp.getConvergedReason())
+
+    def iterate(self) -> None:
+        """Use what is set up as a preconditioner of GMRES from now on."""
+        self._ksp.setType(PETSc.KSP.Type.GMRES)
+        self._ksp.setTolerances(rtol=1e-14, max_it=200)
+
+
+class PartSolver(KspSolver):
     """Factors of this rank's part of the step operator, all of it on one rank.
 
     Not collective. With an overlap as wide as the reach of A^-1 the rank's own unknowns come out
@@ -111,7 +144,7 @@ class PartSolver:
             matrix = part() if rows is None else rows
             self.factors = station_factors(matrix, layout, own.start, own.stop, stations, turns)
         self._made: list[Callable[[], object]] = []  # what frees PETSc's objects
-        self._solve: Callable[[Wrapped, Wrapped], None] = self._solve_by_petsc
+        self._solve: Callable[[Wrapped, Wrapped], None] = super().solve
         if self.factors is None or _is_given(f"{self._prefix}ksp_", f"{self._prefix}mat_"):
             self._ksp.setUp()  # what options ask for, and PETSc refuses, is found out here
         else:
@@ -147,11 +180,6 @@ class PartSolver:
         """Solve A ``solution`` = ``right`` here."""
         self._solve(right, solution)
 
-    def _solve_by_petsc(self, right: Wrapped, solution: Wrapped) -> None:
-        right.tell_petsc()
-        solution.tell_petsc()
-        self._ksp.solve(right.vector, solution.vector)
-
     def _solve_by_stations(self, right: Wrapped, solution: Wrapped) -> None:
         assert self.factors is not None
         self.factors.solve(right.array, solution.array)
@@ -163,12 +191,12 @@ class PartSolver:
     @property
     def is_direct(self) -> bool:
         """Whether a solve cannot fail to converge: neither options nor ``iterate`` ask for more."""
-        return not self._uses_petsc or bool(self._ksp.getType() == PETSc.KSP.Type.PREONLY)
+        return not self._uses_petsc or super().is_direct
 
     @property
     def failure(self) -> int:
         """PETSc's reason why the last solve did not converge; 0 if it did."""
-        return min(0, self._ksp.getConvergedReason()) if self._uses_petsc else 0
+        return super().failure if self._uses_petsc else 0
 
     def bypass_ksp(self) -> None:
         """Use the bare factors from now on, if the solver is direct.
@@ -191,8 +219,8 @@ class PartSolver:
 
     def iterate(self) -> None:
         """Use the factors as a preconditioner of GMRES from now on."""
-        _use_gmres(self._ksp)
-        self._solve = self._solve_by_petsc
+        super().iterate()
+        self._solve = super().solve
 
     def destroy(self) -> None:
         """Free matrix and factors."""
@@ -200,7 +228,7 @@ class PartSolver:
             free()
 
 
-class SchwarzSolver:
+class SchwarzSolver(KspSolver):
     """PETSc's restricted additive Schwarz on all ranks. Collective to make and to use.
 
     Takes the place of ``PartSolver`` where that is not exact, or where options ask for another
@@ -213,10 +241,6 @@ class SchwarzSolver:
     ownership : Ownership
     overlap : range of unknowns [low, high) that influences this rank's own, in whole blocks
     in_stations : whether the matrix has blocks of stations
-
-    Attributes
-    ----------
-    matrix : A as PETSc's distributed matrix
     """
 
     def __init__(
@@ -250,27 +274,6 @@ class SchwarzSolver:
                     _choose_direct(solver, in_stations and has_any)
                     solver.setFromOptions()
             self._ksp.setUpOnBlocks()
-
-    def solve(self, right: Wrapped, solution: Wrapped) -> None:
-        """Solve A ``solution`` = ``right``. Collective."""
-        right.tell_petsc()
-        solution.tell_petsc()
-        self._ksp.solve(right.vector, solution.vector)
-
-    @property
-    def is_direct(self) -> bool:
-        """Whether one application of the preconditioner is all of a solve."""
-        return bool(self._ksp.getType() == PETSc.KSP.Type.PREONLY)
-
-    @property
-    def failure(self) -> int:
-        """PETSc's reason why the last solve did not converge, the same on all ranks; 0 if it
-        did."""
-        return min(0, self._ksp.getConvergedReason())
-
-    def iterate(self) -> None:
-        """Use what is set up as a preconditioner of GMRES from now on."""
-        _use_gmres(self._ksp)
 
     def destroy(self) -> None:
         """Free matrix and factors. Collective."""
@@ -326,8 +329,3 @@ def _choose_direct(ksp: PETSc.KSP, in_stations: bool) -> None:
     ksp.setType(PETSc.KSP.Type.PREONLY)
     pc.setType(PETSc.PC.Type.CHOLESKY if in_stations else PETSc.PC.Type.LU)
     pc.setFactorOrdering(str(ordering.NATURAL if in_stations else ordering.ND))
-
-
-def _use_gmres(ksp: PETSc.KSP) -> None:
-    ksp.setType(PETSc.KSP.Type.GMRES)
-    ksp.setTolerances(rtol=1e-14, max_it=200)

@@ -91,7 +91,6 @@ def law(
     stiffness: float | np.ndarray,
     rest: float | np.ndarray = 0.0,
     acts: int = BOTH,
-    damping: float | np.ndarray = 0.0,
     gap: float | np.ndarray | None = None,
 ) -> np.ndarray:
     """Laws of n links as records of ``LAW``.
@@ -106,8 +105,6 @@ def law(
         Force at rest [N], > 0 in tension, which the rest shape is found with.
     acts : int, optional
         ``BOTH``, ``PULLS`` or ``PUSHES``.
-    damping : float or ndarray, optional
-        Damping [N s/m] of open links; those of K have that of their component only.
     gap : float or ndarray, optional
         Stretch [m] by which an open link of one sign is away from acting at rest, >= 0;
         None for links of K.
@@ -115,16 +112,13 @@ def law(
     Raises
     ------
     ValueError
-        If a link with a gap acts both ways or has a force at rest, or one of K has damping.
+        If a link with a gap acts both ways or has a force at rest.
     """
-    if gap is None and np.any(damping):
-        raise ValueError("links without a gap have the damping of their component")
     if gap is not None and (acts == BOTH or np.any(rest) or np.any(np.asarray(gap) < 0.0)):
         raise ValueError("a link with a gap >= 0 acts one way and carries nothing at rest")
     result = np.zeros(np.shape(place), dtype=LAW)
     result["place"], result["stiffness"] = place, stiffness
-    result["damping"], result["acts"] = damping, acts
-    result["rest"] = rest
+    result["acts"], result["rest"] = acts, rest
     if gap is not None:
         sign = -1.0 if acts == PULLS else 1.0
         result["rest"], result["open"] = sign * np.asarray(stiffness) * gap, True

@@ -179,7 +179,7 @@ def _first_number(model: Model, x: float) -> int:
     return int(model.numbering.within(x - 1e-6, np.inf)[0])
 
 
-def bloch_waves(period: Period, highest: float, n_phases: int = N_PHASES) -> BlochWaves:
+def bloch_waves(period: Period, highest: float) -> BlochWaves:
     """The waves of a periodic line up to a frequency [Hz]. Not collective.
 
     Branches that begin below ``highest`` are whole.
@@ -193,7 +193,7 @@ def bloch_waves(period: Period, highest: float, n_phases: int = N_PHASES) -> Blo
     )  # fmt: skip
     at = np.searchsorted(free, period.contact)
     basis = spans.basis((2 * np.pi * _MODES_UP_TO * highest) ** 2)
-    phase = np.linspace(0.0, np.pi, n_phases)
+    phase = np.linspace(0.0, np.pi, N_PHASES)
     above = (2 * np.pi * _MARGIN * highest) ** 2
     found = []
     for q in phase.tolist():

@@ -18,7 +18,6 @@ from catenary.solver.ends.half_lines import Chain, chain_at, half_lines
 from catenary.solver.ends.line_beyond import END, shared_at, sideways, span_between
 from catenary.solver.model.model import Model
 from catenary.solver.problem.ends import AbsorbingLayer, Periodic
-from catenary.solver.problem.problem import Damping
 
 # epsilon [1/s], and the least group velocity of a wave that counts as one that travels [m/s], and
 # what of its amplitude is left after a span.
@@ -54,23 +53,20 @@ class EndReflection:
         return largest**2, rms**2
 
 
-def end_reflection(
-    model: Model, side: int, frequency: np.ndarray, own_damping: bool = False
-) -> EndReflection:
+def end_reflection(model: Model, side: int, frequency: np.ndarray) -> EndReflection:
     """Reflection by the ``START`` or ``END`` of a model at frequencies (f,) [Hz]. Not collective.
 
-    The line before the end is taken to repeat its span next to that. ``own_damping`` is whether
-    both have the damping of the line, alpha and beta of the whole; it counts from where the end
-    begins. Waves of which it leaves less than a hundredth after a span do not count.
+    The line before the end is taken to repeat its span next to that. Both have the damping of the
+    line, alpha and beta of the whole; it counts from where the end begins. Waves of which it leaves
+    less than a hundredth after a span do not count.
 
     Raises
     ------
     InputError
         If spans are joined by more than a cross-section at a mast.
     """
-    damping = model.simulated.damping if own_damping else Damping(0.0, 0.0)
-    laws = replace(model.simulated, damping=damping)
-    whole = replace(model, simulated=laws, constrained=model.numbering.missing)
+    damping = model.simulated.damping
+    whole = replace(model, constrained=model.numbering.missing)
     s = _GROWTH + 2j * np.pi * frequency
     weights = np.stack([s**2, s, np.ones_like(s)], axis=1)
     line, end = model.problem.line, model.problem.ends[side]

@@ -78,7 +78,7 @@ def ends(folder: Path, before: dict[str, Any], caplog: pytest.LogCaptureFixture)
     """How reading a damaged file ends: refused, told, the same or SILENT."""
     caplog.clear()
     try:
-        records = examined(folder, LIMIT)
+        records = examined(folder)
         found = figures(folder, records)
         compare(folder, folder, records=(records, records))
     except InputError as error:
@@ -266,8 +266,9 @@ def test_a_crash_and_an_endless_loop_of_hdf5_end_in_a_sentence(
         (tmp_path / "made_up_guard.py").write_text(script)
         monkeypatch.setenv("PYTHONPATH", str(tmp_path))
         monkeypatch.setattr(guard, "__name__", "made_up_guard")
+        monkeypatch.setattr(guard, "LIMIT", 1.0)
         with pytest.raises(InputError) as refused:
-            examined(path, 1.0)
+            examined(path)
         assert words in str(refused.value)
 
 

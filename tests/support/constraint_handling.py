@@ -37,6 +37,16 @@ def project(system: System, motion: Motion, time: float) -> Motion:
     return system.project_velocities(system.assemble(motion, time), time)
 
 
+def accelerations(system: System, motion: Motion, time: float, rows: Quantity) -> np.ndarray:
+    """Solution (6 n,) of (3.6) under given rows, gamma being minus their drift."""
+    n, kept = system.mass.size, independent_rows(rows.jacobian)
+    joined = np.zeros((n + len(kept),) * 2)
+    joined[:n, :n] = np.diag(system.mass)
+    joined[n:, :n], joined[:n, n:] = rows.jacobian[kept], rows.jacobian[kept].T
+    right = np.concatenate([system.generalised_forces(motion, time), -rows.drift[kept]])
+    return np.asarray(linalg.solve(joined, right)[:n])
+
+
 @dataclass
 class Baumgarte:
     """Adds feedback to (3.6): gamma - 2 damping dPhi/dt - frequency^2 Phi.
@@ -63,7 +73,7 @@ class Baumgarte:
         rows = system.constraints(motion, time)
         feedback = 2.0 * self.damping * rows.rate + self.frequency**2 * rows.value
         rows = rows._replace(drift=rows.drift + feedback)
-        acceleration = system.accelerations(motion, time, rows).acceleration
+        acceleration = accelerations(system, motion, time, rows)
         return np.concatenate([place_rates(motion), acceleration])
 
 
@@ -175,5 +185,5 @@ class CoordinatePartitioning:
     def rates(self, system: System, motion: Motion, time: float) -> np.ndarray:
         """Rates of the state (13 n,)."""
         motion, rows = self.correct(system, motion, time)
-        acceleration = system.accelerations(motion, time, rows).acceleration
+        acceleration = accelerations(system, motion, time, rows)
         return np.concatenate([place_rates(motion), acceleration])

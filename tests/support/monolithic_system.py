@@ -18,7 +18,7 @@ from scipy import sparse
 
 from catenary.mbs.air import AirForces
 from catenary.mbs.build import steady_forces
-from catenary.mbs.head.newmark_head import raised, raising_rate
+from catenary.mbs.head.newmark_head import raised
 from catenary.mbs.lumped_data import LumpedData
 from catenary.solver.integrators.loads.line_loads import LineLoads
 from catenary.solver.model.elements.beam import shape_slopes, shape_values
@@ -214,7 +214,7 @@ class WholeSystem:
         result = self._mass @ a + self._damping @ v + self._stiffness @ u
         grown = raised(time, self._train.raise_time)
         result[self._carriers] -= grown * self._static + self._base
-        moved = np.array([1.0 - grown, -raising_rate(time, self._train.raise_time)])
+        moved = np.array([1.0 - grown, -_raising_rate(time, self._train.raise_time)])
         result[self._carriers] -= self._way * (moved @ self._rises)
         for p, air in self._air:
             on_head, on_frame, _ = air.now(time)
@@ -252,3 +252,10 @@ class WholeSystem:
         square = self._link_square[switched]
         np.subtract.at(result, self._link_at[switched], change[:, None] * square)
         return np.asarray(result)
+
+
+def _raising_rate(time: float, raise_time: float) -> float:
+    """Rate of the part of the lift that acts at ``time`` [1/s], see ``raised``."""
+    if not 0.0 < time < raise_time:
+        return 0.0
+    return float(0.5 * np.pi / raise_time * np.sin(np.pi * time / raise_time))

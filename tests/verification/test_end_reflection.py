@@ -106,7 +106,7 @@ def damped(n: int, damping: float, own: Damping) -> EndReflection:
     problem = problem_of(line, BARE | ENDS | {"structural_damping"}, ends=ends, damping=own)
     mesh = mesh_of(line, 3)
     model = build(problem, mesh, np.full(mesh.droppers.shape[0], 1.0))
-    return end_reflection(model, END, WITH_GAP, own_damping=True)
+    return end_reflection(model, END, WITH_GAP)
 
 
 # Spans, the line's own damping, and at most: the largest and mean share of the energy of waves that

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from dense_line import DenseLine, DenseLink
 from measuring import History, check, march, registered, start_march
+from monolithic_system import WholeSystem
 from scipy import sparse
 from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of, train
 from stops import (
@@ -35,7 +36,6 @@ from catenary.solver.model.builder import ModelBuilder
 from catenary.solver.model.link_directions import at_nodes
 from catenary.solver.model.links import BOTH, NO_BENDS, PULLS, PUSHES, Bends, law
 from catenary.solver.problem.problem import Damping, Problem
-from catenary.solver.schemes.monolithic_system import WholeSystem
 from catenary.solver.statics.form_finding.equilibrium import find_form
 from catenary.solver.time_loop import march as time_loop
 from catenary.solver.time_loop.views import channels
@@ -261,7 +261,6 @@ def test_laws_that_make_no_sense_are_refused() -> None:
         {"gap": 0.1},
         {"gap": -0.1, "acts": PULLS},
         {"gap": 0.1, "acts": PULLS, "rest": 1.0},
-        {"damping": 1.0},
     ):
         with pytest.raises(ValueError, match="link"):
             law(place, 1e3, **wrong)  # type: ignore[arg-type]

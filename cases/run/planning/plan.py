@@ -16,7 +16,7 @@ from catenary.cases.scene.cost_model import estimate_march
 from catenary.cases.scene.problem import problem_of
 from catenary.cases.scene.scene import Scene
 from catenary.meshgen.slowest_wave import slowest_wave
-from catenary.postproc.evaluate.wording import counted
+from catenary.postproc.evaluate.wording import counted, duration
 from catenary.solver.effects import all_effects as effects
 from catenary.solver.effects.build_model import numbering_of
 from catenary.solver.effects.effect import Effect
@@ -284,7 +284,7 @@ def plan_text(plan: Plan) -> str:
         ("memory", f"about {plan.memory / 1e6:.0f} MB on one rank (estimate)"),
         (
             "march",
-            f"about {_duration(plan.march)} on one rank, real-time factor "
+            f"about {duration(plan.march)} on one rank, real-time factor "
             f"{plan.simulated / plan.march:.1f} (estimate)",
         ),
         (
@@ -314,14 +314,6 @@ def _effect_lines(rows: list[EffectRow]) -> list[str]:
         return ["  (nothing)"]
     width = max(len(row.name) for row in rows)
     return [f"  {row.name:{width}}  {row.title} ({row.reason})" for row in rows]
-
-
-def _duration(seconds: float) -> str:
-    if seconds < 90:
-        return f"{seconds:.2g} s"
-    if seconds < 5400:
-        return f"{seconds / 60:.1f} min"
-    return f"{seconds / 3600:.1f} h"
 
 
 def _nodes_of_unknowns(plan: Plan) -> str:

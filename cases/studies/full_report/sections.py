@@ -38,7 +38,7 @@ def _waves(scene: SceneOfRun, run: EvaluatedRun) -> Section:
         data = film_data(results)
         folder, until = results.path.parent, float(data.time[-1])
         with Snapshots(folder, len(data.points), until=until) as snapshots:
-            snapshots.need_whole("a space-time picture")
+            snapshots.need_whole()
             size = len(snapshots.times) * float(np.ptp(data.points[:, 0]))
             if size > _LARGEST:
                 raise InputError("the run is too long for it; catenary waves draws it")

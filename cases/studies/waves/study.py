@@ -81,7 +81,7 @@ def study_waves(folder: Path) -> Studied:
         data = film_data(results)
         config = results.attributes["config"]
         with Snapshots(folder, len(data.points), until=float(data.time[-1])) as snapshots:
-            snapshots.need_whole("a space-time picture")
+            snapshots.need_whole()
             scene = scene_from(config, Origin(str(folder), recorded=True))
             problem = problem_of(scene)
             rest = line_at_rest(problem, mesh_of(scene))

@@ -150,7 +150,7 @@ def reflections_of(rest: LineAtRest) -> list[EndReflection]:
         step = _STEP_OF_LAYER if isinstance(end, AbsorbingLayer) else _STEP
         frequency = np.arange(_FIRST, HIGHEST + 0.5 * step, step)
         try:
-            found.append(end_reflection(rest.model, side, frequency, own_damping=True))
+            found.append(end_reflection(rest.model, side, frequency))
         except InputError:
             return []
     return found

@@ -157,7 +157,6 @@ class Unknowns:
 def number_unknowns(
     mesh: LineMesh,
     groups: Iterable[Group],
-    padded: bool = False,
     together: Mapping[str, str] | None = None,
 ) -> Unknowns:
     """The registry for a mesh whose wires have the unknowns of ``groups``. Not collective.
@@ -168,8 +167,6 @@ def number_unknowns(
         Mesh of the line.
     groups : iterable of Group
         Names of the unknowns of each wire, by groups that matrices join.
-    padded : bool, optional
-        Whether all stations are filled up to a whole cross-section.
     together : mapping, optional
         Wires that move with another one beside them, and share its unknowns, by name.
 
@@ -205,7 +202,7 @@ def number_unknowns(
         ]
     )
     planes = tuple(int(has_name[:, [names.index(n) for n in own]].sum()) for own in group_names)
-    present, station_type = _station_types(stations, padded)
+    present, station_type = _station_types(stations)
     there = present[:, places[:, 0]]
     station_types = tuple(tuple(map(int, np.flatnonzero(row))) for row in there)
     # Where the unknown of a slot stands among those of a station of each station type.
@@ -222,13 +219,13 @@ def number_unknowns(
     )
 
 
-def _station_types(stations: Stations, padded: bool) -> tuple[np.ndarray, np.ndarray]:
+def _station_types(stations: Stations) -> tuple[np.ndarray, np.ndarray]:
     """Slots of each station type, (n, n_slots), and station type of each station.
 
     The smallest are first, which mostly are the commonest, whatever the line: lines of the same
     station types then have loops in common.
     """
-    present = stations.present | padded
+    present = stations.present
     if present.all():
         return present[:1], np.zeros(len(present), dtype=np.int64)
     rows, station_type, counts = np.unique(present, axis=0, return_inverse=True, return_counts=True)

@@ -64,7 +64,7 @@ class Energies(NamedTuple):
     sources: Sources
 
 
-class Train(NamedTuple):
+class TrainLayout(NamedTuple):
     """What decides which channels a run has.
 
     Attributes
@@ -121,7 +121,7 @@ class Channel:
     values: Callable[[Sources], np.ndarray | Callable[[], np.ndarray]] | None = None
     energy: Callable[[Energies], float] | None = None
     of_motion: bool = False
-    when: Callable[[Train], bool] = lambda train: True
+    when: Callable[[TrainLayout], bool] = lambda train: True
     essential: bool = False
     may_be_nan: bool = False
     own_picture: bool = False
@@ -136,7 +136,7 @@ class Channel:
         """Whether it has a column for each place on the line, which may be recorded in part."""
         return self.per in (ARM, DROPPER, WIRE_END)
 
-    def n_columns(self, train: Train) -> int:
+    def n_columns(self, train: TrainLayout) -> int:
         """Columns of a channel of pantographs, strips or contact wires."""
         n, n_strips = len(train.n_strips), sum(train.n_strips)
         several = {STRIP: n_strips, WIRE: n * train.n_wires, CONTACT: n_strips * train.n_wires}
@@ -328,7 +328,7 @@ ENERGIES: dict[str, Channel] = {
 }
 
 
-def line_channels(train: Train | None = None) -> tuple[str, ...]:
+def line_channels(train: TrainLayout | None = None) -> tuple[str, ...]:
     """Names of the channels with a column for each place on the line: all, or those that a run with
     this train has."""
     own = (channel for channel in CHANNELS.values() if channel.of_line)
@@ -337,10 +337,10 @@ def line_channels(train: Train | None = None) -> tuple[str, ...]:
 
 def line_channels_of_all() -> tuple[str, ...]:
     """Names of the channels of the line that every run has."""
-    return line_channels(Train(()))
+    return line_channels(TrainLayout(()))
 
 
-def train_channels(train: Train | None = None) -> tuple[Channel, ...]:
+def train_channels(train: TrainLayout | None = None) -> tuple[Channel, ...]:
     """Channels of pantographs and strips: all, or the channels of a run with this train."""
     own = (channel for channel in CHANNELS.values() if not channel.of_line)
     return tuple(channel for channel in own if train is None or channel.when(train))

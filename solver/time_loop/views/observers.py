@@ -12,7 +12,7 @@ import numpy as np
 
 from catenary.solver.model.gauges import GaugePlace
 from catenary.solver.time_loop.views import channels
-from catenary.solver.time_loop.views.channels import Train
+from catenary.solver.time_loop.views.channels import TrainLayout
 from catenary.solver.window.moving_columns import MovingColumns
 
 
@@ -37,7 +37,7 @@ class Stage:
     n_places : how many numbers say where each pantograph's masses or bodies are; on rank 0
     """
 
-    train: Train
+    train: TrainLayout
     dt: float
     start_time: float
     n_steps: int

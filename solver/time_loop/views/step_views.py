@@ -24,7 +24,7 @@ from catenary.solver.statics.form_finding.equilibrium import Equilibrium
 from catenary.solver.time_loop.views.channels import (
     Energies,
     Sources,
-    Train,
+    TrainLayout,
     energies_follow_motion,
     energies_of,
 )
@@ -164,7 +164,7 @@ class Showing:
         if self._form.lateral is not None:
             points[:, 1] = self._form.lateral.y
         return Stage(
-            train=Train(
+            train=TrainLayout(
                 train.n_strips,
                 train.joints_in_loop,
                 train.n_wires,

@@ -175,7 +175,7 @@ class March:
 
     def stage(self, first_step: int = 0) -> Stage:
         return Stage(
-            train=channels.Train((1,) * len(self.separations)),
+            train=channels.TrainLayout((1,) * len(self.separations)),
             dt=self.dt,
             start_time=first_step * self.dt,
             n_steps=self.n_steps,

@@ -13,11 +13,11 @@ from catenary.postproc.channels.line_record import GZIP, LineRecord, from_table,
 from catenary.postproc.evaluate import statistics
 from catenary.postproc.read.results import Results
 from catenary.postproc.record.recorder import Recorder
-from catenary.solver.time_loop.views.channels import Train, line_channels_of_all
+from catenary.solver.time_loop.views.channels import TrainLayout, line_channels_of_all
 
 N_STEPS, FLUSH = 3000, 400
 # A train on a line without stops, whose wires do not move along the track.
-USUAL = Train((1,))
+USUAL = TrainLayout((1,))
 WINDOW = (120.0, 80.0)
 
 

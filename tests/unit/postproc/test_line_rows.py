@@ -8,7 +8,7 @@ from mpi4py import MPI
 
 from catenary.postproc.channels.line_record import LineRecord
 from catenary.postproc.record.line_rows import LineGather
-from catenary.solver.time_loop.views.channels import Train
+from catenary.solver.time_loop.views.channels import TrainLayout
 from catenary.solver.time_loop.views.observers import Stage
 from catenary.solver.window.moving_columns import Columns, MovingColumns
 
@@ -19,7 +19,7 @@ X = np.arange(N) * 10.0
 def stage(moving: MovingColumns) -> Stage:
     columns = np.arange(N)
     return Stage(
-        Train((1,)),
+        TrainLayout((1,)),
         1.0,
         0.0,
         100,

@@ -13,7 +13,7 @@ import pytest
 
 from catenary.postproc.read.results import Results
 from catenary.postproc.report.report import write_report
-from catenary.solver.time_loop.views.channels import Train
+from catenary.solver.time_loop.views.channels import TrainLayout
 
 
 @pytest.fixture
@@ -22,7 +22,7 @@ def with_joints(make_march: Any) -> Any:
 
     class Jointed(make_march):  # type: ignore[misc]
         def stage(self, first_step: int = 0) -> Any:
-            return replace(super().stage(first_step), train=Train((1, 1), True))
+            return replace(super().stage(first_step), train=TrainLayout((1, 1), True))
 
         def more(self, step: int) -> Any:
             return {"constraint_violation": np.array([1e-12 * step, np.nan])}

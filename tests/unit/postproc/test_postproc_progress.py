@@ -13,7 +13,7 @@ import pytest
 
 from catenary.base.parallel import set_up_logging
 from catenary.postproc.record.progress import Progress, duration
-from catenary.solver.time_loop.views.channels import Train
+from catenary.solver.time_loop.views.channels import TrainLayout
 from catenary.solver.time_loop.views.observers import Stage
 
 RANK_0 = types.SimpleNamespace(rank=0)
@@ -55,7 +55,7 @@ def log() -> Iterator[list[str]]:
 
 def stage(n_steps: int, start_time: float = 0.0) -> Stage:
     none = np.zeros(0)
-    return Stage(Train((1,)), DT, start_time, n_steps, none, none, none, none, none, none)
+    return Stage(TrainLayout((1,)), DT, start_time, n_steps, none, none, none, none, none, none)
 
 
 def march(progress: Progress, clock: Clock, n_steps: int, wall_per_step: float) -> None:

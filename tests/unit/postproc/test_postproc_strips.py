@@ -13,7 +13,7 @@ import pytest
 from catenary.postproc.read.results import Results
 from catenary.postproc.report.pictures import force_pictures
 from catenary.postproc.report.report import write_report
-from catenary.solver.time_loop.views.channels import Train
+from catenary.solver.time_loop.views.channels import TrainLayout
 
 
 @pytest.fixture
@@ -22,7 +22,7 @@ def with_strips(make_march: Any) -> Any:
 
     class Striped(make_march):  # type: ignore[misc]
         def stage(self, first_step: int = 0) -> Any:
-            return replace(super().stage(first_step), train=Train((1, 2)))
+            return replace(super().stage(first_step), train=TrainLayout((1, 2)))
 
         def more(self, step: int) -> Any:
             leading, trailing = self.force(step * self.dt)

@@ -161,7 +161,7 @@ def test_values_go_from_nodes_to_vectors_and_back() -> None:
 
 def test_a_station_has_the_wires_that_pass_it_or_those_beside_it() -> None:
     mesh = with_wire(paired(), STITCH, 40, 60)
-    found = number_unknowns(mesh, [vertical(mesh)], padded=False)
+    found = number_unknowns(mesh, [vertical(mesh)])
     check(mesh, found)
     widths = np.diff(found.starts)
     inside = np.zeros(widths.size, dtype=bool)
@@ -176,15 +176,12 @@ def test_a_station_has_the_wires_that_pass_it_or_those_beside_it() -> None:
         assert low <= first and last <= high and {low, high} <= set(found.starts)
         begin, end = found.stations_over(first, last)
         assert (found.starts[begin], found.starts[end]) == (low, high)
-    padded = number_unknowns(mesh, [vertical(mesh)], padded=True)
-    check(mesh, padded)
-    assert (np.diff(padded.starts) == 6).all() and padded.block == 6
 
 
 @pytest.mark.parametrize(("first", "last"), [(20, 30), (5, 75)])
 def test_station_types_come_in_one_order_whichever_is_the_commonest(first: int, last: int) -> None:
     mesh = with_wire(paired(), STITCH, first, last)
-    found = number_unknowns(mesh, [vertical(mesh)], padded=False)
+    found = number_unknowns(mesh, [vertical(mesh)])
     assert found.station_types == ((0, 1, 2, 3), (0, 1, 2, 3, 4, 5))
     check(mesh, found)
 
@@ -195,7 +192,7 @@ def test_a_wire_takes_the_slot_of_one_that_has_ended() -> None:
     for number, first in enumerate((10, 30, 50)):
         mesh = with_wire(mesh, f"{STITCH}_{number}", first, first + 10)
     mesh = with_wire(mesh, NEXT_WIRE, 60, last)
-    found = number_unknowns(mesh, [vertical(mesh)], padded=False)
+    found = number_unknowns(mesh, [vertical(mesh)])
     check(mesh, found)
     # The fourth begins where the third has just ended, and both are there in between.
     assert found.width == 8
@@ -211,7 +208,7 @@ def test_rare_station_types_are_filled_up() -> None:
     mesh = paired()
     for number, (first, last) in enumerate(((5, 80), (15, 70), (25, 60), (35, 50))):
         mesh = with_wire(mesh, f"{STITCH}_{number}", first, last)
-    found = number_unknowns(mesh, [vertical(mesh)], padded=False)
+    found = number_unknowns(mesh, [vertical(mesh)])
     check(mesh, found)
     assert len(found.station_types) == MOST_STATION_TYPES and found.width == 12
     assert max(map(len, found.station_types)) == 12
@@ -222,7 +219,7 @@ def test_pieces_of_one_wire_take_a_slot_one_after_the_other() -> None:
     both = {name: nodes for name, nodes in mesh.wires.items() if name != "second"}
     both[STITCH] = np.concatenate([mesh.wires[STITCH], mesh.wires["second"]])
     mesh = replace(mesh, wires=both, breaks={STITCH: np.array([10])})
-    found = number_unknowns(mesh, [vertical(mesh)], padded=False)
+    found = number_unknowns(mesh, [vertical(mesh)])
     check(mesh, found)
     assert found.in_stations and found.width == 6
     assert np.count_nonzero(np.diff(found.starts) == 6) == 12 + 17
