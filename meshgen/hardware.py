@@ -67,6 +67,7 @@ class Droppers:
     Attributes
     ----------
     name : of their group in a mesh file and of their component in the damping
+    kind : stiffness, masses and law of each
     upper, lower : names of the wires that they join
     upper_x, lower_x : positions of their ends, in ascending order of ``lower_x`` [m]
     """

@@ -35,7 +35,7 @@ def duration(seconds: float) -> str:
     """A time in words, of some two digits: ``0.83 s``, ``42 s``, ``3.3 min``, ``2.1 h``."""
     if seconds < 90.0:
         return f"{seconds:.2g} s"
-    return f"{seconds / 60.0:.1f} min" if seconds < 5400.0 else f"{seconds / 3600.0:.1f} h"
+    return f"{seconds / 60.0:.2g} min" if seconds < 5400.0 else f"{seconds / 3600.0:.1f} h"
 
 
 # Further digits after which two numbers are printed in full.

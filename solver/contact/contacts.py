@@ -94,8 +94,12 @@ class Contacts(NamedTuple):
     x : (n,) where they are along the track [m]
     touches : (n,) records of ``TOUCH``
     columns : columns of A^-1 for the nodes of the ``wires``
+    answers, gains : accelerations of the line by a unit force at each, and their gains in a step
     motion, motion_gains : of the line, see ``LineState``
+    followed : links that may switch, as steps follow them
     link_columns : of A^-1 for compensations of all links of the line
+    work : work of the contact forces on the line
+    sideways, across : the wires' lateral unknowns at the contacts, and their lateral motion there
     """
 
     x: np.ndarray

@@ -65,6 +65,7 @@ class Effect:
     data : what a scene has to hold for it to act on, by its keys; empty if any scene does
     after_cutting : True for what befalls a line whose droppers are cut: form finding leaves it out,
         and the line then hangs with it (`statics.with_defects`)
+    cut_for : of an effect after cutting, True where droppers are cut for it
     hangs : of an effect after cutting, what the line's wires become with it
     """
 

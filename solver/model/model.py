@@ -116,6 +116,7 @@ class Model:
     Attributes
     ----------
     simulated : laws of the problem, as its effects set them
+    active : names of the effects that have something to act on, in building order
     numbering : Unknowns, the registry of all unknowns and their numbers
     row_of_node : (n_nodes,) place of each mesh node in the order along the track
     blocks : element blocks; their sums are M and K

@@ -81,6 +81,7 @@ class Wind:
     speed : mean at ``reference_height`` [m] above ground [m/s]
     direction : in which it blows: 0 with the train, pi/2 to the left of it, pi against it [rad]
     height : of the wires above ground [m]
+    profile : how the mean grows with the height
     density : of the air [kg/m3]
     quadratic : whether gusts act with the square of the whole speed, or linearised about the mean
     stretches : of other exposure, which do not overlap

@@ -124,7 +124,7 @@ def test_a_pipe_in_place_of_the_result_is_not_waited_for(tmp_path: Path) -> None
 
 
 LARGE = {
-    "bytes": (RunSize(230e9, 60.0, 1000), "1000 steps take about 1 min and 230.0 GB in "),
+    "bytes": (RunSize(230e9, 60.0, 1000), "1000 steps take about 60 s and 230.0 GB in "),
     "steps": (RunSize(1e9, 600.0, 8_000_000), "8000000 steps take about 10 min and 1.0 GB in "),
     "hours": (RunSize(1e9, 30 * 3600.0, 1000), "1000 steps take about 30.0 h and 1.0 GB in "),
 }

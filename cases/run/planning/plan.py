@@ -67,6 +67,8 @@ class Plan:
     arrivals : sentences about run-in and waves from the ends of the line
     warnings : sentences about them, empty if the line is long enough
     dt, simulated : time step and simulated time [s]
+    scheme : way through a step
+    slow_path : why steps take longer than they could, empty if they do not
     halved : sentence on steps that adapt, empty if none do
     slack : what a slack dropper does, in words; empty if no dropper slackens
     window : which part of the line moves, in words; empty if all of it

@@ -62,8 +62,7 @@ def check_defects(scene: Scene, data: LineData) -> Iterator[Fault]:
         else:
             yield from _place(scene, wire, f"{key}.at_m", table.at_m)
             if isinstance(table, KinkTable) and wire.role is not Role.CONTACT:
-                why = "strips run on contact wires only"
-                yield scene.refused(f"{key}.wire", why)
+                yield scene.refused(f"{key}.wire", "strips run on contact wires only")
             elif isinstance(table, KinkTable) and not wire.bending_stiffness:
                 why = f"{wire.name} has no bending stiffness, and so keeps no bend under tension"
                 yield scene.refused(f"{key}.angle_deg", why)
@@ -85,8 +84,7 @@ def _irregularities(scene: Scene, line: Line) -> Iterator[Fault]:
         start, end = stretch_of(table, line)
         for part, value in (("from_m", table.from_m), ("to_m", table.to_m)):
             if value is not None and value > length + _TINY:
-                why = f"the line ends at {length:g} m"
-                yield scene.refused(f"{key}.{part}", why)
+                yield scene.refused(f"{key}.{part}", f"the line ends at {length:g} m")
         if end <= start and table.to_m is not None:
             why = f"it must be greater than the {start:g} m where they begin"
             yield scene.refused(f"{key}.to_m", why)
@@ -117,8 +115,7 @@ def _place(scene: Scene, wire: Wire, key: str, x: float) -> Iterator[Fault]:
     if not _is_at(wire, x):
         pieces = [f"{piece.x[0]:g} to {piece.x[-1]:g} m" for piece in wire.pieces]
         more = " and so on" if len(pieces) > 3 else ""
-        why = f"{wire.name} runs from {', '.join(pieces[:3])}{more}"
-        yield scene.refused(key, why)
+        yield scene.refused(key, f"{wire.name} runs from {', '.join(pieces[:3])}{more}")
 
 
 def _is_at(wire: Wire, x: float) -> bool:
@@ -135,21 +132,18 @@ def dropper_faults(
 ) -> Iterator[Fault]:
     """The number of a span, or of a dropper in it, that the line does not have."""
     if span > line.n_spans:
-        why = f"the line has {counted(line.n_spans, 'span')}"
-        yield scene.refused(key + parts[0], why)
+        yield scene.refused(key + parts[0], f"the line has {counted(line.n_spans, 'span')}")
         return
     n = len(line.droppers_of_span(span - 1))
     if dropper > n:
-        why = f"span {span} has {counted(n, 'dropper')}"
-        yield scene.refused(key + parts[1], why)
+        yield scene.refused(key + parts[1], f"span {span} has {counted(n, 'dropper')}")
 
 
 def _twice(
     scene: Scene, seen: dict[tuple[object, ...], str], key: str, what: tuple[object, ...]
 ) -> Iterator[Fault]:
     if what in seen:
-        why = f"{seen[what]} has this already; take one of them away"
-        yield scene.refused(key, why)
+        yield scene.refused(key, f"{seen[what]} has this already; take one of them away")
     seen.setdefault(what, key.rsplit(".", 1)[0])
 
 

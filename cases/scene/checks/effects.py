@@ -60,8 +60,7 @@ def check_chosen_act(scene: Scene) -> Iterator[Fault]:
         needs = on and effect.data and not effect.lifts and name not in calmed
         if needs and not effect.applies(problem()):
             lacking = f"it acts only with {effect.data}; give that, or leave the effect out"
-            why = effect.instead(problem()) or lacking
-            yield scene.refused(f"effects.{name}", why)
+            yield scene.refused(f"effects.{name}", effect.instead(problem()) or lacking)
 
 
 def _calmed(scene: Scene) -> set[str]:
@@ -110,8 +109,7 @@ def check_effect_data(scene: Scene) -> Iterator[Fault]:
     n = len(scene.train.pantographs)
     if n > 1 and scene.holds(Limit.ONE_PANTOGRAPH):
         key = "effects.several_pantographs"
-        why = f"train.pantographs has {n} entries; leave one or switch it on"
-        yield scene.refused(key, why)
+        yield scene.refused(key, f"train.pantographs has {n} entries; leave one or switch it on")
 
 
 def check_idle(scene: Scene, line: LineData) -> Iterator[Fault]:

@@ -75,8 +75,7 @@ def check_free_tables(scene: Scene) -> Iterator[Fault]:
             if getattr(link, end, None) is not None:
                 yield from scene.among(f"{key}.{end}", wires, "line.wires has")
         if isinstance(link, FreeDroppersTable | FreeClampsTable) and link.upper == link.lower:
-            why = "a link joins two wires, and lower is this one too"
-            yield scene.refused(f"{key}.upper", why)
+            yield scene.refused(f"{key}.upper", "a link joins two wires, and lower is this one too")
         yield from _numbers(scene, key, link)
     yield from _circles(scene)
     yield from _lifted(scene)
@@ -90,8 +89,7 @@ def _names(scene: Scene) -> Iterator[Fault]:
     links = [(f"line.links.{i}", link.name) for i, link in enumerate(scene.line.links or [])]
     for key, name in [*entries, *links]:
         if name in TAKEN and key.startswith("line.wires"):
-            why = "this name means something else; take another one"
-            yield scene.refused(f"{key}.name", why)
+            yield scene.refused(f"{key}.name", "this name means something else; take another one")
         if name in seen:
             why = f"{seen[name]} has this name too; each wire and each link needs one of its own"
             yield scene.refused(f"{key}.name", why)
@@ -123,8 +121,7 @@ def _wire(
     which = "stretches_m" if table.stretches_m is not None else "from_supports_m"
     stretches = stretches_of(table, masts)
     if not stretches:
-        why = "the line has no inner support"
-        yield scene.refused(f"{key}.{which}", why)
+        yield scene.refused(f"{key}.{which}", "the line has no inner support")
         return
     if stretches[0][0] < -_TINY or stretches[-1][1] > length + _TINY:
         outside = stretches[0] if stretches[0][0] < -_TINY else stretches[-1]

@@ -40,8 +40,7 @@ def _damping(scene: Scene) -> Iterator[Fault]:
         return
     key = f"contact.{key}"
     if on and not acts:
-        why = f"effects.contact_damping is on and needs a value {dissipates}"
-        yield scene.refused(key, why)
+        yield scene.refused(key, f"effects.contact_damping is on and needs a value {dissipates}")
     if acts and not on and not said:
         yield scene.needs_effect(key, "contact_damping")
 

@@ -306,8 +306,7 @@ def check_output(scene: Scene) -> Iterator[Fault]:
     for key in ("line_channels_spans", "field_spans"):
         spans = getattr(output, key)
         if spans is not None and spans[1] > n:
-            why = f"the line has the spans 1 to {n}"
-            yield scene.refused(f"output.{key}", why)
+            yield scene.refused(f"output.{key}", f"the line has the spans 1 to {n}")
 
 
 def check_recorded_parts(scene: Scene, line: LineData) -> Iterator[Fault]:

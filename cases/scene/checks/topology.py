@@ -81,8 +81,7 @@ def _stitch_wire(scene: Scene, line: LineData) -> Iterator[Fault]:
         return
     key, tension = "line.stitch_wire.length_m", stitch.conductor.tension
     if line.n_spans < 2:
-        why = "a stitched line needs a support, that is two spans"
-        yield scene.refused("line.n_spans", why)
+        yield scene.refused("line.n_spans", "a stitched line needs a support, that is two spans")
         return
     yield from _length(scene, line, key, stitch.length)
     clamps = line.around_supports(stitch.length).ravel()
@@ -113,8 +112,7 @@ def _bridle(scene: Scene, line: LineData) -> Iterator[Fault]:
 def _length(scene: Scene, line: LineData, key: str, length: float) -> Iterator[Fault]:
     shortest = min(line.span_lengths)
     if length >= shortest:
-        why = f"it must be less than the shortest span ({shortest:g} m)"
-        yield scene.refused(key, why)
+        yield scene.refused(key, f"it must be less than the shortest span ({shortest:g} m)")
 
 
 def _tension(scene: Scene, wire: str, tension: float, bearer: str, whole: float) -> Iterator[Fault]:

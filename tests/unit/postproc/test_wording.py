@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from catenary.postproc.evaluate.wording import counted, fixed
+from catenary.postproc.evaluate.wording import counted, duration, fixed
 
 
 @pytest.mark.parametrize(
@@ -28,3 +28,11 @@ def test_zero_has_no_sign(value: float, digits: int, text: str) -> None:
 
 def test_one_is_singular() -> None:
     assert [counted(n, "rank") for n in (0, 1, 2)] == ["0 ranks", "1 rank", "2 ranks"]
+
+
+@pytest.mark.parametrize(
+    ("seconds", "said"),
+    [(0.83, "0.83 s"), (42.0, "42 s"), (200.0, "3.3 min"), (5300.0, "88 min"), (7560.0, "2.1 h")],
+)
+def test_times_have_two_digits(seconds: float, said: str) -> None:
+    assert duration(seconds) == said
