@@ -409,8 +409,10 @@ class _Comparing:
         samples within a span depend on each other, spans hardly do."""
         masts = self._results.line("support_x")
         whole = masts[(masts >= at[0] - _NEAR_MAST) & (masts <= at[-1] + _NEAR_MAST)]
-        sums = (span_sums(at, force, whole) for force in (measured, modelled))
-        for what, one in zip(STATISTICS, differences(*sums, paired=True) or (), strict=False):
+        first, second = (span_sums(at, force, whole) for force in (measured, modelled))
+        for what, one in zip(
+            STATISTICS, differences(first, second, paired=True) or (), strict=False
+        ):
             chance = "more than chance" if one.is_certain else "within chance"
             self.remarks.append(
                 f"{name}: {what}, run - measured, {one.value:+.2f} N with a 95 % interval from "

@@ -39,7 +39,7 @@ def contact_force(results: Results) -> Figure:
     names = results.pantograph_names()
     n = results.n_pantographs
     start, end = travelled(results)
-    figure, panels = stacked(0.7 + 2.7 * n, n, shared=True)
+    figure, panels = stacked(0.7 + 2.3 * n, n, shared=True)
     arrivals = results.attributes.get("arrivals", {}).get("pantographs", [])
     for p, axes in enumerate(panels):
         mark_line(axes, results, start, end)

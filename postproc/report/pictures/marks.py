@@ -59,7 +59,7 @@ def panels_along_track(
         Dash the second of two curves, which may lie on each other.
     """
     start, end = travelled(results)
-    figure, panels = stacked(0.7 + 2.7 * len(shown), len(shown), shared=True)
+    figure, panels = stacked(0.7 + 2.3 * len(shown), len(shown), shared=True)
     for axes, (p, curves) in zip(panels, shown.items(), strict=True):
         mark_line(axes, results, start, end)
         for number, (name, column) in enumerate(curves):

@@ -31,7 +31,7 @@ def forces(
     if not panels:
         return None
     n = len(panels)
-    figure, axes = figures.stacked(0.7 + 2.7 * n, n, shared=True)
+    figure, axes = figures.stacked(0.7 + 2.3 * n, n, shared=True)
     for own, (name, curves) in zip(axes, panels, strict=True):
         for number, (label, place, force) in enumerate(curves):
             chosen = thinned(force)
