@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import logging
 import os
 import sys
@@ -34,6 +35,16 @@ sys.path.insert(0, str(Path(__file__).with_name("support")))
 # The linear algebra of tests is small: threads would wait for each other.
 for threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
     os.environ.setdefault(threads, "1")
+
+
+# Libraries, the program and what is collected of tests are hundreds of thousands of objects that
+# stay. To look through them for garbage as often as Python does takes a fourteenth of all tests.
+gc.set_threshold(100_000, 20, 100)
+
+
+def pytest_collection_finish() -> None:
+    """Leave what is there before the first test to no collection."""
+    gc.freeze()
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -75,7 +75,7 @@ def main() -> None:
         console.world()
     is_run = bool(_OF_RUN.intersection(sys.argv[1:2]))
     app = application.app if is_run else all_verbs()
-    command: Any = typer.main.get_command(app)
+    command: Any = typer.main.get_command(application.narrowed(app, sys.argv[1:]))
     try:
         code = command(prog_name="catenary", standalone_mode=False)
     except interrupts.Stopped as stopped:

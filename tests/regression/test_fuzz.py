@@ -26,7 +26,7 @@ from fuzzing import (
     wide_scene,
 )
 from mpi4py import MPI
-from typer.testing import CliRunner
+from verb_runner import CliRunner
 
 from catenary.base.errors import InputError
 from catenary.base.parallel import on_root

@@ -17,7 +17,7 @@ import pytest
 from fuzzing import N_STEPS, RandomScene, wide_scene
 from fuzzing_contact import law_variants
 from program import assert_sound
-from typer.testing import CliRunner
+from verb_runner import CliRunner
 
 from catenary.cases.cli.main import app
 from catenary.cases.scene.load import load_scene

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 from program import catenary, short_run
-from typer.testing import CliRunner
+from verb_runner import CliRunner
 
 from catenary.base.errors import InputError
 from catenary.cases.cli.main import app

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 from program import catenary
-from typer.testing import CliRunner
+from verb_runner import CliRunner
 
 from catenary.cases.cli.main import app
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from typer.testing import CliRunner
+from verb_runner import CliRunner
 
 import catenary
 from catenary.cases.cli.main import app

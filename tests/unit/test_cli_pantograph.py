@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from measuring import check
-from typer.testing import CliRunner
+from verb_runner import CliRunner
 
 from catenary.cases.cli.main import app
 from catenary.cases.scene.input.case_files import shipped

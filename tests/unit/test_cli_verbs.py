@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from verb_runner import CliRunner
 
 from catenary.base.errors import RunBroken
 from catenary.cases.cli.main import app

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 import typer
-from typer.testing import CliRunner
+from verb_runner import CliRunner
 
 from catenary.cases.cli.main import app
 

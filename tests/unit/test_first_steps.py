@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 from program import MPIRUN, catenary
-from typer.testing import CliRunner
+from verb_runner import CliRunner
 
 from catenary.base.errors import InputError
 from catenary.cases.cli.main import app

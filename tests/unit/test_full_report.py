@@ -14,7 +14,7 @@ from pathlib import Path
 import html5lib
 import pypdf
 import pytest
-from typer.testing import CliRunner
+from verb_runner import CliRunner
 
 from catenary.base.errors import InputError
 from catenary.cases.cli.main import app

@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from mpi4py import MPI
-from typer.testing import CliRunner
+from verb_runner import CliRunner
 
 import catenary
 from catenary.base.errors import InputError

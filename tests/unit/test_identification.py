@@ -14,7 +14,7 @@ from measuring import check
 from scipy import stats
 from scipy.optimize import least_squares
 from twin_passages import filtered_noise, write_measurement
-from typer.testing import CliRunner
+from verb_runner import CliRunner
 
 import catenary
 from catenary.base.errors import InputError

@@ -9,7 +9,7 @@ from typing import Any
 
 import jsonschema
 import pytest
-from typer.testing import CliRunner
+from verb_runner import CliRunner
 
 from catenary.cases.cli.main import app
 from catenary.cases.scene.keys.keys import known_keys

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from matplotlib.figure import Figure
 from PIL import Image
-from typer.testing import CliRunner
+from verb_runner import CliRunner
 
 from catenary.cases.cli.main import app
 from catenary.cases.run.scene_mesh import draw_scene

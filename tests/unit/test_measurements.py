@@ -14,7 +14,7 @@ import pytest
 from measuring import check
 from mpi4py import MPI
 from scipy import signal, stats
-from typer.testing import CliRunner
+from verb_runner import CliRunner
 
 from catenary.base.errors import InputError
 from catenary.cases.cli.main import app

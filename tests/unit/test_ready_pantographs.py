@@ -7,7 +7,7 @@ from typing import get_args
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from verb_runner import CliRunner
 
 from catenary.base.errors import InputError
 from catenary.cases.cli.main import app

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 from measuring import COMM
 from program import catenary_started, python, started
-from typer.testing import CliRunner
+from verb_runner import CliRunner
 from work_items import die_at_275, measure_steps
 
 import catenary

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from mpi4py import MPI
 from program import MPIRUN, catenary
-from typer.testing import CliRunner
+from verb_runner import CliRunner
 
 from catenary.cases.cli.main import app
 from catenary.cases.scene.load import load_scene

@@ -7,7 +7,7 @@ import string
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from typer.testing import CliRunner
+from verb_runner import CliRunner
 
 from catenary.base.errors import InputError
 from catenary.cases.cli.main import app

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from typer.testing import CliRunner
+from verb_runner import CliRunner
 
 from catenary.base.errors import InputError
 from catenary.cases.cli.main import app

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from measuring import check
 from mpi4py import MPI
-from typer.testing import CliRunner
+from verb_runner import CliRunner
 
 from catenary.base.errors import InputError
 from catenary.cases.cli.main import app

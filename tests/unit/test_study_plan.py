@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
-from typer.testing import CliRunner
+from verb_runner import CliRunner
 
 from catenary.base.errors import InputError
 from catenary.cases.ambrosio2012.study import TABLE, variants

@@ -8,7 +8,7 @@ from datetime import date
 from importlib import metadata
 from pathlib import Path
 
-from typer.testing import CliRunner
+from verb_runner import CliRunner
 
 from catenary.cases.cli.main import app
 

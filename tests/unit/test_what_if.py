@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from verb_runner import CliRunner
 
 import catenary
 from catenary.cases.cli.main import app

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from measuring import march, registered
 from small_lines import HANGING, en50318_line, mesh_of, problem_of, train
-from typer.testing import CliRunner
+from verb_runner import CliRunner
 
 from catenary.base.errors import InputError
 from catenary.cases.cli.app import Force, RunWords, SceneWords, app

@@ -11,8 +11,8 @@ import pytest
 from constraint_handling import Baumgarte
 from measuring import check
 from seven_bodies import ARM, HEAD, at_rest, calibrated, pressed
-from typer.testing import CliRunner
 from variable_steps import integrate
+from verb_runner import CliRunner
 
 from catenary.base.errors import InputError
 from catenary.cases.cli.main import app

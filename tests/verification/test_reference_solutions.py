@@ -16,7 +16,7 @@ import pytest
 from difference_line import Data, DifferenceLine, Stitch
 from measuring import check, march
 from small_lines import WHOLE, ac_simple_line, mesh_of, numerics, problem_of, train
-from typer.testing import CliRunner
+from verb_runner import CliRunner
 
 from catenary.cases.cli.main import app
 from catenary.cases.studies.reference.solutions import DATA, read

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from refusals import SOUND
-from typer.testing import CliRunner
+from verb_runner import CliRunner
 
 from catenary.cases.cli.main import app
 

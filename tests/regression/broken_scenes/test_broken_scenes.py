@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 from refusals import SOUND, assert_one_sentence, assert_refused
-from typer.testing import CliRunner
+from verb_runner import CliRunner
 
 from catenary.cases.cli.main import app
 
