@@ -11,7 +11,7 @@ from catenary.base.errors import InputError
 _SMALLEST = 0.8
 # Height of a sheet between the margins that the style of the page has, less what rows and headings
 # leave that move to the next sheet; height of a caption, which keeps its size [px of CSS].
-_SHEET, _CAPTION = (297.0 - 15.0 - 18.0 - 3.0) * 96.0 / 25.4, 28.0
+_SHEET, _CAPTION = (297.0 - 15.0 - 18.0 - 9.0) * 96.0 / 25.4, 28.0
 # A sheet on which all of a report has room: it tells how high everything is.
 _ENDLESS = "<style>@page { size: 210mm 100000mm; }</style></head>"
 # A heading so close above a figure goes with it to the next sheet [px of CSS].

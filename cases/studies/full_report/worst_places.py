@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from catenary.cases.studies.full_report.scene_of_run import SceneOfRun
 from catenary.cases.studies.questions.causes import Causes
 from catenary.cases.studies.questions.worst import Passage, Spot, WorstPlaces, worst_places
-from catenary.cases.studies.questions.worst_output import NONE
+from catenary.cases.studies.questions.worst_output import candidates, out
 from catenary.postproc.evaluate import filters
 from catenary.postproc.read.results import Results
 from catenary.postproc.report.pictures.figures import (
@@ -52,16 +52,16 @@ def _blocks(results: Results, places: WorstPlaces, causes: Causes) -> Iterator[T
         yield Text(
             f"span {one.span + 1}, {one.start:.6g} to {one.end:.6g} m, {names[one.pantograph]}: "
             f"standard deviation {one.std:.1f} N (median of all spans {one.median:.1f} N), force "
-            f"{one.minimum:.0f} to {one.maximum:.0f} N{_out(one.stands_out)}.",
+            f"{one.minimum:.0f} to {one.maximum:.0f} N{out(one.stands_out)}.",
             "note",
             "Worst span:",
-            causes.of_passage(one) or _no_cause(one.stands_out),
+            candidates(causes.of_passage(one), one.stands_out),
         )
     for first, spots, words in _KINDS:
         for spot in spots(places)[:1]:
             said = words.format(at=spot.place, v=spot.value, m=spot.median)
-            items = causes.at(spot.x) or _no_cause(spot.stands_out)
-            yield Text(f"{said}{_out(spot.stands_out)}.", "note", first, items)
+            items = candidates(causes.at(spot.x), spot.stands_out)
+            yield Text(f"{said}{out(spot.stands_out)}.", "note", first, items)
     everywhere = causes.of_line()
     if everywhere:
         yield Text("acts on all spans alike:", "note", "The line as a whole", everywhere)
@@ -84,17 +84,6 @@ _KINDS: tuple[tuple[str, Callable[[WorstPlaces], Sequence[Spot]], str], ...] = (
     ("Worst dropper:", lambda p: p.forces, "{at}, up to {v:.0f} N (median {m:.0f} N)"),
     ("Longest slack:", lambda p: p.slack, "dropper at {at}, {v:.2f} s (median {m:.2f} s)"),
 )
-
-
-def _no_cause(is_out: bool | None) -> list[str]:
-    """What stands in the place of candidates; one like the others needs none."""
-    return [] if is_out is False else [NONE]
-
-
-def _out(is_out: bool | None) -> str:
-    if is_out is None:
-        return "; too few others to compare"
-    return "; it stands out" if is_out else "; within the scatter of the others"
 
 
 def _pictures(results: Results, places: WorstPlaces) -> Iterator[Picture]:

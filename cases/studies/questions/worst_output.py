@@ -95,7 +95,7 @@ def _of_spans(
         lines.append(
             f"  span {one.span + 1}, {one.start:.0f} to {one.end:.0f} m{who}: {one.std:.1f} N, "
             f"median {one.median:.1f} N, force {one.minimum:.0f} to {one.maximum:.0f} N"
-            f"{_out(one.stands_out)}"
+            f"{out(one.stands_out)}"
         )
         lines += _told(causes.of_passage(one), one.stands_out)
     return lines
@@ -105,20 +105,25 @@ def _of_spots(title: str, spots: Sequence[Spot], words: str, causes: Causes) -> 
     lines = ["", title] if spots else []
     for one in spots:
         said = words.format(at=one.place, v=one.value, m=one.median)
-        lines.append(f"  {said}{_out(one.stands_out)}")
+        lines.append(f"  {said}{out(one.stands_out)}")
         lines += _told(causes.at(one.x), one.stands_out)
     return lines
 
 
+def candidates(said: Sequence[str], is_out: bool | None) -> Sequence[str]:
+    """Candidates of a place, or that there is none; one like the others needs none."""
+    return said or ([] if is_out is False else [NONE])
+
+
 def _told(said: Sequence[str], is_out: bool | None) -> list[str]:
-    """Lines for the candidates of a place; one like the others needs none."""
-    none = [] if is_out is False else [NONE]
-    lines = [f"    {text}" for text in said[:_MOST_CAUSES] or none]
+    """Lines for the candidates of a place."""
+    lines = [f"    {text}" for text in candidates(said, is_out)[:_MOST_CAUSES]]
     more = len(said) - _MOST_CAUSES
     return [*lines, f"    and {more} more (-o)"] if more > 0 else lines
 
 
-def _out(is_out: bool | None) -> str:
+def out(is_out: bool | None) -> str:
+    """Whether a figure stands out among its likes, None if they are too few, in words."""
     if is_out is None:
         return "; too few others to compare"
     return "; stands out" if is_out else "; within the scatter of the others"

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from catenary.cases.terminal.terminal_text import summary_text
-from catenary.postproc.evaluate.wording import decimals_that_tell
+from catenary.postproc.evaluate.wording import decimals_that_tell, with_minus
 
 
 @pytest.mark.parametrize(
@@ -28,6 +28,12 @@ def test_decimals_go_on_until_two_numbers_differ(
     value: float | None, limit: float, fewest: int, expected: int
 ) -> None:
     assert decimals_that_tell(value, limit, fewest) == expected
+
+
+def test_negative_numbers_have_a_minus_and_all_else_keeps_its_hyphens() -> None:
+    assert with_minus("-7.8 N, from -1 to 2") == "\u22127.8 N, from \u22121 to 2"
+    for text in ("0-5 Hz", "2026-11-27", "mean - 3 sigma", "1e-05", "--set a.b=-3", "-o DIR"):
+        assert with_minus(text) == text
 
 
 def test_a_summary_shows_by_how_little_a_limit_is_missed() -> None:
