@@ -110,11 +110,11 @@ def write(out: Path, merged: Merged) -> Written:
     table = StudyTable([Column(name) for name in rows[0]], rows)
     files = write_files(out, table_files(merged.record, table))
     lacks = merge_histories(out / HISTORIES, merged.folders)
-    files += [path for path in (out / HISTORIES,) if path.is_file()]
+    files += [out / HISTORIES] if lacks == "" else []
     if merged.sampling is not None:
         found, more = output.write_evaluated(out, rows, merged.sampling)
         files += more
-    return Written(files, found, lacks)
+    return Written(files, found, lacks or "")
 
 
 class _Variant(BaseModel):

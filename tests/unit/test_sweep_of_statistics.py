@@ -210,7 +210,7 @@ def test_histories_of_parts_are_merged(scene: catenary.Scene, tmp_path: Path) ->
                 np.testing.assert_allclose(rows, table, rtol=0.0, atol=1e-4)
     (folders[0] / "histories.h5").unlink()
     written = merged_sweeps.write(tmp_path / "less", merged_sweeps.merge(folders))
-    assert written.lacks == f"histories are left out, as {folders[0]} has none"
+    assert written.lacks == f"histories are left out: {folders[0]} has none of {variants[0].name}"
     assert not (tmp_path / "less" / "histories.h5").exists()
 
 

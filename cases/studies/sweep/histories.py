@@ -186,9 +186,9 @@ def _written(path: Path) -> Iterator[h5py.File]:
         raise unwritten(path, error) from error
 
 
-def merge_histories(path: Path, folders: Mapping[str, Path]) -> str:
+def merge_histories(path: Path, folders: Mapping[str, Path]) -> str | None:
     """Join histories of several sweeps in a file; returns why there is none, empty if there is.
-    Not collective.
+    None if no sweep has histories. Not collective.
 
     Parameters
     ----------
@@ -202,22 +202,24 @@ def merge_histories(path: Path, folders: Mapping[str, Path]) -> str:
         If the disk refuses.
     """
     with ExitStack() as stack:
-        sources: dict[Path, h5py.File] = {}
+        sources, rows = dict[Path, h5py.File](), dict[Path, dict[str, int]]()
         for folder in dict.fromkeys(folders.values()):
             try:
-                sources[folder] = stack.enter_context(open_own(folder / FILE))
+                source = stack.enter_context(open_own(folder / FILE))
+                rows[folder] = {name: row for row, name in enumerate(source[_VARIANT].asstr())}
             except HDF5_ERRORS:
                 continue
+            sources[folder] = source
         if not sources:
-            return ""
+            return None
         first = next(iter(sources.values()))
         tables = [name for name in first if name not in _DIMENSIONS]
-        for folder in folders.values():
-            if folder not in sources:
-                return f"histories are left out, as {folder} has none"
-            if [name for name in sources[folder] if name not in _DIMENSIONS] != tables:
-                return f"histories are left out, as those of {folder} have other names"
-        rows = {folder: _rows(file) for folder, file in sources.items()}
+        for variant, folder in folders.items():
+            if variant not in rows.get(folder, ()):
+                return f"histories are left out: {folder} has none of {variant}"
+        for folder, source in sources.items():
+            if [name for name in source if name not in _DIMENSIONS] != tables:
+                return f"histories are left out: those of {folder} have other names"
         at = [(sources[folder], rows[folder][name]) for name, folder in folders.items()]
         varied = {key: _joined(key, at) for key in tables if first[key].ndim == 1}
         names = [name for name in tables if name in HISTORIES]
@@ -229,11 +231,6 @@ def merge_histories(path: Path, folders: Mapping[str, Path]) -> str:
                     table = source[name][own]
                     file[name][(row, *(slice(0, size) for size in table.shape))] = table
     return ""
-
-
-def _rows(file: h5py.File) -> dict[str, int]:
-    """The row of each variant."""
-    return {name: row for row, name in enumerate(file[_VARIANT].asstr()[...])}
 
 
 def _joined(key: str, at: Sequence[tuple[h5py.File, int]]) -> Any:
