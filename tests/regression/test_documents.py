@@ -48,6 +48,13 @@ LIMIT = 250.0  # for one command on a busy machine [s]
 RUNS = {"run", "after", "edit", "append", "words"}
 # Pages of Python that a test of their own runs, which looks at what they give.
 OWN_TEST = {Path("docs/python.md"), Path("docs/tutorials/python.md")}
+# Pages whose commands take longest, of verbs that have tests of their own.
+LONGEST = {
+    Path("cases/tensioned_section/README.md"),
+    Path("docs/guide/films.md"),
+    Path("docs/guide/identification.md"),
+    Path("docs/guide/questions.md"),
+}
 _ENTRY = "from catenary.cases.cli.main import main; main()"
 
 
@@ -157,7 +164,14 @@ def workshop(tmp_path_factory: pytest.TempPathFactory) -> Workshop:
 
 
 @pytest.mark.timeout(600)
-@pytest.mark.parametrize("document", RUN_DOCUMENTS, ids=str)
+@pytest.mark.parametrize(
+    "document",
+    [
+        pytest.param(path, marks=pytest.mark.study if path in LONGEST else ())
+        for path in RUN_DOCUMENTS
+    ],
+    ids=str,
+)
 def test_what_is_shown_is_what_happens(document: Path, workshop: Workshop) -> None:
     names: dict[str, Any] = {}
     wrong = [
@@ -188,6 +202,7 @@ def test_every_block_is_run_or_says_why_not(document: Path) -> None:
 
 def test_blocks_with_output_are_found() -> None:
     assert Path("README.md") in RUN_DOCUMENTS and len(RUN_DOCUMENTS) > 3
+    assert LONGEST < set(RUN_DOCUMENTS)
 
 
 # --- commands that are not run -----------------------------------------------------------------

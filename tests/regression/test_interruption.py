@@ -100,7 +100,10 @@ def test_a_state_of_an_earlier_version_is_refused(tmp_path: Path) -> None:
 
 
 @needs_mpirun
-@pytest.mark.parametrize(("ranks", "ranks_of_restart", "steps"), [(1, 2, 3900), (2, 1, 150)])
+@pytest.mark.parametrize(
+    ("ranks", "ranks_of_restart", "steps"),
+    [pytest.param(1, 2, 3900, marks=pytest.mark.study), (2, 1, 150)],
+)
 def test_any_number_of_ranks_continues_a_run(
     ranks: int, ranks_of_restart: int, steps: int, tmp_path: Path, uninterrupted: Path
 ) -> None:
@@ -145,7 +148,7 @@ def test_a_signal_to_mpirun_closes_the_file(number: signal.Signals, tmp_path: Pa
     assert "interrupted" in (out / "report.html").read_text()
 
 
-@pytest.mark.parametrize("ranks", [1, pytest.param(2, marks=needs_mpirun)])
+@pytest.mark.parametrize("ranks", [1, pytest.param(2, marks=[needs_mpirun, pytest.mark.study])])
 def test_a_killed_run_is_readable_and_can_be_continued(
     ranks: int, tmp_path: Path, uninterrupted: Path
 ) -> None:

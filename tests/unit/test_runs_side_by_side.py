@@ -72,7 +72,9 @@ def one_by_one(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, str]]
 
 
 @pytest.mark.process
-@pytest.mark.parametrize("n_jobs", ["0", "2", "3"])
+@pytest.mark.parametrize(
+    "n_jobs", ["0", *(pytest.param(n, marks=pytest.mark.study) for n in ("2", "3"))]
+)
 def test_runs_at_the_same_time_have_the_same_figures_to_the_last_digit(
     n_jobs: str, one_by_one: list[dict[str, str]], tmp_path: Path
 ) -> None:

@@ -239,7 +239,10 @@ def press(residual: np.ndarray, model: Model, x: float, force: float) -> None:
     residual[model.constrained] = 0.0
 
 
-@pytest.mark.parametrize(("name", "kept"), [("stiffening", 0.0), ("softening", 0.1)])
+@pytest.mark.parametrize(
+    ("name", "kept"),
+    [pytest.param("stiffening", 0.0, marks=pytest.mark.study), ("softening", 0.1)],
+)
 def test_a_run_is_that_of_an_integrator_of_others(name: str, kept: float) -> None:
     """Steps of average acceleration come to the motion with an error of order dt^2.
 
@@ -300,7 +303,7 @@ def test_a_run_is_that_of_an_integrator_of_others(name: str, kept: float) -> Non
     assert errors[-1] < 1e-4 * np.abs(expected - rest).max()
 
 
-@pytest.mark.parametrize("name", CURVES)
+@pytest.mark.parametrize("name", [pytest.param("stiffening", marks=pytest.mark.study), "softening"])
 def test_energy_is_that_of_the_curve_and_balanced_by_work(name: str) -> None:
     """Without damping, what the line holds is the integral of its curves, and what it gains the
     work of the contact force, but for steps in which a dropper comes to another slope: there the

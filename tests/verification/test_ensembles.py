@@ -81,7 +81,16 @@ def differences(one: Any, other: Any, path: str = "") -> list[str]:
 
 # A line of each kind of stations, and trains of one and of two pantographs.
 @pytest.mark.parametrize(
-    "case", ["en50318_2002", "re330_stitched", "overlap", "dc_twin", "shinkansen_compound"]
+    "case",
+    [
+        "en50318_2002",
+        "re330_stitched",
+        "overlap",
+        *(
+            pytest.param(case, marks=pytest.mark.study)
+            for case in ("dc_twin", "shinkansen_compound")
+        ),
+    ],
 )
 def test_scenes_side_by_side_give_what_their_own_runs_give(case: str) -> None:
     speed = read_draft(case).shortened().scene().train.speed_km_h

@@ -256,7 +256,11 @@ def test_an_unlikely_residual_is_left_by_further_searches(tmp_path: Path) -> Non
     [
         (["line.damping.alpha_s=5e-4"], "damping"),
         (["mesh.elements_per_gap=8"], "mesh"),
-        (["line.dropper.stiffness_N_per_m=1e4"], "stiffness of droppers"),
+        pytest.param(
+            ["line.dropper.stiffness_N_per_m=1e4"],
+            "stiffness of droppers",
+            marks=pytest.mark.study,
+        ),
     ],
 )
 def test_a_wrong_model_is_told_by_its_residual(tmp_path: Path, wrong: list[str], by: str) -> None:

@@ -104,6 +104,7 @@ def test_a_search_finds_what_brute_force_finds() -> None:
     assert found.found.value < 0.95 * found.shipped.value
 
 
+@pytest.mark.study
 def test_tolerance_of_a_run_is_that_of_brute_force() -> None:
     """Each sample's critical level by its own bisection, against the one of all samples."""
     draft = tiny()
