@@ -92,11 +92,9 @@ def damping(rng: random.Random, words: Words, span: float) -> None:
 
 
 def mesh(rng: random.Random, words: Words, span: float) -> None:
-    """Finer elements at the supports, or beside all droppers."""
-    if rng.random() < 0.5:
-        words["mesh.support_refinement"] = rng.randint(2, 4)
-    else:
-        words["mesh.grading"] = rng.uniform(1.0, 20.0)
+    """Finer elements at the supports, and beside all droppers."""
+    finer = rng.randint(2, 4)
+    words |= {"mesh.support_refinement": finer, "mesh.grading": 2.5 * finer}
 
 
 def droppers_by_span(words: Words) -> list[int]:
