@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,7 @@ from catenary.base.errors import InputError
 from catenary.cases.cli.main import app
 from catenary.cases.scene.load import load_scene
 from catenary.cases.studies.identification.measurement import Measurement, Whitening, correlation
+from catenary.cases.studies.identification.output import verdict
 from catenary.cases.studies.identification.posterior import (
     innovations_of,
     is_doubtful,
@@ -157,6 +159,23 @@ def test_a_right_model_is_doubted_once_in_ten_passages_at_most() -> None:
     large = [judge(1.1 * rng.normal(size=2 * n), of) for _ in range(100)]
     doubted = np.mean([is_doubtful(one) for one in large])
     assert doubted > 0.8 > np.mean([one["all"].is_too_large for one in large])
+
+
+@pytest.mark.parametrize(
+    ("probability", "said"),
+    [
+        (0.5, "The model fits:"),
+        (0.02, "The model fits, with a doubt:"),
+        (1e-4, "The model does not"),
+    ],
+)
+def test_a_verdict_names_a_doubt(probability: float, said: str) -> None:
+    """White residuals whose chi-square has a chosen probability."""
+    n = 200
+    white = np.random.default_rng(11).normal(size=n)
+    size = np.sqrt(stats.chi2.isf(probability, n) / (white @ white))
+    found: Any = SimpleNamespace(judged=judge(size * white, {"force": slice(0, n)}))
+    assert verdict(found).startswith(said)
 
 
 def test_wrong_residuals_are_told_by_size_and_by_colour() -> None:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from catenary.cases.studies.identification.measurement import UNITS
-from catenary.cases.studies.identification.posterior import RARE, Judged
+from catenary.cases.studies.identification.posterior import RARE, Judged, is_doubtful
 from catenary.cases.studies.identification.study import Identification
 from catenary.postproc.report.study_table import Column, Content, StudyTable
 
@@ -175,6 +175,11 @@ def verdict(found: Identification) -> str:
         )
     if small:
         return f"The noise that the task states is too large: residual of {' and '.join(small)}."
+    if is_doubtful(judged):
+        return (
+            "The model fits, with a doubt: a right one leaves such residuals in one passage of ten "
+            "at most, and more searches (starts) may find better values."
+        )
     return "The model fits: residuals are those of the stated noise."
 
 
