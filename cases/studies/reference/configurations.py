@@ -34,6 +34,7 @@ class Configuration:
     data : where the inputs come from, and which of them are ours
     steps : time steps [ms], finest first
     elements : elements between neighbouring droppers, finest first
+    grading : how many times longer elements are midway between droppers than beside them
     """
 
     name: str
@@ -46,6 +47,7 @@ class Configuration:
     data: str
     steps: tuple[float, ...]
     elements: tuple[int, ...]
+    grading: float
 
     @property
     def words(self) -> str:
@@ -85,12 +87,14 @@ def configurations(names: Sequence[str] = ()) -> list[Configuration]:
 
 
 def _every() -> Iterator[Configuration]:
-    levels = table()["levels"]
+    levels, meshes = table()["levels"], table()["meshes"]
     for model in table()["models"]:
         for speed in model["speeds_km_h"]:
             for train in (ONE, TWO):
+                name = f"{model['name']}_{speed:g}_{train}"
+                mesh = {"grading": 1.0, **levels, **meshes.get(name, {})}
                 yield Configuration(
-                    f"{model['name']}_{speed:g}_{train}",
+                    name,
                     model["name"],
                     model["title"],
                     model["case"],
@@ -99,9 +103,6 @@ def _every() -> Iterator[Configuration]:
                     (f"train.speed_km_h={speed:g}", *(model["pair"] if train == TWO else ())),
                     model["data"],
                     tuple(levels["dt_ms"]),
-                    tuple(
-                        model.get("pair_elements_per_gap", levels["elements_per_gap"])
-                        if train == TWO
-                        else levels["elements_per_gap"]
-                    ),
+                    tuple(mesh["elements_per_gap"]),
+                    float(mesh["grading"]),
                 )

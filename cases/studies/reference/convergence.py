@@ -60,6 +60,7 @@ def _jobs(one: Configuration) -> Iterator[Job]:
         words = (
             f"numerics.dt_s={1e-3 * one.steps[level[0]]:g}",
             f"mesh.elements_per_gap={one.elements[level[1]]}",
+            f"mesh.grading={one.grading:g}",
             *(moved if further else ()),
         )
         variant = Variant(run_name(one, level, further), words)

@@ -48,28 +48,34 @@ def write(folder: Path, chosen: Sequence[Configuration], ended: Sequence[Ended])
     runs = {run.variant.name: run for run in ended}
     rows = [row for one in chosen for row in statistics(one, runs)]
     content: dict[str, bytes | str] = {STATISTICS: rows_csv(rows)}
-    described = {}
     for one in chosen:
-        run = runs[run_name(one, FINEST)]
-        content[f"{one.name}.csv"] = _forces(one, run)
-        described[one.name] = {
+        content[f"{one.name}.csv"] = _forces(one, runs[run_name(one, FINEST)])
+    content[METADATA] = json.dumps(plain(_metadata(chosen)), indent=1) + "\n"
+    return write_all(folder, content)
+
+
+def _metadata(chosen: Sequence[Configuration]) -> dict[str, Any]:
+    """Licence, filter, and inputs of configurations, all keys of their scenes."""
+    described = {
+        one.name: {
             "title": one.words,
             "data": one.data,
             "case": one.case,
             "assignments": list(one.assignments),
             "dt_ms": one.steps[0],
             "elements_per_gap": one.elements[0],
+            "grading": one.grading,
             "scene": resolved(one.scene()),
         }
-    metadata = {
+        for one in chosen
+    }
+    return {
         "licence": "CC-BY-4.0",
         "catenary": version("catenary"),
         "further_spans": table()["levels"]["further_spans"],
         "filter": "low-pass of EN 50317: Butterworth of order 6, 20 Hz, zero phase",
         "configurations": described,
     }
-    content[METADATA] = json.dumps(plain(metadata), indent=1) + "\n"
-    return write_all(folder, content)
 
 
 def _forces(one: Configuration, run: Ended) -> str:
