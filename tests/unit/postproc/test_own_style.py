@@ -93,49 +93,63 @@ def test_the_summary_is_there_before_the_first_picture(
     assert json.loads((tmp_path / "summary.json").read_text())["outcome"] == "done"
 
 
+def pictures_of(run: Path) -> dict[str, bytes]:
+    """The pictures of a report that a process writes, whose working directory holds the run."""
+    with catenary_started("report", run.name, cwd=run.parent) as program:
+        done = program.end()
+    # The scene of this run is made up, so that it has no data sheets.
+    assert "no data sheets" in done.stderr and done.stderr.count("\n") == 1
+    assert (done.code, (run / "summary.json").exists()) == (0, True)
+    pictures = {path.name: path.read_bytes() for path in run.glob("*.svg")}
+    assert len(pictures) >= 7
+    return pictures
+
+
+@pytest.fixture(scope="module")
+def usual_pictures(run_folder: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
+    run = tmp_path_factory.mktemp("usual") / "run"
+    shutil.copytree(run_folder, run)
+    return pictures_of(run)
+
+
 BROKEN = {
-    "none": b"",
     "no text": b"axes.facecolor: \xff\xfe\x00",
     "other words": b"axes.facecolor black\nnonsense\ntext.usetex: perhaps\n",
     "a folder": None,
 }
 
 
-# A file of the user's is looked for by name and never read, so that one content shows it.
+# A file is looked for by name and never read, so that one content shows it.
 @pytest.mark.process
 @pytest.mark.parametrize(
-    ("where", "contents"),
-    [("in the working directory", tuple(BROKEN)), ("of the user", ("none", "no text"))],
-    ids=["in the working directory", "of the user"],
+    ("of_the_user", "what"),
+    [
+        (True, "no text"),
+        (False, "no text"),
+        *(
+            pytest.param(False, what, marks=pytest.mark.study)
+            for what in ("other words", "a folder")
+        ),
+    ],
 )
 def test_a_matplotlibrc_that_cannot_be_read_changes_no_picture(
     run_folder: Path,
+    usual_pictures: dict[str, bytes],
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
-    where: str,
-    contents: tuple[str, ...],
+    of_the_user: bool,
+    what: str,
 ) -> None:
+    """Of the user, or in the working directory."""
     folder, run = tmp_path, tmp_path / "run"
     shutil.copytree(run_folder, run)
-    if where == "of the user":
+    if of_the_user:
         monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "config"))
         folder = tmp_path / "config" / "matplotlib"
         folder.mkdir(parents=True)
-    expected: dict[str, bytes] = {}
-    for what in contents:
-        content = BROKEN[what]
-        (folder / "matplotlibrc").unlink(missing_ok=True)
-        if content is None:
-            (folder / "matplotlibrc").mkdir()
-        elif content:
-            (folder / "matplotlibrc").write_bytes(content)
-        for path in [run / "summary.json", *run.glob("*.svg")]:
-            path.unlink(missing_ok=True)
-        with catenary_started("report", "run", cwd=tmp_path) as program:
-            done = program.end()
-        # The scene of this run is made up, so that it has no data sheets.
-        assert "no data sheets" in done.stderr and done.stderr.count("\n") == 1, what
-        assert (done.code, (run / "summary.json").exists()) == (0, True), what
-        pictures = {path.name: path.read_bytes() for path in run.glob("*.svg")}
-        expected = expected or pictures
-        assert len(pictures) >= 7 and pictures == expected, what
+    content = BROKEN[what]
+    if content is None:
+        (folder / "matplotlibrc").mkdir()
+    else:
+        (folder / "matplotlibrc").write_bytes(content)
+    assert pictures_of(run) == usual_pictures
