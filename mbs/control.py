@@ -37,6 +37,11 @@ class ControlArrays(NamedTuple):
         """Named part of the memory, (1,) ``native.REGULATION_MEMORY``."""
         return self.numbers[:_N_MEMORY].view(native.REGULATION_MEMORY)
 
+    @property
+    def waiting(self) -> np.ndarray:
+        """Forces that wait [N]; kernels read it."""
+        return self.numbers[_N_MEMORY:]
+
 
 def control_arrays(
     settings: dict[str, float],
