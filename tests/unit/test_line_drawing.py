@@ -62,7 +62,7 @@ def test_a_picture_is_written_once_and_only_by_its_suffix(tmp_path: Path) -> Non
     done = invoke(*words, str(out))
     assert done.exit_code == 0 and "the line at rest from" in done.output, done.output
     with Image.open(out) as picture:
-        assert picture.size == (1560, 1053) and len(picture.convert("L").getcolors()) > 20
+        assert picture.size == (1170, 871) and len(picture.convert("L").getcolors()) > 20
     again = invoke(*words, str(out))
     assert again.exit_code == 2 and "exists already" in again.output
     other = invoke(*words, str(tmp_path / "line.pdf"))
