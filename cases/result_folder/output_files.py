@@ -20,15 +20,18 @@ _DROPPER_HEADS = ("span", "x_m", "length_m", "force_N", "from_wire", "to_wire")
 
 
 def new_file(path: Path, suffixes: tuple[str, ...], force: bool) -> None:
-    """Raise ``InputError`` unless ``path`` can be written with one of ``suffixes``."""
+    """Make the folder of a file; raise ``InputError`` unless ``path`` can be written with one of
+    ``suffixes``."""
     if path.suffix not in suffixes:
         raise InputError(f"-o {path} must have a name that ends in {' or '.join(suffixes)}")
     if path.is_dir():
         raise InputError(f"-o {path} is a folder; name a file")
     if path.exists() and not force:
         raise InputError(f"-o {path} exists already; give --force to replace it")
-    if not path.parent.is_dir():
-        raise InputError(f"-o {path} cannot be written: there is no folder {path.parent}")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"-o {path} cannot be written: {error.strerror}") from error
     if not os.access(path if path.exists() else path.parent, os.W_OK):
         raise InputError(f"-o {path} cannot be written: permission denied")
 
