@@ -109,12 +109,12 @@ def write(out: Path, merged: Merged) -> Written:
     rows, found = merged.record["rows"], None
     table = StudyTable([Column(name) for name in rows[0]], rows)
     files = write_files(out, table_files(merged.record, table))
-    lacks = merge_histories(out / HISTORIES, merged.folders)
-    files += [out / HISTORIES] if lacks == "" else []
+    histories, lacks = merge_histories(out / HISTORIES, merged.folders)
+    files += histories
     if merged.sampling is not None:
         found, more = output.write_evaluated(out, rows, merged.sampling)
         files += more
-    return Written(files, found, lacks or "")
+    return Written(files, found, lacks)
 
 
 class _Variant(BaseModel):

@@ -5,16 +5,11 @@ the same factors and the same answers to unit forces; those that differ in error
 lengths, too, rest otherwise but have the same factors and answers. Their motions stand in lanes:
 the numbers of an unknown in all scenes follow each other, so that a step reads each number of a
 factor once.
-
-Droppers that are slack at rest in some scenes are taut in the matrices, as those that slacken under
-way: in such a lane displacements are counted from the shape that the line would have if droppers
-could push, where matrices hold without compensations, and the line starts displaced from there.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -24,18 +19,15 @@ from catenary.meshgen.mesh import DROPPERS
 from catenary.solver.contact.contact_wire import ContactWires
 from catenary.solver.contact.followed_links import FollowedLinks
 from catenary.solver.contact.forces_on_line import ForceColumns
-from catenary.solver.effects.all_effects import needs_form
-from catenary.solver.effects.build_model import build
+from catenary.solver.ensemble.taut_line import TautLine, TautLines
 from catenary.solver.integrators.line_state import LineState, Motion
 from catenary.solver.integrators.make_line import make_line
 from catenary.solver.integrators.two_pass_step import PassArrays, StationPasses
 from catenary.solver.kernels import aligned_arrays, native
-from catenary.solver.model.model import Model, same_matrices
+from catenary.solver.model.model import same_matrices
 from catenary.solver.model.partition import distribute
-from catenary.solver.model.rest_shape import Equilibrium
-from catenary.solver.model.switching_links import LinkArrays, LinkTable, switching_links
+from catenary.solver.model.switching_links import LinkArrays, LinkTable
 from catenary.solver.problem.problem import Problem
-from catenary.solver.statics.changed_line.rest_nearby import StiffLine
 from catenary.solver.statics.line_at_rest import LineAtRest
 
 N_LANES: int = native.SCENES
@@ -59,24 +51,6 @@ class LineExtremes(NamedTuple):
     uplift: np.ndarray
     least: np.ndarray
     largest: np.ndarray
-
-
-class TautLine(NamedTuple):
-    """A line at rest, counted from the shape that it would have if droppers could push.
-
-    Attributes
-    ----------
-    rest : the model of the line at rest, whose droppers may be slack
-    model, form : with all droppers taut, in the shape from which displacements count
-    moved : (n_dofs,) of the line at rest from there [m], [rad]
-    links : what is followed of it
-    """
-
-    rest: Model
-    model: Model
-    form: Equilibrium
-    moved: np.ndarray
-    links: LinkTable
 
 
 class Lane:
@@ -118,9 +92,8 @@ class SharedLine:
 
     def __init__(self, at_rest: LineAtRest, range_of_run: tuple[float, float]) -> None:
         self.comm: Any = alone()
-        self._stiff: StiffLine | None = None
-        self._latest: TautLine | None = None
-        _, model, form, _, self._table = self._taut_of(at_rest)
+        self._taut = TautLines()
+        _, model, form, _, self._table = self._taut.of(at_rest)
         self._model = model
         self.ownership = distribute(model, 1, 0)
         self.line = make_line(self.comm, model, self.ownership, at_rest.problem.numerics)
@@ -155,7 +128,7 @@ class SharedLine:
 
     def takes(self, at_rest: LineAtRest) -> bool:
         """Whether the matrices of a line are these, and the links that are followed."""
-        taut = self._taut_of(at_rest)
+        taut = self._taut.of(at_rest)
         return same_matrices(self._model, taut.model) and _same_links(self._table, taut.links)
 
     def hang(self, lane: Lane, at_rest: LineAtRest) -> None:
@@ -163,7 +136,7 @@ class SharedLine:
         self.native.rest(lane.number)
         links, extremes, number, taut = lane.links, self.extremes, lane.number, lane.taut
         if taut is None or taut.rest is not at_rest.model:
-            lane.taut = taut = self._taut_of(at_rest)
+            lane.taut = taut = self._taut.of(at_rest)
             model = taut.model
             lane.wires = ContactWires(model, taut.form, self.ownership)
             lane.wires_at_rest = ContactWires(model, at_rest.form, self.ownership)
@@ -184,44 +157,6 @@ class SharedLine:
         assert lane.taut is not None
         extremes = self.extremes
         return extremes.uplift[:, lane.number] - lane.taut.moved[extremes.arms]
-
-    def _taut_of(self, at_rest: LineAtRest) -> TautLine:
-        """A line with all its droppers taut, where matrices do not depend on its shape."""
-        model, form = at_rest.model, at_rest.form
-        if self._latest is not None and self._latest.rest is model:
-            return self._latest
-        taut, moved, gap = model, np.zeros(model.n_dofs), model.dropper_gap
-        if gap.any() and not (model.droppers_bend or needs_form(model.problem)):
-            cut = model.cut_lengths
-            taut = build(
-                model.problem,
-                model.mesh,
-                model.dropper_lengths,
-                model.broken,
-                form,
-                cut_lengths=cut,
-            )
-            assert taut.droppers is not None
-            unknowns, weights = taut.droppers.direction
-            lacks = taut.dropper_stiffness * gap
-            load, released = np.zeros(moved.size), 1.0 - taut.simulated.kept_ratio
-            np.add.at(load, unknowns, -released * lacks[:, None] * weights)
-            load[taut.constrained] = 0.0
-            if self._stiff is None:  # of other lines `takes` refuses what follows from it
-                self._stiff = StiffLine(taut)
-            moved = self._stiff.moved(load)
-            stretch = (weights * moved[unknowns]).sum(axis=1)
-            every = np.arange(model.mesh.n_nodes)
-            form = replace(
-                form,
-                height=form.height - moved[model.dofs(every)],
-                slope=form.slope - moved[model.dofs(every, "theta_y")],
-                dropper_force=np.where(gap > 0.0, -lacks, form.dropper_force)
-                - taut.dropper_stiffness * stretch,
-            )
-        links = switching_links(taut, form.dropper_force)
-        self._latest = TautLine(model, taut, form, moved, links)
-        return self._latest
 
     def destroy(self) -> None:
         """Free all PETSc objects."""

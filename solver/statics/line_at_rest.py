@@ -86,7 +86,8 @@ def stable_form(
     InputError
         As ``find_form``, and if the rest is unstable.
     """
-    model, form = find_form(problem, mesh, None if sound is None else sound[:3])
+    own = None if sound is None else (sound.model, sound.form, sound.stiff)
+    model, form = find_form(problem, mesh, own)
     refuse_unstable(model)
     return model, form
 

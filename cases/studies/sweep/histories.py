@@ -186,9 +186,11 @@ def _written(path: Path) -> Iterator[h5py.File]:
         raise unwritten(path, error) from error
 
 
-def merge_histories(path: Path, folders: Mapping[str, Path]) -> str | None:
-    """Join histories of several sweeps in a file; returns why there is none, empty if there is.
-    None if no sweep has histories. Not collective.
+def merge_histories(path: Path, folders: Mapping[str, Path]) -> tuple[list[Path], str]:
+    """Join histories of several sweeps in a file. Not collective.
+
+    Returns the file, if there are some, and why histories are left out, empty if they are not. An
+    earlier file that is none of theirs goes.
 
     Parameters
     ----------
@@ -201,6 +203,8 @@ def merge_histories(path: Path, folders: Mapping[str, Path]) -> str | None:
     RunBroken
         If the disk refuses.
     """
+    if path.parent.resolve() not in map(Path.resolve, folders.values()):
+        path.unlink(missing_ok=True)
     with ExitStack() as stack:
         sources, rows = dict[Path, h5py.File](), dict[Path, dict[str, int]]()
         for folder in dict.fromkeys(folders.values()):
@@ -211,15 +215,15 @@ def merge_histories(path: Path, folders: Mapping[str, Path]) -> str | None:
                 continue
             sources[folder] = source
         if not sources:
-            return None
+            return [], ""
         first = next(iter(sources.values()))
         tables = [name for name in first if name not in _DIMENSIONS]
         for variant, folder in folders.items():
             if variant not in rows.get(folder, ()):
-                return f"histories are left out: {folder} has none of {variant}"
+                return [], f"histories are left out: {folder} has none of {variant}"
         for folder, source in sources.items():
             if [name for name in source if name not in _DIMENSIONS] != tables:
-                return f"histories are left out: those of {folder} have other names"
+                return [], f"histories are left out: those of {folder} have other names"
         at = [(sources[folder], rows[folder][name]) for name, folder in folders.items()]
         varied = {key: _joined(key, at) for key in tables if first[key].ndim == 1}
         names = [name for name in tables if name in HISTORIES]
@@ -230,7 +234,7 @@ def merge_histories(path: Path, folders: Mapping[str, Path]) -> str | None:
                 for name in (_TIME, _POSITION, *names):
                     table = source[name][own]
                     file[name][(row, *(slice(0, size) for size in table.shape))] = table
-    return ""
+    return [path], ""
 
 
 def _joined(key: str, at: Sequence[tuple[h5py.File, int]]) -> Any:
