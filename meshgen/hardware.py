@@ -16,7 +16,7 @@ class DropperKind:
     """Data that all droppers of a group share.
 
     Exactly one of ``stiffness`` [N/m], ``axial_stiffness`` EA [N] and ``curve`` is given; with EA
-    the stiffness of each dropper is EA over its own length, and the points of a curve, strain [-]
+    the stiffness of each dropper is EA over its length, and the points of a curve, strain [-]
     and tension [N] from (0, 0) on, both ascending, are those of its stretch over that length.
     Clamp masses in kg.
     """

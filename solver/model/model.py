@@ -122,8 +122,9 @@ class Model:
     blocks : element blocks; their sums are M and K
     constrained : (n,) int, unknowns held at zero, and numbers that are no node's
     dropper_lengths : (n_droppers,) unstretched [m]
-    cut_lengths : (n_droppers,) those that were wanted, by which droppers weigh [m]: errors of
-        millimetres change a mass by some grams, and lines with other errors have the same matrices
+    cut_lengths : (n_droppers,) those that were wanted, by which droppers weigh and stretch [m]:
+        errors of millimetres change a mass by some grams and a stiffness by a hundredth, and lines
+        with other errors have the same matrices
     dropper_stiffness, dropper_damping : (n_droppers,) [N/m], [N s/m], of the taut dropper, about
         its tension in ``form``
     released_damping : (n_droppers,) the part of ``dropper_damping`` that goes slack with the spring
@@ -199,14 +200,14 @@ class Model:
 
     @cached_property
     def dropper_slopes(self) -> Slopes:
-        """Tension over stretch of the droppers as they are cut, sound ones and broken ones."""
+        """Tension over stretch of the droppers, sound ones and broken ones."""
         groups = [group.kind for group in self.problem.line.droppers]
         found = np.zeros(
             (3, self.mesh.droppers.shape[0], max((k.n_pieces for k in groups), default=1))
         )
         for number, kind in enumerate(groups):
             mine = self.mesh.dropper_group == number
-            own = np.stack(kind.slopes_at(self.dropper_lengths[mine]))
+            own = np.stack(kind.slopes_at(self.cut_lengths[mine]))
             # The last piece again, for those that have fewer.
             found[:, mine] = np.pad(
                 own, ((0, 0), (0, 0), (0, found.shape[2] - own.shape[2])), "edge"
