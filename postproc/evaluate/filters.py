@@ -8,7 +8,7 @@ gain is 1/2 (-6 dB), at frequency f of a low-pass 1 / (1 + (tan(pi f dt)/tan(pi 
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from scipy import signal
@@ -128,14 +128,21 @@ def power_kept(cut_off: float, dt: float | None) -> tuple[np.ndarray, np.ndarray
     return frequency, 1.0 / (1.0 + ratio ** (2 * ORDER)) ** 2
 
 
+class _Sections(NamedTuple):
+    """Second-order sections of a filter, and their state under a constant unit input."""
+
+    sos: np.ndarray
+    at_rest: np.ndarray
+
+
 @lru_cache(maxsize=64)
-def _sections(kind: str, edges: tuple[float, ...], dt: float) -> np.ndarray:
-    """Second-order sections of a filter, which a sweep asks for again and again."""
-    found = signal.butter(ORDER, np.squeeze(edges), btype=kind, fs=1.0 / dt, output="sos")
-    return np.asarray(found)
+def _sections(kind: str, edges: tuple[float, ...], dt: float) -> _Sections:
+    """A filter, which a sweep asks for again and again."""
+    sos = signal.butter(ORDER, np.squeeze(edges), btype=kind, fs=1.0 / dt, output="sos")
+    return _Sections(np.asarray(sos), signal.sosfilt_zi(sos))
 
 
-def _both_ways(sos: np.ndarray, values: np.ndarray, dt: float, slowest: float) -> np.ndarray:
+def _both_ways(one: _Sections, values: np.ndarray, dt: float, slowest: float) -> np.ndarray:
     """Like ``scipy.signal.sosfiltfilt`` along the first axis, to the last bit.
 
     It takes the memory of one more record, not of five: a record is filtered in place, in blocks,
@@ -152,14 +159,14 @@ def _both_ways(sos: np.ndarray, values: np.ndarray, dt: float, slowest: float) -
     if padding:
         extended[:padding] = 2.0 * values[:1] - values[padding:0:-1]
         extended[padding + n :] = 2.0 * values[-1:] - values[-2 : -padding - 2 : -1]
-    _in_place(sos, extended)
-    _in_place(sos, extended[::-1])
+    _in_place(one, extended)
+    _in_place(one, extended[::-1])
     return extended[padding : padding + n]
 
 
-def _in_place(sos: np.ndarray, record: np.ndarray) -> None:
+def _in_place(one: _Sections, record: np.ndarray) -> None:
     """Filter a record along its first axis, from the steady state of its first value on."""
-    at_rest = signal.sosfilt_zi(sos)
+    sos, at_rest = one
     state = at_rest.reshape(*at_rest.shape, *[1] * (record.ndim - 1)) * record[:1]
     for start in range(0, record.shape[0], _BLOCK):
         block = record[start : start + _BLOCK]

@@ -149,18 +149,20 @@ def python(*words: str) -> list[str]:
     return [sys.executable, "-W", "error", *words]
 
 
-def catenary(*words: str, cwd: Path, ranks: int = 1, pictures: bool = False) -> Done:
+def catenary(
+    *words: str, cwd: Path, ranks: int = 1, pictures: bool = False, limit: float | None = None
+) -> Done:
     """Run the command line to its end; on one rank forked from ``forking_server.py``.
 
-    Pictures are painted only if they are looked at.
+    Pictures are painted only if they are looked at. ``limit`` [s] is for what takes long.
     """
     if ranks == 1:
         mark = uuid.uuid4().hex
         environment = {**os.environ, **RANKS_ENVIRONMENT, _MARK: mark}
-        return _ended(*forks().run(list(words), cwd, environment, LIMIT, pictures), mark)
+        return _ended(*forks().run(list(words), cwd, environment, limit or LIMIT, pictures), mark)
     entry = _ENTRY if pictures else _UNPAINTED
     with started(python("-c", entry, *words), cwd, ranks) as program:
-        return program.end()
+        return program.end(limit)
 
 
 @contextmanager

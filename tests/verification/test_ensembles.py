@@ -117,21 +117,23 @@ def test_lanes_are_filled_again_with_trains_of_other_lengths() -> None:
         )
 
 
-def test_lines_with_other_errors_of_dropper_lengths_share_matrices() -> None:
+@pytest.mark.parametrize("case", ["en50318_2002", "ambrosio2012"])
+def test_lines_with_other_errors_of_dropper_lengths_share_matrices(
+    case: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of droppers with a stiffness of their own, and with EA over their length."""
     key = "irregularities.dropper_lengths"
+    monkeypatch.setattr(scenes_on_lines, "_alone", None)
     changes = [
         {f"{key}.standard_deviation_mm": 2.0, f"{key}.seed": seed, "train.speed_km_h": 240.0 + seed}
         for seed in range(1, 6)
     ]
-    found, together = marched(scenes_of("en50318_2002", changes))
+    found, together = marched(scenes_of(case, changes))
     assert together
     deviations = [one.summary["pantographs"][0]["std_N"] for one in found]
     assert len(set(deviations)) == len(changes)
     for number in (0, 4):
-        assert (
-            differences(plain(found[number].summary), own_run("en50318_2002", changes[number]))
-            == []
-        )
+        assert differences(plain(found[number].summary), own_run(case, changes[number])) == []
 
 
 def test_lines_with_other_slack_droppers_at_rest_share_lanes(
