@@ -36,7 +36,7 @@ def write_record(path: Path, content: Mapping[str, Any]) -> None:
     RunBroken
         If the disk refuses.
     """
-    text = json.dumps({**content, _SUM: _sum(content)}, indent=1)
+    text = json.dumps({**content, _SUM: _sum(content)})
     write_all(path.parent, {path.name: text + "\n"})
 
 

@@ -34,20 +34,21 @@ _END_AT, _VERSIONS = 28, (2, 3)
 def plain(value: Any) -> Any:
     """``value`` in types of JSON: NumPy types converted, NaN and infinity as None, zero without a
     sign."""
+    # What tables hold most comes first.
+    if value is None or isinstance(value, (str, int)):
+        return value
+    if isinstance(value, float):
+        return float(value) + 0.0 if math.isfinite(value) else None
     if isinstance(value, Mapping):
         return {str(key): plain(item) for key, item in value.items()}
-    if isinstance(value, (set, frozenset)):
-        return [plain(item) for item in sorted(value)]
     if isinstance(value, (list, tuple)):
         return [plain(item) for item in value]
+    if isinstance(value, (set, frozenset)):
+        return [plain(item) for item in sorted(value)]
     if isinstance(value, np.ndarray):
         return plain(value.tolist())
     if isinstance(value, np.generic):
         return plain(value.item())
-    if isinstance(value, float):
-        return value + 0.0 if math.isfinite(value) else None
-    if value is None or isinstance(value, (str, bool, int, float)):
-        return value
     return str(value)
 
 
