@@ -10,7 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy import signal, sparse
+from force_history import ForceHistory
+from scipy import sparse
 from scipy.sparse import linalg as sparse_linalg
 
 GRAVITY = 9.81
@@ -64,30 +65,6 @@ class Data:
     alpha: float = 1e-4
     beta: float = 0.0125
     stitch: Stitch | None = None
-
-
-@dataclass
-class Found:
-    """Time step [s], places and forces (n, pantographs) [m], [N], and largest uplift at arms of the
-    stretch [m]."""
-
-    dt: float
-    place: np.ndarray
-    force: np.ndarray
-    uplift: float
-
-    def statistics(self, stretch: tuple[float, float], p: int = 0) -> dict[str, float]:
-        """Mean, deviation, maximum and minimum of a force below 20 Hz [N]."""
-        filtered = self.filtered[:, p]
-        place = self.place[:, p]
-        own = filtered[(place >= stretch[0]) & (place <= stretch[1])]
-        return {"mean_N": own.mean(), "std_N": own.std(), "max_N": own.max(), "min_N": own.min()}
-
-    @property
-    def filtered(self) -> np.ndarray:
-        """Forces after the low-pass of EN 50317, forward and backward."""
-        sections = signal.butter(6, 20.0, fs=1.0 / self.dt, output="sos")
-        return signal.sosfiltfilt(sections, self.force, axis=0, padlen=int(0.3 / self.dt))
 
 
 @dataclass
@@ -229,7 +206,7 @@ class DifferenceLine:
         )
         return self.at[0, first : first + 4], numbers
 
-    def run(self, dt: float, ahead: float = 0.5) -> Found:
+    def run(self, dt: float, ahead: float = 0.5) -> ForceHistory:
         """The train's way until its last pantograph leaves the stretch.
 
         Velocities of the line, which stand half a step back, are extrapolated by ``ahead`` steps:
@@ -302,7 +279,7 @@ class DifferenceLine:
             z = z + dt * vz
             if step % 10 == 0:
                 np.maximum(highest, every[0][arms], out=highest)
-        return Found(dt, place, force, float(highest.max()))
+        return ForceHistory(dt, place, force, float(highest.max()))
 
     def _points_up_to(self, x: float) -> int:
         """How many points there are up to a place."""

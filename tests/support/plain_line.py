@@ -1,9 +1,9 @@
-"""A vertical line under one pantograph of lumped masses, computed by a second program.
+"""A vertical line under pantographs of lumped masses, computed by a second program.
 
 Written from the equations with NumPy and SciPy: elements by Gauss quadrature, form finding with the
 droppers' forces as multipliers, average acceleration on all unknowns with banded factors, and slack
-droppers and contacts by switching until all signs fit. Of the package it takes inputs only: places
-of nodes, data of wires and hardware, wanted heights.
+droppers and contacts by switching until all signs fit. Of the package it takes inputs only: data of
+wires and hardware, wanted heights, a mesh, which may be one of ``plain_mesh.py``.
 """
 
 from __future__ import annotations
@@ -11,7 +11,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
+from force_history import ForceHistory
 from scipy import linalg, sparse
+from scipy.linalg import lapack
 from scipy.sparse import linalg as sparse_linalg
 
 from catenary.mbs.lumped_data import LumpedData
@@ -23,6 +25,11 @@ from catenary.solver.problem.problem import Problem
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(6)
 _AT, _SHARE = 0.5 * (1.0 + _POINTS), 0.5 * _WEIGHTS
 _MOST_SWITCHES = 200
+# Share of the largest one from which on numbers of an answer are left out.
+_NOTHING = 1e-14
+# The line ahead of the waves does not move: beyond what is left of them there [m], which is looked
+# at every so many steps over so long a way [m].
+_AT_REST, _LOOK_EVERY, _WAY = 1e-13, 5, 20.0
 
 
 def cubics(s: np.ndarray, h: np.ndarray) -> np.ndarray:
@@ -33,14 +40,10 @@ def cubics(s: np.ndarray, h: np.ndarray) -> np.ndarray:
 
 
 @dataclass
-class History:
-    """What a run gives: place [m], force [N] and wire height [m] at each step, and the largest
-    uplift of each steady arm in the evaluated stretch [m]."""
+class History(ForceHistory):
+    """What a run gives; ``height`` is that of the wire at each step, (n, pantographs) [m]."""
 
-    place: np.ndarray
-    force: np.ndarray
     height: np.ndarray
-    uplift: float
 
 
 @dataclass
@@ -57,7 +60,7 @@ class PlainLine:
         self.size = 2 * mesh.n_nodes
         self.row = np.empty(mesh.n_nodes, dtype=int)
         self.row[np.lexsort((np.arange(mesh.n_nodes), mesh.points[:, 0]))] = np.arange(mesh.n_nodes)
-        self.w = 2 * self.row
+        self.w, self.sorted_x = 2 * self.row, np.sort(mesh.points[:, 0])
         self.mass, self.wires, self.wire_weight = self._wires()
         upper, lower = self.w[mesh.droppers].T
         n, each = len(mesh.droppers), np.arange(len(mesh.droppers))
@@ -220,6 +223,11 @@ class PlainLine:
         keep = self.number[own] >= 0
         return self.number[own[keep]], values[keep], rest
 
+    def _unknowns_up_to(self, x: float) -> int:
+        """How many free unknowns there are up to a place [m]."""
+        last = np.searchsorted(self.sorted_x, x, side="right")
+        return int(np.searchsorted(self.free, 2 * last))
+
     def elasticity(self, start: float, end: float) -> tuple[np.ndarray, np.ndarray]:
         """Places of nodes between two masts (n,) [m], and the lift there under a unit force that
         the contact wires share [m/N]."""
@@ -245,81 +253,183 @@ class PlainLine:
     def run(self, nominal_height: float) -> History:
         """The train's way to its end, by average acceleration."""
         problem, dt = self.problem, self.problem.numerics.dt
-        train, alpha = problem.train, problem.damping.alpha
-        damping = alpha * self.stiffness + problem.damping.beta * self.inertia
-        factor = self._banded(self.inertia + dt / 2 * damping + dt**2 / 4 * self.stiffness)
+        train, alpha, beta = problem.train, problem.damping.alpha, problem.damping.beta
+        # A = M + dt/2 C + dt^2/4 K = mu M + kappa K.
+        mu, kappa = 1.0 + dt / 2 * beta, dt**2 / 4 + dt / 2 * alpha
+        answers = _Answers(self._banded(mu * self.inertia + kappa * self.stiffness)[0], self.pulls)
         wires = [wire.name for wire in problem.line.wires_of(Role.CONTACT)]
         law = problem.contact.stiffness  # type: ignore[union-attr]
-        head = _Chain(train.placements[0].data, train.placements[0].static_force, dt)  # type: ignore[arg-type]
-        head.begin(np.mean([self.at(wire, train.start)[2] for wire in wires]), nominal_height)
-        d, v, a = np.zeros((3, self.free.size))
-        answers: dict[int, np.ndarray] = {}
-        touching, slack = np.zeros(len(wires), dtype=bool), np.zeros(len(self.spring), dtype=bool)
-        worth = self.spring * (dt**2 / 4 + alpha * dt / 2)
+        behind = np.array([own.behind for own in train.placements])
+        heads = [_Chain(own.data, own.static_force, dt) for own in train.placements]  # type: ignore[arg-type]
+        for head, start in zip(heads, train.start - behind, strict=True):
+            head.begin(np.mean([self.at(wire, start)[2] for wire in wires]), nominal_height)
+        # Contacts, head by head, and which of them are of one head.
+        n = len(heads) * len(wires)
+        of = np.repeat(np.arange(len(heads)), len(wires))
+        # Displacement, velocity and acceleration of the first m unknowns; the others are at rest.
+        state, m, front = np.zeros((3, self.free.size)), 0, train.start
+        d, v, a = state[:, :m]
+        worth = self.spring * kappa
+        one_sided = _OneSided(law, worth, n, dt, answers)
         arms = self.mesh.steady_arms
         x = self.mesh.points[arms, 0]
         arms = arms[(x >= problem.evaluation[0]) & (x <= problem.evaluation[1])]
         arm_numbers, uplift = self.number[self.w[arms]], 0.0
         n_steps = int((train.end - train.start) / train.speed / dt + 1e-9)
-        record = np.zeros((n_steps, 3))
+        record = np.zeros((3, n_steps, len(heads)))
         for step in range(n_steps):
             time = (step + 1) * dt
-            place = train.start + train.speed * time
-            d, v = d + dt * v + dt**2 / 4 * a, v + dt / 2 * a
-            free = linalg.cho_solve_banded(factor, -(damping @ v) - self.stiffness @ d)
-            contacts = [self.at(wire, place) for wire in wires]
-            moves = []
-            for own, values, _ in contacts:
-                load = np.zeros(self.free.size)
-                load[own] = values
-                moves.append(linalg.cho_solve_banded(factor, load))
-            height = [r + values @ (d + dt**2 / 4 * free)[own] for own, values, r in contacts]
-            z, give = head.predict(time, train.raise_time)
-            tension = self.tension + self.spring * (self.pulls @ d)
-            tension += alpha * self.spring * (self.pulls @ v) + worth * (self.pulls @ free)
-            depth = z - np.array(height)
-            for turn in range(_MOST_SWITCHES):
-                on, loose = np.flatnonzero(touching), np.flatnonzero(slack)
-                for number in loose:
-                    if number not in answers:
-                        pull = self.pulls[number].toarray()[0]
-                        answers[number] = linalg.cho_solve_banded(factor, pull)
-                columns = [moves[k] for k in on] + [answers[k] for k in loose]
-                k = on.size
-                if columns:
-                    at = np.array(columns).T
-                    by_depth = np.array([-(dt**2 / 4) * (values @ at[own])
-                                         for own, values, _ in contacts])  # fmt: skip
-                    by_depth[:, :k] -= give
-                    by_tension = worth[:, None] * (self.pulls @ at)
-                    # f = law depth of contacts that touch, q = tension of droppers that are slack.
-                    small = np.eye(len(columns))
-                    small[:k] -= law * by_depth[on]
-                    small[k:] -= by_tension[loose]
-                    forces = np.linalg.solve(small, np.append(law * depth[on], tension[loose]))
-                    new_depth, new_tension = (
-                        depth + by_depth @ forces,
-                        tension + by_tension @ forces,
-                    )
-                else:
-                    forces, new_depth, new_tension = np.zeros(0), depth, tension
-                wrong = np.append((new_depth > 0) != touching, (new_tension < 0) != slack)
-                if not wrong.any():
-                    break
-                # All at first; should that go round, one at a time.
-                switched = np.flatnonzero(wrong) if turn < 20 else np.flatnonzero(wrong)[:1]
-                touching[switched[switched < touching.size]] ^= True
-                slack[switched[switched >= touching.size] - touching.size] ^= True
-            else:
-                raise RuntimeError(f"signs do not fit at {time} s")
-            a = free + (at @ forces if columns else 0.0)
-            d, v = d + dt**2 / 4 * a, v + dt / 2 * a
-            force = float(forces[:k].sum())
-            head.follow(force)
-            own, values, rest = contacts[0]
-            record[step] = place, force, rest + values @ d[own]
-            uplift = max(uplift, float(d[arm_numbers].max()))
-        return History(*record.T, uplift)
+            places = train.start + train.speed * time - behind
+            if step % _LOOK_EVERY == 0 and m < self.free.size:
+                near = self._unknowns_up_to(front - _WAY)
+                if not m or np.abs(d[near:]).max() > _AT_REST:
+                    front += 3.0 * _WAY
+                    state[2, :m], m = a, self._unknowns_up_to(front)
+                    d, v, a = state[:, :m]
+                    inertia = self.inertia[:m, :m]
+            # Before the step's own acceleration.
+            d += dt * v
+            d += dt**2 / 4 * a
+            v += dt / 2 * a
+            # a = -A^-1 (K moved + beta M v), where K is (A - mu M) / kappa.
+            moved = (d + alpha * v) / kappa
+            free = answers.whole(inertia @ (mu * moved - beta * v))
+            tension = self.tension + worth * answers.stretch(free)
+            free -= moved
+            contacts = [self.at(wire, place) for place in places for wire in wires]
+            columns = [answers.under(own, values) for own, values, _ in contacts]
+            height = [r + values @ (d[own] + dt**2 / 4 * free[own]) for own, values, r in contacts]
+            lifts = np.array([head.predict(time, train.raise_time) for head in heads])
+            give = lifts[of, 1] * (of[:, None] == of)
+            depth = lifts[of, 0] - height
+            found = one_sided.forces(depth, tension, contacts, columns, give)
+            a, felt = free, np.zeros(len(heads))
+            for number, column, force in found:
+                there = a[column.first :][: column.values.size]
+                there += force * column.values[: there.size]
+                if number < n:
+                    felt[of[number]] += force
+            d += dt**2 / 4 * a
+            v += dt / 2 * a
+            for head, force in zip(heads, felt, strict=True):
+                head.follow(force)
+            lines = contacts[:: len(wires)]
+            record[:, step] = places, felt, [rest + values @ d[own] for own, values, rest in lines]
+            uplift = max(uplift, float(_within(0, d, arm_numbers).max()))
+        place, force, height = record
+        return History(dt, place, force, uplift, height)
+
+
+@dataclass
+class _Column:
+    """The part of A^-1 b that is not zero, from an unknown on, and how it stretches droppers."""
+
+    first: int
+    values: np.ndarray
+    stretch: np.ndarray
+
+    def at(self, numbers: np.ndarray) -> np.ndarray:
+        """Its values of unknowns."""
+        return _within(self.first, self.values, numbers)
+
+
+def _within(first: int, values: np.ndarray, numbers: np.ndarray) -> np.ndarray:
+    there = (numbers >= first) & (numbers < first + values.size)
+    return np.where(there, values[np.where(there, numbers - first, 0)], 0.0)
+
+
+class _Answers:
+    """Solutions by Cholesky factors in bands, of loads on few unknowns where they matter."""
+
+    def __init__(self, factor: np.ndarray, pulls: sparse.csr_matrix) -> None:
+        self.factor = np.asfortranarray(factor)
+        self.pulls, self.reach = pulls, 400
+        pulls.sort_indices()
+        self.size = factor.shape[1]
+        # Unknowns of each dropper, and their weights; -1 and zero where one end is held.
+        self.ends, self.signs = np.full((2, pulls.shape[0]), -1), np.zeros((2, pulls.shape[0]))
+        for side in (0, 1):
+            there = np.diff(pulls.indptr) > side
+            self.ends[side, there] = pulls.indices[pulls.indptr[:-1][there] + side]
+            self.signs[side, there] = pulls.data[pulls.indptr[:-1][there] + side]
+        self.of_droppers: dict[int, _Column] = {}
+
+    def whole(self, load: np.ndarray) -> np.ndarray:
+        """A^-1 load, of all unknowns up to one around which nothing moves."""
+        return lapack.dpbtrs(self.factor[:, : load.size], load, lower=1, overwrite_b=True)[0]
+
+    def stretch(self, values: np.ndarray, first: int = 0) -> np.ndarray:
+        """How unknowns from a first one on stretch each dropper."""
+        return np.sum(self.signs * _within(first, values, self.ends), axis=0)
+
+    def of_dropper(self, number: int) -> _Column:
+        """The answer to a unit force in a dropper."""
+        if number not in self.of_droppers:
+            there = self.ends[:, number] >= 0
+            own = self.under(self.ends[there, number], self.signs[there, number])
+            self.of_droppers[number] = own
+        return self.of_droppers[number]
+
+    def under(self, numbers: np.ndarray, load: np.ndarray) -> _Column:
+        """The answer to a load on unknowns that are near each other. It fades within metres:
+        unknowns around them are enough if at their ends nothing is left."""
+        while True:
+            first = max(int(numbers.min()) - self.reach, 0)
+            last = min(int(numbers.max()) + self.reach, self.size)
+            values = np.zeros(last - first)
+            values[numbers - first] = load
+            values = lapack.dpbtrs(self.factor[:, first:last], values, lower=1, overwrite_b=True)[0]
+            near = 30
+            ends = values[:near] if first else 0.0, values[-near:] if last < self.size else 0.0
+            if max(np.abs(end).max() for end in ends) <= _NOTHING * np.abs(values).max():
+                return _Column(first, values, self.stretch(values, first))
+            self.reach *= 2
+
+
+class _OneSided:
+    """Forces of contacts that touch and of droppers that are slack, which counter their tension."""
+
+    def __init__(self, law: float, worth: np.ndarray, n: int, dt: float, answers: _Answers) -> None:
+        self.law, self.worth, self.n, self.dt, self.answers = law, worth, n, dt, answers
+        # Contacts, then droppers: what is positive for those that touch, negative for slack ones.
+        self.active = np.zeros(n + worth.size, dtype=bool)
+        self.signs = np.repeat([1.0, -1.0], [n, worth.size])
+
+    def forces(
+        self,
+        depth: np.ndarray,
+        tension: np.ndarray,
+        contacts: list[tuple[np.ndarray, np.ndarray, float]],
+        columns: list[_Column],
+        give: np.ndarray,
+    ) -> list[tuple[int, _Column, float]]:
+        """Number, answer of the line and force of each.
+
+        Parameters
+        ----------
+        depth, tension : of contacts and droppers without any of these forces [m], [N]
+        contacts, columns : places on the line, and what a unit force there does to it
+        give : by how much a unit force on each contact lowers the head at each other (n, n) [m/N]
+        """
+        # f = law depth of contacts that touch, q = tension of droppers that are slack.
+        alone = np.append(self.law * depth, tension)
+        effects: dict[int, tuple[_Column, np.ndarray]] = {}
+        for turn in range(_MOST_SWITCHES):
+            on = np.flatnonzero(self.active)
+            for k in on:
+                if k not in effects:
+                    column = columns[k] if k < self.n else self.answers.of_dropper(k - self.n)
+                    less = [self.dt**2 / 4 * values @ column.at(own) for own, values, _ in contacts]
+                    lost = np.array(less) + (give[:, k] if k < self.n else 0.0)
+                    effects[k] = column, np.append(-self.law * lost, self.worth * column.stretch)
+            by = np.array([effects[k][1] for k in on]).reshape(on.size, alone.size).T
+            forces = np.linalg.solve(np.eye(on.size) - by[on], alone[on])
+            wrong = np.flatnonzero((self.signs * (alone + by @ forces) > 0) != self.active)
+            if not wrong.size:
+                return [(k, effects[k][0], f) for k, f in zip(on, forces, strict=True)]
+            # All at first; should that go round, one at a time.
+            self.active[wrong if turn < 20 else wrong[:1]] ^= True
+        raise RuntimeError("signs do not fit")
 
 
 class _Chain:

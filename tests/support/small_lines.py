@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from plain_mesh import mesh_on
 
 from catenary.mbs.lumped_data import LumpedData
 from catenary.meshgen.geometry import find_cuts
@@ -109,63 +110,9 @@ def ac_simple_line(n_spans: int) -> LineData:
 def mesh_of(line: LineData | Line, elements_per_gap: int) -> LineMesh:
     """Equal elements between neighbouring cuts, on all wires; heights without pre-sag and sag."""
     line = make_line(line) if isinstance(line, LineData) else line
-    cuts = find_cuts(line)
-    share = np.arange(elements_per_gap) / elements_per_gap
-    gaps = cuts.x[:-1, None] + np.diff(cuts.x)[:, None] * share
-    x = np.append(gaps.ravel(), cuts.x[-1])
-    points, anchors, n_nodes = [], [], 0
-    wires: dict[str, np.ndarray] = {}
-    breaks: dict[str, np.ndarray] = {}
-    node_at = {wire.name: np.full(x.size, -1) for wire in line.wires}
-    for piece in cuts.pieces:
-        wire, first = line.wire(piece.wire), piece.first * elements_per_gap
-        place = np.arange(first, first + (len(piece.points) - 1) * elements_per_gap + 1)
-        nodes = n_nodes + np.arange(place.size)
-        n_nodes += place.size
-        level = wire.profile.level(x[place]) if wire.profile else np.full(place.size, wire.top)
-        points.append(np.column_stack([x[place], np.zeros(place.size), level]))
-        anchors += [nodes[end] for end, held in zip((0, -1), piece.ends, strict=True) if held]
-        node_at[piece.wire][place] = nodes
-        if piece.wire in wires:
-            begun = breaks.get(piece.wire, np.zeros(0, dtype=np.int64))
-            breaks[piece.wire] = np.append(begun, wires[piece.wire].size)
-        wires[piece.wire] = np.append(wires.get(piece.wire, nodes[:0]), nodes)
-
-    def at(wire: str, places: tuple[float, ...]) -> np.ndarray:
-        return node_at[wire][np.searchsorted(x, np.array(places) - 1e-6)]
-
-    def together(members: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-        nodes = np.concatenate([members[0][:0], *members])
-        group = np.repeat(np.arange(len(members)), [len(own) for own in members])
-        order = np.argsort(whole[nodes.T[-1] if nodes.ndim == 2 else nodes, 0], kind="stable")
-        return nodes[order], group[order]
-
-    whole = np.concatenate(points)
-    droppers, dropper_group = together(
-        [
-            np.column_stack([at(group.upper, group.upper_x), at(group.lower, group.lower_x)])
-            for group in line.droppers
-        ]
-    )
-    clamps = [
-        np.column_stack([at(group.upper, group.x), at(group.lower, group.x)])
-        for group in line.clamps
-    ]
-    arms, arm_group = together([at(group.wire, group.x) for group in line.steady_arms])
-    supports, support_group = together([at(group.wire, group.x) for group in line.supports])
-    return LineMesh(
-        points=whole,
-        wires=wires,
-        droppers=droppers,
-        steady_arms=arms,
-        supports=supports,
-        anchors=np.array(anchors),
-        dropper_group=dropper_group,
-        arm_group=arm_group,
-        support_group=support_group,
-        breaks=breaks,
-        clamps=np.concatenate([np.zeros((0, 2), dtype=int), *clamps]),
-    )
+    cuts, share = find_cuts(line).x, np.arange(elements_per_gap) / elements_per_gap
+    gaps = cuts[:-1, None] + np.diff(cuts)[:, None] * share
+    return mesh_on(line, np.append(gaps.ravel(), cuts[-1]))
 
 
 def numerics(dt: float, scheme: str = "one_solve", **changes: float) -> Numerics:

@@ -1,12 +1,15 @@
-"""The reference solutions beside a plain program: explicit finite differences, nothing of ours.
+"""The reference solutions beside two plain programs.
 
-``difference_line.py`` shares no code, no discretisation, no time scheme and no treatment of contact
-and slack droppers with the package; its data stand here as numbers. Its errors fall with h^2 and
-dt^2, so that two grids of which one is twice as fine in both extrapolate by Richardson.
+``difference_line.py``, explicit finite differences, shares no code, no discretisation, no time
+scheme and no treatment of contact and slack droppers with the package; its data stand here as
+numbers. ``plain_line.py``, finite elements and average acceleration, takes the data of the scene
+and reaches what explicit steps do not. Their errors fall with h^2 and dt^2 or faster, so that two
+grids of which one is twice as fine in both extrapolate by Richardson.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,16 +17,22 @@ import numpy as np
 import pandas as pd
 import pytest
 from difference_line import Data, DifferenceLine, Stitch
+from force_history import ForceHistory
 from measuring import check, march
+from plain_line import PlainLine
+from plain_mesh import graded, mesh_on
 from small_lines import WHOLE, ac_simple_line, mesh_of, numerics, problem_of, train
 from verb_runner import CliRunner
 
 from catenary.cases.cli.main import app
-from catenary.cases.studies.reference.solutions import DATA, read
+from catenary.cases.scene.problem import problem_of as scene_problem
+from catenary.cases.studies.reference.convergence import rms
+from catenary.cases.studies.reference.solutions import DATA, Solution, read
 from catenary.mbs.lumped_data import LumpedData
 from catenary.meshgen.topologies.line_data import ClampedWire
 from catenary.meshgen.wires import Conductor
 from catenary.postproc.evaluate.filters import low_pass
+from catenary.solver.statics.elasticity import middle_span
 
 # Masses, springs and dampers of the pantograph of both lines, head first.
 _MASSES, _SPRINGS, _DAMPERS = (7.5, 9.0, 6.0), (7000.0, 15500.0, 160.0), (45.0, 0.1, 100.0)
@@ -99,14 +108,19 @@ def data_of(name: str) -> Data:
     return replace(own, starts=(start + 200.0, start)) if train == "two" else own
 
 
-# Configurations that two grids reach in an hour of a processor.
-CHECKED = (
+# Configurations that two grids of differences reach in an hour of a processor, and those that two
+# meshes of finite elements do.
+BY_DIFFERENCES = (
     "ac_simple_275_one",
     "ac_simple_320_one",
     "ac_simple_320_two",
     "dc_simple_200_one",
     "dc_simple_250_one",
 )
+BY_ELEMENTS = ("ac_stitched_320_two",)
+# Elements beside hardware [m], ratio of neighbours, longest elements [m] of the coarser mesh, and
+# its time step [s]; the finer one has all of them halved.
+_GRADED, _STEP = (0.06, 2.0, 0.3), 5e-4
 
 
 def grids_of(data: Data) -> tuple[tuple[float, float, float], ...]:
@@ -127,15 +141,13 @@ def extrapolated(coarse: float, fine: float) -> tuple[float, float]:
     return fine + correction, abs(correction)
 
 
-@pytest.mark.study
-@pytest.mark.long
-@pytest.mark.timeout(3600)
-@pytest.mark.parametrize("name", CHECKED)
-def test_plain_finite_differences_reach_a_reference_solution(name: str) -> None:
-    data, solution = data_of(name), read(name)
-    runs = [DifferenceLine(data, h).run(dt, ahead) for h, dt, ahead in grids_of(data)]
+def check_figures(
+    solution: Solution, runs: Sequence[ForceHistory], every: float | None = None
+) -> None:
+    """Compare what two runs extrapolate to with a solution's figures, from samples ``every`` so
+    many metres, or at each step."""
     for number, place in enumerate(solution.forces):
-        coarse, fine = (run.statistics(data.stretch, number) for run in runs)
+        coarse, fine = (run.statistics(solution.stretch, number, every) for run in runs)
         for quantity in coarse:
             value, correction = extrapolated(coarse[quantity], fine[quantity])
             reference, bar = solution.figures[place, quantity]
@@ -144,6 +156,39 @@ def test_plain_finite_differences_reach_a_reference_solution(name: str) -> None:
     value, correction = extrapolated(runs[0].uplift, runs[1].uplift)
     reference, bar = solution.figures["line", "max_uplift_mm"]
     check("uplift [mm]", 1e3 * value, reference, within=bar + 1e3 * correction)
+
+
+@pytest.mark.study
+@pytest.mark.long
+@pytest.mark.timeout(3600)
+@pytest.mark.parametrize("name", BY_DIFFERENCES)
+def test_plain_finite_differences_reach_a_reference_solution(name: str) -> None:
+    data = data_of(name)
+    runs = [DifferenceLine(data, h).run(dt, ahead) for h, dt, ahead in grids_of(data)]
+    check_figures(read(name), runs)
+
+
+@pytest.mark.study
+@pytest.mark.long
+@pytest.mark.timeout(3600)
+@pytest.mark.parametrize("name", BY_ELEMENTS)
+def test_plain_finite_elements_reach_a_reference_solution(name: str) -> None:
+    """Figures, and forces along the stretch."""
+    solution = read(name)
+    problem = scene_problem(solution.configuration.scene())
+    runs = []
+    for halvings in (0, 1):
+        halved = replace(problem, numerics=replace(problem.numerics, dt=_STEP / 2**halvings))
+        line = PlainLine(halved, mesh_on(problem.line, graded(problem.line, *_GRADED, halvings)))
+        runs.append(line.run(line.nominal_height(*middle_span(problem.line))))
+    # Where the stretch is cut between two steps weighs more in a mean than its error bar.
+    check_figures(solution, runs, 1e-3 * solution.configuration.steps[0] * problem.train.speed)
+    for number, (place, force) in enumerate(solution.forces.items()):
+        coarse, fine = (run.at(solution.place, number) for run in runs)
+        apart, correction = force - extrapolated(coarse, fine)[0], (fine - coarse) / 3.0
+        _, bar = solution.figures[place, "force_history_N"]
+        within = bar + rms(correction)
+        check(f"{place} force, rms difference [N]", rms(apart), 0.0, within=within)
 
 
 # Bent within 9 cm too, which grids of 0.25 and 0.125 m carry.

@@ -7,19 +7,24 @@ case's mesh and with its time step: `python -m pytest -m study -s` of this file 
 from __future__ import annotations
 
 import csv
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from measuring import check, march
 from plain_line import History, PlainLine
+from plain_mesh import graded, mesh_on
 from small_lines import WHOLE, ac_simple_line, en50318_line, mesh_of, problem_of, train
 
 from catenary.cases.run.scene_mesh import mesh_of as mesh_of_scene
 from catenary.cases.scene.input.case_files import shipped
 from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.problem import problem_of as problem_of_scene
-from catenary.meshgen.mesh import CONTACT_WIRE
-from catenary.meshgen.topologies.line_data import LineData
+from catenary.meshgen.line import Line
+from catenary.meshgen.mesh import CONTACT_WIRE, LineMesh
+from catenary.meshgen.topologies.all_topologies import make_line
+from catenary.meshgen.topologies.line_data import ClampedWire, LineData
+from catenary.meshgen.wires import Conductor
 from catenary.postproc.evaluate.statistics import contact_statistics
 from catenary.solver.statics.elasticity import middle_span
 
@@ -34,25 +39,45 @@ CASES = {
 }
 
 
-@pytest.mark.parametrize("line", [en50318_line(4), ac_simple_line(4)], ids=["en50318", "ac_simple"])
-def test_a_run_is_that_of_a_second_program(line: LineData) -> None:
-    """Static tensions and the contact force at each step, through slack droppers and losses."""
+def _pair_under_stitch_wires() -> tuple[Line, LineMesh, tuple[float, ...]]:
+    stitch = ClampedWire(Conductor(3500.0, 0.31, 1.6), 18.0, 0.38, 1e7)
+    line = make_line(replace(ac_simple_line(4), topology="stitched", stitch_wire=stitch))
+    return line, mesh_on(line, graded(line, 0.2, 1.6, 1.5)), (0.0, 40.0)
+
+
+def _one(data: LineData) -> tuple[Line, LineMesh, tuple[float, ...]]:
+    line = make_line(data)
+    return line, mesh_of(line, 4), (0.0,)
+
+
+RUNS = {
+    "en50318": lambda: _one(en50318_line(4)),
+    "ac_simple": lambda: _one(ac_simple_line(4)),
+    "pair": _pair_under_stitch_wires,
+}
+
+
+@pytest.mark.parametrize("run", RUNS)
+def test_a_run_is_that_of_a_second_program(run: str) -> None:
+    """Static tensions and contact forces at each step, through slack droppers and losses."""
+    line, mesh, behind = RUNS[run]()
     length = line.span_lengths[0]
-    course = train(83.0, length, 3 * length, static_force=150.0, nominal_height=5.1)
+    course = train(
+        83.0, length + behind[-1], 3 * length, static_force=150.0, behind=behind, nominal_height=5.1
+    )
     problem = problem_of(line, WHOLE, train=course, evaluation=(length, 3 * length))
-    mesh = mesh_of(line, 4)
     history, plain = march(problem, mesh), PlainLine(problem, mesh)
     tension = history["dropper_force"][0]
     # Both find lengths to 1e-10 m, which is worth 24 EI / h^3 + 2 T / h at a node of either wire.
-    wire, h = line.contact_wire, np.diff(mesh.x(mesh.wires[CONTACT_WIRE])).min()
+    wire, h = line.wire(CONTACT_WIRE), np.diff(mesh.x(mesh.wires[CONTACT_WIRE])).min()
     node = 24 * wire.bending_stiffness / h**3 + 2 * wire.tension / h
     check("tensions at rest [N]", tension, plain.tension, within=2e-10 * node)
     slack = (history["dropper_force"] == 0.0).any()
     found = plain.run(5.1)
-    force = history["contact_force"][1:, 0][: found.force.size]
+    force = history["contact_force"][1:][: len(found.force)]
     print(f"droppers slacken: {slack}; {np.count_nonzero(force == 0.0)} steps without contact")
     # The same 1e-10 m in the stretch of a dropper of 1e5 N/m, which is stiffer than the contact.
-    check("contact force [N]", found.force[: force.size], force, within=1e-5)
+    check("contact forces [N]", found.force[: len(force)], force, within=1e-5)
 
 
 def figures_of(case: str, words: list[str]) -> dict[str, float]:
@@ -67,11 +92,10 @@ def figures_of(case: str, words: list[str]) -> dict[str, float]:
 
 def _of_run(plain: PlainLine, history: History) -> dict[str, float]:
     problem = plain.problem
-    force = contact_statistics(
-        "", history.place, history.force, history.height, problem.numerics.dt, problem.evaluation
-    )
-    inside = (history.place >= problem.evaluation[0]) & (history.place <= problem.evaluation[1])
-    lost = 100.0 * np.count_nonzero(history.force[inside] <= 0.0) / np.count_nonzero(inside)
+    place, felt, height = (own[:, 0] for own in (history.place, history.force, history.height))
+    force = contact_statistics("", place, felt, height, problem.numerics.dt, problem.evaluation)
+    inside = (place >= problem.evaluation[0]) & (place <= problem.evaluation[1])
+    lost = 100.0 * np.count_nonzero(felt[inside] <= 0.0) / np.count_nonzero(inside)
     return {
         "mean": force.mean,
         "std": force.std,
