@@ -22,7 +22,7 @@ class Pictures:
     Examples
     --------
     >>> run.plot.names[:3]
-    ('contact_force', 'histogram', 'uplift')
+    ('contact_force', 'histogram', 'spectrum')
     >>> run.plot("static").axes[0].get_ylabel() != ""
     True
     """
