@@ -22,7 +22,7 @@ class Pictures:
     Examples
     --------
     >>> run.plot.names[:3]
-    ('contact_force', 'statistics', 'histogram')
+    ('contact_force', 'histogram', 'spectrum')
     >>> run.plot("static").axes[0].get_ylabel() != ""
     True
     """
@@ -87,7 +87,10 @@ class Pictures:
         --------
         >>> figure = run.plot.statistics()
         """
-        return self("statistics")
+        from catenary.postproc.report.pictures import figures, force_pictures
+
+        evaluated = self._evaluated()
+        return figures.fitted(force_pictures.force_statistics(self._results, evaluated))
 
     def histogram(self) -> Figure:
         """Share of time [%] of the contact force below 20 Hz in bins of 10 N.

@@ -10,7 +10,7 @@ import numpy as np
 from catenary.postproc.evaluate.error_indicators import Indicators
 from catenary.postproc.evaluate.lateral_places import lateral_ranges, sentence
 from catenary.postproc.evaluate.statistics import slackens_at_all
-from catenary.postproc.evaluate.wording import counted
+from catenary.postproc.evaluate.wording import counted, stiffness_words
 from catenary.postproc.read.results import Results
 from catenary.solver.effects.shipped.stiff_link_effects import STIFF
 
@@ -153,7 +153,7 @@ def _about_droppers(results: Results) -> list[str]:
     # Not of NaN either.
     if not stiffness * dt**2 > STIFF:
         return []
-    said = f"Droppers of {stiffness:.3g} N/m are stiff for a step of {1e3 * dt:g} ms"
+    said = f"Droppers of {stiffness_words(stiffness)} are stiff for a step of {1e3 * dt:g} ms"
     longest = f"a numerics.dt_s of {1e3 * math.sqrt(STIFF / stiffness):.2g} ms at most"
     added = results.fact("added_dropper_damping")
     if added > 0.0:
@@ -208,9 +208,10 @@ def _about_contact(results: Results) -> list[str]:
 
 
 def _about_head(head: _Contact) -> list[str]:
+    contact = stiffness_words(float(f"{head.stiffness:.3g}"))
     said = (
-        f"A head of {head.mass:.3g} kg on a contact of {head.stiffness:.3g} N/m has a resonance "
-        f"at {head.frequency:.3g} Hz"
+        f"A head of {head.mass:.3g} kg on a contact of {contact} has a resonance at "
+        f"{head.frequency:.3g} Hz"
     )
     result = []
     if head.frequency < _FELT_HZ:

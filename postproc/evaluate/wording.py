@@ -16,6 +16,11 @@ def fixed(value: float, digits: int) -> str:
     return text.removeprefix("-") if not text.strip("-0.") else text
 
 
+def stiffness_words(value: float) -> str:
+    """A stiffness [N/m] with its unit, without powers of ten: ``433 N/m``, ``82.3 kN/m``."""
+    return f"{value:g} N/m" if value < 1e4 else f"{1e-3 * value:.9g} kN/m"
+
+
 def with_minus(text: str) -> str:
     """``text`` with a minus sign before its negative numbers, where it had a hyphen."""
     return re.sub(r"(?<!\S)-(?=\d)", "\u2212", text)

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import base64
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from catenary.postproc.evaluate.wording import with_minus
 from catenary.postproc.report.sections.section import Section
 
 _TEMPLATES = Path(__file__).parent / "templates"
+_BEFORE_UNIT = re.compile(r"(?<=\d) (?=%|(?:N|mm|m|km/h|Hz|s)\b)")
 # Cells of tables that are coloured.
 _MARKS = {
-    "passed": "yes", "failed": "no", "on": "yes", "yes": "yes", "no": "no", "?": "unknown",
+    "passed": "yes", "failed": "no", "yes": "yes", "no": "no", "?": "unknown",
     "reproduced": "yes", "not reproduced": "no", "cannot be decided": "unknown",
 }  # fmt: skip
 
@@ -53,6 +56,7 @@ def page(
         lstrip_blocks=True,
     )
     environment.filters["minus"] = lambda value: with_minus(str(value))
+    environment.filters["commands"] = _with_commands
     made = list(sections)
     uris = {name: _data_uri(data) for name, data in pictures.items()}
     return environment.get_template("page.html.j2").render(
@@ -65,6 +69,15 @@ def page(
         plots={name: text.replace("</", "<\\/") for name, text in (plots or {}).items() if text},
         script=script,
     )
+
+
+def _with_commands(text: str) -> Any:
+    """A sentence as HTML, in which what stands between back quotes is a command."""
+    from markupsafe import Markup, escape
+
+    # A figure stays on the line of its unit.
+    words = _BEFORE_UNIT.sub("\u00a0", str(escape(with_minus(text)))).split("`")
+    return Markup("".join(f"<code>{w}</code>" if n % 2 else w for n, w in enumerate(words)))
 
 
 def _data_uri(data: bytes) -> str:

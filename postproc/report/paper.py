@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from typing import Any
 
@@ -13,7 +14,9 @@ _SMALLEST = 0.8
 # leave that move to the next sheet; height of a caption, which keeps its size [px of CSS].
 _SHEET, _CAPTION = (297.0 - 15.0 - 18.0 - 9.0) * 96.0 / 25.4, 28.0
 # A sheet on which all of a report has room: it tells how high everything is.
-_ENDLESS = "<style>@page { size: 210mm 100000mm; }</style></head>"
+_ENDLESS = "@page { size: 210mm 100000mm !important; }"
+# What a reader unfolds is not printed; without it a page of large tables is laid out in a third.
+_FOLDED = re.compile("(?<=</summary>).*?(?=</details>)", re.DOTALL)
 # A heading so close above a figure goes with it to the next sheet [px of CSS].
 _CLOSE = 60.0
 
@@ -26,30 +29,27 @@ def pdf(html: str) -> bytes:
     Parameters
     ----------
     html : str
-        What ``page`` returned; what is folded away there is printed in full.
+        What ``page`` returned; what is folded away there is not printed.
 
     Raises
     ------
     InputError
         If the package WeasyPrint or a library that it needs is missing.
     """
-    HTML, URLFetcher = _weasyprint()
+    CSS, HTML, URLFetcher = _weasyprint()
     fetcher = URLFetcher(allowed_protocols=["data"])  # pictures are in the page
     cache: dict[str, Any] = {}  # of pictures, which are laid out twice
-    before, *figures = html.split("<figure>")
-    endless = before.replace("</head>", _ENDLESS, 1)
-    named = (f'<figure id="figure-{n}">{rest}' for n, rest in enumerate(figures))
-    layout = HTML(string="".join([endless, *named]), url_fetcher=fetcher).render(cache=cache)
+    page = HTML(string=_FOLDED.sub("", html), url_fetcher=fetcher)
+    figures = list(page.etree_element.iter("figure"))
+    for n, figure in enumerate(figures):
+        figure.set("id", f"figure-{n}")
+    layout = page.render(stylesheets=[CSS(string=_ENDLESS)], cache=cache)
     tops = {name: (box[1], box[3]) for name, box in layout.pages[0].anchors.items()}
-    boxes = [tops.pop(f"figure-{n}") for n in range(len(figures))]
-    sized = (
-        f'<figure style="--share: {share:.3f}">{rest}'
-        for share, rest in zip(
-            shares(boxes, [top for top, _ in tops.values()]), figures, strict=True
-        )
-    )
-    sheets = HTML(string="".join([before, *sized]), url_fetcher=fetcher)
-    return bytes(sheets.write_pdf(cache=cache))
+    boxes = [tops.pop(figure.get("id")) for figure in figures]
+    found = shares(boxes, [top for top, _ in tops.values()])
+    for figure, share in zip(figures, found, strict=True):
+        figure.set("style", f"--share: {share:.3f}")
+    return bytes(page.write_pdf(cache=cache))
 
 
 def shares(figures: Sequence[tuple[float, float]], headings: Sequence[float]) -> list[float]:
@@ -83,13 +83,13 @@ def refuse_without_pdf() -> None:
     _weasyprint()
 
 
-def _weasyprint() -> tuple[Any, Any]:
+def _weasyprint() -> tuple[Any, Any, Any]:
     try:
-        from weasyprint import HTML
+        from weasyprint import CSS, HTML
         from weasyprint.urls import URLFetcher
     except (ImportError, OSError) as error:  # OSError: of Pango, which is no package of Python
         raise InputError(
             f"--pdf needs the package weasyprint and the library Pango ({error}): pip install "
             "'catenary[report]', and on Debian apt-get install libpango-1.0-0 libpangoft2-1.0-0"
         ) from error
-    return HTML, URLFetcher
+    return CSS, HTML, URLFetcher

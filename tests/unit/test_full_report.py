@@ -126,7 +126,7 @@ def test_data_sheets_have_the_data_of_the_scene(folder: Path) -> None:
     assert speed == pytest.approx((21e3 / 1.35) ** 0.5, abs=0.05)
     assert "span length 55.00 m" in sheet
     # Masses, and stiffness and damping below each, from the head down.
-    assert "1 (head) 7.5 7000 45 2 9 15500 0.1 3 6 160 100" in sheet
+    assert "1 (head) 7.5 7000 45.0 2 9.0 15500 0.1 3 6.0 160 100.0" in sheet
 
 
 @pytest.mark.process
@@ -290,12 +290,12 @@ def test_a_report_shows_measured_costs_of_effects(folder: Path, tmp_path: Path) 
     shutil.copy(folder / "run.h5", tmp_path / "run.h5")
     invoke("report", str(tmp_path))
     without = words_of((tmp_path / "report.html").read_text())
-    assert "catenary report with --cost FOLDER shows it here" in without
+    assert "catenary report --cost STUDY shows it here" in without
     invoke("report", str(tmp_path), "--cost", str(cost_study(tmp_path, "ac_simple", on=True)))
     words = words_of((tmp_path / "report.html").read_text())
     assert "it costs 1.25 times; without it sigma changes by +10 %, most of all: keep it." in words
     assert f"costs and changes are those of {tmp_path}" in words
-    assert "with --cost FOLDER" not in words
+    assert "--cost STUDY" not in words
 
 
 def test_costs_of_another_case_or_of_other_effects_are_refused(

@@ -19,6 +19,7 @@ from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import LineMesh
 from catenary.meshgen.slowest_wave import slowest_wave_of
 from catenary.meshgen.wires import Role, Wire
+from catenary.postproc.evaluate.wording import capital, stiffness_words
 from catenary.postproc.report.pictures.figures import COLOURS, FewTicks, new_figure, own_style, tidy
 from catenary.postproc.report.sections.section import EvaluatedRun, Picture, Section, Text, number
 from catenary.postproc.report.study_table import StudyTable, texts_table
@@ -49,7 +50,7 @@ def _line_blocks(problem: Problem, rest: LineAtRest) -> Iterator[StudyTable]:
         alpha, beta = damping.per_component.get(wire.name, (damping.alpha, damping.beta))
         rows.append([
             _plain(wire.name), wire.role.value, number(1e-3 * wire.tension, 2),
-            number(wire.mass_per_length, 3), number(wire.bending_stiffness, 1),
+            number(wire.mass_per_length, 3), f"{wire.bending_stiffness:.9g}",
             number(None if wire.axial_stiffness is None else 1e-6 * wire.axial_stiffness, 2),
             number(slowest_wave_of(line, wire), 1), f"{alpha:.3g}", f"{beta:.3g}",
         ])  # fmt: skip
@@ -122,22 +123,24 @@ def _hardware(problem: Problem) -> Iterator[list[Any]]:
             (kind.mass_per_length, f"{kind.mass_per_length:g} kg/m"),
             (kind.clamp_mass, f"clamp {kind.clamp_mass:g} kg"),
             (kind.by_radial_force, "vertical stiffness radial force over length"),
-            (kind.stiffness, f"vertical stiffness {kind.stiffness:g} N/m"),
+            (kind.stiffness, f"vertical stiffness {stiffness_words(kind.stiffness)}"),
         ]
         parts = [said for value, said in known if value]
         if kind.uplift_stop is not None:
-            stop = f"stop at {1e3 * kind.uplift_stop:g} mm with {kind.stop_stiffness:g} N/m"
+            stop = (
+                f"stop at {1e3 * kind.uplift_stop:g} mm with {stiffness_words(kind.stop_stiffness)}"
+            )
             parts.append(stop)
         yield [f"steady arms on {_plain(arms.wire)}", len(arms.x), ", ".join(parts)]
     for supports in line.supports:
         yield [
             f"supports of {_plain(supports.wire)}",
             len(supports.x),
-            f"stiffness {supports.stiffness:g} N/m",
+            f"stiffness {stiffness_words(supports.stiffness)}",
         ]
     for clamps in line.clamps:
         joined = f"{_plain(clamps.upper)} to {_plain(clamps.lower)}"
-        held = f"stiffness {clamps.stiffness:g} N/m, {clamps.mass:g} kg"
+        held = f"stiffness {stiffness_words(clamps.stiffness)}, {clamps.mass:g} kg"
         yield [f"clamps, {joined}", len(clamps.x), held]
     for own in line.fittings:
         masses = _range(np.array(own.mass), 2)
@@ -169,9 +172,9 @@ def _of_wind(wind: Wind) -> Iterator[list[Any]]:
 
 def _of_dropper(kind: DropperKind) -> str:
     if kind.stiffness is not None:
-        data = f"stiffness {kind.stiffness:g} N/m"
+        data = f"stiffness {stiffness_words(kind.stiffness)}"
     elif kind.axial_stiffness is not None:
-        data = f"EA {kind.axial_stiffness:g} N"
+        data = f"EA {1e-3 * kind.axial_stiffness:g} kN"
     else:
         data = f"curve of {kind.n_pieces + 1} points"
     if kind.mass_per_length + kind.upper_clamp_mass + kind.lower_clamp_mass == 0.0:
@@ -188,6 +191,12 @@ def _range(values: np.ndarray, digits: int) -> str:
     return low if low == high else f"{low} to {high}"
 
 
+def _alike(values: Sequence[float]) -> list[str]:
+    """Figures of a column, with the decimals that the one with most of them has."""
+    decimals = max(len(f"{value:.9g}".partition(".")[2]) for value in values)
+    return [number(value, decimals) for value in values]
+
+
 def _plain(name: str) -> str:
     return name.replace("_", " ")
 
@@ -201,7 +210,7 @@ def pantographs(scene: SceneOfRun, run: EvaluatedRun) -> Section:
     pictures = [
         Picture(
             f"pantograph_{n}",
-            f"{_plain(name)}, {_how_drawn(one[0].data)}.",
+            f"{capital(_plain(name))}, {_how_drawn(one[0].data)}.",
             partial(_drawn, one[0].data),
         )
         for n, (name, one) in enumerate(kinds.items(), start=1)
@@ -219,14 +228,13 @@ def _pantograph_blocks(
     kinds: dict[str, tuple[Placement, str]],
 ) -> Iterator[Text | StudyTable]:
     for name, (placement, description) in kinds.items():
-        yield Text(f"{description}.", "", name)
+        yield Text(f"{description}.", "", f"{capital(_plain(name))}:")
         data = placement.data
         if isinstance(data, LumpedData):
+            columns = map(_alike, (data.masses, data.stiffnesses, data.dampings))
             rows = [
-                [f"{n}{' (head)' if n == 1 else ''}", *(f"{value:g}" for value in own)]
-                for n, own in enumerate(
-                    zip(data.masses, data.stiffnesses, data.dampings, strict=True), start=1
-                )
+                [f"{n}{' (head)' if n == 1 else ''}", *own]
+                for n, own in enumerate(zip(*columns, strict=True), start=1)
             ]
             heads = ["mass", "mass [kg]", "stiffness below [N/m]", "damping below [N s/m]"]
             yield texts_table(heads, rows, {1, 2, 3})
@@ -236,7 +244,7 @@ def _pantograph_blocks(
             heads = ["body", "mass [kg]", "Ixx [kg m²]", "Iyy [kg m²]", "Izz [kg m²]"]
             yield texts_table(heads, rows, {1, 2, 3, 4})
         strips = data.strips
-        rows = [["strips", str(strips.number), ""]]
+        rows = [["collector strips", str(strips.number), ""]]
         if strips.number > 1:
             rows.append(["distance of the strips", number(strips.spacing, 3), "m"])
         if strips.length is not None:
@@ -248,7 +256,7 @@ def _pantograph_blocks(
                 ["stiffness below a strip", f"{own.stiffness:g}", "N/m"],
                 ["damping below a strip", f"{own.damping:g}", "N s/m"],
             ]
-        yield texts_table(["head", "", ""], rows, {1})
+        yield texts_table(["head", "value", "unit"], rows, {1})
 
 
 @own_style()

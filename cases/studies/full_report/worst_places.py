@@ -66,8 +66,8 @@ def _blocks(results: Results, places: WorstPlaces, causes: Causes) -> Iterator[T
     if everywhere:
         yield Text("acts on all spans alike:", "note", "The line as a whole", everywhere)
     yield Text(
-        "Candidates are near in place or frequency; none is proved. catenary worst FOLDER prints "
-        "them all."
+        "A candidate for the cause is near in place or frequency; none is proved. `catenary worst "
+        "FOLDER` prints them all."
     )
     rows = [
         [p.span + 1, f"{p.start:.6g} to {p.end:.6g}", names[p.pantograph], number(p.std),
@@ -118,8 +118,9 @@ def _span(results: Results, passage: Passage) -> Figure:
     raw = results.column("contact_force", p)
     filtered = filters.contact_force(results, p)[rows]
     for axes in (force, height):
-        mark_line(axes, results, low, high)
-        axes.axvspan(passage.start, passage.end, color=WORST, zorder=0.5, label="worst span")
+        mark_line(axes, results, low, high, named=axes is force)
+        label = "worst span" if axes is force else None
+        axes.axvspan(passage.start, passage.end, color=WORST, zorder=0.5, label=label)
     x = position[rows]
     light: dict[str, Any] = {"color": colour(p), "alpha": 0.35, "linewidth": 0.7}
     force.plot(x, raw[rows], label="unfiltered", **light)
@@ -134,13 +135,13 @@ def _span(results: Results, passage: Passage) -> Figure:
         )  # fmt: skip
         force.plot(x[at], filtered[at], "o", color=LIMIT, ms=4)
     force.axhline(0.0, color=LIMIT, linewidth=0.9)
-    force.margins(y=0.15)  # for what is written at the extremes
+    force.margins(y=0.25)  # for what is written at the extremes
     tidy(force, "", "contact force [N]")
-    legend_above(force, 6)
+    legend_above(force)
     line = results.column("wire_height", p)[rows]
     height.plot(x, line, color=COLOURS[2], linewidth=1.3, label="contact wire at the pantograph")
     tidy(height, "position of the pantograph along the track [m]", "height [m]")
-    legend_above(height, 6)
+    legend_above(height)
     return figure
 
 

@@ -218,8 +218,8 @@ class Causes:
             usual = float(np.median([row[column][1] for row in table.values()]))
             if abs(own / usual - 1.0) > _SOFTER:
                 yield (
-                    f"elasticity: {1e3 * own:.3f} mm/N at the {word} place ({at:.0f} m), usual are "
-                    f"{1e3 * usual:.3f} mm/N"
+                    f"elasticity: {1e3 * own:.3f} mm/N at the {word} place ({at:.0f} m), median "
+                    f"of all spans {1e3 * usual:.3f} mm/N"
                 )
 
     @cached_property
@@ -283,7 +283,7 @@ class Causes:
             if usual > 0.0 and abs(force[number] / usual - 1.0) > _HEAVIER:
                 yield (
                     f"the dropper at {x[number]:.1f} m carries {force[number]:.0f} N at rest, "
-                    f"usual are {usual:.0f} N"
+                    f"others at the same place of a span {usual:.0f} N"
                 )
 
     def _gusts(self, span: int, pantograph: int) -> Iterator[str]:

@@ -18,6 +18,7 @@ from catenary.postproc.report.pictures.figures import (
     own_style,
     stacked,
     tidy,
+    uprights,
 )
 from catenary.postproc.report.pictures.marks import mark_line, panels_along_track, still_marks
 from catenary.solver.time_loop.views.channels import (
@@ -94,7 +95,7 @@ def _on_line(results: Results, channel: Channel) -> Figure:
     mark_line(axes, results, float(np.min(x, initial=0.0)), float(np.max(x, initial=1.0)))
     drawn = thinned_ranges(low, high)
     how: Any = {"color": COLOURS[0], "linewidth": 1.6, "label": "range over the run"}
-    axes.vlines(x[drawn], low[drawn], high[drawn], **how)
+    uprights(axes, x[drawn], low[drawn], high[drawn], **how)
     still_marks(axes, x, low, high)
     tidy(axes, "position along the track [m]", _label(channel))
     legend_above(axes)

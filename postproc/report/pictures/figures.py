@@ -179,6 +179,24 @@ def curve(
     axes.plot(x, y, look, **(usual | how))
 
 
+def uprights(axes: Axes, x: np.ndarray, low: Any, high: Any, **how: Any) -> None:
+    """Draw upright lines as one curve: a picture has hundreds, and a PDF takes each apart.
+
+    Parameters
+    ----------
+    axes : Axes
+        Panel.
+    x : ndarray, shape (n,)
+        Places of the lines, in the unit of the panel.
+    low, high : array_like, shape (n,) or ()
+        Their ends.
+    **how : dict
+        Properties of Matplotlib's line.
+    """
+    ends = np.broadcast_arrays(low, high, np.nan, x)[:3]
+    axes.plot(np.repeat(x, 3), np.stack(ends, axis=1).ravel(), solid_capstyle="butt", **how)
+
+
 def tidy(axes: Axes, x_label: str, y_label: str, title: str = "") -> None:
     """Give a panel labels, a light grid, few ticks and no box.
 
@@ -214,7 +232,7 @@ def log_log(axes: Axes) -> None:
         axis.set_minor_formatter(NullFormatter())
 
 
-def legend_above(axes: Axes, columns: int = 5) -> Legend:
+def legend_above(axes: Axes, columns: int = 8) -> Legend:
     """Legend above the axes at the right, where no curve can pass.
 
     Where it is too long to stand beside the title, ``png`` makes room for it.
@@ -351,12 +369,13 @@ def _room_above(axes: Axes, legend: Legend, canvas: FigureCanvasAgg, room: float
     labels = [text.get_text() for text in legend.get_texts()]
     # A letter is 8 px wide at most and the sign of an entry with its gaps some 60: shorter legends,
     # as most are, need no measuring.
-    if 8 * (len(title) + sum(map(len, labels))) + 60 * len(labels) < room and len(labels) <= 5:
+    if 8 * (len(title) + sum(map(len, labels))) + 60 * len(labels) < room:
         return 0.0
     renderer = canvas.get_renderer()
     written = axes.set_title(title, loc="left", fontsize="medium", y=1.0)
     beside = written.get_window_extent(renderer)
-    columns = 5
+    columns = len(labels)
+    legend = legend_above(axes, columns)
     while True:
         box = legend.get_window_extent(renderer)
         if box.width <= room or columns == 1:

@@ -27,8 +27,15 @@ from catenary.postproc.report.pictures.figures import (
     stacked,
     tidy,
 )
-from catenary.postproc.report.pictures.marks import mark_line, panels_along_track, travelled
+from catenary.postproc.report.pictures.marks import (
+    mark_line,
+    panels_along_track,
+    title_of,
+    travelled,
+)
 
+# Of bars, which a print without colours tells apart.
+_HATCHES = ("", "//", "..", "xx")
 # Frequencies that a spectrum shows [Hz], and fewest records of one.
 _HIGHEST, _FEWEST = 60.0, 64
 
@@ -36,13 +43,12 @@ _HIGHEST, _FEWEST = 60.0, 64
 @own_style()
 def contact_force(results: Results) -> Figure:
     """Contact force of each pantograph along the track: unfiltered light, 20 Hz low-pass bold."""
-    names = results.pantograph_names()
     n = results.n_pantographs
     start, end = travelled(results)
     figure, panels = stacked(0.7 + 2.3 * n, n, shared=True)
     arrivals = results.attributes.get("arrivals", {}).get("pantographs", [])
     for p, axes in enumerate(panels):
-        mark_line(axes, results, start, end)
+        mark_line(axes, results, start, end, named=p == 0)
         if p < len(arrivals):
             _mark_arrivals(axes, results.evaluation[0], arrivals[p])
         force = results.column("contact_force", p)
@@ -61,7 +67,7 @@ def contact_force(results: Results) -> Figure:
         for chosen, values, style in curves:
             axes.plot(position[chosen], values, color=colour(p), **style)
         del position
-        tidy(axes, "", "contact force [N]", names[p].capitalize())
+        tidy(axes, "", "contact force [N]", title_of(results, p))
         legend_above(axes)
     panels[-1].set_xlabel("position along the track [m]")
     return figure
@@ -74,7 +80,7 @@ def _mark_arrivals(axes: Axes, evaluated_from: float, facts: Mapping[str, Any]) 
     for end, style in (("near", ":"), ("far", "-.")):
         met = facts.get(f"{end}_end_met_at_m")
         if met is not None:
-            label = f"reflection of the {end} end"
+            label = f"{end}-end reflection"
             axes.axvline(met, color=LIMIT, linestyle=style, linewidth=1.3, label=label)
 
 
@@ -144,7 +150,7 @@ def contact_height(
         (height, 1, 1.0, "height above rail [m]"),
         (gradient, 2, 1e3, "gradient [‰]"),
     ):
-        mark_line(axes, results, start, end)
+        mark_line(axes, results, start, end, named=axes is height)
         for p, (name, own) in enumerate(heights.items()):
             chosen = thinned(own[number])
             curve(axes, own[0][chosen], factor * own[number][chosen], p, name, _look(p))
@@ -196,7 +202,8 @@ def force_statistics(results: Results, statistics: RunStatistics) -> Figure:
     for place, (index, pantograph) in enumerate(shown):
         at = np.arange(len(groups)) + (place - 0.5 * (len(shown) - 1)) * width
         values = np.array([getattr(pantograph, name) for name in groups])
-        bars = axes.bar(at, values, 0.92 * width, color=colour(index), label=pantograph.name)
+        look: dict[str, Any] = {"color": colour(index), "hatch": _HATCHES[index % 4]}
+        bars = axes.bar(at, values, 0.92 * width, label=pantograph.name, **look)
         labels_of_bars = [f"{round(value)}" for value in values]
         axes.bar_label(bars, labels_of_bars, padding=2, fontsize=8 if len(shown) < 4 else 6)
     axes.axhline(0.0, color=GREY, linewidth=0.8)
@@ -218,7 +225,8 @@ def force_histogram(results: Results, statistics: RunStatistics) -> Figure:
         bin_width = edges[1] - edges[0]
         width = 0.86 * bin_width / len(shown)
         left = edges[:-1] + 0.07 * bin_width + place * width
-        axes.bar(left, percent, width, align="edge", color=colour(index), label=pantograph.name)
+        look: dict[str, Any] = {"color": colour(index), "hatch": _HATCHES[index % 4]}
+        axes.bar(left, percent, width, align="edge", label=pantograph.name, **look)
     axes.xaxis.set_major_locator(MaxNLocator(12, steps=[1, 2, 2.5, 5, 10]))
     widths = sorted({f"{np.diff(p.histogram_edges[:2])[0]:g}" for _, p in shown}, key=float)
     title = f"Histogram, bins of {' and '.join(widths)} N"

@@ -112,9 +112,11 @@ def _side_view(
     stretch: tuple[float, float],
 ) -> None:
     """From the side; droppers that carry nothing are dotted."""
-    for (upper, lower), carries in zip(mesh.droppers, form.dropper_force > 0.0, strict=True):
-        style = "-" if carries else ":"
-        axes.plot(points[[upper, lower], 0], points[[upper, lower], 2], style, color=GREY, lw=0.7)
+    for which, style in ((form.dropper_force > 0.0, "-"), (form.dropper_force <= 0.0, ":")):
+        gap = np.full((np.count_nonzero(which), 1), np.nan)
+        ends = mesh.droppers[which]
+        x, z = (np.hstack([points[ends, axis], gap]).ravel() for axis in (0, 2))
+        axes.plot(x, z, style, color=GREY, lw=0.7)
     for upper, lower in mesh.clamps:
         axes.plot(points[[upper, lower], 0], points[[upper, lower], 2], color=GREY, lw=1.5)
     _wires(axes, line, mesh, points, 2)

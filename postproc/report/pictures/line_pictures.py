@@ -25,6 +25,7 @@ from catenary.postproc.report.pictures.figures import (
     own_style,
     stacked,
     tidy,
+    uprights,
 )
 from catenary.postproc.report.pictures.marks import mark_line, mark_static, still_marks, with_margin
 from catenary.solver.statics.tension_along import LineAtTemperature
@@ -58,18 +59,18 @@ def arm_uplift(results: Results, statistics: RunStatistics, limit: float | None)
 
     mark_line(along, results, float(supports.x.min(initial=0)), float(supports.x.max(initial=1)))
     along.margins(x=0.02)
-    along.vlines(supports.x, 0.0, 1e3 * supports.uplift, color=GREY, linewidth=1.4)
+    uprights(along, supports.x, 0.0, 1e3 * supports.uplift, color=GREY, linewidth=1.4)
     along.plot(
         supports.x, 1e3 * supports.uplift, "o", color="#222222", ms=4, label="largest uplift"
     )
     along.set_xlim(*with_margin(supports.x))
-    along.set_ylim(bottom=0.0)
     if limit is not None:
         label = f"limit {1e3 * limit:.0f} mm"
         if limit < _FAR * np.nanmax(supports.uplift, initial=0.0):
             along.axhline(1e3 * limit, color=LIMIT, linewidth=1.1, label=label)
         else:
             along.plot([], [], color=LIMIT, linewidth=1.1, label=f"{label}, far above")
+    along.set_ylim(bottom=0.0)
     tidy(along, "position along the track [m]", "largest uplift [mm]", "All arms")
     legend_above(along)
     return figure
@@ -144,7 +145,8 @@ def dropper_force(results: Results, statistics: RunStatistics) -> Figure:
 
     mark_line(along, results, *with_margin(x))
     drawn = thinned_ranges(droppers.lowest, droppers.highest)
-    along.vlines(
+    uprights(
+        along,
         x[drawn],
         droppers.lowest[drawn],
         droppers.highest[drawn],
@@ -234,7 +236,7 @@ def energies(results: Results) -> Figure | None:
     for number, name in enumerate(("kinetic", "elastic")):
         chosen = thinned(recorded[name])
         curve = recorded["time"][chosen], recorded[name][chosen]
-        axes.plot(*curve, color=COLOURS[number], label=name)
+        axes.plot(*curve, color=COLOURS[number], linestyle=("-", "--")[number], label=name)
     axes.margins(x=0.0)
     tidy(axes, "time [s]", "energy [J]", "Energies of the line relative to equilibrium")
     legend_above(axes)

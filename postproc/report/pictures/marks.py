@@ -25,6 +25,7 @@ from catenary.postproc.report.pictures.figures import (
     own_style,
     stacked,
     tidy,
+    uprights,
 )
 
 # More supports or droppers than these are no marks but a grey ground: they are left out.
@@ -61,7 +62,7 @@ def panels_along_track(
     start, end = travelled(results)
     figure, panels = stacked(0.7 + 2.3 * len(shown), len(shown), shared=True)
     for axes, (p, curves) in zip(panels, shown.items(), strict=True):
-        mark_line(axes, results, start, end)
+        mark_line(axes, results, start, end, named=axes is panels[0])
         for number, (name, column) in enumerate(curves):
             values = results.column(channel, column)
             if low_pass:
@@ -77,34 +78,48 @@ def panels_along_track(
                 linestyle=("-", "--")[number % 2] if dashed else "-",
                 label=name,
             )
-        tidy(axes, "", label, results.pantograph_names()[p].capitalize())
+        tidy(axes, "", label, title_of(results, p))
         legend_above(axes)
     panels[-1].set_xlabel("position of the pantograph along the track [m]")
     return figure, panels
 
 
-def mark_line(axes: Axes, results: Results, start: float, end: float) -> None:
-    """Supports as lines, droppers as ticks at the bottom, the evaluation stretch shaded."""
+def mark_line(
+    axes: Axes, results: Results, start: float, end: float, *, named: bool = True
+) -> None:
+    """Mark the line in a panel along the track.
+
+    Supports are lines, droppers ticks at the bottom, the evaluation stretch is shaded.
+
+    Parameters
+    ----------
+    axes : Axes
+        Panel.
+    results : Results
+        Results of the run.
+    start, end : float
+        From and to of the panel [m].
+    named : bool, optional
+        Whether its legend names these marks; of several panels the first one does.
+    """
     low, high = results.evaluation
-    axes.axvspan(low, high, color=SHADE, zorder=0, label="evaluation stretch")
+    label = "evaluation stretch" if named else None
+    axes.axvspan(low, high, color=SHADE, zorder=0, label=label)
     support = results.line("support_x")
     support = support[(support >= start) & (support <= end)]
-    _uprights(axes, support, 0.9)
+    _supports(axes, support, 0.9, "support" if named else None)
     dropper = results.line("dropper_x")
     dropper = dropper[(dropper >= start) & (dropper <= end)]
     if 0 < dropper.size <= _MOST_DROPPERS:
-        axes.plot(
-            dropper,
-            np.full(dropper.size, 0.015),
-            "|",
-            color=GREY,
-            markersize=5,
-            markeredgewidth=0.7,
-            transform=axes.get_xaxis_transform(),
-            label="dropper",
-            clip_on=True,
-        )
+        _ticks(axes, dropper, 0.035, 0.7, "dropper" if named else None)
     axes.set_xlim(start, end)
+
+
+def _ticks(axes: Axes, dropper: np.ndarray, height: float, width: float, label: str | None) -> None:
+    """Droppers as ticks at the bottom of a panel, of a height in shares of it."""
+    transform = axes.get_xaxis_transform()
+    uprights(axes, dropper, 0.0, height, color=GREY, linewidth=width, transform=transform)
+    axes.plot([], [], "|", color=GREY, markersize=5, label=label)
 
 
 def still_marks(axes: Axes, x: np.ndarray, low: np.ndarray, high: np.ndarray) -> None:
@@ -116,29 +131,29 @@ def still_marks(axes: Axes, x: np.ndarray, low: np.ndarray, high: np.ndarray) ->
 def mark_static(axes: Axes, results: Results, start: float, end: float) -> None:
     """Supports and droppers of a stretch of the line at rest, with a margin at both ends."""
     support = results.line("support_x")
-    _uprights(axes, support[(support >= start - 1e-6) & (support <= end + 1e-6)], 1.2)
+    there = (support >= start - 1e-6) & (support <= end + 1e-6)
+    _supports(axes, support[there], 1.2, "support")
     dropper = results.line("dropper_x")
     dropper = dropper[(dropper >= start) & (dropper <= end)]
-    axes.plot(
-        dropper,
-        np.full(dropper.size, 0.02),
-        "|",
-        color=GREY,
-        markersize=7,
-        transform=axes.get_xaxis_transform(),
-        label="dropper" if dropper.size else None,
-    )
+    if dropper.size:
+        _ticks(axes, dropper, 0.06, 1.0, "dropper")
     axes.set_xlim(*with_margin(np.array([start, end])))
 
 
-def _uprights(axes: Axes, support: np.ndarray, width: float) -> None:
+def _supports(axes: Axes, support: np.ndarray, width: float, label: str | None) -> None:
     """Supports as lines over the whole height, in one collection."""
     if not 0 < support.size <= _MOST_SUPPORTS:
         return
     lines = [((x, 0.0), (x, 1.0)) for x in support]
     transform = axes.get_xaxis_transform()
-    known: dict[str, Any] = {"colors": LIGHT, "linewidths": width, "zorder": 1, "label": "support"}
+    known: dict[str, Any] = {"colors": LIGHT, "linewidths": width, "zorder": 1, "label": label}
     axes.add_collection(LineCollection(lines, transform=transform, **known), autolim=False)
+
+
+def title_of(results: Results, pantograph: int) -> str:
+    """Title of the panel of a pantograph, empty if it is the only one."""
+    names = results.pantograph_names()
+    return names[pantograph].capitalize() if len(names) > 1 else ""
 
 
 def travelled(results: Results) -> tuple[float, float]:

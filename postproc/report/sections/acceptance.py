@@ -187,10 +187,11 @@ def _criteria(run: EvaluatedRun) -> Iterator[Text | StudyTable]:
     some = any(one.compared for one in run.criteria)
     for one, label in zip(run.criteria, labels(run.criteria), strict=True):
         if one.absent:
-            left.append(f"{label}: because {one.because}")
+            left.append(f"{label}: {one.because}")
             continue
         value, limit = _figures(one)
-        source = f"{one.clause}; {_UNCOMPARED}" if some and not one.compared else one.clause
+        clause = one.clause.replace("<=", "≤")
+        source = f"{clause}; {_UNCOMPARED}" if some and not one.compared else clause
         words = one.unit, source
         of_margin = _margin(one), _error(one, errors)
         first = label, _WORDS[one.passed], value, _RELATIONS[one.relation], limit
@@ -203,8 +204,8 @@ def _criteria(run: EvaluatedRun) -> Iterator[Text | StudyTable]:
         if run.measured
         else "The error is that of the time step, estimated from the record; three times the rms "
         "error of the history for extremes, a dash where there is no estimate. The error of the "
-        f"mesh is not estimated: measure it by catenary accuracy {case} -o STUDY --axes grid, and "
-        "show it here by catenary report --accuracy STUDY."
+        f"mesh is not estimated: `catenary accuracy {case} -o STUDY --axes grid` measures it, "
+        "`catenary report --accuracy STUDY` shows it here."
     )
     yield Text(f"The margin is the distance from the limit, negative beyond it. {how}")
     if left:

@@ -68,8 +68,10 @@ def _pictures(run: EvaluatedRun) -> Iterator[Picture]:
     if results.has("lateral_place"):
         text = "Lateral place of the contact wires on the strips."
         yield Picture("lateral_place", text, lambda: lateral_places(results))
-    if len(statistics.complaints) < len(statistics.pantographs):
+    known = len(statistics.pantographs) - len(statistics.complaints)
+    if known > 1:  # of one the table says it all
         text = "Contact force in the evaluation stretch."
         yield Picture("statistics", text, lambda: forces.force_statistics(results, statistics))
+    if known:
         text = "Distribution of the contact force in the evaluation stretch."
         yield Picture("histogram", text, lambda: forces.force_histogram(results, statistics))

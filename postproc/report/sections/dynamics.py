@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import replace
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
@@ -13,7 +12,6 @@ from catenary.postproc.evaluate.statistics import slack_times
 from catenary.postproc.read.results import Results
 from catenary.postproc.report.sections.section import (
     EvaluatedRun,
-    Folded,
     Picture,
     Section,
     Text,
@@ -21,8 +19,8 @@ from catenary.postproc.report.sections.section import (
 )
 from catenary.postproc.report.study_table import StudyTable, texts_table
 
-# Rows of a table beyond which it is folded away.
-_MOST = 200
+# Places that a table shows all of, and extremes of each kind that it shows of more.
+_FEW, _EXTREMES = 20, 5
 
 
 def has_statistics(run: EvaluatedRun) -> bool:
@@ -110,42 +108,87 @@ def has_places(run: EvaluatedRun) -> bool:
 
 
 def places(run: EvaluatedRun) -> Section:
-    """Tables of the evaluated supports and droppers."""
-    shown, folded = [], []
-    for table in _tables(run):
-        if len(table.rows) <= _MOST:
-            shown.append(table)
-        else:
-            title = f"{table.title} ({len(table.rows)})"
-            folded.append(Folded(title, replace(table, title="")))
-    return Section("Supports and droppers", shown, folded=folded)
+    """Tables of the evaluated supports and droppers, of many only the extremes."""
+    return Section("Supports and droppers", _tables(run))
 
 
 def _tables(run: EvaluatedRun) -> Iterator[StudyTable]:
     results, supports, droppers = run.results, run.statistics.supports, run.statistics.droppers
-    limits = [c.limit for c in run.criteria if c.quantity == "arm_uplift" and c.limit == c.limit]
-    wires = results.arm_wires()
-    rows = []
-    for n in np.flatnonzero(supports.evaluated).tolist():
-        uplift = 1e3 * float(supports.uplift[n])
-        left = number(min(limits) - uplift) if limits else "–"
-        rows.append([number(supports.x[n], 2), wires[n].replace("_", " "), number(uplift), left])
+    limit = _least_limit(run, "arm_uplift")
+    wires = [name.replace("_", " ") for name in results.arm_wires()]
+    several = len(set(wires)) > 1
+    uplift = 1e3 * supports.uplift
+    chosen = _extremes(supports.evaluated, {"": uplift}, uplift > limit)
+    rows = [
+        [number(supports.x[n], 2), *([wires[n]] if several else ()), number(uplift[n]),
+         number(limit - uplift[n])]
+        for n in chosen
+    ]  # fmt: skip
     if rows:
-        heads = ["position [m]", "wire", "largest uplift [mm]", "margin [mm]"]
-        yield texts_table(heads, rows, {0, 2, 3}, "Uplift at the evaluated steady arms")
+        heads = ["position [m]", *(["wire"] if several else ()), "largest uplift [mm]"]
+        right = {0, len(heads) - 1, len(heads)}
+        title = "Uplift at the evaluated steady arms"
+        note = _note(len(rows), int(supports.evaluated.sum()), "summary.json")
+        yield texts_table([*heads, "margin [mm]"], rows, right, title, note)
     at_rest, slack = results.static("dropper_force"), slack_times(results)
     names = [name.replace("_", " ") for name in results.roles]
     carried = [names[wire] for wire in results.dropper_wires()[:, 1].tolist()]
     several = len(set(carried)) > 1
+    # The least force of all that slacken is zero.
+    slackened = bool(np.any(slack[droppers.evaluated] > 0.0))
+    least = {"longest slack": slack} if slackened else {"least force": -droppers.lowest}
+    kinds = {"largest force": droppers.highest, **least}
+    allowed = _least_limit(run, "dropper_force_max")
+    chosen = _extremes(droppers.evaluated, kinds, droppers.highest > allowed)
     rows = [
-        [*([carried[n]] if several else ()), number(droppers.x[n], 2),
-         number(at_rest[n]), number(droppers.highest[n]),
-         number(droppers.lowest[n]), number(slack[n], 3)]
-        for n in np.flatnonzero(droppers.evaluated).tolist()
+        [number(droppers.x[n], 2), *([carried[n]] if several else ()), number(at_rest[n]),
+         number(droppers.highest[n]), number(droppers.lowest[n]), number(slack[n], 3),
+         ", ".join(words)]
+        for n, words in chosen.items()
     ]  # fmt: skip
     if rows:
-        heads = ["position [m]", "at rest [N]", "largest [N]", "least [N]", "slack [s]"]
-        note = "Forces over the whole run; slack is the time without force."
-        heads = [*(["carries"] if several else ()), *heads]
-        right = set(range(len(heads) - 5, len(heads)))
+        heads = ["position [m]", *(["carries"] if several else ())]
+        right = {0, *range(len(heads), len(heads) + 4)}
+        heads += ["at rest [N]", "largest [N]", "least [N]", "slack [s]", "among the extremes"]
+        note = "Forces over the whole run; slack is the time without force. "
+        note += _note(len(rows), int(droppers.evaluated.sum()), "droppers.csv")
         yield texts_table(heads, rows, right, "Evaluated droppers", note)
+
+
+def _least_limit(run: EvaluatedRun, quantity: str) -> float:
+    """Smallest limit of a quantity, in its unit; NaN where none is judged."""
+    limits = [c.limit for c in run.criteria if c.quantity == quantity and c.limit == c.limit]
+    return min(limits, default=float("nan"))
+
+
+def _extremes(
+    evaluated: np.ndarray, kinds: Mapping[str, np.ndarray], beyond: np.ndarray
+) -> dict[int, list[str]]:
+    """Places of a table in their order, each with the kinds of extremes that it is among.
+
+    All places stand there if they are few; of many the largest of each kind, and those beyond
+    limits.
+
+    Parameters
+    ----------
+    evaluated, beyond : ndarray of bool, shape (n,)
+        Whether a place is evaluated, and beyond a limit.
+    kinds : mapping
+        Values (n,) by the name of their kind; NaN is never an extreme.
+    """
+    all_of = np.flatnonzero(evaluated)
+    found: dict[int, list[str]] = {n: [] for n in all_of.tolist()} if all_of.size <= _FEW else {}
+    for word, values in kinds.items():
+        known = all_of[np.isfinite(values[all_of])]
+        for n in known[np.argsort(-values[known], kind="stable")][:_EXTREMES].tolist():
+            found.setdefault(n, []).append(word)
+    for n in np.flatnonzero(evaluated & beyond).tolist():
+        found.setdefault(n, []).append("beyond the limit")
+    return dict(sorted(found.items()))
+
+
+def _note(n_shown: int, n_all: int, file: str) -> str:
+    """What a table leaves out."""
+    if n_shown == n_all:
+        return ""
+    return f"{n_shown} of {n_all} are shown, the extremes and any beyond a limit; all: {file}."

@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Any
 
+import numpy as np
+
+from catenary.postproc.evaluate.wording import counted
 from catenary.postproc.read.results import Results
 from catenary.postproc.report import csv_tables
 from catenary.postproc.report.csv_tables import DropperRow
@@ -26,7 +29,7 @@ def in_motion(run: EvaluatedRun) -> Section:
         ["largest uplift at a steady arm", number(1e3 * supports.maximum), "mm"]
     ]
     of_droppers: list[list[Any]] = [
-        ["droppers that slackened", droppers.n_slackened, f"of {droppers.evaluated.sum()}"],
+        ["droppers that slackened", f"{droppers.n_slackened} of {droppers.evaluated.sum()}", ""],
         ["largest dropper force", number(droppers.maximum), "N"],
         ["smallest dropper force", number(droppers.minimum), "N"],
     ]
@@ -71,8 +74,8 @@ def _of_rest(results: Results) -> Iterator[Text | StudyTable]:
         low, high = elasticity.min(), elasticity.max()
         start, end = results.static("elasticity_x")[[0, -1]]
         yield Text(
-            f"Elasticity in span {span}, {start:.6g} to {end:.6g} m, in the middle of the line: "
-            f"{low:#.3g} to {high:#.3g} mm/N (non-uniformity "
+            f"Elasticity in span {span}, {start:.6g} to {end:.6g} m, near the middle of the line "
+            f"and outside of overlaps: {low:#.3g} to {high:#.3g} mm/N (non-uniformity "
             f"{number(100 * (high - low) / (high + low))} %)."
         )
     own = [row for row in csv_tables.dropper_table(results) if row.span == span]
@@ -121,7 +124,15 @@ def from_above(run: EvaluatedRun) -> Section:
 
 
 def _lateral(results: Results) -> Iterator[Text]:
-    """From where to where contact wires that move sideways are at rest in the running spans."""
+    """Radial forces, and where contact wires that move sideways are at rest in running spans."""
+    arms = results.registration()
+    assert arms is not None
+    low, high = (number(float(end)) for end in (arms.tension.min(), arms.tension.max()))
+    n_pushed = np.count_nonzero(arms.pushed)
+    yield Text(
+        f"The {counted(len(arms.x), 'steady arm')} pull the wires at rest by {low} to {high} N"
+        + (f"; {n_pushed} of them are pushed, with a negative force." if n_pushed else ".")
+    )
     if not results.has_static("contact_y"):
         return
     first, last = results.line("running_range")
@@ -129,10 +140,9 @@ def _lateral(results: Results) -> Iterator[Text]:
         assert wire.y is not None
         own = wire.y[(wire.x >= first) & (wire.x <= last)]
         words = name.replace("_", " ").capitalize()
-        low, high = (number(float(end), 3) for end in (own.min(), own.max()))
         yield Text(
-            f"{words} lies between {low} and {high} m to the left of the track's axis in the "
-            "running spans."
+            f"{words} lies between {own.min():.3f} and {own.max():.3f} m to the left of the "
+            "track's axis in the running spans."
         )
 
 

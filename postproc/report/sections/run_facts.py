@@ -17,8 +17,6 @@ from catenary.postproc.report.sections.section import EvaluatedRun, Folded, Sect
 from catenary.postproc.report.study_table import StudyTable, texts_table
 from catenary.postproc.report.summary import real_time_factor
 
-# Counters of summary.json that say how the contact problem was solved, not what came of it.
-_OF_THE_SOLVER = ("steps", "rounds", "repeated_steps", "pivoted_steps")
 # File beside a full report: the scene as a case that `catenary run` takes.
 INPUT = "input.toml"
 
@@ -74,24 +72,21 @@ def effects(run: EvaluatedRun, costs: tuple[Mapping[str, str], str] = ({}, "")) 
         them.
     """
     about, (told, study) = run.results.attributes, costs
-    heads = ["effect", "", "what it is", "why", *(["what it costs and changes"] if told else [])]
+    heads = ["effect", "what it is", "why", *(["what it costs and changes"] if told else [])]
     on, off = (
         texts_table(
             heads,
-            [
-                [name, state, *words, *([told.get(name, "–")] if told else [])]
-                for name, *words in about[f"effects_{state}"]
-            ],
+            [[name, *words, *([told.get(name, "–")] if told else [])] for name, *words in rows],
         )
-        for state in ("on", "off")
+        for rows in (about["effects_on"], about["effects_off"])
     )
     left = Folded(f"What was not simulated: {counted(len(off.rows), 'effect')}", off)
     how = (
         "Costs are how many times as long a step takes with the effect as without; costs and "
         f"changes are those of {study}."
         if told
-        else f"catenary plan {about['case']} --cost -o FOLDER measures what each costs and "
-        "changes; catenary report with --cost FOLDER shows it here."
+        else f"`catenary plan {about['case']} --cost -o STUDY` measures what each costs and "
+        "changes; `catenary report --cost STUDY` shows it here."
     )
     return Section("What was simulated", [on, Text(how)], folded=[left])
 
@@ -124,10 +119,7 @@ def signatures(text: str | None, run: EvaluatedRun) -> Section:
 def section(run: EvaluatedRun) -> Section:
     """Facts on the run, and its whole configuration."""
     about = run.results.attributes
-    rows = [*_facts(run.results), *_of_mesh(run.indicators)]
-    phases = about.get("phase_wall_s", {}).items()
-    rows += [(f"wall time, phase {name}", f"{number(wall, 2)} s") for name, wall in phases]
-    rows += [(f"version of {name}", version) for name, version in about["versions"].items()]
+    rows = [*_facts(run.results), *_of_mesh(run.indicators), *_of_program(run.results)]
     config = json.dumps(about["config"], indent=2, ensure_ascii=False)
     folded = Folded("Full configuration, defaults included", Text(config, "code"))
     return Section("The run", [texts_table(["", ""], rows)], folded=[folded])
@@ -152,51 +144,58 @@ def _of_mesh(found: Indicators) -> list[tuple[str, str]]:
 def _facts(results: Results) -> list[tuple[str, str]]:
     about = results.attributes
     n_cells = sum(len(pairs) for pairs in results.elements().values())
-    facts = [
+    arrivals, masts = about.get("arrivals", {}), results.line("support_x")
+    names = results.pantograph_names()
+    kinds: dict[str, list[str]] = {}
+    for name, told in zip(names, results.pantograph_words(), strict=True):
+        if told:
+            kinds.setdefault(f"{told['kind']}, {told['description']}", []).append(name)
+    met = [fact["says"].partition(": ")[2] for fact in arrivals.get("pantographs", [])]
+    return [
         (
             "line",
-            f"{counted(results.line('support_x').size - 1, 'span')}, "
-            f"{results.line('support_x')[-1] - results.line('support_x')[0]:.0f} m, "
+            f"{counted(masts.size - 1, 'span')}, {masts[-1] - masts[0]:.0f} m, "
             f"{counted(results.line('dropper_x').size, 'dropper')}, "
             f"{counted(results.line('arm_x').size, 'steady arm')}",
         ),
-        *(
-            (name, f"{told['kind']}, {told['description']}")
-            for name, told in zip(
-                results.pantograph_names(), results.pantograph_words(), strict=True
-            )
-            if told
-        ),
-        ("mesh", f"{results.line('node_points').shape[0]} nodes, {n_cells} wire elements"),
-        ("unknowns", f"{about['n_dofs']}"),
-        ("ranks", f"{about['n_ranks']}"),
-        *([("speed of steps", about["detour"])] if about.get("detour") else []),
-        *([("window", about["window"])] if about.get("window") else []),
+        *([("ends of the line", "; ".join(arrivals["ends"]))] if arrivals.get("ends") else []),
+        *((", ".join(own), words) for words, own in kinds.items()),
+        *((f"waves and run-in, {name}", says) for name, says in zip(names, met, strict=False)),
         *(("defect", fact["says"]) for fact in about.get("defects", [])),
         *(
             (f"incident at {fact['time_s']:.4g} s", fact["says"])
             for fact in about.get("incidents", [])
         ),
-        *(("end of the line", says) for says in about.get("arrivals", {}).get("ends", [])),
-        *(
-            ("waves and run-in", fact["says"])
-            for fact in about.get("arrivals", {}).get("pantographs", [])
+        (
+            "mesh",
+            f"{results.line('node_points').shape[0]} nodes, {n_cells} wire elements, "
+            f"{about['n_dofs']} unknowns on {counted(about['n_ranks'], 'rank')}",
+        ),
+        (
+            "time",
+            f"{results.simulated:.3f} s, {results.n_steps} of {about['n_steps_planned']} steps of "
+            f"{1e3 * results.dt:g} ms",
         ),
         ("arm uplift and dropper forces", says(results.line_record, results.dt)),
-        ("time step", f"{1e3 * results.dt:g} ms"),
-        ("steps", f"{results.n_steps} of {about['n_steps_planned']}"),
-        ("simulated time", f"{results.simulated:.3f} s"),
+        *([("speed of steps", about["detour"])] if about.get("detour") else []),
+        *([("window", about["window"])] if about.get("window") else []),
     ]
-    if "march_wall_s" in about:
-        facts.append(("wall time of the march", f"{about['march_wall_s']:.2f} s"))
-    for name, with_records in (("steps", False), ("steps and all records", True)):
-        factor = real_time_factor(results, with_records)
-        if factor is not None:
-            facts.append((f"real-time factor (simulated / wall), {name}", f"{factor:.2f}"))
-    facts += [
-        (name.replace("_", " "), f"{value}")
-        for name, value in about.get("inner_iterations", {}).items()
-        if name not in _OF_THE_SOLVER
+
+
+def _of_program(results: Results) -> list[tuple[str, str]]:
+    """When and how fast the program ran, and its versions."""
+    about = results.attributes
+    phases = about.get("phase_wall_s", {}).items()
+    factors = [
+        f"{factor:.2f} {words}"
+        for words, with_records in (("of the steps", False), ("with all records", True))
+        if (factor := real_time_factor(results, with_records)) is not None
     ]
-    facts.append(("started", str(about["created"])))
-    return facts
+    versions = ", ".join(f"{name} {version}" for name, version in about["versions"].items())
+    rows = {
+        "started": str(about["created"]),
+        "wall time": ", ".join(f"{name} {number(wall, 2)} s" for name, wall in phases),
+        "real-time factor (simulated / wall)": ", ".join(factors),
+        "versions": versions,
+    }
+    return [(name, words) for name, words in rows.items() if words]

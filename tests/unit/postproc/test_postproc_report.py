@@ -154,13 +154,13 @@ def test_report_says_what_was_found(report_folder: Path, march: Any) -> None:
     by = "EN 50367:2006 (AC): 14 of 14 criteria passed, 1 not judged; 14 of 14 limits"
     assert f"Passed. {by} not compared with the text of their standard." in words
     assert "not complete" not in words
-    assert "lateral off stagger and lateral motion not asked for" in words
-    assert "vertical on vertical motion of the tensioned wires always" in words
+    assert "lateral stagger and lateral motion not asked for" in words
+    assert "vertical vertical motion of the tensioned wires always" in words
     # Eight seconds simulated by four of steps, five with the records after them.
-    assert "real-time factor (simulated / wall), steps 2.00" in words
-    assert "real-time factor (simulated / wall), steps and all records 1.60" in words
-    assert "wall time, phase equilibrium 0.20 s" in words
-    assert "version of petsc 3.18.5" in words
+    factors = "2.00 of the steps, 1.60 with all records"
+    assert f"real-time factor (simulated / wall) {factors}" in words
+    assert "equilibrium 0.20 s" in words[words.index("wall time") :]
+    assert "petsc 3.18.5" in words[words.index("versions") :]
     assert '"scheme": "one_solve"' in words
     assert f"Droppers of all spans ({march.dropper_x.size})" in words
 

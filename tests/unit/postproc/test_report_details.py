@@ -18,8 +18,8 @@ from catenary.postproc.evaluate import statistics
 from catenary.postproc.evaluate.acceptance import criteria_of
 from catenary.postproc.evaluate.verdict import Criterion
 from catenary.postproc.read.results import Results
-from catenary.postproc.report import paper
-from catenary.postproc.report.pictures import figures, force_pictures, interactive
+from catenary.postproc.report import page, paper
+from catenary.postproc.report.pictures import figures, force_pictures, interactive, line_pictures
 from catenary.postproc.report.report import SECTIONS, write_report
 from catenary.postproc.report.sections import acceptance, dynamics
 from catenary.postproc.report.sections.section import EvaluatedRun
@@ -174,16 +174,45 @@ def test_tables_of_supports_and_droppers(run_folder: Path) -> None:
         uplift = results.extremes("arm_uplift")[1]
         lowest, highest = results.extremes("dropper_force")
         x = results.line("dropper_x")
+        slack = results.dt * np.count_nonzero(results.channel("dropper_force") <= 0.0, axis=0)
     # Supports at 250, 300 ... 550 m, and a limit of 120 mm.
     assert [row[0] for row in arms.texts()] == [f"{50 * k}.00" for k in range(5, 12)]
     for row, own in zip(arms.texts(), uplift[4:11], strict=True):
-        assert float(row[2]) == pytest.approx(1e3 * own, abs=0.05)
-        assert float(row[3]) == pytest.approx(120.0 - 1e3 * own, abs=0.1)
-    inside = np.flatnonzero((x >= 250.0) & (x <= 550.0))
-    assert len(droppers.rows) == inside.size
-    first = droppers.texts()[0]
-    assert float(first[2]) == pytest.approx(highest[inside[0]], abs=0.05)
-    assert float(first[3]) == pytest.approx(lowest[inside[0]], abs=0.05)
+        assert float(row[1]) == pytest.approx(1e3 * own, abs=0.05)
+        assert float(row[2]) == pytest.approx(120.0 - 1e3 * own, abs=0.1)
+    # Of 54 droppers those with the five largest forces and the five longest slacks.
+    inside = np.flatnonzero((x >= 250.0) & (x <= 550.0)).tolist()
+    numbers = {f"{x[n]:.2f}": n for n in inside}
+    rows = droppers.texts()
+    assert f"{len(rows)} of {len(inside)} are shown" in droppers.note and len(inside) == 54
+    assert [row[0] for row in rows] == sorted((row[0] for row in rows), key=float)
+    for word, values in (("largest force", highest), ("longest slack", slack)):
+        own = [values[numbers[row[0]]] for row in rows if word in row[5]]
+        assert sorted(own) == pytest.approx(sorted(values[inside])[-5:])
+    for row in rows:
+        n = numbers[row[0]]
+        assert float(row[2]) == pytest.approx(highest[n], abs=0.05)
+        assert float(row[3]) == pytest.approx(lowest[n], abs=0.05)
+        assert float(row[4]) == pytest.approx(slack[n], abs=0.6e-3)
+        assert row[5]
+
+
+def test_the_limit_of_the_uplift_is_in_its_picture(run_folder: Path) -> None:
+    """One that is less than twenty times the uplift of 61.6 mm, which others would shrink to."""
+    with Results(run_folder) as results:
+        found = statistics.evaluate(results)
+        for limit, drawn in ((0.12, True), (0.05, True), (2.0, False)):
+            _, axes = line_pictures.arm_uplift(results, found, limit).axes
+            low, high = axes.get_ylim()
+            assert low == 0.0 and (low < 1e3 * limit < high) == drawn
+
+
+def test_commands_and_figures_with_units_stay_together() -> None:
+    said = page._with_commands("-7.8 N of 41.7 % <here>: `catenary report -o A` shows 12 of 18.")
+    assert said == (
+        "\u22127.8\u00a0N of 41.7\u00a0% &lt;here&gt;: <code>catenary report -o A</code> shows "
+        "12 of 18."
+    )
 
 
 @figures.own_style()
