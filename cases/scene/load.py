@@ -51,9 +51,8 @@ class Draft:
             If no scene has such a key, or if it leads through something that is no table.
         """
         raw, given = self._copy(), list(self.given)
-        known = known_keys(Scene)
         for key, value, where in values:
-            if not is_known(key, known):
+            if not is_known(key, known_keys(Scene)):
                 near = known_keys(Scene, with_kinds(key, raw, Scene))
                 raise InputError(unknown_key(key, where, near))
             assign(raw, key, value, where)

@@ -17,7 +17,9 @@ def least_squares(matrix: np.ndarray, right: np.ndarray, cond: float) -> np.ndar
     Directions in which the matrix is smaller than ``cond`` of its size count as none. By QR with
     pivoting, which iterates nothing.
     """
-    return np.asarray(linalg.lstsq(matrix, right, cond=cond, lapack_driver="gelsy")[0])
+    return np.asarray(
+        linalg.lstsq(matrix, right, cond=cond, lapack_driver="gelsy", check_finite=False)[0]
+    )
 
 
 def null_space(matrix: np.ndarray) -> np.ndarray:

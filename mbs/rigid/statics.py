@@ -66,11 +66,12 @@ def at_rest(system: System, start: Motion, tolerance: float = 1e-9) -> tuple[Mot
     """Place and N^T g of ``equilibrium``, without the multipliers."""
     resting = start.with_velocities(np.zeros(6 * start.n_bodies))
     motion = system.assemble(resting)
-    size = float(np.abs(system.generalised_forces(motion, 0.0)).max())
+    force = system.generalised_forces(motion, 0.0)
+    size = float(np.abs(force).max())
     left = np.inf
     for _ in range(_MOST_ITERATIONS):
         free = null_space(system.constraints(motion, 0.0).jacobian)
-        unbalanced = free.T @ system.generalised_forces(motion, 0.0)
+        unbalanced = free.T @ force
         left = float(np.abs(unbalanced).max(initial=0.0))
         if left <= tolerance * size:
             return motion, left
@@ -86,6 +87,7 @@ def at_rest(system: System, start: Motion, tolerance: float = 1e-9) -> tuple[Mot
             break  # nothing resists what is left over
         step *= min(1.0, LONGEST / longest)
         motion = system.assemble(motion.moved(step))
+        force = system.generalised_forces(motion, 0.0)
     raise RunBroken(
         f"The multibody system finds no equilibrium near its start: {left:.3g} N are left over; "
         "start closer to it, or check springs and actuators."

@@ -185,6 +185,9 @@ def _invalid(
     for first in range(0, n_columns, _COLUMNS):
         columns = (slice(first, first + _COLUMNS),) if table.ndim == 2 else ()
         values = np.asarray(table[(part, *columns)]).reshape(bad.size, -1)
+        # Not true of NaN. As good as all blocks are valid, and this makes no arrays.
+        if values.size and -most <= values.min() and values.max() <= most:
+            continue
         with np.errstate(invalid="ignore"):
             valid = np.abs(values) <= most
         bad |= ~(valid | np.isnan(values) if may_be_nan else valid).all(axis=1)

@@ -186,14 +186,15 @@ class Results(TrainOfRun):
     def rows(self, name: str, part: slice) -> np.ndarray:
         """Some rows of a channel, shape (rows, columns), NaN where it is damaged and where the
         line is not recorded."""
-        n = len(range(*part.indices(self.n_rows(name))))
-        whole = np.full((n, self._n_places(name)), np.nan)
-        table = self._table(name)
+        n, table = len(range(*part.indices(self.n_rows(name)))), self._table(name)
+        columns, n_places = self.recorded_columns(name), self._n_places(name)
+        valid = self._valid(name, part)
+        n_valid, all_there = valid.stop - valid.start, columns.size == n_places
+        if table is not None and all_there and n_valid == n:
+            return np.asarray(table[valid])
+        whole = np.full((n, n_places), np.nan)
         if table is not None:
-            valid = self._valid(name, part)
-            columns = self.recorded_columns(name)
-            all_there = columns.size == whole.shape[1]
-            whole[: valid.stop - valid.start, slice(None) if all_there else columns] = table[valid]
+            whole[:n_valid, slice(None) if all_there else columns] = table[valid]
         return whole
 
     def column(self, name: str, index: int, part: slice | None = None) -> np.ndarray:

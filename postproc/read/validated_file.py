@@ -33,6 +33,7 @@ from catenary.postproc.read.validation import (
     names_in,
     read_attributes,
     table_values,
+    values_fault,
 )
 from catenary.solver.time_loop.views import channels
 
@@ -70,6 +71,7 @@ class ValidatedFile:
         self, path: Path, records: Records | None = None, image: bytes | None = None
     ) -> None:
         self.path = path
+        self._opened: dict[str, Any] = {}
         try:
             self._file, self._complete = (
                 opened(path) if image is None else (opened_image(image), None)
@@ -127,7 +129,8 @@ class ValidatedFile:
         """Read the facts; returns their faults."""
         try:
             group = self._file["facts"]
-            intact = sum_is_kept(group, {name: np.asarray(group[name][()]) for name in group})
+            read = {name: np.asarray(group[name][()]) for name in group}
+            intact = sum_is_kept(group, read)
         except HDF5_ERRORS:
             return ["its facts are missing or cannot be read"]
         if intact is False:
@@ -135,15 +138,15 @@ class ValidatedFile:
         faults = []
         for path, declared in fact_tables().items():
             name = path.removeprefix("facts/")
-            if name not in group and intact and name not in _ESSENTIAL_FACTS:
+            if name in read:
+                fault = values_fault(read[name], declared, self.sizes)
+                self.facts |= {} if fault else {name: read[name]}
+                faults += [f"{path} {fault}"] if fault else []
+            elif intact and name not in _ESSENTIAL_FACTS:
                 shape = tuple(self.sizes.get(own, 1) for own in declared.dimensions)
                 self.facts[name] = np.full(shape, NONE)
-                continue
-            values, fault = table_values(self._file, path, declared, self.sizes)
-            if values is None:
-                faults.append(fault)
             else:
-                self.facts[name] = values
+                faults.append(f"{path} is missing or cannot be read")
         return faults
 
     def _constant_faults(self) -> list[str]:
@@ -263,10 +266,14 @@ class ValidatedFile:
         return path not in self._faults and is_there(self._file, path)
 
     def __getitem__(self, path: str) -> Any:
-        try:
-            return self._file[path]
-        except HDF5_ERRORS as error:
-            raise InputError(f"{self.path} is damaged: {path} cannot be read") from error
+        # Kept open: with a table HDF5 forgets the chunks that it has read, and reads them again for
+        # the next column.
+        if path not in self._opened:
+            try:
+                self._opened[path] = self._file[path]
+            except HDF5_ERRORS as error:
+                raise InputError(f"{self.path} is damaged: {path} cannot be read") from error
+        return self._opened[path]
 
     @property
     def has_energies(self) -> bool:

@@ -211,9 +211,10 @@ def _painted(sections: Iterable[Section], kind: str) -> dict[str, bytes]:
     from catenary.postproc.report.pictures import figures
 
     painted: dict[str, bytes] = {}
-    for section in sections:
-        for name, _, draw in section.pictures:
-            painted |= figures.painted(f"{name}.{kind}", draw)
+    with figures.own_style():  # set once for all of them
+        for section in sections:
+            for name, _, draw in section.pictures:
+                painted |= figures.painted(f"{name}.{kind}", draw)
     return painted
 
 

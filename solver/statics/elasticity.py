@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy import sparse
@@ -43,7 +44,7 @@ class Elasticity:
         [m/N]."""
         return np.einsum("iww->iw", self.compliance)
 
-    @property
+    @cached_property
     def lift(self) -> np.ndarray:
         """Lift of a head that presses with a unit force from where it touches all contact wires,
         (n,) [m/N]; of a single wire its own."""

@@ -28,10 +28,9 @@ from catenary.postproc.report.pictures.figures import (
     uprights,
 )
 from catenary.postproc.report.pictures.marks import mark_line, mark_static, still_marks, with_margin
-from catenary.solver.statics.tension_along import LineAtTemperature
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from catenary.solver.statics.tension_along import LineAtTemperature
 
 
 # A limit so many times the largest uplift is left out of its picture, whose dots would be at zero.
