@@ -130,7 +130,7 @@ def power_kept(cut_off: float, dt: float | None) -> tuple[np.ndarray, np.ndarray
 
 @lru_cache(maxsize=64)
 def _sections(kind: str, edges: tuple[float, ...], dt: float) -> np.ndarray:
-    """Second-order sections of a filter, which a sweep asks for again and again."""
+    """Second-order sections of a filter; cached, as sweeps use it in each run."""
     found = signal.butter(ORDER, np.squeeze(edges), btype=kind, fs=1.0 / dt, output="sos")
     return np.asarray(found)
 

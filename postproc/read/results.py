@@ -83,7 +83,7 @@ class Results(TrainOfRun):
 
     @property
     def damage(self) -> list[str]:
-        """A sentence that names the file's damage and what is used of it, none if it is valid."""
+        """A sentence on the file's damage and its usable part, none if the file is valid."""
         return self._file.damage
 
     @property
