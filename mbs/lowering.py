@@ -49,7 +49,7 @@ class Lowering:
 
 
 class LoweringArrays(NamedTuple):
-    """A lowering as kernels take it; see `kernels/heads/lowering.hpp`."""
+    """A lowering as kernels take it; see `kernels/heads/head.hpp`."""
 
     time: float
     drop: float

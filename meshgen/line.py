@@ -84,7 +84,7 @@ class Line(Spans):
 
     @property
     def hardware(self) -> tuple[SteadyArms | Supports, ...]:
-        """Groups of what stands at single places of wires: arms, then supports."""
+        """Groups at single places of wires: arms, then supports."""
         return (*self.steady_arms, *self.supports)
 
     @property

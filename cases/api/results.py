@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
-# Names of the columns' dimension, by what a column stands for.
+# Name of the dimension of a channel's columns, by the part that a column is of.
 _COLUMNS = {
     channels.PANTOGRAPH: "pantograph",
     channels.STRIP: "strip",
@@ -114,7 +114,7 @@ class Run:
 
     @cached_property
     def summary(self) -> dict[str, Any]:
-        """What ``summary.json`` holds: the figures of the run as numbers, texts, lists and tables.
+        """The figures of ``summary.json`` as numbers, texts, lists and tables.
 
         Examples
         --------
@@ -252,7 +252,7 @@ class Run:
         return xr.DataArray(results.channel(name), coords, dims, name, _about(channel))
 
     def _columns(self, per: str) -> dict[str, Any]:
-        """What stands beside the columns of a channel, by the name of the coordinate."""
+        """The coordinates of the columns of a channel, by name."""
         results, dim = self._results, _COLUMNS[per]
         names = results.pantograph_names()
         if per in _PLACES:

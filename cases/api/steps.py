@@ -360,7 +360,7 @@ class Simulation:
         self._add("base_acceleration", value)
 
     def close(self) -> None:
-        """Give back the memory of the line; nothing but ``time`` can be asked then.
+        """Free the memory of the line; only ``time`` can be read afterwards.
 
         Examples
         --------
@@ -389,7 +389,7 @@ class Simulation:
 
 
 class _Closed:
-    """What is left of a simulation that was closed."""
+    """A simulation that was closed."""
 
     def __init__(self, time: float) -> None:
         self.time = time

@@ -5,6 +5,7 @@ Backends are imported inside the verbs, so that --help stays quick.
 
 from __future__ import annotations
 
+import os
 from copy import copy
 from dataclasses import dataclass
 from functools import partial
@@ -237,6 +238,27 @@ def options(
     """Not collective."""
 
 
+def lone_task(n_ranks: int) -> str:
+    """The sentence for a process that SLURM started as one of several and MPI as a single one.
+
+    "" for all others, and for tasks but the first, so that it is told once. Not collective.
+
+    Parameters
+    ----------
+    n_ranks : ranks that MPI sees
+    """
+    # A step of one task within a larger job is meant so.
+    told = os.environ.get("SLURM_STEP_NUM_TASKS") or os.environ.get("SLURM_NTASKS", "")
+    n_tasks = int(told) if told.isascii() and told.isdigit() else 1
+    if n_ranks > 1 or n_tasks == 1 or os.environ.get("SLURM_PROCID", "0") != "0":
+        return ""
+    return (
+        f"SLURM has {n_tasks} tasks here and MPI sees one rank: each task simulates the whole line "
+        "by itself; start ranks with `srun --mpi=pmix`, or as `srun --mpi=list` and your site say, "
+        "or with mpirun"
+    )
+
+
 def begin(
     read: Callable[[], tuple[T, list[str]]], verbose: bool, scene_of: Callable[[T], Scene]
 ) -> tuple[Any, T, list[str]]:
@@ -251,7 +273,6 @@ def begin(
         on_root,
         set_up_logging,
     )
-    from catenary.cases.process.batch_tasks import lone_task
     from catenary.cases.process.petsc_options import as_arguments, idle_options, start_petsc
 
     # A process of its own is refused before MPI has started.

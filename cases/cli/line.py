@@ -9,6 +9,7 @@ import typer
 
 from catenary.base.errors import InputError
 from catenary.cases.cli.app import Force, SceneWords, serial_verb
+from catenary.cases.result_folder.output_folder import new_file
 from catenary.cases.terminal import console
 from catenary.postproc.evaluate.wording import counted
 
@@ -104,8 +105,6 @@ def static(
     ] = None,
 ) -> None:
     """Serial."""
-    from catenary.cases.result_folder.output_files import new_file, write_static
-
     if registration and (out is None or over is not None):
         raise InputError("--registration takes -o with the name of a *.csv file to write")
     if out is not None:
@@ -118,7 +117,7 @@ def static(
         console.say(temperatures(words.load(), differences, out))
         return
     scene = words.load()
-    from catenary.cases.run.at_rest.static_table import rest_text, static_table
+    from catenary.cases.run.at_rest.static_table import rest_text, static_table, write_static
     from catenary.cases.run.describe.defects import defect_facts
     from catenary.cases.scene.problem import problem_of
 
@@ -148,8 +147,6 @@ def prepare(
     force: Force = False,
 ) -> None:
     """Serial."""
-    from catenary.cases.result_folder.output_files import new_file
-
     scene = words.load()
     new_file(out, (".line",), force)
     from catenary.cases.run.prepared import HEADER, LIBRARY, prepare_line

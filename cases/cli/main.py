@@ -28,9 +28,9 @@ def all_verbs() -> typer.Typer:
     # Each of these files adds its verbs, in this order of --help.
     # isort: off
     from catenary.cases.cli import plan, line, results  # noqa: F401
-    from catenary.cases.cli.studies import sweep, uncertainty, optimise, questions  # noqa: F401
+    from catenary.cases.cli.studies import sweep, optimise, questions  # noqa: F401
     from catenary.cases.cli.studies import numerics, reference, parameters  # noqa: F401
-    from catenary.cases.cli.studies import stability, waves, scaling  # noqa: F401
+    from catenary.cases.cli.studies import waves  # noqa: F401
     from catenary.cases.cli import first_steps  # noqa: F401
 
     # isort: on

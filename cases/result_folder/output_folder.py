@@ -1,4 +1,4 @@
-"""The folder of a run's results, judged before anything is computed: names, files there, room."""
+"""Folder of a run's results, or file of a verb, judged before all computing: names, files, room."""
 
 from __future__ import annotations
 
@@ -241,3 +241,20 @@ def _is_hdf5(path: Path) -> bool:
 def volume(n_bytes: float) -> str:
     """A size in words: MB below one GB."""
     return f"{n_bytes / 1e9:.1f} GB" if n_bytes >= 1e9 else f"{n_bytes / 1e6:.1f} MB"
+
+
+def new_file(path: Path, suffixes: tuple[str, ...], force: bool) -> None:
+    """Make the folder of a file; raise ``InputError`` unless ``path`` can be written with one of
+    ``suffixes``."""
+    if path.suffix not in suffixes:
+        raise InputError(f"-o {path} must have a name that ends in {' or '.join(suffixes)}")
+    if path.is_dir():
+        raise InputError(f"-o {path} is a folder; name a file")
+    if path.exists() and not force:
+        raise InputError(f"-o {path} exists already; give --force to replace it")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"-o {path} cannot be written: {error.strerror}") from error
+    if not os.access(path if path.exists() else path.parent, os.W_OK):
+        raise InputError(f"-o {path} cannot be written: permission denied")

@@ -1,4 +1,4 @@
-"""Lines that are prepared for steps from outside."""
+"""Lines of scenes at rest, and lines prepared for steps from outside."""
 
 from __future__ import annotations
 
@@ -10,13 +10,25 @@ import catenary.solver.kernels
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.problem import problem_of
 from catenary.cases.scene.scene import Scene
-from catenary.solver.statics.line_at_rest import line_at_rest
+from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest
 from catenary.solver.statics.stability_of_rest import refuse_lost_wire
 from catenary.solver.time_loop.march import March
 
 _KERNELS = Path(catenary.solver.kernels.__path__[0])
 # What C programs include and link.
 HEADER, LIBRARY = _KERNELS / "simulation/catenary.h", _KERNELS / "libcatenary.so"
+
+
+def rest_of(scene: Scene) -> LineAtRest:
+    """The line of a scene at rest. Not collective."""
+    return line_at_rest(problem_of(scene), mesh_of(scene))
+
+
+def sound_rest(scene: Scene) -> LineAtRest:
+    """The line of a scene at rest; InputError if a wire has lost its tension. Not collective."""
+    found = rest_of(scene)
+    refuse_lost_wire(found.model, found.form)
+    return found
 
 
 def prepare_line(scene: Scene, path: Path) -> int:
@@ -29,7 +41,5 @@ def prepare_line(scene: Scene, path: Path) -> int:
     RunBroken
         If the file cannot be written.
     """
-    rest = line_at_rest(problem_of(scene), mesh_of(scene))
-    refuse_lost_wire(rest.model, rest.form)
-    with March(MPI.COMM_SELF, *rest) as march:
+    with March(MPI.COMM_SELF, *sound_rest(scene)) as march:
         return march.write_line(path)

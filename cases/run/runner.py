@@ -90,7 +90,7 @@ class Phases:
 
 
 def performance(outcome: Outcome, phases: Phases, n_ranks: int) -> dict[str, Any]:
-    """What is known at the end; after a restart, of the last part."""
+    """Result of a run; after a restart, of its last part."""
     counted: dict[str, float] = dict(outcome.counters)
     if outcome.traffic is not None:
         # Of the rank that sends most; a whole number unless droppers of other ranks slacken.
@@ -109,7 +109,7 @@ def performance(outcome: Outcome, phases: Phases, n_ranks: int) -> dict[str, Any
 
 
 def on_as_many(scene: Scene, comm: Any, run: Callable[[Any], T]) -> T:
-    """What ``run`` returns for the ranks that a scene needs. Collective.
+    """The result of ``run`` on the ranks that a scene needs. Collective.
 
     A window is some tens of spans, which one rank steps in less time than two can agree on: rank 0
     runs alone, as if the others were not there, and these sleep until it is done. A signal to
@@ -439,7 +439,7 @@ def _report(out_dir: Path, outcome: Outcome, only_summary: bool) -> RunOutcome:
             accepted = write_report(out_dir / RESULT, out_dir).verdict
         summary = json.loads((out_dir / "summary.json").read_text(encoding="utf-8"))
     except (OSError, CatenaryError) as error:
-        if outcome.outcome != "done":  # that has been told, and this adds nothing
+        if outcome.outcome != "done":  # reported already
             return RunOutcome(outcome.outcome, None)
         raise RunBroken(
             f"{error}; the results are complete: `catenary report {out_dir}` writes the report "

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from catenary.base.errors import InputError
-from catenary.cases.result_folder.output_files import new_file
+from catenary.cases.result_folder.output_folder import new_file
 from catenary.cases.scene.checks.mesh_size import MANY_NODES, size_of
 from catenary.cases.scene.problem import line_of
 from catenary.cases.scene.scene import Scene

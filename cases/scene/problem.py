@@ -57,7 +57,7 @@ def line_data_of(scene: Scene) -> LineData:
 
 
 def end_of(scene: Scene) -> float:
-    """Where the leading pantograph stops [m]: ``train.end_m`` or what stands for it."""
+    """Where the leading pantograph stops [m]: ``train.end_m`` or its default."""
     if scene.train.end_m is not None:
         return scene.train.end_m
     line = line_data_of(scene)
@@ -151,7 +151,7 @@ def _vehicle(scene: Scene) -> VehicleMotion | None:
     if scene.vehicle is None:
         return None
     vehicle = vehicle_of(scene.vehicle)
-    # A suspension passes on what the track does, and nothing else.
+    # A suspension passes on the motion of the track only.
     return vehicle if scene.switches()["vehicle_motion"] else replace(vehicle, suspension=None)
 
 

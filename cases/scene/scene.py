@@ -89,8 +89,15 @@ class Scene(Table):
     def among(
         self, key: str, known: Collection[str], has: str = "", *, name: str | None = None
     ) -> Iterator[Fault]:
-        """The fault of a key that holds a name which is none of those ``known``; ``has`` says whose
-        they are. ``name`` is one that the key holds beside others."""
+        """The fault of a key whose name is unknown.
+
+        Parameters
+        ----------
+        key : holds the name
+        known : allowed names
+        has : words for whose they are
+        name : the name, if the key holds several
+        """
         name = str(self._at(key)) if name is None else name
         if name not in known:
             near = difflib.get_close_matches(name, known, n=1)
@@ -116,7 +123,7 @@ class Scene(Table):
         return Fault(key, f"{key} {self._origin.of(key)} {says}")
 
     def needs_effect(self, key: str, effect: str) -> Fault:
-        """The fault of a key that nothing reads without an effect, which is off by default."""
+        """The fault of a key that acts only with an effect that is off by default."""
         why = f"it acts only with effects.{effect} = true; write that, or false to leave it out"
         return self.refused(key, why)
 

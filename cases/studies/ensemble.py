@@ -88,7 +88,7 @@ class Keeper(Observer):
         return self._extremes
 
 
-# What changes the line at rest, but not how it moves about that.
+# Changes the line at rest, but not its matrices.
 _OF_THE_REST = "dropper_lengths"
 # Lanes have no watch of energies and motions. A march by itself is watched, and is made of scenes
 # where that may have something to say: of an uplift at an arm [m], a contact force [N], a share of
@@ -214,7 +214,7 @@ class Marches:
 
 
 def _key_of_line(scene: Scene) -> str:
-    """What the line of a scene depends on but for errors of the droppers' lengths, as text."""
+    """All keys of the line of a scene as text, without errors of the droppers' lengths."""
     tables = {name: own for name, own in resolved(scene).items() if name not in OF_THE_TRAIN}
     if _OF_THE_REST in tables.get("irregularities", {}):
         tables["irregularities"] = {**tables["irregularities"], _OF_THE_REST: "some"}
@@ -378,7 +378,7 @@ def _alone(line: _Line, number: int, scene: Scene, problem: Problem, rest: LineA
 def _summary(
     head: Header, tables: dict[str, np.ndarray], extremes: dict[str, np.ndarray], outcome: str
 ) -> dict[str, Any]:
-    """What a run of the scene writes as its summary."""
+    """The summary that a run of the scene would write."""
     results = Results.of(MarchedFile(head, tables, extremes, outcome))
     statistics = stats.evaluate(results)
     return summarise(results, statistics, criteria_of(results, statistics))

@@ -199,7 +199,7 @@ def stand(data: MultibodyData) -> Standing:
 
 @dataclass
 class _Mechanism:
-    """A mechanism with its arm held at the ``height``, and what was found of it for one static
+    """A mechanism with its arm held at the ``height``, and its equilibrium for one static
     force, which serves for others: the calibration, the head with the place where it was measured
     and the number of freedoms there, and places of the arm."""
 
@@ -239,7 +239,7 @@ def _mechanism(data: MultibodyData) -> _Mechanism:
 
 
 def _bodies_of(data: MultibodyData) -> MultibodyData:
-    """Data of the mechanism alone: no static force, and nothing that is not there at standstill."""
+    """Data of the mechanism alone at standstill: no static force, no air."""
     return MultibodyData(
         data.name,
         data.system,
@@ -335,7 +335,7 @@ def describe_assembly(missed: tuple[Miss, ...]) -> str:
 
 
 def without_head(data: MultibodyData, system: System) -> System:
-    """The mechanism that raises the arm: nothing that the head is, or hangs on."""
+    """The mechanism that raises the arm, without the head and its suspension."""
     bodies = tuple(body for body in system.bodies if body.name != data.head)
     joints = tuple(joint for joint in system.joints if data.head not in _joined(joint))
     forces: list[Force] = []

@@ -137,7 +137,7 @@ class _Sections(NamedTuple):
 
 @lru_cache(maxsize=64)
 def _sections(kind: str, edges: tuple[float, ...], dt: float) -> _Sections:
-    """A filter, which a sweep asks for again and again."""
+    """A filter; cached, as sweeps use it in each run."""
     sos = signal.butter(ORDER, np.squeeze(edges), btype=kind, fs=1.0 / dt, output="sos")
     return _Sections(np.asarray(sos), signal.sosfilt_zi(sos))
 

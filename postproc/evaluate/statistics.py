@@ -272,7 +272,7 @@ def _pantograph(name: str, number: int, results: Results) -> PantographStatistic
 
 
 def _unjudged(noun: str, force: np.ndarray, results: Results) -> str:
-    """Why statistics of a force (n,) of the evaluation stretch judge nothing, "" if they do."""
+    """Why a force (n,) of the evaluation stretch is not judged, "" if it is."""
     if not force.any():
         return f"Nothing is judged of the {noun}: its contact force is zero all the way."
     start, end = results.evaluation
@@ -314,7 +314,7 @@ def _droppers(results: Results) -> DropperStatistics:
 
 
 def slackens_at_all(results: Results) -> bool:
-    """Whether droppers of a run slacken at zero force: not if they may push, or carry nothing at
+    """Whether droppers of a run slacken at zero force: not if they may push, or have no force at
     rest."""
     kept = results.fact("slack_stiffness_share")
     if np.isnan(kept):  # a file without this fact, of a version with one effect for it

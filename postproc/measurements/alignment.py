@@ -28,11 +28,11 @@ _SAMPLES, _LEAST_OVERLAP, _MOST_REFINED = 8, 0.5, 12
 # Drifts that the search begins from: between two of them ends of a record are off by this part of
 # the shortest wave.
 _LARGEST_DRIFT, _DRIFT_STEP = 0.02, 0.25
-# Forces with other gains are not those of the run.
+# A force with a gain beyond these is not the force of the run.
 _GAINS = (0.3, 3.0)
 # Of a longer stretch [m] the middle is searched; the section that is fitted then grows by so much.
 _SECTION, _GROWTH = 1500.0, 4.0
-# What the file's filter may be, in cut-offs that it should have; beside none.
+# Cut-offs tried for the file's filter, over the stated one; no filter is tried too.
 _FACTORS = (0.15, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.125, 1.25, 1.5, 2.0, 3.0)
 # Twice the logarithm of a likelihood ratio beyond which the worse model is given up: chance passes
 # 20 in 8 of a million cases, with one parameter.
@@ -235,7 +235,7 @@ class _Fit:
     def chosen(
         self, starts: list[tuple[float, float]], passed: float | None
     ) -> tuple[_Refined | None, tuple[float, ...]]:
-        """Of those that fit as well the one next to the file's places, and shifts of the others."""
+        """The equally good fit nearest to the file's places, and the shifts of the others."""
         # The second time with the samples that belong to the section.
         lengths = [_SECTION, _SECTION]
         middle = 0.5 * (self._place[0] + self._place[-1])

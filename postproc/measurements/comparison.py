@@ -24,13 +24,13 @@ _SHIFT, _DRIFTED, _FORCE_SHARE, _HEIGHT, _FILTER_SHARE = 0.2, 0.1, 0.003, 2e-3, 
 # A pantograph has no force if half of its samples lie below this share of the run's mean, and none
 # was measured if this share of the samples has no number.
 _NO_FORCE, _MOST_GAPS = 0.2, 0.2
-# Forces with a lower correlation are not those of the run: nothing is aligned by them.
+# Forces with a lower correlation are not those of the run, and are not used for alignment.
 _LEAST_CORRELATION = 0.6
 # A constant of so many stated deviations is no error.
 _BIASES = 3.0
-# What remains is more than the stated noise beyond this factor.
+# A residual exceeds the stated noise beyond this factor.
 _MORE_THAN_NOISE = 1.3
-# What is compared has at least so many periods of the cut-off.
+# The compared stretch has at least so many periods of the cut-off.
 _LEAST_PERIODS = 20
 # A range is widened by noise of deviation 1 by up to so much.
 _WIDENED = 6.0
@@ -43,7 +43,7 @@ LINE_TEST = "comparison with a line test, EN 50318"
 
 @dataclass(frozen=True)
 class Finding:
-    """An error of the measurement, or of what is said of it.
+    """An error of the measurement, or of its description.
 
     Attributes
     ----------
@@ -321,7 +321,7 @@ class _Comparing:
         return None
 
     def _errors(self, found: Alignment, name: str, run: RunForce, bias: float) -> None:
-        """Find what the alignment says of the measurement; ``bias`` [N] is stated of the force."""
+        """Find errors of the measurement from the alignment; ``bias`` [N] is the stated one."""
         passage = self._passage
         if found.shift.differs(0.0, _SHIFT):
             shift, way = found.shift, "far along the track" if found.shift.value > 0 else "far back"
@@ -364,7 +364,8 @@ class _Comparing:
             self.remarks.append(f"{name}: shifts of {shifts} m fit as well")
 
     def _noise_floor(self, found: Alignment, name: str, stated: float) -> None:
-        """Tell what remains, and which errors are told beyond it; ``stated`` is the noise [N]."""
+        """Add a remark on the residual and on the smallest errors that show beside it;
+        ``stated`` is the noise [N]."""
         told, length = np.sqrt(CERTAIN), found.length
         self.remarks.append(
             f"{name}: noise floor {found.residual:.2f} N (correlation {found.correlation:.3f}); "
@@ -375,7 +376,7 @@ class _Comparing:
         self._beyond_noise(name, "noise floor", "N", found.residual, stated)
 
     def _beyond_noise(self, name: str, what: str, unit: str, floor: float, stated: float) -> None:
-        """Tell how much of a floor is more than the stated noise, zero if none is stated."""
+        """Add a remark on the part of a floor beyond the stated noise, zero if not stated."""
         if stated and floor > _MORE_THAN_NOISE * stated:
             more = np.sqrt(floor**2 - stated**2)
             self.remarks.append(
@@ -405,8 +406,8 @@ class _Comparing:
     def _beyond_chance(
         self, name: str, at: np.ndarray, measured: np.ndarray, modelled: np.ndarray
     ) -> None:
-        """Tell how sure differences of mean and deviation are, by the spread from span to span:
-        samples within a span depend on each other, spans hardly do."""
+        """Add remarks on the confidence of differences of mean and deviation, by the spread from
+        span to span: samples within a span are correlated, spans hardly are."""
         masts = self._results.line("support_x")
         whole = masts[(masts >= at[0] - _NEAR_MAST) & (masts <= at[-1] + _NEAR_MAST)]
         first, second = (span_sums(at, force, whole) for force in (measured, modelled))
@@ -490,7 +491,7 @@ class _Comparing:
     # ---- the train, and supports ----------------------------------------------------------------
 
     def unmeasured(self) -> None:
-        """Find pantographs of the run of which the description names no column."""
+        """Find pantographs of the run without a column in the description."""
         there = {one.pantograph for one in self._passage.forces}
         for number, name in enumerate(self._names):
             if number not in there:

@@ -15,7 +15,7 @@ from catenary.base.errors import InputError
 from catenary.meshgen.wires import Role
 from catenary.postproc.channels.line_record import LineRecord
 from catenary.postproc.files.filtered_force import filtered_in
-from catenary.postproc.files.hdf5 import block_reading
+from catenary.postproc.files.hdf5 import table_rows
 from catenary.postproc.files.run_schema import ALL_COLUMNS, DONE, LINE_TIME, PLACES, RUNNING
 from catenary.postproc.read.line_of_run import ResultTables
 from catenary.postproc.read.records import Records
@@ -83,7 +83,7 @@ class Results(TrainOfRun):
 
     @property
     def damage(self) -> list[str]:
-        """A sentence that names the file's damage and what is used of it, none if it is valid."""
+        """A sentence on the file's damage and its usable part, none if the file is valid."""
         return self._file.damage
 
     @property
@@ -206,14 +206,14 @@ class Results(TrainOfRun):
         if table is not None and place.size:
             valid = self._valid(name, part)
             n = valid.stop - valid.start
-            values[:n] = block_reading.column(table, valid, int(place[0]))
+            values[:n] = table_rows.column(table, valid, int(place[0]))
         return values
 
     def blocks(self, name: str) -> Iterator[tuple[slice, np.ndarray]]:
         """All rows of a channel in order, by blocks: which rows, and their values as ``rows``."""
         table = self._table(name)
         step = table.chunks[0] if table is not None and table.chunks else 1
-        for part in block_reading.row_blocks(self.n_rows(name), self._n_places(name), step):
+        for part in table_rows.row_blocks(self.n_rows(name), self._n_places(name), step):
             yield part, self.rows(name, part)
 
     def recorded_columns(self, name: str) -> np.ndarray:
@@ -239,7 +239,7 @@ class Results(TrainOfRun):
         if table is None or (of_line and not self.line_record.whole):
             return np.full((2, self._n_places(name)), np.nan)
         valid = self._valid(name, slice(0, self.n_rows(name)))
-        return block_reading.extremes(table, valid.stop)
+        return table_rows.extremes(table, valid.stop)
 
     def has(self, name: str) -> bool:
         """Whether a channel was recorded, and can be read."""

@@ -36,7 +36,7 @@ class Column(NamedTuple):
     in_files: bool = True
 
     def shown(self, value: Any, unknown: str) -> str:
-        """A value where people read it; ``unknown`` stands for None."""
+        """A value as readers see it; ``unknown`` is printed for None."""
         if value is None:
             return unknown
         if not self.format:
@@ -85,16 +85,16 @@ class StudyTable:
 
     @property
     def for_people(self) -> list[Column]:
-        """The columns that people read."""
+        """The columns for readers."""
         return [column for column in self.columns if column.head]
 
     @property
     def head(self) -> list[str]:
-        """What stands above the columns that people read."""
+        """Heads of the columns for readers."""
         return [column.head for column in self.for_people]
 
     def texts(self, unknown: str = "") -> list[list[str]]:
-        """The cells that people read, row by row; an outcome stands in the second one."""
+        """Cells of the columns for readers, row by row; an outcome is in the second one."""
         people, rows = self.for_people, []
         for row in self.rows:
             if _is_done(row):
@@ -172,7 +172,7 @@ def rows_csv(rows: Sequence[Row]) -> str:
     return StudyTable([Column(name) for name in rows[0]], rows).csv()
 
 
-# What a file of a study holds, see ``write_files``.
+# Content of a file of a study, see ``write_files``.
 Content = StudyTable | Mapping[str, Any] | Sequence[Row] | Callable[[], Any] | str | bytes
 
 

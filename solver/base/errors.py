@@ -1,4 +1,4 @@
-"""Errors that a user sees: one sentence, one exit code. A leaf module, importing none of ours."""
+"""Errors that a user sees: one sentence, one exit code. A leaf module: imports no other of ours."""
 
 from typing import Any, NamedTuple
 

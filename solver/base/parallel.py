@@ -1,4 +1,4 @@
-"""What every rank must agree on. A leaf module: errors, one-rank work, abort on the unforeseen."""
+"""Agreement of all ranks: errors, one-rank work, abort on unforeseen errors. A leaf module."""
 
 from __future__ import annotations
 

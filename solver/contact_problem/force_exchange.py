@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from mpi4py import MPI
 
-from catenary.base.petsc_events import event
+from catenary.base.petsc import event
 from catenary.solver.contact.line_response import Bounds, LineResponse
 
 _FIRST_CAPACITY = 32

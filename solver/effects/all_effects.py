@@ -1,4 +1,4 @@
-"""All effects: the registry with the shipped ones in it, and what those of a problem set."""
+"""All effects: the registry with the shipped ones, and the laws that those of a problem set."""
 
 from __future__ import annotations
 

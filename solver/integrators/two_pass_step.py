@@ -25,7 +25,7 @@ from catenary.solver.linear.factors.station_factors import FactorArrays
 from catenary.solver.linear.stations.station_products import ProductArrays
 from catenary.solver.linear.step_operators import ByStations
 from catenary.solver.model.switching_links import NO_LINKS, LinkArrays
-from catenary.solver.window.window_arrays import WindowArrays
+from catenary.solver.window.moving_window import WindowArrays
 
 # Unknowns of a stretch of the pass back, after which its droppers are looked at: large enough for
 # memory to be read ahead, 64 kB of each array, which a cache next to a processor holds.

@@ -14,8 +14,7 @@ from mpi4py import MPI
 from scipy import sparse
 
 from catenary.base.errors import NotConverged, RunBroken
-from catenary.base.petsc import PETSc
-from catenary.base.petsc_events import event
+from catenary.base.petsc import PETSc, event
 from catenary.solver.linear.factors.station_factors import StationFactors
 from catenary.solver.linear.halo import Halo, Subdomain
 from catenary.solver.linear.line_products import LineProducts

@@ -181,7 +181,7 @@ class Model:
 
     @property
     def weight(self) -> np.ndarray:
-        """Gravity load (n_dofs,) [N], [N m]; summed anew when it is asked for."""
+        """Gravity load (n_dofs,) [N], [N m]; summed at each access."""
         weight, gravity = np.zeros(self.n_dofs), self.simulated.gravity
         for dofs, mass, kind in self.hanging if gravity else ():
             own = mass if kind is None else mass[kind]

@@ -26,8 +26,8 @@ from catenary.solver.schemes.one_solve import OneSolve
 from catenary.solver.schemes.scheme import Scheme
 from catenary.solver.statics.changed_line.after_incidents import ChangedLine
 from catenary.solver.statics.form_finding.equilibrium import Equilibrium
+from catenary.solver.window.choice import refuse_window
 from catenary.solver.window.moving_window import MovingWindow, wanted_pieces
-from catenary.solver.window.where_possible import refuse_window
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ import numpy as np
 
 from catenary.base.errors import RunBroken
 from catenary.base.parallel import on_root
-from catenary.base.petsc_events import NAMES, event
+from catenary.base.petsc import NAMES, event
 from catenary.solver.contact.forces_on_line import ForcesOnLine
 from catenary.solver.contact.line_response import Bounds, LineResponse
 from catenary.solver.contact.train.head_states import Heads

@@ -43,7 +43,7 @@ class LineAtRest(NamedTuple):
         return self.model.mesh
 
     def under(self, problem: Problem) -> LineAtRest:
-        """The same line under the train and the contact law of another problem of it."""
+        """The same line with the train and the contact law of another problem."""
         own = replace(self.problem, train=problem.train, contact=problem.contact)
         model = replace(self.model, problem=own, simulated=simulated(own))
         return LineAtRest(own, model, self.form, self.lift)

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from catenary.base.petsc_events import event
+from catenary.base.petsc import event
 from catenary.mbs.head.head_arrays import drive_width
 from catenary.solver.contact.contacts import Contacts
 from catenary.solver.contact.line_response import affine

@@ -343,7 +343,7 @@ class March:
         return self.n_steps - self._first_step
 
     def in_loop(self) -> tuple[OneSolve, Showing, float]:
-        """Scheme, what is shown of it, and time step [s] of a march that one compiled loop takes
+        """Scheme, shown channels and time step [s] of a march that one compiled loop takes
         from its start to its end. Not collective; one rank only.
 
         Raises

@@ -1,4 +1,4 @@
-"""How many spans of a line move with the train, and what that costs in accuracy.
+"""How many spans of a line move with the train, what that costs in accuracy, and where none can.
 
 Waves that outrun the train come back from the end of a window. How many spans it takes until that
 is negligible follows from how waves fade on the way, and for how long they are on it.
@@ -11,9 +11,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from catenary.base.errors import InputError
 from catenary.meshgen.slowest_wave import slowest_wave, slowest_wave_of
 from catenary.meshgen.wires import Role
 from catenary.solver.effects import all_effects as effects
+from catenary.solver.problem.ends import Periodic
 from catenary.solver.problem.problem import Problem
 from catenary.solver.problem.window import BOUNDED, EXACT, ROUND_OFF, WindowChoice
 
@@ -166,3 +168,38 @@ def _fading_rate(problem: Problem) -> float:
     usual = problem.damping.alpha, problem.damping.beta
     dampings = [problem.damping.per_component.get(name, usual) for name in names]
     return max(min(0.5 * (alpha * _OMEGA**2 + beta) for alpha, beta in dampings), 1e-4)
+
+
+def why_no_window(problem: Problem) -> str:
+    """Why the steps of a problem take on the whole line, empty if they need not. Not collective."""
+    numerics = problem.numerics
+    if numerics.scheme != "one_solve":
+        return f"numerics.scheme is {numerics.scheme}"
+    if numerics.coupling == "explicit":
+        return "numerics.coupling is explicit"
+    if numerics.adaptive_tolerance is not None:
+        return "numerics.adaptive_tolerance_N lets steps be halved"
+    if any(isinstance(end, Periodic) for end in problem.ends):
+        return "an end of the line is periodic, and remembers every step"
+    return ""
+
+
+def refuse_window(problem: Problem, n_ranks: int, by_stations: bool) -> None:
+    """Raise InputError if a problem wants a window that is not possible.
+
+    Parameters
+    ----------
+    problem : Problem
+        Problem of the run.
+    n_ranks : int
+        Number of ranks that step the line.
+    by_stations : bool
+        Whether steps are taken in two passes over stations.
+    """
+    why = why_no_window(problem)
+    if not why and n_ranks > 1:
+        why = f"the run has {n_ranks} ranks, and all that moves is on one: start it without mpirun"
+    if not why and not by_stations:
+        why = "this line, or an option of PETSc, does not let it be stepped by stations"
+    if why:
+        raise InputError(f"window.mode is {problem.window.mode}, which cannot be here, as {why}")

@@ -23,7 +23,7 @@ from catenary.solver.linear.pieces import pieces
 from catenary.solver.problem.window import BOUNDED, EXACT, WindowChoice
 from catenary.solver.statics.line_at_rest import LineAtRest
 from catenary.solver.window import moving_window
-from catenary.solver.window.where_possible import why_no_window
+from catenary.solver.window.choice import why_no_window
 
 pytestmark = pytest.mark.study
 

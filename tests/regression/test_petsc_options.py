@@ -10,7 +10,7 @@ import pytest
 from petsc4py import PETSc
 from program import MPIRUN, assert_sound, catenary, short_run
 
-from catenary.base.petsc_events import NAMES
+from catenary.base.petsc import NAMES
 from catenary.postproc.read.results import Results
 
 # Events of a step whose parts follow one another, in place of two passes, and of several ranks.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from catenary.cases.process.batch_tasks import lone_task
+from catenary.cases.cli.app import lone_task
 
 NAMES = ("SLURM_NTASKS", "SLURM_STEP_NUM_TASKS", "SLURM_PROCID")
 

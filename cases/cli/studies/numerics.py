@@ -1,4 +1,4 @@
-"""The verbs ``accuracy`` and ``hard``: errors of settings, and limits that hard cases keep."""
+"""The verbs ``accuracy``, ``hard``, ``stability-map`` and ``scaling``: errors and time of steps."""
 
 from __future__ import annotations
 
@@ -15,9 +15,11 @@ from catenary.cases.cli.app import (
     Jobs,
     Out,
     RunWords,
+    SceneWords,
     Verbose,
     begin,
     folder_option,
+    serial_verb,
     verb,
 )
 from catenary.cases.result_folder.output_folder import refuse_impossible, refuse_table
@@ -174,3 +176,104 @@ def hard(
         f"{len(found) - len(failed)} of {len(found)} limits kept"
     )
     return console.NOT_ACCEPTED if failed else console.DONE
+
+
+MAP, MAP_PICTURE = "stability_map.csv", "stability_map.png"
+
+
+@serial_verb(
+    "stability-map",
+    help="Find the largest stable step of every coupling. It is found against contact stiffness "
+    "and head mass, from the matrices of a step and by marching, and drawn. Some three "
+    "minutes; exits with 3 if matrices and marches do not agree. The same command continues "
+    "one that was stopped.",
+    epilog="Example: catenary stability-map en50318_2002 -o results/stability",
+)
+def stability_map(
+    words: SceneWords,
+    out: Out,
+    quick: Annotated[bool, typer.Option("--quick", help="Few stiffnesses and masses.")] = False,
+    n_jobs: Jobs = 1,
+    force: Force = False,
+) -> int:
+    """Serial."""
+    from catenary.cases.process.workers import at_once
+    from catenary.cases.scene.load import read_draft
+    from catenary.cases.studies.records import held_study
+    from catenary.cases.studies.stability import map as study
+    from catenary.postproc.report.study_table import Content, write_files
+
+    refuse_table(out / MAP, force)
+    grid, comm = study.QUICK if quick else study.Grid(), console.alone()
+    draft = read_draft(words.case, words.changes, words.shortened)
+    with held_study(out, comm, f"catenary stability-map {words.case}", force) as (kept, write):
+        found = study.make_map(draft, comm, grid, console.say, kept, at_once(n_jobs, comm))
+        content: dict[str, Content] = {MAP: study.as_rows(found)}
+        content[MAP_PICTURE] = lambda: study.draw(found)
+        files = write(lambda folder: write_files(folder, content))
+    console.say("\n" + study.as_text(found) + "\n" + "\n".join(map(str, files)))
+    return console.DONE if all(one.agrees for one in found.limits) else console.NOT_ACCEPTED
+
+
+@verb(
+    "scaling",
+    help="Predict the time of a step on many ranks. It follows from latency and bandwidth of "
+    "messages: those between the ranks that it is started on, or given ones. On several "
+    "ranks it also times all messages of a step between them.",
+    epilog="Example: mpirun -n 8 --oversubscribe catenary scaling ambrosio2012 "
+    "--ranks 64,512,4096 --set line.n_spans=10000",
+)
+def scaling(
+    words: SceneWords,
+    ranks: Annotated[
+        str, typer.Option("--ranks", metavar="N,...", help="Numbers of ranks.")
+    ] = "64,512,4096",
+    latency: Annotated[
+        float | None,
+        typer.Option(
+            "--latency-us", help="Latency of a message; measured on several ranks if absent."
+        ),
+    ] = None,
+    bandwidth: Annotated[
+        float | None,
+        typer.Option(
+            "--bandwidth-GB-per-s", help="Bandwidth of a message; given with the latency."
+        ),
+    ] = None,
+) -> int:
+    """Collective."""
+    from catenary.base.parallel import launched_by_mpirun, on_root
+    from catenary.cases.studies import scaling as study
+    from catenary.cases.studies.sweep.variants import whole_numbers
+
+    if (latency is None) != (bandwidth is None):
+        raise InputError("--latency-us and --bandwidth-GB-per-s belong together; give both")
+    given = None
+    if latency is not None and bandwidth is not None:
+        if not (0.0 < latency <= 1e6 and 1e-6 <= bandwidth <= 1e6):
+            raise InputError(
+                f"--latency-us {latency:g} must be above 0 and at most 1e6, --bandwidth-GB-per-s "
+                f"{bandwidth:g} between 1e-6 and 1e6"
+            )
+        given = study.Wire(1e-6 * latency, 1e-9 / bandwidth)
+    numbers = whole_numbers(ranks, "--ranks", 1, study.MOST_RANKS, "64,512,4096")
+    comm = console.world() if launched_by_mpirun() else None
+    several = comm is not None and comm.size > 1
+    if not several and given is None:
+        raise InputError(
+            "on one rank no message can be timed: start it with mpirun -n 2 or more, or give "
+            "--latency-us and --bandwidth-GB-per-s"
+        )
+
+    def work() -> study.Work:
+        return study.work_of(words.load())
+
+    found = on_root(comm, work, takes_long=True) if comm is not None else work()
+    wire, exchange = given, None
+    if several:
+        assert comm is not None
+        wire = given or study.wire_between(comm)
+        exchange = (comm.size, *study.time_of_exchange(comm, found.sizes))
+    assert wire is not None
+    console.say(study.as_text(found, wire, numbers, given is None, exchange))
+    return console.DONE

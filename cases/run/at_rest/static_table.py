@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
-from typing import NamedTuple
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from catenary.base.errors import InputError, RunBroken
 from catenary.cases.run.describe.arrivals import arrival_facts
 from catenary.cases.run.describe.pantographs import kind_lines
 from catenary.cases.run.scene_mesh import mesh_of
@@ -18,11 +21,16 @@ from catenary.meshgen.mesh import LineMesh
 from catenary.meshgen.wires import End
 from catenary.postproc.channels.header import line_datasets, static_datasets
 from catenary.postproc.evaluate.wording import counted
+from catenary.postproc.files.csv_text import csv_text
 from catenary.postproc.read.registration import Registration
 from catenary.solver.model.rest_shape import Equilibrium
 from catenary.solver.statics.form_finding.equilibrium import lengths_to_cut
 from catenary.solver.statics.line_at_rest import line_at_rest, stable_form
 from catenary.solver.statics.stability_of_rest import refuse_lost_wire
+
+DROPPER_COLUMNS = ("dropper_span", "dropper_x", "dropper_length", "dropper_force")
+DROPPER_WIRES = ("dropper_upper", "dropper_lower")
+_DROPPER_HEADS = ("span", "x_m", "length_m", "force_N", "from_wire", "to_wire")
 
 
 def installed(line: Line, mesh: LineMesh, height: np.ndarray) -> dict[str, np.ndarray]:
@@ -118,3 +126,30 @@ def check_line(scene: Scene) -> Checked:
         *(fact["says"] for fact in waves["pantographs"]),
     ]
     return Checked(sentences, [*waves["warnings"], *([] if arms is None else arms.warnings())])
+
+
+def write_static(path: Path, table: Mapping[str, Any], registration: bool = False) -> None:
+    """Write the static table: the droppers as CSV, or the ``registration`` instead, or everything
+    as JSON, by the file's suffix."""
+    wires = [name.removeprefix("wires/") for name in table if name.startswith("wires/")]
+    arms = Registration.of(table, wires) if registration else None
+    if registration and arms is None:
+        raise InputError("--registration: no steady arm pulls a wire sideways; give line.stagger_m")
+    try:
+        with path.open("w", encoding="utf-8", newline="") as stream:
+            if path.suffix == ".json":
+                plain = {name: np.asarray(value).tolist() for name, value in table.items()}
+                json.dump(plain, stream, indent=1)
+                stream.write("\n")
+                return
+            if arms is not None:
+                stream.write(arms.csv())
+                return
+            columns = [np.asarray(table[name]) for name in (*DROPPER_COLUMNS, *DROPPER_WIRES)]
+            rows = (
+                (int(span) + 1, f"{x:.4f}", f"{length:.5f}", f"{force:.3f}", upper, lower)
+                for span, x, length, force, upper, lower in zip(*columns, strict=True)
+            )
+            stream.write(csv_text(_DROPPER_HEADS, rows))
+    except OSError as error:
+        raise RunBroken(f"{path} could not be written: {error.strerror}") from error

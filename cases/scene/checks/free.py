@@ -203,7 +203,7 @@ def _circles(scene: Scene) -> Iterator[Fault]:
 
 
 def _lifted(scene: Scene) -> Iterator[Fault]:
-    """Supports that are to hold a wire which nothing but droppers joins to their own."""
+    """Supports that are to hold a wire which only droppers join to the wire that they carry."""
     wires, links = scene.line.wires or [], scene.line.links or []
     joined = [(wire.name, end) for wire in wires for end in (wire.start, wire.end) if end]
     joined += [(link.upper, link.lower) for link in links if isinstance(link, FreeClampsTable)]
@@ -224,7 +224,7 @@ def _lifted(scene: Scene) -> Iterator[Fault]:
 
 
 def _slack(scene: Scene) -> Iterator[Fault]:
-    """Droppers that would do different things when slack, of which there is one for the line."""
+    """Droppers with different behaviour when slack: a line has one for all of them."""
     links = [
         (i, link)
         for i, link in enumerate(scene.line.links or [])
@@ -317,7 +317,7 @@ def droppers_inside(
         return
 
 
-# A wire may hang on nothing over so many times the longest span.
+# A wire may be without a link over so many times the longest span.
 MOST_SPANS = 1.5
 
 
@@ -331,7 +331,7 @@ def check_free_droppers(scene: Scene, line: LineData) -> Iterator[Fault]:
 
 
 def check_free_places(scene: Scene, line: LineData) -> Iterator[Fault]:
-    """Links where a wire is not, places too close, wires that hang on nothing."""
+    """Links beyond the ends of a wire, places too close, wires that no link carries."""
     assert line.wires is not None and line.links is not None
     wires = {wire.name: wire for wire in line.wires}
     found = [
@@ -449,7 +449,7 @@ def _twice(scene: Scene, line: LineData) -> Iterator[Fault]:
 
 
 def _carried(scene: Scene, key: str, wire: FreeWire, line: LineData) -> Iterator[Fault]:
-    """Wires that nothing carries over much more than the longest span."""
+    """Wires that no link carries over much more than the longest span."""
     at, longest = carriers(line, wire), max(line.span_lengths)
     for start, end in wire.stretches:
         own = at[(at > start - _TINY) & (at < end + _TINY)]

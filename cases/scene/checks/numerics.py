@@ -10,7 +10,7 @@ from catenary.cases.scene.problem import problem_of
 from catenary.cases.scene.run.contact import HERTZ, WITH_RESTITUTION
 from catenary.cases.scene.scene import Scene
 from catenary.solver.problem.integrator_parameters import NEWMARK
-from catenary.solver.window.where_possible import why_no_window
+from catenary.solver.window.choice import why_no_window
 
 
 def check_contact(scene: Scene) -> Iterator[Fault]:

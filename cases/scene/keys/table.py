@@ -1,4 +1,4 @@
-"""What all tables of a scene share: strict types, no unknown keys, bounds, courses of pairs."""
+"""Base of all tables of a scene: strict types, no unknown keys, bounds, courses of pairs."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class Table(BaseModel):
     predicate ("must be ...") that ``messages.sentence`` completes with key, value and place.
     """
 
-    # A validator is built when it is first used: that of a scene has those of all tables in it.
+    # Validators are built at their first use: the one of a scene includes those of all its tables.
     model_config = ConfigDict(
         strict=True, extra="forbid", frozen=True, allow_inf_nan=False, defer_build=True
     )
@@ -38,7 +38,7 @@ def exactly_one(table: Table, *names: str) -> None:
 
 
 def either(table: Table, one: str, other: str) -> None:
-    """Raise ``ValueError`` if two keys have other values than those they have when absent."""
+    """Raise ``ValueError`` if two keys both differ from their defaults."""
     fields = type(table).model_fields
     if all(getattr(table, name) != fields[name].default for name in (one, other)):
         raise ValueError(f"takes {one} or {other}, but both are given{TAKE_AWAY}")
@@ -75,7 +75,7 @@ def ascending(values: Sequence[float], what: str) -> None:
 
 # A list for which a person may write one number.
 OneOrMore = BeforeValidator(_as_list)
-# Name of a wire, of which a line may have any.
+# Name of any wire of a line.
 WireName = Annotated[str, Field(min_length=1, max_length=100)]
 PAIR = Annotated[list[Annotated[float, Field(ge=-1e6, le=1e6)]], Field(min_length=2, max_length=2)]
 

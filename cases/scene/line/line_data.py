@@ -149,7 +149,7 @@ def span_lengths(table: LineTable) -> tuple[float, ...]:
     return ends * transition.n_spans_start + running + ends * transition.n_spans_end
 
 
-# What ``start`` and ``end`` of a wire say besides names of wires.
+# Values of ``start`` and ``end`` of a wire besides names of wires.
 TENSIONER, FIXED = "tensioner", "fixed"
 _INSIDE = 1e-6  # [m]
 
@@ -202,8 +202,8 @@ def _wire(line: LineTable, table: FreeWireTable, masts: np.ndarray) -> FreeWire:
 def _tensioned(
     table: FreeWireTable, side: int, masts: np.ndarray, stretches: tuple[tuple[float, float], ...]
 ) -> bool | None:
-    """Whether an end has a tensioner; None of one where the line ends, about which nothing is
-    said."""
+    """Whether an end has a tensioner; None where the wire ends with the line and the scene does not
+    say."""
     given = table.start if side == 0 else table.end
     if given is not None:
         return given == TENSIONER

@@ -46,7 +46,7 @@ class Level:
 
 @dataclass(frozen=True)
 class Reference:
-    """What the levels of a discretisation axis are compared with, and what it is measured by.
+    """Reference and measure of the levels of a discretisation axis.
 
     Attributes
     ----------
@@ -212,7 +212,7 @@ def lateral_dampings(scene: Scene) -> list[Level]:
 
 
 def parts_of_the_line(scene: Scene) -> list[Level]:
-    """The line without each wire or fitting that it can do without; none of a simple line."""
+    """Lines without one optional wire or fitting each; none for a simple line."""
     levels = []
     for part, left in _PARTS.items():
         if getattr(scene.line, part) is not None:
@@ -333,12 +333,12 @@ _TOLERANCES: tuple[str, ...] = ("eps_d_m", "eps_v_m_per_s", "eps_force_N", "max_
 
 
 def _without_tolerances(scene: Scene, of: tuple[str, ...] = _TOLERANCES) -> tuple[str, ...]:
-    """What takes a scene's tolerances of iterations from a level that makes none."""
+    """Removes the tolerances of iterations from a level that does not iterate."""
     return tuple(f"numerics.{name}=" for name in of if name in scene.numerics.model_fields_set)
 
 
 def _one_solve(scene: Scene) -> tuple[str, ...]:
-    """One solve a step with the scene's coupling, of which exchanges have their tolerance."""
+    """One solve a step with the scene's coupling; an iterated one has its tolerance."""
     exchanged = scene.numerics.coupling == "iterated"
     own = _TOLERANCES[:2] if exchanged else _TOLERANCES
     return (*_ONE_SOLVE, *_without_tolerances(scene, own))

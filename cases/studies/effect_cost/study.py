@@ -15,7 +15,7 @@ from mpi4py import MPI
 
 from catenary.base.errors import InputError, RunBroken
 from catenary.cases.process.interrupts import Phase
-from catenary.cases.run.scene_mesh import mesh_of
+from catenary.cases.run.prepared import rest_of
 from catenary.cases.scene.checks.effects import RELATIVE_MOTION, needs_relative_motion
 from catenary.cases.scene.input.toml_input import Assigned
 from catenary.cases.scene.load import load_scene
@@ -27,7 +27,6 @@ from catenary.cases.studies.sweep.run_jobs import run_jobs
 from catenary.cases.studies.sweep.variants import Variant
 from catenary.solver.effects import all_effects as effects
 from catenary.solver.problem.problem import Problem, steps_of
-from catenary.solver.statics.line_at_rest import line_at_rest
 
 # What an effect without data lacks, where it does not say so itself.
 _NO_DATA = "the scene has no data for it"
@@ -314,7 +313,7 @@ def measure(
     rows = []
     with (
         Phase(comm, "steps were timed", "runs are kept where -o names a folder") as phase,
-        RepeatedMarch(comm, _at_rest(scene), first, n_steps) as as_it_is,
+        RepeatedMarch(comm, rest_of(scene), first, n_steps) as as_it_is,
     ):
         step = in_turns({AS_IT_IS: as_it_is}, wish.rounds)[AS_IT_IS]
         for number, switch in enumerate(effects.switches, start=1):
@@ -325,7 +324,7 @@ def measure(
                 outcome = refused[switch.name] if one is None else one.outcome
                 rows.append(Measured(switch, outcome))
                 continue
-            with RepeatedMarch(comm, _at_rest(job.scene), first, n_steps) as march:
+            with RepeatedMarch(comm, rest_of(job.scene), first, n_steps) as march:
                 timed, own = beside(march, as_it_is, wish.rounds), size_of(march)
             figures = figures_of(one.summary)
             rows.append(Measured(switch, "done", own, timed.ratio, figures, one.remarks))
@@ -348,10 +347,6 @@ def _round_of(problem: Problem) -> tuple[int, int]:
     begin = round((problem.evaluation[0] - train.start) / train.speed / dt)
     first = max(0, min(begin, steps_of(problem) - n_steps))
     return first, min(n_steps, steps_of(problem) - first)
-
-
-def _at_rest(scene: Scene) -> Any:
-    return line_at_rest(problem_of(scene), mesh_of(scene))
 
 
 def size_of(march: RepeatedMarch) -> Size:

@@ -1,4 +1,4 @@
-"""What is measured of hard cases, and the limits that it must keep.
+"""Measures of hard cases, and the limits that they must keep.
 
 Limits that are no answer of a single case's are derived here:
 
@@ -39,7 +39,7 @@ class Left(NamedTuple):
 
 
 def energy_that_left(rest: LineAtRest, run: Watched) -> list[Left]:
-    """What left at each incident of a run that was watched for it. Not collective.
+    """Energy that left the line at each incident of a watched run. Not collective.
 
     A dropper takes along the T^2 / 2k that its tension T at that time has stored. A wire whose
     tension falls from T to T' gives (T - T') / 2 times the integral of z'^2 to its tensioner, z'
@@ -100,7 +100,7 @@ class Criterion(NamedTuple):
 
 
 class Checked(NamedTuple):
-    """What was measured of a hard case, and what the runs of its forms told of themselves."""
+    """Measures of a hard case, and the remarks of the runs of its forms."""
 
     found: list[Criterion]
     remarks: dict[str, list[str]]
@@ -157,7 +157,7 @@ class _Check:
 
 
 class _OneCase:
-    """A hard case: its runs in all forms, criteria on them, and what they told, by their names."""
+    """A hard case: its runs in all forms, criteria on them, and their remarks by name."""
 
     def __init__(self, case: HardCase, alone: Any, short: bool) -> None:
         self.case, self.alone, self.short = case, alone, short

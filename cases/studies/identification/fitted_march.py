@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 
 from catenary.base.errors import InputError
+from catenary.cases.run.prepared import sound_rest
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.identification.measurement import FORCE, Measurement
 from catenary.cases.studies.sensitivity.parameters import ChangedScenes, Parameter
-from catenary.cases.studies.sensitivity.study import change_by, parts_of, sound_rest
+from catenary.cases.studies.sensitivity.study import change_by, parts_of
 from catenary.solver.statics.line_at_rest import LineAtRest
 from catenary.solver.tangents.march import Tangents, march_with_tangents
 from catenary.solver.tangents.set_up import Change, SetUp, set_up_of

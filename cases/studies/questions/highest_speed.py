@@ -126,7 +126,7 @@ class Holds(NamedTuple):
 
 
 class SpeedStudy(NamedTuple):
-    """What a search has found.
+    """Result of a search.
 
     Attributes
     ----------
@@ -226,7 +226,7 @@ def _speeds(ended: _Marched) -> list[float]:
 
 
 def _criteria(ended: Iterable[Ended], wanted: Sequence[str]) -> tuple[list[str], list[str]]:
-    """Names of the wanted criteria: those that are judged at any speed, and the others."""
+    """Names of the wanted criteria: judged at some speed, and judged at none."""
     rows = [row for one in ended for row in one.summary.get("acceptance", [])]
     known = list(dict.fromkeys(row["criterion"] for row in rows))
     for text in wanted:
@@ -257,7 +257,8 @@ def _is_held(
 def _between(
     ended: _Marched, directions: Sequence[str], names: Sequence[str], within: float
 ) -> list[float]:
-    """Middles of neighbouring speeds farther apart than ``within`` of which one fails."""
+    """Midpoints between neighbouring speeds, one passing and one failing, farther apart than
+    ``within``."""
     speeds, middles = _speeds(ended), []
     for slower, faster in zip(speeds, speeds[1:], strict=False):
         if faster - slower > within and any(

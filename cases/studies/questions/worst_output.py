@@ -7,15 +7,13 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from catenary.base.errors import CatenaryError
-from catenary.cases.run.scene_mesh import mesh_of
+from catenary.cases.run.prepared import rest_of
 from catenary.cases.scene.input.faults import Origin
 from catenary.cases.scene.load import scene_from
-from catenary.cases.scene.problem import problem_of
 from catenary.cases.studies.questions.causes import Causes
 from catenary.cases.studies.questions.worst import Passage, Spot, WorstPlaces, worst_places
 from catenary.postproc.read.results import Results
 from catenary.postproc.report.study_table import Column, StudyTable, write_files
-from catenary.solver.statics.line_at_rest import line_at_rest
 
 NONE = "no cause found"
 _MOST_CAUSES = 4  # of a place in the text; tables have all
@@ -77,7 +75,7 @@ def _causes(results: Results, passages: Sequence[Passage]) -> tuple[Causes, str]
     try:
         origin = Origin(str(results.path), recorded=True)
         scene = scene_from(results.attributes["config"], origin)
-        return Causes(results, passages, line_at_rest(problem_of(scene), mesh_of(scene))), ""
+        return Causes(results, passages, rest_of(scene)), ""
     except CatenaryError as error:
         return Causes(results, passages, None), str(error)
 

@@ -9,15 +9,14 @@ from typing import Any
 import numpy as np
 
 from catenary.base.errors import InputError
-from catenary.cases.run.scene_mesh import mesh_of
+from catenary.cases.run.prepared import rest_of, sound_rest
 from catenary.cases.scene.problem import problem_of
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.sensitivity.parameters import ChangedScenes, Parameter, parameters_of
 from catenary.postproc.evaluate import derivatives, filters
 from catenary.postproc.evaluate.derivatives import ForceDerivatives
 from catenary.postproc.evaluate.statistics import covers
-from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest
-from catenary.solver.statics.stability_of_rest import refuse_lost_wire
+from catenary.solver.statics.line_at_rest import LineAtRest
 from catenary.solver.tangents.march import Tangents, march_with_tangents
 from catenary.solver.tangents.set_up import Change, SetUp, differentiate, set_up_of
 
@@ -120,17 +119,6 @@ def sensitivity_of(
     return found
 
 
-def sound_rest(scene: Scene) -> LineAtRest:
-    """The line of a scene at rest; InputError if a wire has lost its tension. Not collective."""
-    found = _at_rest(scene)
-    refuse_lost_wire(found.model, found.form)
-    return found
-
-
-def _at_rest(scene: Scene) -> LineAtRest:
-    return line_at_rest(problem_of(scene), mesh_of(scene))
-
-
 def change_by(
     parameter: Parameter, scenes: ChangedScenes, at_rest: LineAtRest, now: SetUp, comm: Any
 ) -> Change:
@@ -151,7 +139,7 @@ def change_by(
         changed, n_steps = scenes.changed(parameter, by), len(now.drives)
         if parameter.is_of_train:
             return set_up_of(comm, at_rest.under(problem_of(changed)), n_steps, now)
-        return set_up_of(comm, _at_rest(changed), n_steps)
+        return set_up_of(comm, rest_of(changed), n_steps)
 
     return differentiate(set_up, now, parameter.step, parameter.key)
 

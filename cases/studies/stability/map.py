@@ -72,7 +72,7 @@ _SLACK = 1e-4
 
 @dataclass(frozen=True)
 class Grid:
-    """What is varied: stiffnesses [N/m] and head masses [kg] of the two axes of the map, and the
+    """Varied parameters: stiffnesses [N/m] and head masses [kg] of the two axes of the map, and the
     few of each that curves are drawn for on the other axis."""
 
     stiffnesses: tuple[float, ...] = tuple(float(f"{10**e:.4g}") for e in np.arange(4.0, 8.1, 0.5))
@@ -174,7 +174,7 @@ def make_map(
     kept: KeptRows | None = None,
     n_at_once: int = 1,
 ) -> StabilityMap:
-    """Find all limits but those that are ``kept``. Not collective; ``comm`` is this process's.
+    """Find all limits that are not ``kept`` yet. Not collective; ``comm`` is this process's.
 
     ``n_at_once`` points of the map are tried at the same time, each in a process of its own.
     """

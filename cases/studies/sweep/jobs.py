@@ -1,4 +1,4 @@
-"""What a sweep is to run and how it ended. Nothing here loads a backend."""
+"""Jobs of a sweep and how they ended. Imports no backend."""
 
 from __future__ import annotations
 
@@ -190,7 +190,7 @@ def jobs_and_refused(
 def in_order(
     variants: Sequence[Variant], ended: Sequence[Ended], refused: Sequence[Ended]
 ) -> list[Ended]:
-    """What ended and what was refused, in the order of the variants; an interruption comes last."""
+    """Ended and refused variants in the order of the variants; an interruption comes last."""
     by_name = {one.variant.name: one for one in (*refused, *ended)}
     merged = [by_name[variant.name] for variant in variants if variant.name in by_name]
     return sorted(merged, key=lambda one: one.outcome == "interrupted")

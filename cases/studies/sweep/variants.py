@@ -129,7 +129,7 @@ def text_of(value: Any) -> str:
 
 
 def value_at(tables: Any, key: str) -> Any:
-    """What nested tables have under a dotted key, in which numbers are entries of lists; else None.
+    """The value of a dotted key in nested tables, None if there is none; numbers index lists.
 
     Parameters
     ----------
@@ -150,7 +150,7 @@ def is_number(value: Any) -> bool:
 
 
 def check_key(key: str, where: str) -> None:
-    """Raise InputError if no scene has a dotted key, which stands at ``where``."""
+    """Raise InputError if no scene has a dotted key; ``where`` says where it was written."""
     from catenary.cases.scene.scene import Scene
 
     known = known_keys(Scene)

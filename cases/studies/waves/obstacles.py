@@ -219,7 +219,7 @@ LEAST = (0.01, 0.1)
 
 
 class Obstacle(NamedTuple):
-    """An obstacle as a bench, and the springs and masses that theory has of it.
+    """An obstacle as a bench, and its springs and masses in theory.
 
     Attributes
     ----------
@@ -370,7 +370,7 @@ def picture(results: list[Result]) -> Figure:
 
 
 def _curves(result: Result) -> list[tuple[str, np.ndarray]]:
-    """What a picture shows of an obstacle: label, and shares (2, f) measured and by theory.
+    """An obstacle in a picture: label, and shares (2, f) measured and by theory.
 
     What an obstacle sends to another wire runs both ways alike.
     """

@@ -317,7 +317,7 @@ class Pantographs:
                 path.fill_ahead(times, drives[:, number, N_DRIVE : N_DRIVE + 2 * path.place.size])
 
     def measure_joints(self) -> None:
-        """Measure by how much joints are open now; nothing where there are no models."""
+        """Measure by how much joints are open now; no effect on ranks without models."""
         for number in range(len(self.models)):
             self._measure_joint(number)
 

@@ -1,3 +1,4 @@
+// Where contacts are, and what forces and heights a step shows.
 #include "contact/outputs.hpp"
 
 #include <algorithm>
@@ -37,6 +38,31 @@ void write_outputs(const TrainOutputs& outputs, std::span<const double> force,
         outputs.contact_force[p] = total;
         outputs.head_height[p] = mean / strips;
         outputs.wire_height[p] = mean_of_wire / strips;
+    }
+}
+
+namespace {
+
+/// How far the contact of raked strip i is ahead of its middle [m].
+double lead_of(const Leads& leads, int64_t i, double middle) {
+    const auto middles = part(leads.middle, leads.first[i], leads.first[i + 1]);
+    const auto own = part(leads.lead, leads.first[i], leads.first[i + 1]);
+    if (middle >= middles.back()) return own.back();
+    const int64_t beyond = std::ranges::upper_bound(middles, middle) - middles.begin();
+    if (beyond == 0) return own[0];
+    const double before = middles[beyond - 1];
+    const double share = (middle - before) / (middles[beyond] - before);
+    return own[beyond - 1] + share * (own[beyond] - own[beyond - 1]);
+}
+
+}  // namespace
+
+void move_contacts(const TrainPlaces& places, double way) {
+    for (size_t i = 0; i < places.start.size(); ++i) places.now[i] = places.start[i] + way;
+    const Leads& leads = places.leads;
+    for (int64_t i = 0; i < size(leads.contact); ++i) {
+        double& here = places.now[leads.contact[i]];
+        here += lead_of(leads, i, here);
     }
 }
 

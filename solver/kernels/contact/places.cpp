@@ -1,13 +1,28 @@
 // Where contacts are on wires, and what answers to forces there.
+#include <array>
 #include <cmath>
 
-#include "base/shape_functions.hpp"
 #include "contact/columns.hpp"
 #include "contact/contacts.hpp"
 
 namespace catenary {
 
 namespace {
+
+/// Hermite functions N at `xi` in [0, 1] of an element's `length` [m]: w(x) = sum of N times
+/// unknowns [m].
+std::array<double, 4> shape_values(double xi, double length) {
+    const double square = xi * xi, cube = xi * xi * xi;
+    return {1 - 3 * square + 2 * cube, length * (xi - 2 * square + cube), 3 * square - 2 * cube,
+            length * (cube - square)};
+}
+
+/// Derivatives dN/dx [1/m], of those of rotations [-].
+std::array<double, 4> shape_slopes(double xi, double length) {
+    const double square = xi * xi;
+    return {6 * (square - xi) / length, 1 - 4 * xi + 3 * square, 6 * (xi - square) / length,
+            3 * square - 2 * xi};
+}
 
 /// Height and slope of the running surface at a place, cubic between samples, zero beyond.
 void find_surface(double place, std::span<const Sample> surface, Touch& touch) {

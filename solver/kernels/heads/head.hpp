@@ -1,19 +1,65 @@
 #pragma once
-// What all pantographs share that step by Newmark's method: state, strips, contact.
+// What all pantographs share that step by Newmark's method: the row that drives a step, state,
+// strips, contact; and how one is lowered under way until it is caught, see mbs/lowering.py.
 //
 // A pantograph has n coordinates and s strips. Its state are positions, velocities and
 // accelerations one after the other (3 n,).
 #include <optional>
 #include <vector>
 
+#include "base/arrays.hpp"
 #include "base/curves.hpp"
+#include "base/record.hpp"
 #include "contact/across.hpp"
 #include "contact/touch.hpp"
-#include "heads/drive.hpp"
-#include "heads/lowering.hpp"
 #include "heads/regulation.hpp"
 
 namespace catenary {
+
+/// Of the strips' mean over what catches them.
+struct LoweringMemory {
+    double height;     ///< now [m]
+    double caught_at;  ///< where it is caught [m], known from the lowering on
+    double phase;      ///< 0 before the lowering, 1 while it goes on, 2 when the head is caught
+};
+
+struct Lowering {
+    double time;                       ///< after which it begins [s]
+    double drop;                       ///< of the head until it is caught [m]
+    std::span<LoweringMemory> memory;  ///< (1,)
+    CATENARY_RECORD(time, drop, memory)
+};
+
+/// What a step of a head depends on besides its state: the first numbers of a row that is known
+/// before. Upward is positive; a model reads those that it needs.
+struct Drive {
+    double time;                 ///< at the end of the step [s]
+    double force;                ///< on the last mass of a chain [N]
+    double part;                 ///< of the lift that acts
+    double base;                 ///< height of the base [m], over where it rests
+    double base_velocity;        ///< [m/s]
+    double base_acceleration;    ///< [m/s2]
+    double roof, roof_velocity;  ///< height of what catches a head that is lowered, over where it
+                                 ///< rests [m], and velocity [m/s]
+    double head_air;             ///< force of the air on the head [N]
+    double arm_air;              ///< force of the air on the arm of a mechanism [N]
+    double bodies_air;  ///< what it lifts by the mechanism's bodies, in parts of the tables'
+};
+inline constexpr int64_t kDrive = sizeof(Drive) / sizeof(double);
+
+/// A row (kDrive + 2 s,) of a head with s strips: behind its `Drive` where wires are on the strips,
+/// to the left of their middle [m], and how fast that changes [m/s].
+template <class Number>
+struct DriveRow {
+    std::span<Number> numbers;
+    int64_t n_strips;
+
+    const Drive& drive() const { return *reinterpret_cast<const Drive*>(numbers.data()); }
+    std::span<Number> place() const { return part(numbers, kDrive, kDrive + n_strips); }
+    std::span<Number> rate() const {
+        return part(numbers, kDrive + n_strips, kDrive + 2 * n_strips);
+    }
+};
 
 /// Factors of Newmark's formulas, the same for all coordinates.
 struct NewmarkFactors {

@@ -67,4 +67,18 @@ void SprungHead::remember(std::span<const double> contact_force) {
     if (laws_.any()) laws_.press(contact_force);
 }
 
+LawfulChain::LawfulChain(const HeadArrays& arrays, const SprungMasses& masses, const HeadLaws& laws,
+                         int64_t carrier)
+    : SprungHead(arrays, masses, laws), carrier_(carrier) {
+    if (carrier < 0 || carrier >= n())
+        throw std::invalid_argument("a chain is driven at one of its coordinates");
+}
+
+bool LawfulChain::step_free(const Drive& drive) {
+    begin(drive);
+    force()[carrier_] += drive.force + added(drive);
+    finish(drive);
+    return true;
+}
+
 }  // namespace catenary

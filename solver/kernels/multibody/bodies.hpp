@@ -1,10 +1,26 @@
 #pragma once
 // Rigid bodies in space: where n bodies are and how they move, the frame at rest being one more.
+#include <array>
+
 #include "base/arrays.hpp"
 #include "base/record.hpp"
-#include "multibody/vectors.hpp"
 
 namespace catenary {
+
+using Vector3 = std::array<double, 3>;
+
+inline Vector3 sum(const Vector3& a, const Vector3& b) {
+    return {a[0] + b[0], a[1] + b[1], a[2] + b[2]};
+}
+inline Vector3 difference(const Vector3& a, const Vector3& b) {
+    return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
+}
+inline Vector3 cross(const Vector3& a, const Vector3& b) {
+    return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+}
+inline double dot(const Vector3& a, const Vector3& b) {
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
 
 /// See `Motion` of mbs/rigid/bodies.py.
 struct BodyMotion {

@@ -2,7 +2,6 @@
 #include "contact/contacts.hpp"
 #include "contact/outputs.hpp"
 #include "contact/response.hpp"
-#include "contact/train_places.hpp"
 #include "contact_problem/forces.hpp"
 #include "contact_problem/simplicial_path.hpp"
 #include "python/from_python.hpp"

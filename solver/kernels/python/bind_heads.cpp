@@ -1,5 +1,5 @@
 // What Python calls of pantographs: heads, and multibody systems.
-#include "heads/lawful_chain.hpp"
+#include "heads/sprung_head.hpp"
 #include "heads/linear_chain.hpp"
 #include "heads/raised_head.hpp"
 #include "multibody/joints_and_lines.hpp"

@@ -4,7 +4,6 @@
 #include "simulation/simulation.hpp"
 #include "tangents/tangents.hpp"
 #include "views/extremes.hpp"
-#include "views/points.hpp"
 
 namespace catenary::python {
 

@@ -7,7 +7,7 @@
 // nobody.
 #include <string>
 
-#include "heads/lawful_chain.hpp"
+#include "heads/sprung_head.hpp"
 #include "heads/linear_chain.hpp"
 #include "heads/raised_head.hpp"
 #include "simulation/image.hpp"

@@ -1,5 +1,5 @@
 #pragma once
-// Where elimination from both ends meets, and how it moves. See meeting_station.py.
+// Where elimination from both ends meets, and how it moves. See station_factors.py.
 #include "base/arrays.hpp"
 #include "base/record.hpp"
 

@@ -3,7 +3,6 @@
 // problem of contact forces and switching links, and what both do to line and pantographs.
 #include "contact/outputs.hpp"
 #include "contact/response.hpp"
-#include "contact/train_places.hpp"
 #include "contact_problem/forces.hpp"
 #include "heads/head.hpp"
 #include "loads/loads.hpp"

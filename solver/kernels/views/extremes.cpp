@@ -1,4 +1,4 @@
-// Extremes, row by row.
+// Extremes and points, row by row.
 #include "views/extremes.hpp"
 
 #include "base/targets.hpp"
@@ -17,6 +17,17 @@ void take_extremes(Array2<const double> rows, int64_t first, int64_t begin, int6
             smallest[j] = value < low ? value : low;
             largest[j] = value > high ? value : high;
         }
+    }
+}
+
+void take_points(Array2<const double> rows, std::span<const int64_t> columns,
+                 std::span<const int64_t> first, std::span<const int64_t> count,
+                 std::span<double> result) {
+    size_t at = 0;
+    for (int64_t i = 0; i < size(first); ++i) {
+        const auto row = rows[i];
+        for (const int64_t column : columns.subspan(first[i], count[i]))
+            result[at++] = column >= 0 ? row[column] : 0.0;
     }
 }
 

@@ -5,14 +5,16 @@ from __future__ import annotations
 import numpy as np
 
 from catenary.base.errors import RunBroken
-from catenary.solver.linear.factors.meeting_station import MIDDLES, Turning, softened
 from catenary.solver.linear.factors.station_factors import (
+    MIDDLES,
     FoundFactors,
     StationFactors,
+    Turning,
     besides_of,
     completed,
     packed_blocks,
     packed_factors,
+    softened,
 )
 from catenary.solver.linear.pieces.pieces import Piece, Pieces, Slots
 from catenary.solver.linear.stations.sections import Sections

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from catenary.solver.kernels import aligned_arrays
-from catenary.solver.linear.factors.meeting_station import MIDDLES
+from catenary.solver.linear.factors.station_factors import MIDDLES
 from catenary.solver.model.unknowns.registry import Unknowns
 
 # Stations of a piece, some twenty spans: a multiple of ``MIDDLES``.

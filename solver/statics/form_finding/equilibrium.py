@@ -222,7 +222,7 @@ class _HangingWires:
         heights = np.concatenate([heights, np.zeros(ends.size)])
         self._heights = np.zeros(n)
         self._heights[self._given] = heights
-        # Without weight droppers carry nothing: what holds the lower wire pulls at nothing above.
+        # Without weight the forces of all droppers are zero.
         self._weighted = model.simulated.gravity != 0.0
         upper, lower = self._w[model.mesh.droppers if self._weighted else model.mesh.droppers[:0]].T
         rows = np.concatenate([self._w[held_at], ends + 1, upper])
@@ -334,7 +334,7 @@ def _given_heights(model: Model) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _refuse_twice(mesh: LineMesh, given: np.ndarray) -> None:
-    """Refuse heights that two parts are to hold, whose forces nothing would tell apart."""
+    """Refuse heights that two parts are to hold: their forces would not be unique."""
     twice = np.flatnonzero(np.bincount(given) > 1)
     if twice.size:
         node = int(twice[0])

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 import numpy as np
 
 from catenary.base.errors import RunBroken
-from catenary.base.petsc_events import event
+from catenary.base.petsc import event
 from catenary.solver.time_loop.views.observers import NEVER, Observer, Stage, StepView
 
 

@@ -13,7 +13,7 @@ import pytest
 from scipy import signal
 
 from catenary.postproc.evaluate import filters
-from catenary.postproc.files.hdf5 import block_reading
+from catenary.postproc.files.hdf5 import table_rows
 from catenary.postproc.files.kept_extremes import store_extremes
 from catenary.postproc.files.run_schema import COMPLETE
 from catenary.postproc.read.results import Results
@@ -38,8 +38,8 @@ def test_filters_in_blocks_are_those_of_scipy(
 def test_columns_and_extremes_are_those_of_the_whole_table(
     run_folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(block_reading, "BLOCK_BYTES", 1e5)
-    monkeypatch.setattr(block_reading, "_SLICE", 1000)
+    monkeypatch.setattr(table_rows, "BLOCK_BYTES", 1e5)
+    monkeypatch.setattr(table_rows, "_SLICE", 1000)
     with Results(run_folder) as results:
         for name in ("contact_force", "contact_position", "arm_uplift", "dropper_force"):
             whole = results.channel(name)

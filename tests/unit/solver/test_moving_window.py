@@ -16,7 +16,7 @@ from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.problem import problem_of as scene_problem
 from catenary.meshgen.mesh import LineMesh
 from catenary.solver.kernels import native
-from catenary.solver.linear.factors import meeting_station
+from catenary.solver.linear.factors import station_factors
 from catenary.solver.problem.ends import Fixed, Periodic
 from catenary.solver.problem.incidents import DropperBreak
 from catenary.solver.problem.problem import Damping, Problem
@@ -24,8 +24,8 @@ from catenary.solver.problem.window import BOUNDED, EXACT, WindowChoice
 from catenary.solver.time_loop import compiled_steps
 from catenary.solver.time_loop import march as time_loop
 from catenary.solver.time_loop.views.observers import Observer, StepView
+from catenary.solver.window.choice import refuse_window
 from catenary.solver.window.moving_columns import MovedStations, columns_of
-from catenary.solver.window.where_possible import refuse_window
 
 LINE = ac_simple_line(12)
 SPEED, START = 70.0, 330.0
@@ -191,7 +191,7 @@ def test_no_window_ends_where_elements_are_too_short_to_be_held(
     problem = replace(problem, train=replace(problem.train, end=problem.train.start + 66.0))
     found, _ = steps(problem, mesh, problem.window)
     assert np.abs(found["dropper_force"]).max() < 1e3
-    monkeypatch.setattr(meeting_station, "_SOFTENED", 1e9)
+    monkeypatch.setattr(station_factors, "_SOFTENED", 1e9)
     broken, _ = steps(problem, mesh, problem.window)
     assert np.abs(broken["dropper_force"]).max() > 1e6
 
