@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import logging
 import os
+import signal
 import sys
 from pathlib import Path
 
@@ -35,6 +36,14 @@ sys.path.insert(0, str(Path(__file__).with_name("support")))
 # The linear algebra of tests is small: threads would wait for each other.
 for threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
     os.environ.setdefault(threads, "1")
+
+
+# A signal that is ignored, as under nohup or in the background of a script, is ignored by every
+# process that is started here too, and by the program's handlers. One with a handler, if it does
+# nothing, comes to them as to processes of a terminal; and still ends no test.
+for number in (signal.SIGHUP, signal.SIGINT):
+    if signal.getsignal(number) == signal.SIG_IGN:
+        signal.signal(number, lambda *_: None)
 
 
 # Libraries, the program and what is collected of tests are hundreds of thousands of objects that

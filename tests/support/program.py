@@ -160,15 +160,17 @@ def catenary(
         mark = uuid.uuid4().hex
         environment = {**os.environ, **RANKS_ENVIRONMENT, _MARK: mark}
         return _ended(*forks().run(list(words), cwd, environment, limit or LIMIT, pictures), mark)
-    entry = _ENTRY if pictures else _UNPAINTED
-    with started(python("-c", entry, *words), cwd, ranks) as program:
+    with catenary_started(*words, cwd=cwd, ranks=ranks, pictures=pictures) as program:
         return program.end(limit)
 
 
 @contextmanager
-def catenary_started(*words: str, cwd: Path, ranks: int = 1) -> Iterator[Program]:
-    """The command line, running; pictures are not painted."""
-    with started(python("-c", _UNPAINTED, *words), cwd, ranks) as program:
+def catenary_started(
+    *words: str, cwd: Path, ranks: int = 1, pictures: bool = False
+) -> Iterator[Program]:
+    """The command line, running; pictures are painted only if they are looked at."""
+    entry = _ENTRY if pictures else _UNPAINTED
+    with started(python("-c", entry, *words), cwd, ranks) as program:
         yield program
 
 

@@ -4,6 +4,7 @@ labels and legends, and not painted: both take long."""
 from __future__ import annotations
 
 import base64
+import functools
 import importlib.util
 import sys
 from importlib.machinery import ModuleSpec
@@ -12,10 +13,18 @@ from types import ModuleType
 from typing import Any
 
 PAINTER = "catenary.postproc.report.pictures.figures"
-# A PNG file of one pixel.
-PIXEL = base64.b64decode(
-    b"iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAAAAAA6fptVAAAACklEQVR4nGP4DwABAQEAsTj2FAAAAABJRU5ErkJggg=="
-)
+# Files of one pixel, by the function that paints them.
+PIXELS = {
+    "png": base64.b64decode(
+        b"iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAAAAAA6fptVAAAACklEQVR4nGP4DwABAQEAsTj2FAAAAABJRU5ErkJggg=="
+    ),
+    "svg": b'<svg xmlns="http://www.w3.org/2000/svg" width="1" height="1" viewBox="0 0 1 1"/>',
+}
+
+
+def _give(pixel: bytes, figure: Any) -> bytes:
+    """In place of a painter."""
+    return pixel
 
 
 def _blank_panels() -> Any:
@@ -42,8 +51,9 @@ class _Finder:
 
         def exec_module(module: ModuleType) -> None:
             load(module)
-            assert callable(module.png)
-            setattr(module, "png", lambda figure: PIXEL)  # noqa: B010
+            for name, pixel in PIXELS.items():
+                assert callable(getattr(module, name))
+                setattr(module, name, functools.partial(_give, pixel))
             blank = _blank_panels()
             for name in ("stacked", "tidy", "legend_above"):
                 assert callable(getattr(module, name))
