@@ -26,6 +26,7 @@ from catenary.cases.studies.sweep.jobs import (
     Ended,
     Part,
     RunOptions,
+    all_ended,
     in_order,
     interrupted,
     scene_of,
@@ -205,9 +206,7 @@ class Marching:
         """
         ended = run_ensemble(ensemble_of(self.draft, variants), self.out, self.comm, self.options)
         self.options = self.options._replace(force=False)  # which would forget these
-        if interrupted(ended):
-            raise Interrupted("the study was interrupted; the same command continues it")
-        return ended
+        return all_ended(ended)
 
 
 class _March:
