@@ -137,7 +137,7 @@ def interrupted(ended: Sequence[Ended]) -> bool:
     return bool(ended) and ended[-1].outcome == "interrupted"
 
 
-def all_ended(ended: list[Ended], what: str = "study") -> list[Ended]:
+def all_ended(ended: Sequence[Ended], what: str = "study") -> list[Ended]:
     """The runs of a study, unless a signal ended it.
 
     Raises
@@ -147,7 +147,7 @@ def all_ended(ended: list[Ended], what: str = "study") -> list[Ended]:
     """
     if interrupted(ended):
         raise Interrupted(f"the {what} was interrupted; the same command continues it")
-    return ended
+    return list(ended)
 
 
 def _assigned(variant: Variant) -> list[Assigned]:
