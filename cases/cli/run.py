@@ -304,7 +304,7 @@ def _array_script(
 
 
 def _sbatch(script: str, *options: str) -> str:
-    """What sbatch says when it takes a script."""
+    """The answer of sbatch to a script that it takes."""
     import subprocess
 
     done = subprocess.run(

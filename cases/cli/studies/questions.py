@@ -39,7 +39,7 @@ def _begun(
     check: Callable[[], object],
     runs: StudyRuns,
 ) -> tuple[Marching, Scene, Any]:
-    """What marches variants of a case, its scene, and the communicator. Collective.
+    """The march of variants of a case, its scene, and the communicator. Collective.
 
     Parameters
     ----------

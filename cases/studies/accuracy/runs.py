@@ -31,7 +31,7 @@ _LONG = 2e8
 
 @dataclass(frozen=True)
 class Measured:
-    """What an accuracy study has found.
+    """Result of an accuracy study.
 
     Attributes
     ----------
@@ -171,7 +171,7 @@ def _row(
 
 
 def _found(one: Ended) -> Found | None:
-    """What a run found, None if it broke."""
+    """Result of a run, None if it broke."""
     if not one.done:
         return None
     histories = [np.array(values) for values in one.measured["histories"]]

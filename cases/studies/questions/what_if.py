@@ -45,7 +45,7 @@ _OF_FORCE = (
 
 
 class Differences(NamedTuple):
-    """What a change changes, as tables with the columns ``as_it_is``, ``changed``, ``difference``.
+    """Differences by a change: tables with the columns ``as_it_is``, ``changed``, ``difference``.
 
     Attributes
     ----------

@@ -177,7 +177,7 @@ def pieces_of_work(variants: Sequence[Variant], size: int) -> list[list[Variant]
 
 
 def _of_the_line(variant: Variant) -> tuple[str, ...]:
-    """What changes the line of a variant: its direction and assignments."""
+    """The changes of a variant that its line depends on: its direction and assignments."""
     changes = (one for one in variant.assignments if one.split(".")[0] not in OF_THE_TRAIN)
     return (variant.varied.get(DIRECTION, ""), *changes)
 
