@@ -85,7 +85,7 @@ def highest_speeds(
 
 @contextmanager
 def _marching(scene: SceneLike, jobs: int) -> Iterator[tuple[Marching, Checked]]:
-    """What marches variants of a scene, and the scene itself."""
+    """The march of variants of a scene, and the scene itself."""
     own, comm = checked(scene), alone()
     from catenary.cases.process.interrupts import Interrupted
     from catenary.cases.studies.sweep.jobs import RunOptions

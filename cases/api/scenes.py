@@ -38,7 +38,7 @@ class Scene:
 
     @property
     def name(self) -> str:
-        """What the case is called.
+        """Name of the case.
 
         Examples
         --------

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
     from catenary.cases.scene.load import Draft
     from catenary.cases.scene.scene import Scene
+    from catenary.cases.studies.sweep.jobs import RunOptions
 
     Command = Callable[..., int | None]
 
@@ -212,6 +213,31 @@ NamedVariants = Annotated[
     ),
 ]
 Verbose = Annotated[bool, typer.Option("-v", "--verbose", help="Print the time of each phase.")]
+
+
+@dataclass
+class StudyRuns:
+    """How the runs of a study are made.
+
+    Attributes
+    ----------
+    n_jobs : runs at the same time, 0 for one on each core
+    force : whether existing results are overwritten
+    verbose : whether the time of each phase is printed
+    """
+
+    n_jobs: Jobs = 1
+    force: Force = False
+    verbose: Verbose = False
+
+    def begin(
+        self, read: Callable[[], tuple[T, list[str]]], scene_of: Callable[[T], Scene]
+    ) -> tuple[Any, T, RunOptions]:
+        """Communicator, what ``read`` gives, and options of the runs; see ``begin``. Collective."""
+        comm, what, arguments = begin(read, self.verbose, scene_of)
+        from catenary.cases.studies.sweep.jobs import RunOptions
+
+        return comm, what, RunOptions(self.force, arguments, console.say, self.n_jobs)
 
 
 def _version(wanted: bool) -> None:

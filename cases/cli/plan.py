@@ -101,7 +101,7 @@ def _within(option: str, value: float, low: float, high: float) -> float:
 
 
 def _cost(wish: Wish, out: Path | None, as_json: bool, n_jobs: int, force: bool) -> int:
-    """What --cost does; returns the exit code."""
+    """Runs ``--cost``; returns the exit code."""
     import tempfile
 
     from catenary.base.parallel import launched_by_mpirun

@@ -278,7 +278,7 @@ def paraview(
 
 
 def _records(folder: Path) -> Records | None:
-    """What is in the result file of a folder, None if a quick look is enough."""
+    """Content of the result file of a folder, None if a quick look is enough."""
     from catenary.postproc.read.guard import examined
 
     if not folder.is_dir():

@@ -10,8 +10,6 @@ import typer
 
 from catenary.base.errors import InputError
 from catenary.cases.cli.app import (
-    Force,
-    Jobs,
     NamedVariants,
     Out,
     PartOfRuns,
@@ -19,6 +17,7 @@ from catenary.cases.cli.app import (
     RunFolder,
     RunWords,
     Strict,
+    StudyRuns,
     Vary,
     Verbose,
     begin,
@@ -43,14 +42,13 @@ if TYPE_CHECKING:
 def run(
     words: RunWords,
     out: Out,
-    force: Force = False,
     strict: Strict = False,
     study: Annotated[
         bool, typer.Option("--study", help="Run the case's study: variants, figures, verdicts.")
     ] = False,
-    n_jobs: Jobs = 1,
     part: PartOfRuns = None,
-    verbose: Verbose = False,
+    *,
+    runs: StudyRuns,
 ) -> int:
     """Collective."""
     from catenary.cases.scene.load import load_scene
@@ -60,8 +58,8 @@ def run(
 
         if strict:
             raise InputError("a study is not judged as a whole: give --study without --strict")
-        return run_study(words, out, n_jobs, part, force, verbose)
-    if n_jobs != 1 or part is not None:
+        return run_study(words, out, runs, part)
+    if runs.n_jobs != 1 or part is not None:
         raise InputError("-j and --part belong to --study; mpirun shares a single run among ranks")
 
     def read() -> tuple[Scene, list[str]]:
@@ -69,7 +67,7 @@ def run(
         refuse_impossible(out)
         return load_scene(words.case, changes, words.shortened), options
 
-    comm, scene, arguments = begin(read, verbose, lambda scene: scene)
+    comm, scene, arguments = begin(read, runs.verbose, lambda scene: scene)
     from catenary.cases.run.describe.arrivals import arrival_warnings
     from catenary.cases.run.runner import on_as_many, run_case
 
@@ -84,7 +82,7 @@ def run(
             scene,
             out,
             ranks,
-            force=force,
+            force=runs.force,
             petsc_options=arguments,
             tell=_teller(out),
             ready=warn,
@@ -306,7 +304,7 @@ def _array_script(
 
 
 def _sbatch(script: str, *options: str) -> str:
-    """What sbatch says when it takes a script."""
+    """The answer of sbatch to a script that it takes."""
     import subprocess
 
     done = subprocess.run(

@@ -32,7 +32,7 @@ _SAID = 200  # characters of what a library said
 
 @dataclass(frozen=True)
 class Finding:
-    """What was found of one part.
+    """State of one part.
 
     Attributes
     ----------
@@ -125,7 +125,7 @@ if MPI.COMM_WORLD.rank == 0: print("ranks", n, MPI.Get_library_version().split("
 
 
 def _tried(part: str, program: str, remedy: str, needed: bool = False) -> Finding:
-    """What a short program in Python says of a part, if it ends well."""
+    """Output of a short Python program on a part, if it ends well."""
     code, said = _answer([sys.executable, "-c", program])
     if code == 0:
         return Finding(part, OK, said)

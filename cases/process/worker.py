@@ -70,7 +70,7 @@ def _work(answers: _Answers) -> None:
 
 
 class _Answers(logging.Handler):
-    """What goes back: results, and what is logged, which the other process writes."""
+    """Results and log records, sent to the process that writes them."""
 
     def __init__(self, connection: Connection) -> None:
         super().__init__()

@@ -45,7 +45,7 @@ class WorkerLost(RunBroken):
 
 
 class Outcome(NamedTuple):
-    """What became of an item.
+    """Result of an item.
 
     Attributes
     ----------
@@ -103,10 +103,10 @@ def each(
     comm: Any,
     initialise: Callable[[], object] | None = None,
 ) -> Generator[Outcome, None, None]:
-    """What ``function(item, comm)`` gives for each item, as they come. Collective.
+    """Results of ``function(item, comm)`` for all items, as they come. Collective.
 
     With ``n_at_once`` 1 the items are worked on here, by all ranks together. With more there are so
-    many processes, or, on as many ranks, each takes every so manieth item; ``comm`` is then of one
+    many processes, or, on as many ranks, each takes every n-th item; ``comm`` is then of one
     rank alone. Items are drawn when they begin, except on ranks. An error of the program and a lost
     process are the outcome of their item. After a signal no further item begins, and those that
     are under way are ended: there are fewer outcomes than items. So are they when the generator is
@@ -185,7 +185,7 @@ def _on_ranks(
 def _share(
     function: Callable[[T, Any], Any], items: Sequence[T], comm: Any, stop: Callable[[], bool]
 ) -> Iterator[Outcome]:
-    """What becomes of the items of this rank. Not collective."""
+    """Outcomes of the items of this rank. Not collective."""
     from mpi4py import MPI
 
     for number in range(comm.rank, len(items), comm.size):
@@ -195,7 +195,7 @@ def _share(
 
 
 def _gathered(own: Iterator[Outcome], comm: Any) -> Iterator[Outcome]:
-    """What becomes of all items, on rank 0: of its own, and between them what others send."""
+    """Outcomes of all items, on rank 0: its own, and between them those that others send."""
     n_working = comm.size - 1
     mine: Outcome | None = next(own, None)
     while mine is not None or n_working:
@@ -231,7 +231,7 @@ class Pool(Generic[T]):
         self._idle: list[_Process] = []
 
     def of(self, items: Iterable[T]) -> Iterator[Outcome]:
-        """What the function gives for each item, as of ``each``."""
+        """Results of the function for all items, as of ``each``."""
         left = enumerate(items)
         busy: list[_Process] = []
         gone: list[_Process] = []

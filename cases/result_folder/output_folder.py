@@ -37,7 +37,7 @@ _HDF5 = b"\x89HDF\r\n\x1a\n"
 
 
 class RunSize(NamedTuple):
-    """What a run is estimated to take.
+    """Estimated size of a run.
 
     Attributes
     ----------
@@ -204,7 +204,7 @@ def _refuse_without_room(
 
 
 def free_bytes(folder: Path) -> float:
-    """What this user may still write to the disk of a folder [bytes]."""
+    """Space left for this user on the disk of a folder [bytes]."""
     try:
         found = os.statvfs(folder)
     except OSError as error:

@@ -16,7 +16,7 @@ from catenary.solver.waves.excitation_load import load_of
 
 @dataclass(frozen=True)
 class ExcitedRun:
-    """What such a run is, beside its scene.
+    """Such a run, beside its scene.
 
     Attributes
     ----------
@@ -36,7 +36,7 @@ class ExcitedRun:
         rest.model.loads.append(load_of(self.excitation, rest.model, self.problem.numerics.dt))
 
     def attributes(self) -> dict[str, Any]:
-        """What the result file says of it, in place of what it says of a train."""
+        """Attributes of the result file that replace those of a train."""
         says = self.excitation.says()
         return {
             "excitation": as_facts(self.excitation),

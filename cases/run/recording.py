@@ -36,7 +36,7 @@ _SAMPLES = 200
 
 
 class Extent(NamedTuple):
-    """What of a line is recorded: positions of arms and droppers [m], nodes and cells of snapshots.
+    """Recorded parts of a line: positions of arms and droppers [m], nodes and cells of snapshots.
 
     ``n_cells`` are the elements of the wires and the droppers.
     """
@@ -48,7 +48,7 @@ class Extent(NamedTuple):
 
 
 def extent_of(mesh: LineMesh) -> Extent:
-    """What of a mesh is recorded. Not collective."""
+    """Recorded parts of a mesh. Not collective."""
     n_cells = sum(len(mesh.elements(name)) for name in mesh.wires) + len(mesh.droppers)
     arms, droppers = mesh.x(mesh.steady_arms), mesh.x(mesh.droppers[:, 1])
     return Extent(arms, droppers, mesh.n_nodes, n_cells)
@@ -64,7 +64,7 @@ def extent_before_meshing(line: Line, n_nodes: int) -> Extent:
 
 @dataclass(frozen=True)
 class Recording:
-    """What a run records.
+    """Records of a run.
 
     Attributes
     ----------
@@ -91,7 +91,7 @@ class Recording:
     end_x: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
     def sentences(self, dt: float) -> dict[str, str]:
-        """What is recorded in words, by what it is, at a time step of ``dt`` [s]."""
+        """Records in words, by their kind, at a time step of ``dt`` [s]."""
         ends = ", tensions and travel at wire ends" if self.end_x.size else ""
         what = f"arm uplift and dropper forces{ends}"
         told = {"line": f"{what} {says(self.line, dt)}"}
@@ -123,7 +123,7 @@ def recording_of(
     usual_s: float = FIELD_EVERY,
     with_train: bool = True,
 ) -> Recording:
-    """What a run of a problem records. Not collective.
+    """Records of a run of a problem. Not collective.
 
     Parameters
     ----------
@@ -157,7 +157,7 @@ def recording_of(
 
 
 def train_of(problem: Problem) -> channels.TrainLayout:
-    """What decides which channels a run of a problem has. Not collective."""
+    """The facts of a problem that decide which channels a run has. Not collective."""
     places = problem.train.placements
     return channels.TrainLayout(
         tuple(len(place.data.strip_offsets) for place in places),

@@ -115,6 +115,21 @@ class Marched(NamedTuple):
     tables: Mapping[str, np.ndarray] = {}
 
 
+# Of a summary, as much as tables of studies read.
+_IN_SHORT = (
+    *("pantographs", "histograms", "droppers"),
+    *("acceptance", "not_judged", "passed", "remarks"),
+)
+
+
+def in_short(summary: Mapping[str, Any]) -> dict[str, Any]:
+    """A summary without tables of all supports; empty if it is."""
+    kept = {name: summary[name] for name in _IN_SHORT if name in summary}
+    if "supports" in summary:
+        kept["supports"] = {"max_uplift_mm": summary["supports"]["max_uplift_mm"]}
+    return kept
+
+
 class Marches:
     """Marches scenes in this process alone; keeps the line of the latest for those to come."""
 

@@ -96,7 +96,7 @@ class KeptRows:
         comm: Any,
         initialise: Callable[[], object] | None = None,
     ) -> Iterator[Outcome]:
-        """What ``function(item, comm)`` gave or gives, in the order of the items. Collective.
+        """Results of ``function(item, comm)``, kept or new, in the order of the items. Collective.
 
         Lists of plain values and of NumPy's scalars, as JSON holds them if they were kept.
 

@@ -34,7 +34,7 @@ BLOCKS, EXCHANGES = 25, 20
 
 
 class Wire(NamedTuple):
-    """What a message takes: ``latency`` [s] and ``per_byte`` [s/B]."""
+    """Time of a message: ``latency`` [s] and ``per_byte`` [s/B]."""
 
     latency: float
     per_byte: float
@@ -175,7 +175,7 @@ class Predicted(NamedTuple):
 
     @property
     def messages(self) -> float:
-        """What of it are messages [s]."""
+        """Share of the messages [s]."""
         return self.neighbours + self.tree
 
 

@@ -32,7 +32,7 @@ _GLOB = "*?["
 
 @dataclass(frozen=True)
 class Key:
-    """What is known of a key: its field, and which kinds of a table have it (none for all)."""
+    """A key: its field, and which kinds of a table have it (none for all)."""
 
     name: str
     default: str
@@ -208,7 +208,7 @@ def allowed(key: Key) -> str:
 
 
 def _of_schema(schema: dict[str, Any]) -> str:
-    """What a JSON schema allows, in words."""
+    """Allowed values of a JSON schema in words."""
     if "anyOf" in schema:
         options = [_of_schema(one) for one in schema["anyOf"] if one.get("type") != "null"]
         return " or ".join(dict.fromkeys(text for text in options if text))

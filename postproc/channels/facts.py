@@ -100,14 +100,9 @@ def _integration(source: Derivation) -> Integration:
     return integration_of(*own)
 
 
-def _contacts(source: Derivation) -> tuple[Wire, ...]:
-    """The contact wires."""
-    return source.problem.line.wires_of(Role.CONTACT)
-
-
 def _of_contacts(of: Callable[[Derivation, Wire], float]) -> Callable[[Derivation], list[float]]:
     """Derivation of a fact of each contact wire."""
-    return lambda source: [of(source, wire) for wire in _contacts(source)]
+    return lambda source: [of(source, wire) for wire in source.problem.line.wires_of(Role.CONTACT)]
 
 
 def _damping(source: Derivation, component: str) -> tuple[float, float]:

@@ -14,7 +14,6 @@ from catenary.meshgen.line import Line
 from catenary.meshgen.wires import Role
 from catenary.solver.effects.build_model import with_wires_apart
 from catenary.solver.model.link_directions import at_nodes, at_places
-from catenary.solver.model.links import Direction
 from catenary.solver.model.matrices import part_of
 from catenary.solver.model.model import Model
 
@@ -96,7 +95,9 @@ def elasticity(model: Model, x_from: float, x_to: float) -> Elasticity:
     first, last = model.numbering.within(x_from, x_to)
     factor = sparse_linalg.splu(_seen_from(model, x_from, x_to))
     # Where a wire is held it does not give way; the matrix has a one there, which is no spring.
-    weights = [np.where(_moves(model, place), place.weights, 0.0) for place in places]
+    weights = [
+        np.where(np.isin(place.unknowns, model.constrained), 0.0, place.weights) for place in places
+    ]
     unknowns = [place.unknowns - first for place in places]
     compliance = np.full((x.size, len(places), len(places)), np.nan)
     load = np.zeros(last - first)
@@ -161,11 +162,6 @@ def _element_ends(model: Model, x_from: float, x_to: float) -> tuple[float, floa
         low.append(x[max(int(np.searchsorted(x, x_from)) - 1, 0)])
         high.append(x[min(int(np.searchsorted(x, x_to, side="right")), x.size - 1)])
     return float(min(low)), float(max(high))
-
-
-def _moves(model: Model, places: Direction) -> np.ndarray:
-    """Which unknowns of places are not held, shape as they are."""
-    return ~np.isin(places.unknowns, model.constrained)
 
 
 def _seen_from(model: Model, x_from: float, x_to: float) -> sparse.csc_matrix:

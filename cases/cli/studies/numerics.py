@@ -16,8 +16,7 @@ from catenary.cases.cli.app import (
     Out,
     RunWords,
     SceneWords,
-    Verbose,
-    begin,
+    StudyRuns,
     folder_option,
     serial_verb,
     verb,
@@ -66,9 +65,8 @@ def accuracy(
     repeats: Annotated[
         int, typer.Option("--repeats", metavar="N", help="How often short runs are timed.")
     ] = 3,
-    n_jobs: Jobs = 1,
-    force: Force = False,
-    verbose: Verbose = False,
+    *,
+    runs: StudyRuns,
 ) -> int:
     """Collective."""
     from catenary.cases.studies.accuracy.analysis import parse_target
@@ -88,19 +86,15 @@ def accuracy(
         )
         return plan, options
 
-    comm, plan, arguments = begin(read, verbose, lambda made: made.jobs[0].scene)
+    comm, plan, options = runs.begin(read, lambda made: made.jobs[0].scene)
     from catenary.base.parallel import on_root
     from catenary.cases.result_folder.folder_lock import held
     from catenary.cases.studies.accuracy import output as accuracy_output
     from catenary.cases.studies.accuracy import runs as study
-    from catenary.cases.studies.sweep.jobs import RunOptions
     from catenary.postproc.evaluate.wording import counted
 
     with held(out, comm, f"catenary accuracy {words.case}"):
-        found, ended = study.run(plan, out, comm, RunOptions(force, arguments, console.say, n_jobs))
-        if found is None:
-            console.complain("the study was interrupted; the same command continues it")
-            return console.BROKEN
+        found, ended = study.run(plan, out, comm, options)
         files = on_root(comm, lambda: accuracy_output.write(found, out, wanted), takes_long=True)
     console.say("\n" + accuracy_output.as_text(found, wanted))
     console.say(
@@ -129,9 +123,8 @@ def hard(
     shortened: Annotated[
         bool, typer.Option("--short", help="Shorter runs, steps halved once only.")
     ] = False,
-    n_jobs: Jobs = 1,
-    force: Force = False,
-    verbose: Verbose = False,
+    *,
+    runs: StudyRuns,
 ) -> int:
     """Collective."""
 
@@ -139,23 +132,27 @@ def hard(
         from catenary.cases.studies.hard.cases import hard_cases
 
         if out is not None:
-            refuse_table(out / TABLES[0], force)
+            refuse_table(out / TABLES[0], runs.force)
         return hard_cases(names)
 
-    comm, cases, arguments = begin(lambda: (read(), []), verbose, lambda cases: cases[0].scene())
+    comm, cases, options = runs.begin(lambda: (read(), []), lambda cases: cases[0].scene())
     from catenary.cases.process.petsc_options import start_petsc
     from catenary.cases.process.workers import at_once
     from catenary.cases.studies.hard import checks
     from catenary.cases.studies.records import held_study
     from catenary.postproc.report.study_table import Content, remark_lines, write_files
 
-    if comm.size > 1 and n_jobs != 1:
-        raise InputError(f"-j is {n_jobs} on {comm.size} ranks, of which each case is to take all")
+    if comm.size > 1 and runs.n_jobs != 1:
+        raise InputError(
+            f"-j is {runs.n_jobs} on {comm.size} ranks, of which each case is to take all"
+        )
     found: list[Criterion] = []
     told: dict[str, dict[str, list[str]]] = {}
-    petsc = partial(start_petsc, arguments)
-    with held_study(out, comm, "catenary hard", force) as (kept, write):
-        checked = checks.check_cases(cases, comm, shortened, kept, at_once(n_jobs, comm), petsc)
+    petsc = partial(start_petsc, list(options.petsc))
+    with held_study(out, comm, "catenary hard", runs.force) as (kept, write):
+        checked = checks.check_cases(
+            cases, comm, shortened, kept, at_once(runs.n_jobs, comm), petsc
+        )
         for number, case in enumerate(cases, start=1):
             console.say(f"[{number}/{len(cases)}] {case.name}: {case.what}")
             rows, told[case.name] = next(checked)

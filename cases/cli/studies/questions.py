@@ -12,12 +12,9 @@ import typer
 
 from catenary.base.errors import InputError
 from catenary.cases.cli.app import (
-    Force,
-    Jobs,
     RunFolder,
     RunWords,
-    Verbose,
-    begin,
+    StudyRuns,
     folder_option,
     serial_verb,
     tell,
@@ -40,11 +37,9 @@ def _begun(
     table: str,
     out: Path | None,
     check: Callable[[], object],
-    n_jobs: int,
-    force: bool,
-    verbose: bool,
+    runs: StudyRuns,
 ) -> tuple[Marching, Scene, Any]:
-    """What marches variants of a case, its scene, and the communicator. Collective.
+    """The march of variants of a case, its scene, and the communicator. Collective.
 
     Parameters
     ----------
@@ -55,15 +50,13 @@ def _begun(
     def read() -> tuple[tuple[Draft, Scene], list[str]]:
         check()
         if out is not None:
-            refuse_table(out / table, force)
+            refuse_table(out / table, runs.force)
         draft, options = words.draft()
         return (draft, draft.scene()), options
 
-    comm, (draft, scene), arguments = begin(read, verbose, lambda made: made[1])
-    from catenary.cases.studies.sweep.jobs import RunOptions
+    comm, (draft, scene), options = runs.begin(read, lambda made: made[1])
     from catenary.cases.studies.sweep.together import Marching
 
-    options = RunOptions(force, arguments, console.say, n_jobs)
     return Marching(draft, out, comm, options), scene, comm
 
 
@@ -112,16 +105,15 @@ def speed(
         Path | None,
         folder_option("Folder for tables and picture; without it nothing is written."),
     ] = None,
-    n_jobs: Jobs = 1,
-    force: Force = False,
-    verbose: Verbose = False,
+    *,
+    runs: StudyRuns,
 ) -> int:
     """Collective."""
     from catenary.cases.studies.questions import highest_speed as question
 
     speeds = question.Speeds(slowest, fastest, step, within)
 
-    marching, scene, comm = _begun(words, "speed.csv", out, speeds.first, n_jobs, force, verbose)
+    marching, scene, comm = _begun(words, "speed.csv", out, speeds.first, runs)
     from catenary.cases.studies.records import held_study
 
     with held_study(out, comm, f"catenary speed {words.case}") as (_, write):
@@ -152,17 +144,15 @@ def separation(
         Path | None,
         folder_option("Folder for table and picture; without it nothing is written."),
     ] = None,
-    n_jobs: Jobs = 1,
-    force: Force = False,
-    verbose: Verbose = False,
+    *,
+    runs: StudyRuns,
 ) -> int:
     """Collective."""
     from catenary.cases.studies.questions import separation as question
 
     distances = question.Distances(nearest, farthest, step)
 
-    check = distances.values
-    marching, scene, comm = _begun(words, "separation.csv", out, check, n_jobs, force, verbose)
+    marching, scene, comm = _begun(words, "separation.csv", out, distances.values, runs)
     from catenary.base.parallel import on_root
     from catenary.cases.studies.records import held_study
 
@@ -188,9 +178,8 @@ def what_if(
         Path | None,
         folder_option("Folder for page, tables, pictures and both runs; none is kept if absent."),
     ] = None,
-    n_jobs: Jobs = 1,
-    force: Force = False,
-    verbose: Verbose = False,
+    *,
+    runs: StudyRuns,
 ) -> int:
     """Collective."""
     from catenary.base.parallel import on_root
@@ -200,14 +189,12 @@ def what_if(
         changes, options = words.split()
         jobs = question.jobs_of(words.case, changes, words.shortened)
         if out is not None:
-            refuse_table(out / "what_if.html", force)
+            refuse_table(out / "what_if.html", runs.force)
         return (jobs, changes), options
 
-    comm, (jobs, changes), arguments = begin(read, verbose, lambda made: made[0][0].scene)
+    comm, (jobs, changes), options = runs.begin(read, lambda made: made[0][0].scene)
     from catenary.cases.result_folder.folder_lock import held
-    from catenary.cases.studies.sweep.jobs import RunOptions
 
-    options = RunOptions(force, arguments, console.say, n_jobs)
     with ExitStack() as stack:
         folder = out
         if folder is None:

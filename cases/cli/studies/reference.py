@@ -9,11 +9,9 @@ import typer
 
 from catenary.cases.cli.app import (
     Force,
-    Jobs,
     Out,
     Strict,
-    Verbose,
-    begin,
+    StudyRuns,
     folder_option,
     serial_verb,
     verb,
@@ -43,9 +41,8 @@ def reference(
             "(ac_simple_275_one); all if absent.",
         ),
     ] = None,
-    n_jobs: Jobs = 1,
-    force: Force = False,
-    verbose: Verbose = False,
+    *,
+    runs: StudyRuns,
 ) -> int:
     """Collective."""
     from catenary.cases.studies.reference.configurations import configurations
@@ -55,20 +52,16 @@ def reference(
         chosen = configurations(names or ())
         return (chosen, jobs_of(chosen)), []
 
-    comm, (chosen, jobs), arguments = begin(read, verbose, lambda made: made[1][0].scene)
+    comm, (chosen, jobs), options = runs.begin(read, lambda made: made[1][0].scene)
     from catenary.base.parallel import on_root
     from catenary.cases.result_folder.folder_lock import held
     from catenary.cases.studies.accuracy.runs import RUNS, measure
     from catenary.cases.studies.reference import solutions
-    from catenary.cases.studies.sweep.jobs import RunOptions, interrupted
+    from catenary.cases.studies.sweep.jobs import all_ended
     from catenary.cases.studies.sweep.run_jobs import run_jobs
 
-    options = RunOptions(force, arguments, console.say, n_jobs)
     with held(out, comm, "catenary reference"):
-        ended = run_jobs(jobs, out / RUNS, comm, options, measure=measure)
-        if interrupted(ended):
-            console.complain("the study was interrupted; the same command continues it")
-            return console.BROKEN
+        ended = all_ended(run_jobs(jobs, out / RUNS, comm, options, measure=measure))
         files = on_root(comm, lambda: solutions.write(out, chosen, ended), takes_long=True)
     console.say("\n".join(map(str, files)))
     return console.DONE
@@ -136,33 +129,28 @@ def validate(
             help="Folder of `catenary compare RUN FILE -o FOLDER`: a line test beside its run.",
         ),
     ] = None,
-    n_jobs: Jobs = 1,
     strict: Strict = False,
-    force: Force = False,
-    verbose: Verbose = False,
+    *,
+    runs: StudyRuns,
 ) -> int:
     """Collective."""
     from catenary.cases.studies.reference import validation as study
 
     def read() -> tuple[tuple[list[Job], study.Step], list[str]]:
-        refuse_table(out / "validation.csv", force)
+        refuse_table(out / "validation.csv", runs.force)
         return (study.jobs_of_validation(), study.line_test(measured)), []
 
-    comm, (jobs, tested), arguments = begin(read, verbose, lambda made: made[0][0].scene)
+    comm, (jobs, tested), options = runs.begin(read, lambda made: made[0][0].scene)
     from catenary.base.parallel import on_root
     from catenary.cases.result_folder.folder_lock import held
     from catenary.cases.studies.accuracy.runs import RUNS
     from catenary.cases.studies.reference import pages
     from catenary.cases.studies.reference.judgement import any_failed
-    from catenary.cases.studies.sweep.jobs import RunOptions, interrupted
+    from catenary.cases.studies.sweep.jobs import all_ended
     from catenary.cases.studies.sweep.run_jobs import run_jobs
 
-    options = RunOptions(force, arguments, console.say, n_jobs)
     with held(out, comm, "catenary validate"):
-        ended = run_jobs(jobs, out / RUNS, comm, options)
-        if interrupted(ended):
-            console.complain("the validation was interrupted; the same command continues it")
-            return console.BROKEN
+        ended = all_ended(run_jobs(jobs, out / RUNS, comm, options), "validation")
         found = on_root(comm, lambda: study.validate(ended, tested), takes_long=True)
         files = on_root(comm, lambda: pages.write_validation(out, found), takes_long=True)
     console.say("\n" + pages.validation_text(found) + "\n\n" + "\n".join(map(str, files)))

@@ -10,14 +10,12 @@ import typer
 from catenary.base.errors import InputError
 from catenary.cases.cli.app import (
     Force,
-    Jobs,
     NamedVariants,
     Out,
     PartOfRuns,
     RunWords,
+    StudyRuns,
     Vary,
-    Verbose,
-    begin,
     folder_option,
     serial_verb,
     tell,
@@ -93,15 +91,14 @@ def sweep(
             "contact force, and a picture of it.",
         ),
     ] = False,
-    n_jobs: Jobs = 1,
     part: PartOfRuns = None,
-    force: Force = False,
-    verbose: Verbose = False,
+    *,
+    runs: StudyRuns,
 ) -> int:
     """Collective."""
     from catenary.cases.studies.sampling.samples import samples
     from catenary.cases.studies.sampling.tables import read_sampling
-    from catenary.cases.studies.sweep.jobs import RunOptions, check_statistics, parse_part
+    from catenary.cases.studies.sweep.jobs import check_statistics, parse_part
     from catenary.cases.studies.sweep.sweep import run_part, run_sweep, sweep_of
 
     own = None if part is None else parse_part(part)
@@ -128,16 +125,15 @@ def sweep(
             full_report=reports,
             only_statistics=only_statistics,
             histories=_names(histories),
-            force=force,
+            force=runs.force,
         )
         return (made, sampling), options
 
-    comm, (made, sampling), arguments = begin(read, verbose, lambda made: made[0].first)
+    comm, (made, sampling), options = runs.begin(read, lambda made: made[0].first)
     for one in made.refused[:_SHOWN_REFUSED]:
         console.warn(f"variant {one.variant.name} is not run: {one.outcome}")
     if len(made.refused) > _SHOWN_REFUSED:
         console.warn(f"{len(made.refused) - _SHOWN_REFUSED} more variants are not run")
-    options = RunOptions(force, arguments, console.say, n_jobs)
     if own is not None:
         return verdict(run_part(made, own, out, comm, options), "sweep")
     command = f"catenary sweep {words.case}"
@@ -184,9 +180,7 @@ def read_variants(vary: Sequence[str] | None, named: Path | None) -> list[Varian
     return product(varied, table)
 
 
-def run_study(
-    words: RunWords, out: Path, n_jobs: int, part: str | None, force: bool, verbose: bool
-) -> int:
+def run_study(words: RunWords, out: Path, runs: StudyRuns, part: str | None) -> int:
     """What ``catenary run CASE --study`` does; returns the exit code. Collective."""
     from catenary.cases.studies.case_study import Plan, find_study, make_plan
     from catenary.cases.studies.sweep.jobs import parse_part
@@ -201,12 +195,10 @@ def run_study(
         )
         return make_plan(words.case, changes, words.shortened), options
 
-    comm, plan, arguments = begin(read, verbose, lambda made: made.jobs[0].scene)
+    comm, plan, options = runs.begin(read, lambda made: made.jobs[0].scene)
     from catenary.cases.result_folder.folder_lock import held
     from catenary.cases.studies import case_study
-    from catenary.cases.studies.sweep.jobs import RunOptions
 
-    options = RunOptions(force, arguments, console.say, n_jobs)
     if own is not None:
         return verdict(case_study.run(plan, out, comm, options, own)[1], "study")
     with held(out, comm, f"catenary run {words.case} --study"):
@@ -217,13 +209,10 @@ def run_study(
 
 
 def verdict(ended: Sequence[Ended], what: str) -> int:
-    """The exit code; prints which variants broke. Not collective."""
-    from catenary.cases.studies.sweep.jobs import interrupted
+    """The exit code; prints which variants broke. Raises ``Interrupted``. Not collective."""
+    from catenary.cases.studies.sweep.jobs import all_ended
 
-    if interrupted(ended):
-        console.complain(f"the {what} was interrupted; the same command continues it")
-        return console.BROKEN
-    broken = [one for one in ended if not one.done]
+    broken = [one for one in all_ended(ended, what) if not one.done]
     if not broken:
         return console.DONE
     names = ", ".join(f"{one.variant.name} ({one.outcome})" for one in broken[:_SHOWN_BROKEN])

@@ -31,7 +31,7 @@ class WaveWords(SceneWords):
 
 @dataclass
 class Excited:
-    """What moves or strikes the line in the place of a train, None for what is usual."""
+    """Excitation of the line in place of a train; None stands for the usual value."""
 
     force_n: Annotated[
         float | None,
@@ -154,7 +154,7 @@ def waves(
 
 
 def _window_error(words: WaveWords, out: Path, text: str, vary: list[str], force: bool) -> int:
-    """What --window-error does; returns the exit code."""
+    """Runs ``--window-error``; returns the exit code."""
     from catenary.cases.process.petsc_options import start_petsc
     from catenary.cases.studies.sweep.variants import (
         check_keys,

@@ -94,7 +94,7 @@ def rest_text(scene: Scene, table: Mapping[str, np.ndarray]) -> str:
 
 
 class Checked(NamedTuple):
-    """What a check found: sentences on line, pantographs and waves, and warnings."""
+    """Result of a check: sentences on line, pantographs and waves, and warnings."""
 
     sentences: list[str]
     warnings: list[str]

@@ -41,7 +41,7 @@ def lets_waves_out(end: EndCondition) -> bool:
 
 
 def end_warnings(problem: Problem) -> list[str]:
-    """What about the ends may spoil a run, in sentences."""
+    """Sentences on how the ends of the line may spoil a run."""
     line, train = problem.line, problem.train
     masts, n = line.support_positions, line.n_spans
     start, end = problem.ends

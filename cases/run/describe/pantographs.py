@@ -43,7 +43,7 @@ def _tied_of(data: LumpedData) -> str:
 
 
 def _strips_of(strips: Strips) -> str:
-    """What is not the usual single strip, fixed to the head."""
+    """Words on strips unless there is one, fixed to the head."""
     if strips.number == 1 and strips.suspension is None:
         return ""
     text = "; 1 strip" if strips.number == 1 else f"; 2 strips {strips.spacing:g} m apart"

@@ -72,7 +72,7 @@ class Meeting(NamedTuple):
 
 
 class Arrivals(NamedTuple):
-    """What reaches a pantograph, and when.
+    """Waves that reach a pantograph, and when.
 
     Attributes
     ----------
@@ -93,7 +93,7 @@ class Arrivals(NamedTuple):
 
 
 def arrivals(line: WaveLine, course: Course) -> Arrivals:
-    """What reaches a pantograph on its course. Not collective."""
+    """Waves that reach a pantograph on its course. Not collective."""
     run_in = course.stretch[0] - course.start
     return Arrivals(
         run_in,

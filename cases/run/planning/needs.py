@@ -50,7 +50,7 @@ _PER_PANTOGRAPH = 8  # channels of a pantograph, mostly at most
 
 @dataclass(frozen=True)
 class Needs:
-    """What a run needs.
+    """Needs of a run.
 
     Attributes
     ----------
@@ -79,7 +79,7 @@ class Kept(NamedTuple):
 
 
 class NeedsOfRuns(NamedTuple):
-    """What several runs need.
+    """Needs of several runs.
 
     Attributes
     ----------
@@ -101,7 +101,7 @@ def needs_of(
     stations: Mapping[int, int] | None = None,
     slow_path: SlowPath | None = None,
 ) -> Needs:
-    """What a run of a scene needs. Not collective.
+    """Needs of a run of a scene. Not collective.
 
     Parameters
     ----------
@@ -143,7 +143,7 @@ def simulated_time(problem: Problem) -> float:
 
 
 def needs_before_meshing(scene: Scene, problem: Problem | None = None) -> Needs | None:
-    """What a run needs, known from its scene alone; None if that brings its own mesh.
+    """Needs of a run from its scene alone; None if that brings its own mesh.
 
     Not collective. ``problem`` is the scene's unless another one is run on its line.
     """
@@ -156,7 +156,7 @@ def needs_before_meshing(scene: Scene, problem: Problem | None = None) -> Needs 
 
 
 def needs_with_mesh(scene: Scene, mesh: LineMesh) -> Needs:
-    """What a run on a mesh needs. Not collective."""
+    """Needs of a run on a mesh. Not collective."""
     problem = problem_of(scene)
     numbering = numbering_of(problem, mesh)
     slow_path = slow_path_of(problem, numbering) or single_steps_of(problem)
@@ -197,7 +197,7 @@ def total_size(runs: Iterable[Kept], n_at_once: int = 1) -> RunSize:
 
 
 def total_needs(scenes: Iterable[Scene]) -> NeedsOfRuns:
-    """What several runs need together. Not collective.
+    """Needs of several runs together. Not collective.
 
     Those of scenes that bring their own mesh count as the longest and largest of the others.
     """

@@ -31,7 +31,7 @@ _GB = 1e9
 
 @dataclass(frozen=True)
 class Job:
-    """What is wanted of a job.
+    """Request for a job.
 
     Attributes
     ----------

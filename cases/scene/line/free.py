@@ -179,7 +179,7 @@ class _AtSupports(Table):
 
 
 class FreeSupportsTable(_AtSupports, SupportTable):
-    """What carries a wire at masts."""
+    """Supports of a wire at masts."""
 
     type: Literal["supports"] = Field(description="kind of link")
     holds: WireName | None = Field(

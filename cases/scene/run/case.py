@@ -130,7 +130,7 @@ _AroundTrain = Annotated[
 
 
 class OutputTable(Table):
-    """What is written, and how much of it."""
+    """Which files are written, and how much into them."""
 
     field_every_s: float | None = Field(
         None,

@@ -40,7 +40,7 @@ WORDS = {"std": "the standard deviation (0-20 Hz)", HISTORY: "the force history 
 
 @dataclass(frozen=True)
 class Found:
-    """What one run found.
+    """Result of one run.
 
     Attributes
     ----------

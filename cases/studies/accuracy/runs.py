@@ -14,7 +14,7 @@ from scipy.interpolate import CubicSpline
 from catenary.cases.studies.accuracy.analysis import Found, Row, compare, separate, uncertainties
 from catenary.cases.studies.accuracy.axes import Level
 from catenary.cases.studies.accuracy.plan import Plan, PlannedAxis, again
-from catenary.cases.studies.sweep.jobs import AS_USUAL, Ended, RunOptions, interrupted
+from catenary.cases.studies.sweep.jobs import AS_USUAL, Ended, RunOptions, all_ended
 from catenary.cases.studies.sweep.run_jobs import run_jobs
 from catenary.postproc.evaluate import filters
 from catenary.postproc.evaluate.statistics import covers
@@ -31,7 +31,7 @@ _LONG = 2e8
 
 @dataclass(frozen=True)
 class Measured:
-    """What an accuracy study has found.
+    """Result of an accuracy study.
 
     Attributes
     ----------
@@ -77,23 +77,22 @@ def run(
     out_dir: Path,
     comm: Any,
     options: RunOptions = AS_USUAL,
-) -> tuple[Measured | None, list[Ended]]:
+) -> tuple[Measured, list[Ended]]:
     """Run what is not done yet; returns what was found and all runs. Collective.
 
     Repeats go through all settings before any is timed again, so that a disturbance does not
     fall on a single one. They are made one at a time also where first runs are made several at a
-    time, whose times then count for long runs alone. Nothing was found if the study was
-    interrupted.
+    time, whose times then count for long runs alone.
 
     Raises
     ------
     InputError
         If ``out_dir`` holds other results and ``options.force`` is not given.
+    Interrupted
+        If a signal came.
     """
     folder = out_dir / RUNS
-    ended = run_jobs(plan.jobs, folder, comm, options, measure=measure)
-    if interrupted(ended):
-        return None, ended
+    ended = all_ended(run_jobs(plan.jobs, folder, comm, options, measure=measure))
     every = list(ended)
     times = {one.variant.name: [_cost(one)] for one in ended if one.done}
     work = {
@@ -109,10 +108,9 @@ def run(
         round_of = f"no. {number} of {plan.repeats}"
         options.progress(f"again, for their time, {round_of}: {len(short)} short runs")
         short.reverse()  # whatever else the machine does now and then meets others
-        repeated = run_jobs([again(job, number) for job in short], folder, comm, alone)
+        runs = run_jobs([again(job, number) for job in short], folder, comm, alone)
+        repeated = all_ended(runs)
         every += repeated
-        if interrupted(repeated):
-            return None, every
         for job, one in zip(short, repeated, strict=True):
             if one.done:
                 times[job.variant.name].append(_cost(one))
@@ -173,7 +171,7 @@ def _row(
 
 
 def _found(one: Ended) -> Found | None:
-    """What a run found, None if it broke."""
+    """Result of a run, None if it broke."""
     if not one.done:
         return None
     histories = [np.array(values) for values in one.measured["histories"]]

@@ -101,7 +101,7 @@ class Beside(NamedTuple):
 
 
 def beside(march: RepeatedMarch, other: RepeatedMarch, rounds: int) -> Beside:
-    """What steps of a march take beside those of another. Collective.
+    """Time of steps of a march over that of another. Collective.
 
     A round marches both twice, as in a b b a, and takes the lesser of each. The ratio is the median
     of rounds: where the machine slows down for some of them, it does so for both.

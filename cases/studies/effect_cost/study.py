@@ -122,7 +122,7 @@ UPLIFT = "max_uplift_mm"
 
 @dataclass(frozen=True)
 class Wish:
-    """What is measured, and how long.
+    """Effects to be measured, and how long.
 
     Attributes
     ----------
@@ -185,7 +185,7 @@ class Measured:
 
 @dataclass(frozen=True)
 class Costs:
-    """What was found.
+    """Result of the study.
 
     Attributes
     ----------
@@ -213,7 +213,7 @@ class Costs:
 
 
 def jobs_of(wish: Wish) -> tuple[SwitchableEffects, list[Job], dict[str, str]]:
-    """What can be chosen, the runs to be made, and why others cannot. Not collective.
+    """Effects that can be switched, the runs for them, and why others cannot. Not collective.
 
     The first run is of the scene as it is; those of switches have the names of their effects.
 

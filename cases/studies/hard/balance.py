@@ -100,7 +100,7 @@ class LineBalance:
         self._stop_share = 0.5 * max(stops, default=0.0) * ((1.0 - gamma) * dt) ** 2
 
     def damping_terms(self, states: Mapping[str, np.ndarray], taut: np.ndarray) -> np.ndarray:
-        """What numerical damping adds to the energy of states (k, n_dofs) each [J], shape (k,).
+        """Term of numerical damping in the energy of states (k, n_dofs) each [J], shape (k,).
 
         ``taut`` (k, n_droppers) are the droppers that carry anything.
         """

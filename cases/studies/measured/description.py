@@ -70,7 +70,7 @@ class Height(_Signal):
 
 
 class Measured(Table):
-    """What was measured, and how well.
+    """Measured quantities and their noise.
 
     Attributes
     ----------

@@ -227,7 +227,7 @@ def run_name(reading: str, damping: str, train: str) -> str:
 
 
 def changes_of(reading: Mapping[str, Any]) -> list[str]:
-    """What a reading changes of the case, its kind of pantograph included, as assignments."""
+    """Changes of the case by a reading, its kind of pantograph included, as assignments."""
     kind = [f"train.pantographs.0.name={reading['kind']}"] if "kind" in reading else []
     return [*kind, *reading["set"]]
 

@@ -70,7 +70,7 @@ class Statement(Table):
 
 
 class _Open(Exception):
-    """What is missing for a verdict."""
+    """Figures that are missing for a verdict."""
 
 
 class _Found(NamedTuple):

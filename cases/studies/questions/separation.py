@@ -87,7 +87,7 @@ class Distances(NamedTuple):
 
 @dataclass(frozen=True)
 class SeparationStudy:
-    """What a study of distances found.
+    """Result of a study of distances.
 
     Attributes
     ----------
@@ -113,7 +113,7 @@ class SeparationStudy:
 
     @property
     def by_deviation(self) -> list[Row]:
-        """Those with statistics, by the larger deviation of the two, the best first."""
+        """Distances with statistics, by the larger deviation of the two, the best first."""
         names = [f"std_{place}_N" for place in PLACES]
         known = [row for row in self.done if all(row[name] is not None for name in names)]
         return sorted(known, key=lambda row: max(row[name] for name in names))
@@ -175,7 +175,7 @@ def _row(separation: float | None, one: Ended) -> Row:
 
 
 class Period(NamedTuple):
-    """What explains good and bad distances, all [m]; NaN where there is no answer.
+    """Periods that explain good and bad distances, all [m]; NaN where there is no answer.
 
     Attributes
     ----------
@@ -211,7 +211,7 @@ def period_in(study: SeparationStudy, scene: Scene) -> Period:
 
 
 def period_of(d: np.ndarray, sigma: np.ndarray, theory: WaveTheory, span: float) -> Period:
-    """What deviations repeat themselves with, and what theory offers.
+    """Period of the deviations, and those that theory offers.
 
     Parameters
     ----------
@@ -282,7 +282,7 @@ def _uplift(row: Row) -> str:
 
 
 def _explained(period: Period) -> str:
-    """What the deviation repeats itself with, and what theory offers."""
+    """Sentence on the period of the deviation, and on those that theory offers."""
     low, high = period.ringing
     found = f"No period is found in fewer than {_LEAST_FOR_PERIOD} distances"
     if np.isfinite(period.fitted):

@@ -12,9 +12,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from catenary.base.errors import InputError, RunBroken
-from catenary.cases.process.interrupts import Interrupted
 from catenary.cases.scene.input.toml_input import parse_assignment
-from catenary.cases.studies.sweep.jobs import Ended, Job, RunOptions, interrupted, make_jobs
+from catenary.cases.studies.sweep.jobs import Ended, Job, RunOptions, all_ended, make_jobs
 from catenary.cases.studies.sweep.run_jobs import run_jobs
 from catenary.cases.studies.sweep.variants import Variant, check_keys
 from catenary.postproc.evaluate import filters
@@ -46,7 +45,7 @@ _OF_FORCE = (
 
 
 class Differences(NamedTuple):
-    """What a change changes, as tables with the columns ``as_it_is``, ``changed``, ``difference``.
+    """Differences by a change: tables with the columns ``as_it_is``, ``changed``, ``difference``.
 
     Attributes
     ----------
@@ -93,9 +92,7 @@ def run(jobs: Sequence[Job], out: Path, comm: Any, options: RunOptions) -> list[
     RunBroken
         If one breaks; ``Interrupted`` if a signal came.
     """
-    ended = run_jobs(jobs, out, comm, options)
-    if interrupted(ended):
-        raise Interrupted("the runs were interrupted; the same command continues them")
+    ended = all_ended(run_jobs(jobs, out, comm, options))
     for one in ended:
         if not one.done:
             raise RunBroken(f"the run {one.variant.name} broke: {one.outcome}")

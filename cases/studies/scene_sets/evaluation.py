@@ -22,8 +22,6 @@ if TYPE_CHECKING:
 BROKE = "broke"
 # Tables of a scene that its figures do not depend on.
 _IDLE = ("case", "output", "test")
-# What studies read of a summary, without tables of all supports.
-_KEPT = ("pantographs", "droppers", "acceptance", BROKE)
 OF_EACH_PANTOGRAPH = tuple(column.name for column in OF_PANTOGRAPH)
 # Statistics of the line: table and key in a summary.
 _OF_LINE = {
@@ -176,10 +174,10 @@ class Evaluation:
                 del new[key]
         if not new:
             return
+        from catenary.cases.studies.ensemble import in_short
+
         for key, summary in zip(new, evaluate(list(new.values()), self._pool), strict=True):
-            own = {name: summary[name] for name in _KEPT if name in summary}
-            if BROKE not in own:
-                own["supports"] = {"max_uplift_mm": summary["supports"]["max_uplift_mm"]}
+            own = summary if BROKE in summary else in_short(summary)
             self._known[key] = own
             self._kept.keep(key, own)
 

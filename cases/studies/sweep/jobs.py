@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple, TypeVar
 
 from catenary.base.errors import InputError
+from catenary.cases.process.interrupts import Interrupted
 from catenary.cases.scene.input.faults import UnfitScene, shown
 from catenary.cases.scene.input.toml_input import Assigned
 from catenary.cases.scene.keys.keys import nearest
@@ -134,6 +135,19 @@ class Ended:
 def interrupted(ended: Sequence[Ended]) -> bool:
     """Whether a signal ended the last of some runs, after which no other began."""
     return bool(ended) and ended[-1].outcome == "interrupted"
+
+
+def all_ended(ended: Sequence[Ended], what: str = "study") -> list[Ended]:
+    """The runs of a study, unless a signal ended it.
+
+    Raises
+    ------
+    Interrupted
+        If one did; ``what`` names the study.
+    """
+    if interrupted(ended):
+        raise Interrupted(f"the {what} was interrupted; the same command continues it")
+    return list(ended)
 
 
 def _assigned(variant: Variant) -> list[Assigned]:

@@ -210,7 +210,7 @@ def _leave_record(job: Job, folder: Path, measure: Measure | None, wall: float) 
 
 
 def _earlier(jobs: Sequence[Job], out_dir: Path, force: bool, measured: bool) -> list[Ended | None]:
-    """What is there of each job: how it ended, None if it is to be run."""
+    """How each job ended earlier, None if it is to be run."""
     refuse_impossible(out_dir)
     refuse_earlier(out_dir, force)
     if force:

@@ -26,6 +26,7 @@ from catenary.cases.studies.sweep.jobs import (
     Ended,
     Part,
     RunOptions,
+    all_ended,
     in_order,
     interrupted,
     scene_of,
@@ -37,8 +38,6 @@ from catenary.postproc.files.run_schema import DONE, INTERRUPTED
 # are smaller, so that all cores have some; they do not depend on the number of cores, as a sweep
 # that was stopped may go on with more.
 _MOST, _LEAST, _PIECES = 64, 4, 16
-# What a sweep's table needs of a summary.
-_KEPT = ("pantographs", "histograms", "droppers", "acceptance", "not_judged", "passed", "remarks")
 
 
 class Ensemble(NamedTuple):
@@ -178,7 +177,7 @@ def pieces_of_work(variants: Sequence[Variant], size: int) -> list[list[Variant]
 
 
 def _of_the_line(variant: Variant) -> tuple[str, ...]:
-    """What changes the line of a variant: its direction and assignments."""
+    """The changes of a variant that its line depends on: its direction and assignments."""
     changes = (one for one in variant.assignments if one.split(".")[0] not in OF_THE_TRAIN)
     return (variant.varied.get(DIRECTION, ""), *changes)
 
@@ -205,9 +204,7 @@ class Marching:
         """
         ended = run_ensemble(ensemble_of(self.draft, variants), self.out, self.comm, self.options)
         self.options = self.options._replace(force=False)  # which would forget these
-        if interrupted(ended):
-            raise Interrupted("the study was interrupted; the same command continues it")
-        return ended
+        return all_ended(ended)
 
 
 class _March:
@@ -224,7 +221,7 @@ class _March:
         ----------
         work : variants, and the file of their histories
         """
-        from catenary.cases.studies.ensemble import Marches
+        from catenary.cases.studies.ensemble import Marches, in_short
         from catenary.cases.studies.sweep.histories import piece_file
 
         piece, file = work
@@ -241,12 +238,9 @@ class _March:
         with piece_file(file, self._histories) as put:
             for marched in self._marches.of(scenes):
                 number = numbers[marched.number]
-                kept = {name: marched.summary[name] for name in _KEPT if name in marched.summary}
                 if marched.outcome == DONE:
-                    uplift = marched.summary["supports"]["max_uplift_mm"]
-                    kept["supports"] = {"max_uplift_mm": uplift}
                     put(number, marched.tables)
-                rows[number] = [marched.outcome, kept]
+                rows[number] = [marched.outcome, in_short(marched.summary)]
         return rows
 
     def __getstate__(self) -> dict[str, Any]:

@@ -141,7 +141,7 @@ _LITTLE = 0.02
 
 
 def reflections_of(rest: LineAtRest) -> list[EndReflection]:
-    """What both ends send back, start first, with the line's own damping from where they begin.
+    """Reflection of both ends, start first, with the line's own damping from where they begin.
 
     None if the line's spans there are not alike. Not collective.
     """

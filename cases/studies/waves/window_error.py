@@ -39,7 +39,7 @@ _AHEAD = 0.55
 
 
 class Error(NamedTuple):
-    """What a window costs in accuracy; worst of all pantographs.
+    """Error that a window makes; worst of all pantographs.
 
     Attributes
     ----------

@@ -48,7 +48,7 @@ def text_of(value: Any) -> Any:
 def seal_attributes(place: h5py.HLObject, names: Iterable[str] | None = None) -> None:
     """Store the checksums of attributes of ``place``, of all that it has now if none are named."""
     chosen = list(place.attrs) if names is None else names
-    sums = {name: _sum_of_value(place.attrs[name]) for name in chosen}
+    sums = {name: _sum_of(text_of(place.attrs[name])) for name in chosen}
     set_attribute(place, ATTRIBUTE_SUMS, json.dumps(sums))
 
 
@@ -121,10 +121,6 @@ def create_checked(file: h5py.Group, path: str, values: Any) -> h5py.Dataset:
     """A dataset with HDF5's own checksum; an empty one has nothing to check."""
     array = np.asarray(values)
     return file.create_dataset(path, data=array, fletcher32=bool(array.size) and array.ndim > 0)
-
-
-def _sum_of_value(value: Any) -> int:
-    return _sum_of(text_of(value))
 
 
 def _sum_of(value: Any) -> int:
