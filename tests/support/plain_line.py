@@ -328,9 +328,11 @@ class _Column:
     values: np.ndarray
     stretch: np.ndarray
 
-    def at(self, numbers: np.ndarray) -> np.ndarray:
-        """Its values of unknowns."""
-        return _within(self.first, self.values, numbers)
+    def at(self, numbers: np.ndarray, weights: np.ndarray) -> float:
+        """The weighted sum of its values of unknowns in ascending order."""
+        if numbers[-1] < self.first or numbers[0] >= self.first + self.values.size:
+            return 0.0
+        return float(weights @ _within(self.first, self.values, numbers))
 
 
 def _within(first: int, values: np.ndarray, numbers: np.ndarray) -> np.ndarray:
@@ -419,7 +421,7 @@ class _OneSided:
             for k in on:
                 if k not in effects:
                     column = columns[k] if k < self.n else self.answers.of_dropper(k - self.n)
-                    less = [self.dt**2 / 4 * values @ column.at(own) for own, values, _ in contacts]
+                    less = [self.dt**2 / 4 * column.at(*place[:2]) for place in contacts]
                     lost = np.array(less) + (give[:, k] if k < self.n else 0.0)
                     effects[k] = column, np.append(-self.law * lost, self.worth * column.stretch)
             by = np.array([effects[k][1] for k in on]).reshape(on.size, alone.size).T

@@ -108,8 +108,7 @@ def data_of(name: str) -> Data:
     return replace(own, starts=(start + 200.0, start)) if train == "two" else own
 
 
-# Configurations that two grids of differences reach in an hour of a processor, and those that two
-# meshes of finite elements do.
+# Configurations that two grids of differences reach in an hour of a processor.
 BY_DIFFERENCES = (
     "ac_simple_275_one",
     "ac_simple_320_one",
@@ -117,10 +116,15 @@ BY_DIFFERENCES = (
     "dc_simple_200_one",
     "dc_simple_250_one",
 )
-BY_ELEMENTS = ("ac_stitched_320_two",)
-# Elements beside hardware [m], ratio of neighbours, longest elements [m] of the coarser mesh, and
-# its time step [s]; the finer one has all of them halved.
-_GRADED, _STEP = (0.06, 2.0, 0.3), 5e-4
+# Those that two meshes of finite elements reach: longest elements [m] of the coarser mesh, and its
+# time step [s]; the finer one has both halved. A trailing pantograph meets the shorter waves.
+BY_ELEMENTS = {
+    "ac_stitched_275_two": (0.3, 5e-4),
+    "ac_stitched_320_one": (0.6, 1e-3),
+    "ac_stitched_320_two": (0.3, 5e-4),
+}
+# Elements beside hardware [m] of the coarser mesh, and the ratio of neighbours.
+_FIRST, _RATIO = 0.06, 2.0
 
 
 def grids_of(data: Data) -> tuple[tuple[float, float, float], ...]:
@@ -174,12 +178,12 @@ def test_plain_finite_differences_reach_a_reference_solution(name: str) -> None:
 @pytest.mark.parametrize("name", BY_ELEMENTS)
 def test_plain_finite_elements_reach_a_reference_solution(name: str) -> None:
     """Figures, and forces along the stretch."""
-    solution = read(name)
-    problem = scene_problem(solution.configuration.scene())
-    runs = []
+    solution, (longest, step) = read(name), BY_ELEMENTS[name]
+    problem, runs = scene_problem(solution.configuration.scene()), []
     for halvings in (0, 1):
-        halved = replace(problem, numerics=replace(problem.numerics, dt=_STEP / 2**halvings))
-        line = PlainLine(halved, mesh_on(problem.line, graded(problem.line, *_GRADED, halvings)))
+        halved = replace(problem, numerics=replace(problem.numerics, dt=step / 2**halvings))
+        x = graded(problem.line, _FIRST, _RATIO, longest, halvings)
+        line = PlainLine(halved, mesh_on(problem.line, x))
         runs.append(line.run(line.nominal_height(*middle_span(problem.line))))
     # Where the stretch is cut between two steps weighs more in a mean than its error bar.
     check_figures(solution, runs, 1e-3 * solution.configuration.steps[0] * problem.train.speed)
