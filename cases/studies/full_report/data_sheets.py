@@ -46,12 +46,12 @@ def line(scene: SceneOfRun, run: EvaluatedRun) -> Section:
 
 def _line_blocks(problem: Problem, rest: LineAtRest) -> Iterator[StudyTable]:
     line, damping = problem.line, simulated(problem).damping
-    rows = []
-    for wire in line.wires:
+    rows, bending = [], _alike([wire.bending_stiffness for wire in line.wires])
+    for wire, stiffness in zip(line.wires, bending, strict=True):
         alpha, beta = damping.per_component.get(wire.name, (damping.alpha, damping.beta))
         rows.append([
             _plain(wire.name), wire.role.value, number(1e-3 * wire.tension, 2),
-            number(wire.mass_per_length, 3), f"{wire.bending_stiffness:.9g}",
+            number(wire.mass_per_length, 3), stiffness,
             number(None if wire.axial_stiffness is None else 1e-6 * wire.axial_stiffness, 2),
             number(slowest_wave_of(line, wire), 1), f"{alpha:.3g}", f"{beta:.3g}",
         ])  # fmt: skip
