@@ -185,4 +185,4 @@ def _note(n_shown: int, n_all: int, file: str) -> str:
     """What a table leaves out."""
     if n_shown == n_all:
         return ""
-    return f"{n_shown} of {n_all} are shown, the extremes and any beyond a limit; all: {file}."
+    return f"{n_shown} of {n_all} are shown, the extremes and any beyond a limit; {file} has all."
