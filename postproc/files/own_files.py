@@ -33,7 +33,7 @@ REPORT_FILES = (
 )
 _OF_FULL_REPORTS = (
     *("lateral_place", "spectrum", "contact_height", "space_time", "line"),
-    *("worst_span", "worst_support", "worst_dropper", "longest_slack"),
+    *("worst_span", "worst_dropper", "longest_slack"),
     *(f"pantograph_{n}" for n in range(1, 17)),
 )
 # What `catenary report` leaves besides, but for its input.toml, which a user may have changed.

@@ -55,9 +55,9 @@ LOOKS = {
     TRACK: Look(0.8, "#6b7078"),
     TRAIN: Look(0.2, "#d9dde2"),
 }
-# Thickness of the lines of a pantograph by their kind, and its colour by its order.
+# Thickness of the lines of a pantograph by their kind, and its colour by its order, as in reports.
 THICK = {SPRING: 0.5, BODY: 1.0, HEAD: 1.7}
-COLOURS = ("#b2182b", "#2166ac", "#1b7837", "#762a83")
+COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7")
 # From the smallest to the largest motion, and from no force of a dropper to the largest one: both
 # grow darker or lighter all the way, also to eyes that see no red or no green.
 MOTIONS = ("#440154", "#472d7b", "#3b528b", "#2c728e", "#21918c", "#28ae80", "#5ec962", "#a8d327")

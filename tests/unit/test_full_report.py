@@ -110,7 +110,7 @@ def test_all_sections_of_a_run_with_data_sheets(folder: Path) -> None:
         "line", "above", "pantographs", "effects", "run", "signatures",
     ]  # fmt: skip
     pictures = {path.stem for path in folder.glob("*.svg")}
-    assert pictures >= {"spectrum", "contact_height", "space_time", "worst_span", "worst_support",
+    assert pictures >= {"spectrum", "contact_height", "space_time", "worst_span",
                         "worst_dropper", "line", "pantograph_1"}  # fmt: skip
 
 
@@ -179,6 +179,15 @@ def test_a_rail_has_neither_droppers_nor_a_view_from_above(tmp_path: Path) -> No
     assert re.search(
         r"Elasticity in span [0-9]+, [0-9.]+ to [0-9.]+ m.*0.00165 to 0.0261 mm/N", words
     )
+
+
+def test_the_stagger_of_twins_is_that_of_both_wires() -> None:
+    """0.2 m to either side, and the wires 30 mm to either side of it."""
+    recorded = resolved(load_scene("dc_twin", shortened=True))
+    scene = SceneOfRun(_Recorded(recorded))  # type: ignore[arg-type]
+    _, geometry, *_ = data_sheets.line(scene, None).blocks  # type: ignore[arg-type]
+    told = {row[0]: row[1:] for row in geometry.texts()}  # type: ignore[union-attr]
+    assert told["stagger there, to the left"] == ["-0.230 to 0.230", "m"]
 
 
 def test_the_data_sheet_tells_the_wind() -> None:

@@ -271,7 +271,9 @@ def _name(axes: Axes, rows: Sequence[Row]) -> None:
             continue
         named.append(place)
         text = row.level.replace("_elements", "").replace("_ms_", " ms, ").replace("_", " ")
-        axes.annotate(text, point, textcoords="offset points", xytext=(5, 4), fontsize="x-small")
+        # No setting is both cheaper and more accurate than one of the front: there is room.
+        how: dict[str, Any] = {"ha": "right", "va": "top", "fontsize": "x-small"}
+        axes.annotate(text, point, textcoords="offset points", xytext=(-4, -3), **how)
 
 
 def _precise(found: Measured) -> list[Axis]:

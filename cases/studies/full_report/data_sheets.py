@@ -19,7 +19,7 @@ from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import LineMesh
 from catenary.meshgen.slowest_wave import slowest_wave_of
 from catenary.meshgen.wires import Role, Wire
-from catenary.postproc.evaluate.wording import capital, stiffness_words
+from catenary.postproc.evaluate.wording import stiffness_words
 from catenary.postproc.report.pictures.figures import COLOURS, FewTicks, new_figure, own_style, tidy
 from catenary.postproc.report.sections.section import EvaluatedRun, Picture, Section, Text, number
 from catenary.postproc.report.study_table import StudyTable, texts_table
@@ -29,8 +29,9 @@ from catenary.solver.problem.wind import Wind
 from catenary.solver.statics.line_at_rest import LineAtRest
 from catenary.solver.wind.wind_at import exposure
 
-# Places along the track closer than this are one [m].
-_OFF = 1e-6
+# Places along the track closer than this are one, contact wires whose heights differ less are met
+# together [m].
+_OFF, _ALIKE = 1e-6, 1e-3
 
 
 def line(scene: SceneOfRun, run: EvaluatedRun) -> Section:
@@ -45,12 +46,12 @@ def line(scene: SceneOfRun, run: EvaluatedRun) -> Section:
 
 def _line_blocks(problem: Problem, rest: LineAtRest) -> Iterator[StudyTable]:
     line, damping = problem.line, simulated(problem).damping
-    rows = []
-    for wire in line.wires:
+    rows, bending = [], _alike([wire.bending_stiffness for wire in line.wires])
+    for wire, stiffness in zip(line.wires, bending, strict=True):
         alpha, beta = damping.per_component.get(wire.name, (damping.alpha, damping.beta))
         rows.append([
             _plain(wire.name), wire.role.value, number(1e-3 * wire.tension, 2),
-            number(wire.mass_per_length, 3), f"{wire.bending_stiffness:.9g}",
+            number(wire.mass_per_length, 3), stiffness,
             number(None if wire.axial_stiffness is None else 1e-6 * wire.axial_stiffness, 2),
             number(slowest_wave_of(line, wire), 1), f"{alpha:.3g}", f"{beta:.3g}",
         ])  # fmt: skip
@@ -80,10 +81,10 @@ def _geometry(rest: LineAtRest, line: Line) -> Iterator[list[Any]]:
     places[:, 2] = rest.form.height
     if rest.form.lateral is not None:
         places[:, 1] = rest.form.lateral.y
-    # Of several contact wires the lowest is the one that the train meets.
+    # Of several contact wires the train meets the lowest, and twins that are as low.
     contact = _courses(rest.mesh, places, line.wires_of(Role.CONTACT), masts)
-    met = np.nanargmin(contact[:, 1], axis=0), np.arange(masts.size)
-    y, height = contact[:, 0][met], contact[:, 1][met]
+    height = np.nanmin(contact[:, 1], axis=0)
+    y = contact[:, 0][contact[:, 1] <= height + _ALIKE]
     at = "at the supports of the running spans"
     yield [f"contact wire above the rail {at}", _range(height, 3), "m"]
     messengers = line.wires_of(Role.MESSENGER)
@@ -210,7 +211,7 @@ def pantographs(scene: SceneOfRun, run: EvaluatedRun) -> Section:
     pictures = [
         Picture(
             f"pantograph_{n}",
-            f"{capital(_plain(name))}, {_how_drawn(one[0].data)}.",
+            f"Pantograph {_plain(name)}, {_how_drawn(one[0].data)}.",
             partial(_drawn, one[0].data),
         )
         for n, (name, one) in enumerate(kinds.items(), start=1)
@@ -228,7 +229,7 @@ def _pantograph_blocks(
     kinds: dict[str, tuple[Placement, str]],
 ) -> Iterator[Text | StudyTable]:
     for name, (placement, description) in kinds.items():
-        yield Text(f"{description}.", "", f"{capital(_plain(name))}:")
+        yield Text(f"{description}.", "", f"{_plain(name)}:")
         data = placement.data
         if isinstance(data, LumpedData):
             columns = map(_alike, (data.masses, data.stiffnesses, data.dampings))

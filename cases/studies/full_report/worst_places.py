@@ -1,4 +1,4 @@
-"""The worst span, steady arm and dropper of a run, each seen closely, with candidates for why."""
+"""The worst span, steady arm and dropper of a run, with candidates for why; close views."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from catenary.postproc.report.pictures.marks import mark_line
 from catenary.postproc.report.sections.section import EvaluatedRun, Picture, Section, Text, number
 from catenary.postproc.report.study_table import StudyTable, texts_table
 
-# What is shown beside an arm or a dropper and its extreme [m], and how many places tables have.
+# What is shown beside a dropper and its extreme [m], and how many places tables have.
 _BESIDE, _MOST = 30.0, 5
 
 
@@ -92,14 +92,13 @@ def _pictures(results: Results, places: WorstPlaces) -> Iterator[Picture]:
         who = results.pantograph_names()[passage.pantograph]
         text = f"Contact force of the {_noun(who)} in the worst span and its neighbours."
         yield Picture("worst_span", text, lambda: _span(results, passage))
-    for name, spots, channel, what in (
-        ("worst_support", places.arms, "arm_uplift", "Uplift at the worst support"),
-        ("worst_dropper", places.forces, "dropper_force", "Force of the most loaded dropper"),
-        ("longest_slack", places.slack, "dropper_force", "Force of the dropper with longest slack"),
+    for name, spots, what in (
+        ("worst_dropper", places.forces, "Force of the most loaded dropper"),
+        ("longest_slack", places.slack, "Force of the dropper with longest slack"),
     ):
         for spot in spots[:1]:
             caption = f"{what}, {spot.place}, as the train passes."
-            yield Picture(name, caption, partial(_passage, results, channel, spot))
+            yield Picture(name, caption, partial(_passage, results, spot))
 
 
 def _noun(name: str) -> str:
@@ -146,31 +145,27 @@ def _span(results: Results, passage: Passage) -> Figure:
 
 
 @own_style()
-def _passage(results: Results, channel: str, spot: Spot) -> Figure:
-    """History of an arm or a dropper over the place of the leading pantograph."""
+def _passage(results: Results, spot: Spot) -> Figure:
+    """Force of a dropper over the place of the leading pantograph."""
     leader = int(np.argmax(results.first_position))
     place = results.column("contact_position", leader)[:: results.line_record.every]
     behind = results.first_position[leader] - results.first_position
-    most = place[int(np.nanargmax(results.column(channel, spot.number)))]
+    most = place[int(np.nanargmax(results.column("dropper_force", spot.number)))]
     reach = min(spot.x, most) - _BESIDE, max(spot.x + float(behind.max()), most) + _BESIDE
-    rows = slice(*np.clip(np.searchsorted(place, reach), 0, results.n_rows(channel)).tolist())
-    values = results.column(channel, spot.number, rows)
-    is_uplift = channel == "arm_uplift"
-    values = 1e3 * values if is_uplift else values
+    n_rows = results.n_rows("dropper_force")
+    rows = slice(*np.clip(np.searchsorted(place, reach), 0, n_rows).tolist())
+    force, x = results.column("dropper_force", spot.number, rows), place[rows] - spot.x
     figure, (axes,) = stacked(3.0, 1)
-    x = place[rows] - spot.x
-    axes.plot(x, values, color="#222222", linewidth=1.4, label="uplift" if is_uplift else "force")
+    axes.plot(x, force, color="#222222", linewidth=1.4, label="force")
     for p, name in enumerate(results.pantograph_names()):
         label = f"{name} passes"
         axes.axvline(behind[p], color=colour(p), linestyle="--", linewidth=1.1, label=label)
-    if not is_uplift:
-        slack = values <= 0.0
-        if slack.any():
-            axes.plot(x[slack], values[slack], ".", color=LIMIT, ms=3, label="slack")
+    slack = force <= 0.0
+    if slack.any():
+        axes.plot(x[slack], force[slack], ".", color=LIMIT, ms=3, label="slack")
     axes.axhline(0.0, color="#6b6b6b", linewidth=0.7)
     axes.margins(x=0.0)
     who = "leading pantograph" if results.n_pantographs > 1 else "pantograph"
-    label = "uplift [mm]" if is_uplift else "dropper force [N]"
-    tidy(axes, f"position of the {who} relative to this place [m]", label)
+    tidy(axes, f"position of the {who} relative to this place [m]", "dropper force [N]")
     legend_above(axes)
     return figure

@@ -194,7 +194,7 @@ def force_statistics(results: Results, statistics: RunStatistics) -> Figure:
         "maximum",
         "minimum",
         "mean + 3 sigma",
-        "mean - 3 sigma",
+        "mean − 3 sigma",
     )
     shown = [(i, p) for i, p in enumerate(statistics.pantographs) if not p.complaint]
     figure, (axes,) = stacked(3.4, 1)

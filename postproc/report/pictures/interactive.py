@@ -197,7 +197,7 @@ def _shapes(axes: Axes, own: str) -> Iterator[dict[str, Any]]:
         yield {"type": "rect", "layer": "below", **look, **name, **ends}
     for line in axes.lines:
         across = line.get_transform() in (axes.get_xaxis_transform(), axes.get_yaxis_transform())
-        if across and len(line.get_xydata()) == 2 and line.get_linestyle() != "None":
+        if across and np.size(line.get_xdata()) == 2 and line.get_linestyle() != "None":
             (x0, y0), (x1, y1) = np.asarray(line.get_xydata())[[0, -1]].tolist()
             yield {
                 "type": "line",

@@ -40,7 +40,7 @@ _MOST_ARMS = 60
 
 
 @own_style()
-def arm_uplift(results: Results, statistics: RunStatistics, limit: float | None) -> Figure:
+def arm_uplift(results: Results, statistics: RunStatistics, limit: float) -> Figure:
     """Uplift at the evaluated arms as the train passes, and the largest uplift of every arm.
 
     Parameters
@@ -49,8 +49,8 @@ def arm_uplift(results: Results, statistics: RunStatistics, limit: float | None)
         Results of the run.
     statistics : RunStatistics
         Its statistics.
-    limit : float or None
-        Largest uplift that is allowed [m]; None without a limit.
+    limit : float
+        Largest uplift that is allowed [m]; NaN without a limit.
     """
     supports = statistics.supports
     figure, (passing, along) = stacked(4.8, 2)
@@ -63,7 +63,7 @@ def arm_uplift(results: Results, statistics: RunStatistics, limit: float | None)
         supports.x, 1e3 * supports.uplift, "o", color="#222222", ms=4, label="largest uplift"
     )
     along.set_xlim(*with_margin(supports.x))
-    if limit is not None:
+    if np.isfinite(limit):
         label = f"limit {1e3 * limit:.0f} mm"
         if limit < _FAR * np.nanmax(supports.uplift, initial=0.0):
             along.axhline(1e3 * limit, color=LIMIT, linewidth=1.1, label=label)

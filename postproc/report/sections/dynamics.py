@@ -20,7 +20,7 @@ from catenary.postproc.report.sections.section import (
 from catenary.postproc.report.study_table import StudyTable, texts_table
 
 # Places that a table shows all of, and extremes of each kind that it shows of more.
-_FEW, _EXTREMES = 20, 5
+_FEW, _EXTREMES = 12, 5
 
 
 def has_statistics(run: EvaluatedRun) -> bool:
@@ -114,7 +114,7 @@ def places(run: EvaluatedRun) -> Section:
 
 def _tables(run: EvaluatedRun) -> Iterator[StudyTable]:
     results, supports, droppers = run.results, run.statistics.supports, run.statistics.droppers
-    limit = _least_limit(run, "arm_uplift")
+    limit = run.limit("arm_uplift")
     wires = [name.replace("_", " ") for name in results.arm_wires()]
     several = len(set(wires)) > 1
     uplift = 1e3 * supports.uplift
@@ -138,7 +138,7 @@ def _tables(run: EvaluatedRun) -> Iterator[StudyTable]:
     slackened = bool(np.any(slack[droppers.evaluated] > 0.0))
     least = {"longest slack": slack} if slackened else {"least force": -droppers.lowest}
     kinds = {"largest force": droppers.highest, **least}
-    allowed = _least_limit(run, "dropper_force_max")
+    allowed = run.limit("dropper_force_max")
     chosen = _extremes(droppers.evaluated, kinds, droppers.highest > allowed)
     rows = [
         [number(droppers.x[n], 2), *([carried[n]] if several else ()), number(at_rest[n]),
@@ -153,12 +153,6 @@ def _tables(run: EvaluatedRun) -> Iterator[StudyTable]:
         note = "Forces over the whole run; slack is the time without force. "
         note += _note(len(rows), int(droppers.evaluated.sum()), "droppers.csv")
         yield texts_table(heads, rows, right, "Evaluated droppers", note)
-
-
-def _least_limit(run: EvaluatedRun, quantity: str) -> float:
-    """Smallest limit of a quantity, in its unit; NaN where none is judged."""
-    limits = [c.limit for c in run.criteria if c.quantity == quantity and c.limit == c.limit]
-    return min(limits, default=float("nan"))
 
 
 def _extremes(
@@ -191,4 +185,4 @@ def _note(n_shown: int, n_all: int, file: str) -> str:
     """What a table leaves out."""
     if n_shown == n_all:
         return ""
-    return f"{n_shown} of {n_all} are shown, the extremes and any beyond a limit; all: {file}."
+    return f"{n_shown} of {n_all} are shown, the extremes and any beyond a limit; {file} has all."

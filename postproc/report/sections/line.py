@@ -45,10 +45,7 @@ def _of_motion(run: EvaluatedRun) -> Iterator[Picture]:
 
     results, statistics = run.results, run.statistics
     if results.n_rows("time") > 1 and statistics.supports.x.size:
-        limits = [
-            c.limit for c in run.criteria if c.quantity == "arm_uplift" and c.limit == c.limit
-        ]
-        limit = 1e-3 * min(limits) if limits else None
+        limit = 1e-3 * run.limit("arm_uplift")
         text = "Uplift of the contact wire at the steady arms."
         yield Picture("uplift", text, lambda: line_pictures.arm_uplift(results, statistics, limit))
     if results.n_rows("time") > 1 and statistics.droppers.x.size:
@@ -130,7 +127,8 @@ def _lateral(results: Results) -> Iterator[Text]:
     low, high = (number(float(end)) for end in (arms.tension.min(), arms.tension.max()))
     n_pushed = np.count_nonzero(arms.pushed)
     yield Text(
-        f"The {counted(len(arms.x), 'steady arm')} pull the wires at rest by {low} to {high} N"
+        f"The {counted(len(arms.x), 'steady arm')} pull the wires at rest by "
+        f"{low if low == high else f'{low} to {high}'} N"
         + (f"; {n_pushed} of them are pushed, with a negative force." if n_pushed else ".")
     )
     if not results.has_static("contact_y"):

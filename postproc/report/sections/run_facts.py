@@ -151,6 +151,7 @@ def _facts(results: Results) -> list[tuple[str, str]]:
         if told:
             kinds.setdefault(f"{told['kind']}, {told['description']}", []).append(name)
     met = [fact["says"].partition(": ")[2] for fact in arrivals.get("pantographs", [])]
+    of = [f", {name}" if len(names) > 1 else "" for name in names]
     return [
         (
             "line",
@@ -160,7 +161,7 @@ def _facts(results: Results) -> list[tuple[str, str]]:
         ),
         *([("ends of the line", "; ".join(arrivals["ends"]))] if arrivals.get("ends") else []),
         *((", ".join(own), words) for words, own in kinds.items()),
-        *((f"waves and run-in, {name}", says) for name, says in zip(names, met, strict=False)),
+        *((f"waves and run-in{name}", told) for name, told in zip(of, met, strict=False)),
         *(("defect", fact["says"]) for fact in about.get("defects", [])),
         *(
             (f"incident at {fact['time_s']:.4g} s", fact["says"])

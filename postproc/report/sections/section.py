@@ -40,6 +40,11 @@ class EvaluatedRun:
         """Estimates of its errors."""
         return indicate(self.results)
 
+    def limit(self, quantity: str) -> float:
+        """Smallest limit of a quantity, in its unit; NaN where none is judged."""
+        limits = [c.limit for c in self.criteria if c.quantity == quantity and c.limit == c.limit]
+        return min(limits, default=float("nan"))
+
     @property
     def verdict(self) -> bool | None:
         """Whether all criteria are met, None if that is not known."""
