@@ -47,6 +47,8 @@ class Results(TrainOfRun):
         so that no report can be made of it.
     """
 
+    _latest: tuple[str, h5py.Dataset] | None = None
+
     def __init__(
         self, path: Path | str, records: Records | None = None, image: bytes | None = None
     ) -> None:
@@ -251,7 +253,13 @@ class Results(TrainOfRun):
     def _table(self, name: str) -> h5py.Dataset | None:
         """The table of a channel, None if there is none that is valid."""
         path = self._path(name)
-        return self._file[path] if path in self._file else None
+        if path not in self._file:
+            return None
+        # The latest is kept open: HDF5 forgets the chunks of one that is closed, and would read
+        # them again for the next column.
+        if self._latest is None or self._latest[0] != path:
+            self._latest = path, self._file[path]
+        return self._latest[1]
 
     def _valid(self, name: str, part: slice) -> slice:
         """The rows of a part that can be read."""

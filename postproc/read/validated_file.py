@@ -71,7 +71,6 @@ class ValidatedFile:
         self, path: Path, records: Records | None = None, image: bytes | None = None
     ) -> None:
         self.path = path
-        self._opened: dict[str, Any] = {}
         try:
             self._file, self._complete = (
                 opened(path) if image is None else (opened_image(image), None)
@@ -266,14 +265,10 @@ class ValidatedFile:
         return path not in self._faults and is_there(self._file, path)
 
     def __getitem__(self, path: str) -> Any:
-        # Kept open: with a table HDF5 forgets the chunks that it has read, and reads them again for
-        # the next column.
-        if path not in self._opened:
-            try:
-                self._opened[path] = self._file[path]
-            except HDF5_ERRORS as error:
-                raise InputError(f"{self.path} is damaged: {path} cannot be read") from error
-        return self._opened[path]
+        try:
+            return self._file[path]
+        except HDF5_ERRORS as error:
+            raise InputError(f"{self.path} is damaged: {path} cannot be read") from error
 
     @property
     def has_energies(self) -> bool:
