@@ -6,8 +6,12 @@ import gc
 import logging
 import os
 import signal
+import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
+from unittest import mock
 
 import pytest
 from hypothesis import settings
@@ -21,7 +25,7 @@ FIRST = (
     "regression/test_fuzz_damage.py",
     "unit/test_full_report.py",
     "verification/test_dropper_curves.py",
-    "unit/postproc/test_own_style.py",
+    "unit/postproc/test_film.py",
     "verification/test_ensembles.py",
 )
 
@@ -69,3 +73,30 @@ def _log_without_handlers() -> None:
     log.handlers.clear()
     log.propagate = True
     log.setLevel(logging.NOTSET)
+
+
+@pytest.fixture(scope="module")
+def quick_reports() -> Iterator[None]:
+    """What reports of this process do without in a file of tests that looks at no picture of a run
+    and damages no result: pictures of runs are drawn and not painted, those of studies are; and a
+    result is examined in this process and not in one of its own, which HDF5 may crash.
+    """
+    from pixels import FIGURES, PAINTERS
+
+    from catenary.postproc.read import guard
+    from catenary.postproc.report import report
+
+    painted, child = report._painted, guard._child
+
+    def not_painted(*words: Any) -> dict[str, bytes]:
+        with mock.patch.multiple(FIGURES, **PAINTERS):
+            return painted(*words)
+
+    def examined_here(words: list[str], limit: float) -> subprocess.CompletedProcess[bytes]:
+        if words[:2] != ["-m", guard.__name__]:
+            return child(words, limit)
+        return subprocess.CompletedProcess(words, 0, guard.examine(Path(words[2])).encode(), b"")
+
+    with mock.patch.object(report, "_painted", not_painted):
+        with mock.patch.object(guard, "_child", examined_here):
+            yield

@@ -55,6 +55,8 @@ LONGEST = {
     Path("docs/guide/films.md"),
     Path("docs/guide/identification.md"),
     Path("docs/guide/questions.md"),
+    Path("docs/guide/uncertainty.md"),
+    Path("docs/tutorials/long_line.md"),
 }
 _ENTRY = "from catenary.cases.cli.main import main; main()"
 

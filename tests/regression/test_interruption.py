@@ -204,7 +204,7 @@ def can_mount() -> bool:
     if shutil.which("unshare") is None:
         return False
     command = ["unshare", "-rm", "mount", "-t", "tmpfs", "tmpfs", "/tmp"]
-    return subprocess.run(command, capture_output=True, timeout=10).returncode == 0
+    return subprocess.run(command, capture_output=True, timeout=240).returncode == 0
 
 
 @pytest.mark.skipif(not can_mount(), reason="no small disk can be mounted")

@@ -16,6 +16,8 @@ from catenary.cases.scene.load import load_scene
 from catenary.postproc.evaluate.statistics import evaluate
 from catenary.postproc.read.results import Results
 
+pytestmark = pytest.mark.usefixtures("quick_reports")
+
 COMMON = (
     "line.dropper.pre_sag_mid_mm=20",
     "contact.stiffness_N_per_m=1e6",

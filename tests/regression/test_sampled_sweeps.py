@@ -14,6 +14,8 @@ from verb_runner import CliRunner
 import catenary
 from catenary.cases.cli.main import app
 
+pytestmark = pytest.mark.usefixtures("quick_reports")
+
 CASE = "en50318_2002"
 # Six spans with one element a gap, run through in 460 steps.
 TINY = (

@@ -105,10 +105,10 @@ def test_a_task_that_is_told_to_end_asks_to_be_started_again(
     program = task(script, 1, SLURM_RESTART_COUNT=restarts)
     begin = time.monotonic()
     while not (out / "speed_km_h_230" / "run.h5").exists():
-        assert time.monotonic() < begin + 120
+        assert time.monotonic() < begin + 240
         time.sleep(0.03)
     program.send_signal(signal.SIGTERM)
-    _, told = program.communicate(timeout=120)
+    _, told = program.communicate(timeout=240)
     assert program.returncode == 1
     assert "the sweep was interrupted; the same command continues it" in told
     noted = programs / "calls"
@@ -118,7 +118,7 @@ def test_a_task_that_is_told_to_end_asks_to_be_started_again(
 def test_a_task_that_breaks_is_not_started_again(programs: Path, tmp_path: Path) -> None:
     script = array_script(["sweep", "no_such_case"], tmp_path / "out", Job(), 3, NEEDS)
     program = task(script, 2)
-    program.communicate(timeout=120)
+    program.communicate(timeout=240)
     assert program.returncode == 2 and not (programs / "calls").exists()
 
 
@@ -146,7 +146,7 @@ def test_words_of_strangers_stay_words(programs: Path, tmp_path: Path) -> None:
     (programs / "catenary").unlink()
     (programs / "catenary").write_text('#!/bin/bash\nprintf "%s\\n" "$@" > "$STAND_IN/words"\n')
     (programs / "catenary").chmod(0o755)
-    task(script, 3).communicate(timeout=60)
+    task(script, 3).communicate(timeout=240)
     passed = (programs / "words").read_text().splitlines()
     ending = ["-j", "2", "--part=3/3", "--", "-x", "$(touch bad)"]
     assert passed == [*words, "-o", str(out), *ending]

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 import signal
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 
@@ -56,14 +57,17 @@ def words(window: str) -> tuple[str, ...]:
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    """Runs from end to end, which no one interrupts."""
-    folder, result = tmp_path_factory.mktemp("whole"), {}
-    for window in WINDOWS:
-        result[window] = folder / window
-        done = catenary(*words(window), "-o", str(result[window]), cwd=folder)
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
+    """Runs from end to end, which no one interrupts, each made when it is first needed."""
+    folder = tmp_path_factory.mktemp("whole")
+
+    @cache
+    def run(window: str) -> Path:
+        done = catenary(*words(window), "-o", str(folder / window), cwd=folder)
         assert done.code == 0, done.stderr
-    return result
+        return folder / window
+
+    return run
 
 
 def assert_to_the_last_bit(out: Path, reference: Path) -> None:
@@ -84,7 +88,7 @@ def test_a_window_goes_on_with_other_ranks_to_the_last_bit(
     ranks_of_restart: int,
     steps: int | None,
     tmp_path: Path,
-    whole: dict[str, Path],
+    whole: Callable[[str], Path],
 ) -> None:
     out = tmp_path / "out"
     if steps is None:
@@ -97,7 +101,7 @@ def test_a_window_goes_on_with_other_ranks_to_the_last_bit(
             assert results.checkpoint["step"] == steps
     done = catenary("restart", str(out), cwd=tmp_path, ranks=ranks_of_restart)
     assert done.code == 0, done.stderr
-    assert_to_the_last_bit(out, whole[window])
+    assert_to_the_last_bit(out, whole(window))
 
 
 def kill(window: str, ranks: int, out: Path) -> None:

@@ -115,7 +115,7 @@ class Program:
 
 def _ended(code: int, stdout: str, stderr: str, mark: str) -> Done:
     """What a program was that has ended, when the last of its processes had time to end."""
-    for _ in range(200):  # the launcher may end a moment before those it has killed
+    for _ in range(1200):  # the launcher may end a moment before those it has killed
         left = [pid for pid, _ in _processes(mark)]
         if not left:
             break

@@ -3,8 +3,6 @@ labels and legends, and not painted: both take long."""
 
 from __future__ import annotations
 
-import base64
-import functools
 import importlib.util
 import sys
 from importlib.machinery import ModuleSpec
@@ -12,19 +10,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-PAINTER = "catenary.postproc.report.pictures.figures"
-# Files of one pixel, by the function that paints them.
-PIXELS = {
-    "png": base64.b64decode(
-        b"iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAAAAAA6fptVAAAACklEQVR4nGP4DwABAQEAsTj2FAAAAABJRU5ErkJggg=="
-    ),
-    "svg": b'<svg xmlns="http://www.w3.org/2000/svg" width="1" height="1" viewBox="0 0 1 1"/>',
-}
-
-
-def _give(pixel: bytes, figure: Any) -> bytes:
-    """In place of a painter."""
-    return pixel
+from pixels import FIGURES, PAINTERS
 
 
 def _blank_panels() -> Any:
@@ -42,7 +28,7 @@ class _Finder:
     """Changes the painter when the program imports it, and does not import it before."""
 
     def find_spec(self, name: str, path: Any, target: Any = None) -> ModuleSpec | None:
-        if name != PAINTER:
+        if name != FIGURES:
             return None
         sys.meta_path.remove(self)
         spec = importlib.util.find_spec(name)
@@ -51,9 +37,9 @@ class _Finder:
 
         def exec_module(module: ModuleType) -> None:
             load(module)
-            for name, pixel in PIXELS.items():
+            for name, painter in PAINTERS.items():
                 assert callable(getattr(module, name))
-                setattr(module, name, functools.partial(_give, pixel))
+                setattr(module, name, painter)
             blank = _blank_panels()
             for name in ("stacked", "tidy", "legend_above"):
                 assert callable(getattr(module, name))

@@ -54,7 +54,7 @@ def run_all(command_lines: list[str]) -> list[Any]:
         [sys.executable, "-c", PROGRAM, json.dumps(command_lines)],
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=240,
         check=True,
         # Python's own view: MPI, once started by another test, adds a launcher's marks below it.
         env=dict(os.environ),

@@ -48,6 +48,6 @@ options = PETSc.Options()
 print(options.getString("my_type"), options.getBool("my_flag"), options.getReal("my_rtol"))
 """
     done = subprocess.run(
-        [sys.executable, "-c", script], capture_output=True, text=True, timeout=60, check=True
+        [sys.executable, "-c", script], capture_output=True, text=True, timeout=240, check=True
     )
     assert done.stdout.split() == ["x", "True", "1e-12"]

@@ -21,6 +21,8 @@ from catenary.cases.scene.load import load_scene
 from catenary.cases.terminal import console
 from catenary.solver.effects import all_effects as effects
 
+pytestmark = pytest.mark.usefixtures("quick_reports")
+
 VERBS = ["run", "restart", "sweep", "list", "plan", "check", "mesh", "static", "pantograph"]
 VERBS += ["report", "compare", "hard", "stability-map", "new", "doctor", "optimise", "tolerance"]
 SUMMARY = {
@@ -107,7 +109,7 @@ def test_importing_the_command_line_loads_no_backend() -> None:
         f"print([name for name in {heavy!r} if name in sys.modules])"
     )
     done = subprocess.run(
-        [sys.executable, "-c", script], capture_output=True, text=True, timeout=60, check=True
+        [sys.executable, "-c", script], capture_output=True, text=True, timeout=240, check=True
     )
     assert done.stdout.strip() == "[]"
 
@@ -340,7 +342,7 @@ def test_the_reader_of_a_pipe_may_leave(tmp_path: Path) -> None:
         shell=True,
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=240,
         check=True,
     )
     assert done.stdout.count("\n") == 1

@@ -13,6 +13,8 @@ from verb_runner import CliRunner
 
 from catenary.cases.cli.main import app
 
+pytestmark = pytest.mark.usefixtures("quick_reports")
+
 
 def invoke(*words: str) -> Any:
     return CliRunner().invoke(app, list(words))
@@ -80,7 +82,7 @@ def test_too_low_a_limit_of_memory_is_one_sentence() -> None:
     program = "from catenary.cases.cli.main import main; main()"
     bash = f"ulimit -v 450000; exec \"$0\" -c '{program}' report x"
     words = ["bash", "-c", bash, sys.executable]
-    done = subprocess.run(words, capture_output=True, text=True, timeout=60, check=False)
+    done = subprocess.run(words, capture_output=True, text=True, timeout=240, check=False)
     assert done.returncode == 2
     assert done.stderr.startswith("catenary: this process may take 461 MB of memory (ulimit -v)")
     assert done.stderr.count("\n") == 1 and not done.stdout

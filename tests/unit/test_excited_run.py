@@ -35,7 +35,7 @@ from catenary.solver.statics.line_at_rest import LineAtRest
 from catenary.solver.waves.excitation import Blow, MovingForce, as_facts, excitation_of_facts
 
 # HDF5's files are examined by a process of its own.
-pytestmark = pytest.mark.process
+pytestmark = [pytest.mark.process, pytest.mark.usefixtures("quick_reports")]
 
 AT, FORCE, EVERY = 160.0, 120.0, 0.02
 SHORT = ("line.n_spans=6", "train.start_m=130", "train.end_m=170", "train.raise_time_s=0.1",

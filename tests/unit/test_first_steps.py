@@ -108,7 +108,7 @@ def test_a_terminal_is_asked_for_the_kind_of_line(tmp_path: Path) -> None:
         with contextlib.suppress(OSError):  # the end of a terminal that its program has left
             while chunk := os.read(own, 4096):
                 said += chunk
-        assert asked.wait(60) == 0, said
+        assert asked.wait(240) == 0, said
     os.close(own)
     assert b"conductor_rail" in said and b"Which kind of line [simple]: " in said
     assert load_scene(tmp_path / "a").line.topology == "single"

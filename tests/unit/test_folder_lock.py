@@ -221,7 +221,7 @@ def test_a_lock_lives_in_a_folder_that_is_moved(
     lock = FolderLock(here, "catenary run case")
     here.rename(there)
     os.utime(there / LOCK_FILE, (0, 0))
-    for _ in range(500):
+    for _ in range(6000):
         if (there / LOCK_FILE).stat().st_mtime > 0:
             break
         threading.Event().wait(0.01)

@@ -225,6 +225,7 @@ class _Recorded:
 
 
 @pytest.mark.process
+@pytest.mark.usefixtures("quick_reports")
 def test_a_scene_of_another_version_costs_the_data_sheets_alone(
     folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -270,6 +271,7 @@ def test_measured_errors_of_the_same_step_and_mesh(tmp_path: Path) -> None:
 
 
 @pytest.mark.process
+@pytest.mark.usefixtures("quick_reports")
 def test_a_report_shows_measured_errors(folder: Path, tmp_path: Path) -> None:
     shutil.copy(folder / "run.h5", tmp_path / "run.h5")
     with Results(folder) as results:
@@ -295,10 +297,10 @@ def cost_study(folder: Path, case: str, on: bool) -> Path:
 
 
 @pytest.mark.process
+@pytest.mark.usefixtures("quick_reports")
 def test_a_report_shows_measured_costs_of_effects(folder: Path, tmp_path: Path) -> None:
     shutil.copy(folder / "run.h5", tmp_path / "run.h5")
-    invoke("report", str(tmp_path))
-    without = words_of((tmp_path / "report.html").read_text())
+    without = words_of((folder / "report.html").read_text())
     assert "catenary report --cost STUDY shows it here" in without
     invoke("report", str(tmp_path), "--cost", str(cost_study(tmp_path, "ac_simple", on=True)))
     words = words_of((tmp_path / "report.html").read_text())

@@ -33,6 +33,8 @@ from catenary.cases.studies.sweep.jobs import AS_USUAL, Ended
 from catenary.cases.studies.sweep.together import Marching
 from catenary.cases.studies.sweep.variants import DIRECTION, Variant, text_of
 
+pytestmark = pytest.mark.usefixtures("quick_reports")
+
 CASE = "en50318_2002"
 # Of EN 50318:2002: 20 kN on 1.35 kg/m.
 WAVE_SPEED = 3.6 * np.sqrt(20e3 / 1.35)

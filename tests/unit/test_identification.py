@@ -35,6 +35,8 @@ from catenary.cases.studies.measured.table_file import read_table
 from catenary.cases.studies.task_files import checked_table
 from catenary.postproc.evaluate import filters
 
+pytestmark = pytest.mark.usefixtures("quick_reports")
+
 CASE = "en50318_2002"
 # Six spans with two elements a gap, run through in 1152 steps.
 TINY = (

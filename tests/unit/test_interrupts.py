@@ -26,6 +26,8 @@ from catenary.postproc.read.results import Results
 from catenary.postproc.report import report
 from catenary.solver.statics import line_at_rest
 
+pytestmark = pytest.mark.usefixtures("quick_reports")
+
 # What is called in each phase of a run before its march.
 BEFORE = {
     "the mesh was made": (runner, "mesh_of"),

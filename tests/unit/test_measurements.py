@@ -33,6 +33,8 @@ from catenary.postproc.measurements.comparison import Comparison, compare_with
 from catenary.postproc.measurements.passage import RunForce
 from catenary.postproc.read.results import Results
 
+pytestmark = pytest.mark.usefixtures("quick_reports")
+
 # Nine spans with two elements a gap, 6.7 s at 2 ms.
 SCENE = (
     "line.n_spans=9", "mesh.elements_per_gap=2", "train.start_m=65", "train.end_m=475",

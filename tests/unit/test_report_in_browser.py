@@ -73,7 +73,7 @@ def visit(page: Path, folder: Path) -> Visit:
             f"--user-data-dir={folder / 'profile'}", f"--log-net-log={log}",
             "--virtual-time-budget=60000", "--dump-dom", page.as_uri(),
         ],
-        capture_output=True, text=True, timeout=120, check=True,
+        capture_output=True, text=True, timeout=240, check=True,
     )  # fmt: skip
     requests = (one.get("params", {}) for one in json.loads(log.read_text())["events"])
     # The browser has errands of its own, which have no origin.

@@ -25,6 +25,8 @@ from catenary.cases.studies.sweep.run_jobs import run_jobs
 from catenary.cases.studies.sweep.variants import parse_vary, product
 from catenary.cases.terminal.runs_bar import RunsBar
 
+pytestmark = pytest.mark.usefixtures("quick_reports")
+
 CASE = "en50318_2002"
 # Six spans with one element a gap, run through in 2300 steps.
 TINY = (
@@ -116,7 +118,7 @@ def test_a_signal_ends_all_runs_and_the_same_command_continues(
     with catenary_started(*words, cwd=tmp_path) as program:
         program.wait_for(lambda: bool(list(out.glob("*/run.h5"))))
         program.send(number)
-        ended = program.end(60.0)
+        ended = program.end()
     assert ended.left == []
     if number != signal.SIGKILL:
         assert ended.code == 1, ended

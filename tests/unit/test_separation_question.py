@@ -25,6 +25,8 @@ from catenary.cases.studies.waves.theory import WaveTheory
 from catenary.postproc.report.study_table import Row
 from catenary.solver.waves.bloch import BlochWaves
 
+pytestmark = pytest.mark.usefixtures("quick_reports")
+
 CASE = "en50318_2002"
 
 

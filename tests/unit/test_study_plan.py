@@ -34,6 +34,8 @@ from catenary.postproc.report.study_report import (
     write_study,
 )
 
+pytestmark = pytest.mark.usefixtures("quick_reports")
+
 
 @pytest.fixture(autouse=True)
 def own_hook(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -28,6 +28,8 @@ from catenary.cases.studies.sweep.sweep import refuse_other_sweep
 from catenary.cases.studies.sweep.variants import Variant, parse_vary, product
 from catenary.postproc.read.results import Results
 
+pytestmark = pytest.mark.usefixtures("quick_reports")
+
 CASE = "en50318_2002"
 # Six spans with one element a gap, run through in 460 steps.
 TINY = (

@@ -33,6 +33,8 @@ from catenary.cases.studies.tolerance.study import (
 )
 from catenary.cases.studies.tolerance.task import ToleranceTask
 
+pytestmark = pytest.mark.usefixtures("quick_reports")
+
 # Six spans with one element a gap.
 TINY: dict[str, Any] = {
     "line.n_spans": 6,

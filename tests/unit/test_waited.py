@@ -18,4 +18,4 @@ def test_the_wait_counts_from_the_start_of_the_process() -> None:
         "print(waited() - (time.perf_counter() - begin))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert -0.02 < float(done.stdout) < 5.0
+    assert -0.02 < float(done.stdout) < 60.0

@@ -15,6 +15,8 @@ from catenary.cases.studies.questions.what_if import AS_IT_IS, CHANGED, _pairs
 from catenary.postproc.evaluate.statistics import slack_times
 from catenary.postproc.read.results import Results
 
+pytestmark = pytest.mark.usefixtures("quick_reports")
+
 CASE = "en50318_2002"
 CHANGE = "train.speed_km_h=320"
 

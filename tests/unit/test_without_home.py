@@ -35,7 +35,7 @@ def run_as_nobody(folder: Path) -> None:
         cwd="/",
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=240,
         check=False,
     )
     assert done.returncode == 0 and not done.stderr, done.stderr

@@ -119,7 +119,7 @@ def test_processes_end_with_the_one_that_started_them(number: int, tmp_path: Pat
     program = subprocess.Popen([sys.executable, "-c", start])
     numbers = sleepers(tmp_path)
     program.send_signal(number)
-    program.wait(30.0)
+    program.wait(240.0)
     wait_for_end(numbers)
 
 

@@ -25,6 +25,8 @@ from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest
 from catenary.solver.wind.gust_field import GustField
 from catenary.solver.wind.spectra import UPWARD
 
+pytestmark = pytest.mark.usefixtures("quick_reports")
+
 # Three missing droppers, a mass, three droppers cut too short, in spans of 60 m.
 PLANTED = {9: "missing", 13: "hard spot of 10 kg", 16: "higher at 930 m"}
 CHANGES = (

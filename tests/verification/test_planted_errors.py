@@ -25,6 +25,8 @@ from catenary.cases.studies.measured.table_file import read_table
 from catenary.postproc.measurements.comparison import Comparison, compare_with
 from catenary.postproc.read.results import Results
 
+pytestmark = pytest.mark.usefixtures("quick_reports")
+
 SPEED, DT = 250.0 / 3.6, 1e-3
 STRETCH = (180.0, 540.0)
 # Ten spans of 60 m, two pantographs 90 m apart, droppers that err by 3 mm.
@@ -218,7 +220,7 @@ def share(run_folder: Path, folder: Path, n: int, errors: bool) -> list[str]:
     return wrong
 
 
-@pytest.mark.parametrize("errors", [True, False])
+@pytest.mark.parametrize(("errors", "run_folder"), [(True, 0), (False, 1)], indirect=["run_folder"])
 def test_planted_errors_are_found_and_none_is_invented(
     errors: bool, run_folder: Path, tmp_path: Path
 ) -> None:

@@ -375,7 +375,7 @@ def test_the_program_itself_exits_with_2(words: list[str], tmp_path: Path) -> No
         cwd=tmp_path,
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=240,
         check=False,
     )
     assert done.returncode == 2, done.stderr

@@ -83,7 +83,7 @@ def test_a_file_written_by_blocks_is_the_same(
     record: LineRecord | None,
     first: int,
 ) -> None:
-    march = make_march(n_steps=250)
+    march = make_march(n_steps=150)
     found = {}
     for way in ("steps", "blocks"):
         files, path = (tmp_path / way / name for name in ("fields.xdmf", "run.h5"))

@@ -36,11 +36,11 @@ def test_a_file_system_without_locks_is_written_to(tmp_path: Path) -> None:
         pytest.skip("a C compiler makes the stand-in of such a file system")
     source, library = tmp_path / "no_flock.c", tmp_path / "no_flock.so"
     source.write_text(NO_FLOCK)
-    subprocess.run([compiler, "-shared", "-fPIC", "-o", library, source], check=True, timeout=60)
+    subprocess.run([compiler, "-shared", "-fPIC", "-o", library, source], check=True, timeout=240)
     subprocess.run(
         [sys.executable, "-c", WRITE, tmp_path / "written.h5"],
         env={"LD_PRELOAD": str(library), "PATH": ""},
-        check=True, timeout=60,
+        check=True, timeout=240,
     )  # fmt: skip
     with h5py.File(tmp_path / "written.h5") as file:
         assert file["x"][()] == 6.0

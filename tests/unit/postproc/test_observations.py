@@ -34,6 +34,8 @@ from catenary.postproc.standards.quantities import QUANTITIES
 from catenary.solver.effects.all_effects import registry
 from catenary.solver.problem.watched_links import TENSION
 
+pytestmark = pytest.mark.usefixtures("quick_reports")
+
 NONE = np.zeros(0, dtype=int)
 MASTS = np.arange(0.0, 301.0, 50.0)
 OWN_BOOK = {

@@ -15,6 +15,8 @@ from catenary.postproc.read.results import Results
 from catenary.postproc.report.report import write_report
 from catenary.solver.time_loop.views.channels import TrainLayout
 
+pytestmark = pytest.mark.usefixtures("quick_reports")
+
 
 @pytest.fixture
 def with_joints(make_march: Any) -> Any:

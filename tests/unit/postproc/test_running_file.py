@@ -34,7 +34,7 @@ def written(path: Path) -> Path:
 
 
 def go_on(path: Path) -> None:
-    subprocess.run([sys.executable, "-c", GOES_ON, str(path)], check=True, timeout=60)
+    subprocess.run([sys.executable, "-c", GOES_ON, str(path)], check=True, timeout=240)
 
 
 @pytest.mark.process

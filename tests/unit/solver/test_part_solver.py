@@ -62,5 +62,5 @@ def test_a_solver_that_nobody_destroyed_does_not_crash_the_end_of_python() -> No
         "kept = PartSolver(lambda: whole, slice(0, 2), True, True, Layout((4,))); "
         "kept.itself = kept"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=240)
     assert done.returncode == 0, done.stderr
