@@ -520,7 +520,7 @@ def test_pixels_are_those_of_what_is_drawn(folder: Path) -> None:
     np.testing.assert_array_equal(first, again)
     assert (first != second).any(axis=2).mean() > 1e-3
     dot = again[drawing.SIZE[1] - int(height) - 1, int(column), :3].astype(int)
-    assert np.abs(dot - (0xB2, 0x18, 0x2B)).max() < 12
+    assert np.abs(dot - (0x00, 0x72, 0xB2)).max() < 12
 
 
 def test_every_view_draws_the_line(folder: Path) -> None:
@@ -565,7 +565,7 @@ def test_films_have_a_picture_for_each_snapshot_that_is_far_from_others(folder: 
     changed = [(a != b).mean() for a, b in zip(pictures, pictures[1:], strict=False)]
     assert min(changed) > 1e-3
     # A GIF has the colours of the pantograph's curve and of slack droppers, within its palette.
-    for colour in ((0xB2, 0x18, 0x2B), (0xD6, 0x00, 0x6C)):
+    for colour in ((0x00, 0x72, 0xB2), (0xD6, 0x00, 0x6C)):
         off = np.abs(pictures[4].astype(int) - colour).max(axis=2)
         assert (off < 30).sum() > 20
 
