@@ -231,24 +231,36 @@ class PlainLine:
     def elasticity(self, start: float, end: float) -> tuple[np.ndarray, np.ndarray]:
         """Places of nodes between two masts (n,) [m], and the lift there under a unit force that
         the contact wires share [m/N]."""
+        x = self._nodes(start, end)
+        return x, self._lift(x)
+
+    def _nodes(self, start: float, end: float) -> np.ndarray:
+        """Places of the contact wire's nodes between two masts (n,) [m]."""
+        wire = self.problem.line.wires_of(Role.CONTACT)[0]
+        x = self.mesh.points[self.mesh.wires[wire.name], 0]
+        return np.asarray(x[(x > start - 1e-9) & (x < end + 1e-9)])
+
+    def _lift(self, places: np.ndarray) -> np.ndarray:
+        """Lift under a unit force that the contact wires share, (n,) [m/N]."""
         factor, wires = self._banded(self.stiffness), self.problem.line.wires_of(Role.CONTACT)
-        x = self.mesh.points[self.mesh.wires[wires[0].name], 0]
-        x, lifts = x[(x > start - 1e-9) & (x < end + 1e-9)], []
-        for place in x:
+        lifts = []
+        for place in places:
             load = np.zeros(self.free.size)
             for wire in wires:
                 own, values, _ = self.at(wire.name, place)
                 load[own] += values / len(wires)
             lifts.append(load @ linalg.cho_solve_banded(factor, load))
-        return x, np.array(lifts)
+        return np.array(lifts)
 
     def nominal_height(self, start: float, end: float) -> float:
-        """Mean height between two masts of a head that presses with its static force [m]."""
-        x, lift = self.elasticity(start, end)
-        wire = self.problem.line.wires_of(Role.CONTACT)[0].name
-        height = np.array([self.at(wire, place)[2] for place in x])
-        height += lift * self.problem.train.placements[0].static_force
-        return float(np.sum(np.diff(x) * (height[1:] + height[:-1]) / 2) / (end - start))
+        """Mean height between two masts of a head that presses with its static force [m], by two
+        Gauss points an element: trapezoids between nodes miss how the wire bends within it."""
+        x, wire = self._nodes(start, end), self.problem.line.wires_of(Role.CONTACT)[0].name
+        half = np.repeat(np.diff(x) / 2, 2)
+        places = np.repeat(x[:-1], 2) + half * (1 + np.tile([-1, 1], x.size - 1) / np.sqrt(3))
+        height = np.array([self.at(wire, place)[2] for place in places])
+        height += self._lift(places) * self.problem.train.placements[0].static_force
+        return float(half @ height / (end - start))
 
     def run(self, nominal_height: float) -> History:
         """The train's way to its end, by average acceleration."""
