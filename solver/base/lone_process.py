@@ -11,11 +11,14 @@ from catenary.base.parallel import launched_by_mpirun
 
 # Open MPI's daemon for processes that this one might start, its networks, and the search for them
 # take 0.3 s at the start. hwloc, with which it looks for processors, would call at each display and
-# each driver of a graphics card. Other implementations do not read these variables.
+# each driver of a graphics card. Its folder for what processes of a job share has one name for all
+# that no launcher has started: one that ends would take it from another that starts. Other
+# implementations do not read these variables.
 SETTINGS = {
     "OMPI_MCA_ess_singleton_isolated": "1",
     "OMPI_MCA_pml": "ob1",
     "OMPI_MCA_btl": "self",
+    "OMPI_MCA_orte_create_session_dirs": "0",
     "HWLOC_PLUGINS_BLACKLIST": "hwloc_gl.so,hwloc_opencl.so",
 }
 

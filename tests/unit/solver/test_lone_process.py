@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
+from pathlib import Path
 
 import pytest
 
@@ -34,3 +37,19 @@ def test_ranks_of_a_launcher_reach_each_other(monkeypatch: pytest.MonkeyPatch) -
     monkeypatch.setenv("OMPI_COMM_WORLD_SIZE", "2")
     with settings():
         assert not set(SETTINGS) & set(os.environ)
+
+
+@pytest.mark.process
+def test_processes_share_no_folder_that_one_could_take_from_another(tmp_path: Path) -> None:
+    """Of 240 that started side by side two found the folder removed, and ended."""
+    program = (
+        "from catenary.base.lone_process import world; world(); import os; print(os.listdir({!r}))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program.format(str(tmp_path))],
+        env={**os.environ, "TMPDIR": str(tmp_path)},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert done.stdout == "[]\n"
