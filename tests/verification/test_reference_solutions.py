@@ -119,6 +119,7 @@ BY_DIFFERENCES = (
 # Those that two meshes of finite elements reach: longest elements [m] of the coarser mesh, and its
 # time step [s]; the finer one has both halved. A trailing pantograph meets the shorter waves.
 BY_ELEMENTS = {
+    "ac_simple_275_two": (0.3, 5e-4),
     "ac_stitched_275_one": (0.6, 1e-3),
     "ac_stitched_275_two": (0.3, 5e-4),
     "ac_stitched_320_one": (0.6, 1e-3),
