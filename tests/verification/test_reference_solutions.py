@@ -124,6 +124,7 @@ BY_ELEMENTS = {
     "ac_stitched_275_two": (0.3, 5e-4),
     "ac_stitched_320_one": (0.6, 1e-3),
     "ac_stitched_320_two": (0.3, 5e-4),
+    "dc_simple_200_two": (0.3, 5e-4),
     "dc_simple_250_two": (0.3, 5e-4),
 }
 # Elements beside hardware [m] of the coarser mesh, and the ratio of neighbours.
