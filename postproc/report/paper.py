@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from typing import Any
 
@@ -15,8 +14,6 @@ _SMALLEST = 0.8
 _SHEET, _CAPTION = (297.0 - 15.0 - 18.0 - 9.0) * 96.0 / 25.4, 28.0
 # A sheet on which all of a report has room: it tells how high everything is.
 _ENDLESS = "@page { size: 210mm 100000mm !important; }"
-# What a reader unfolds is not printed; without it a page of large tables is laid out in a third.
-_FOLDED = re.compile("(?<=</summary>).*?(?=</details>)", re.DOTALL)
 # A heading so close above a figure goes with it to the next sheet [px of CSS].
 _CLOSE = 60.0
 
@@ -39,7 +36,10 @@ def pdf(html: str) -> bytes:
     CSS, HTML, URLFetcher = _weasyprint()
     fetcher = URLFetcher(allowed_protocols=["data"])  # pictures are in the page
     cache: dict[str, Any] = {}  # of pictures, which are laid out twice
-    page = HTML(string=_FOLDED.sub("", html), url_fetcher=fetcher)
+    page = HTML(string=html, url_fetcher=fetcher)
+    # What a reader unfolds is not printed; without it large tables are laid out in a third.
+    for folded in page.etree_element.iter("details"):
+        folded[:] = folded.findall("summary")
     figures = list(page.etree_element.iter("figure"))
     for n, figure in enumerate(figures):
         figure.set("id", f"figure-{n}")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
+from textwrap import fill
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -59,7 +60,7 @@ def scatter(table: RunTable, wanted: Sequence[str] = ()) -> Figure | None:
                 )  # fmt: skip
             _panel(axes, "", _meaning(name) if key == keys[0] else "")
     for axes, key in zip(panels[-1], keys, strict=True):
-        axes.set_xlabel(key_in_words(key), fontsize="small")
+        axes.set_xlabel(fill(key_in_words(key), 26), fontsize="small")
     if len(table.of(statistics[0])) > 1:
         figures.legend_above(panels[0][-1])
     return figure
