@@ -20,10 +20,10 @@ with python_signals_kept():
         petsc4py.init(["catenary", "-skip_petscrc"])
     from petsc4py import PETSc  # starts PETSc unless it runs
 
-__all__ = ["NAMES", "PETSc", "event"]
+__all__ = ["EVENTS", "PETSc", "event"]
 
 # Events of a step, names as -log_view prints them, in the order of a step, and what they hold.
-NAMES = {
+EVENTS = {
     "LineColumns": "answers of the line to unit contact forces",
     "LineFree": "prediction, product with K, solve and correction of the line",
     "LineProduct": "product with K where it is on its own, part of LineFree",
@@ -47,7 +47,7 @@ class Event(NamedTuple):
 
 
 def event(name: str) -> Event:
-    """The event of a name of ``NAMES``; one event for each name. Not collective.
+    """The event of a name of ``EVENTS``; one event for each name. Not collective.
 
     An event that is not logged costs less than a tenth of a microsecond.
     """

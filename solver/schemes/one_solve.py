@@ -9,7 +9,7 @@ import numpy as np
 
 from catenary.base.errors import RunBroken
 from catenary.base.parallel import on_root
-from catenary.base.petsc import NAMES, event
+from catenary.base.petsc import EVENTS, event
 from catenary.solver.contact.forces_on_line import ForcesOnLine
 from catenary.solver.contact.line_response import Bounds, LineResponse
 from catenary.solver.contact.train.head_states import Heads
@@ -60,7 +60,7 @@ class OneSolve:
         self._none = np.zeros(n)
         self._found: InnerSolution | None = None
         self._why: RunBroken | None = None
-        self._events = {name: event(name) for name in NAMES}
+        self._events = {name: event(name) for name in EVENTS}
 
     def step(self, time: float, stop: bool) -> bool:
         self.begin(time)

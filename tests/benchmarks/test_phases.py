@@ -10,7 +10,7 @@ import pytest
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from catenary.base.petsc import NAMES
+from catenary.base.petsc import EVENTS
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.problem import problem_of
@@ -41,7 +41,7 @@ def test_blocks_of_steps(benchmark: Any, pantograph: str) -> None:
 def test_phases_of_a_step(benchmark: Any, pantograph: str, single_steps: None) -> None:
     """Times of events add up to the step but for what Python does between them."""
     spent = time_events(benchmark, pantograph)
-    outer = [name for name in NAMES if "part of" not in NAMES[name] and name != "Show"]
+    outer = [name for name in EVENTS if "part of" not in EVENTS[name] and name != "Show"]
     parts = sum(spent[name] for name in outer)
     print(f"  {'between them':15}{spent['TSStep'] - parts:8.1f}")
     assert 0.0 < parts < spent["TSStep"]
@@ -59,7 +59,7 @@ def time_events(benchmark: Any, pantograph: str) -> dict[str, float]:
     problem = replace(problem, train=replace(train_of, end=train_of.start + length))
     PETSc.Log.begin()
     with March(MPI.COMM_SELF, problem, model, form, lift) as march:
-        names = ("TSStep", *NAMES)
+        names = ("TSStep", *EVENTS)
         before = {name: PETSc.Log.Event(name).getPerfInfo()["time"] for name in names}
         benchmark.pedantic(lambda: march.run([]), rounds=1)
         spent = {
@@ -68,6 +68,6 @@ def time_events(benchmark: Any, pantograph: str) -> dict[str, float]:
         }
     print(f"\n\nambrosio2012, {pantograph}, one rank, us a step with logging on")
     for name, cost in spent.items():
-        print(f"  {name:15}{cost:8.1f}   {NAMES.get(name, '')}")
+        print(f"  {name:15}{cost:8.1f}   {EVENTS.get(name, '')}")
     benchmark.extra_info.update(spent)
     return spent

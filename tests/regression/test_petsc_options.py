@@ -10,7 +10,7 @@ import pytest
 from petsc4py import PETSc
 from program import MPIRUN, assert_sound, catenary, short_run
 
-from catenary.base.petsc import NAMES
+from catenary.base.petsc import EVENTS
 from catenary.postproc.read.results import Results
 
 # Events of a step whose parts follow one another, in place of two passes, and of several ranks.
@@ -58,12 +58,12 @@ def test_views_show_stepper_solver_and_stages(tmp_path: Path) -> None:
     found = [line.rsplit(": ", 1)[1] for line in log]
     # Twice: a table of times and one of memory.
     assert [name for name in found if name in STAGES] == [*STAGES, *STAGES]
-    assert listed(text) == set(NAMES) - ONE_BY_ONE - OF_RANKS - OF_BLOCKS
+    assert listed(text) == set(EVENTS) - ONE_BY_ONE - OF_RANKS - OF_BLOCKS
 
 
 def test_a_step_in_parts_lists_its_parts(tmp_path: Path) -> None:
     text = run(tmp_path / "out", "-march_pc_type", "lu", "-log_view")
-    assert listed(text) == set(NAMES) - OF_RANKS - OF_BLOCKS
+    assert listed(text) == set(EVENTS) - OF_RANKS - OF_BLOCKS
 
 
 def test_monitors_see_each_solution(tmp_path: Path) -> None:
@@ -83,7 +83,7 @@ def test_monitors_see_each_solution(tmp_path: Path) -> None:
 
 def listed(text: str) -> set[str]:
     """Our events in the table of -log_view, where those that were never begun are left out."""
-    return {line.split()[0] for line in text.splitlines() if line.strip()} & set(NAMES)
+    return {line.split()[0] for line in text.splitlines() if line.strip()} & set(EVENTS)
 
 
 @pytest.mark.parametrize(
@@ -177,7 +177,7 @@ def test_several_ranks_show_the_solver_that_is_used_and_list_their_messages(tmp_
     assert done.code == INTERRUPTED, done.stderr
     text = done.stdout
     assert text.count("KSP Object") == 1 and "exact factors of" in text and "type: asm" not in text
-    assert listed(text) == set(NAMES) - ONE_BY_ONE - OF_BLOCKS
+    assert listed(text) == set(EVENTS) - ONE_BY_ONE - OF_BLOCKS
 
 
 @pytest.mark.skipif(MPIRUN is None, reason="there is no mpirun")
