@@ -79,8 +79,7 @@ def _handle(number: int, frame: FrameType | None) -> None:
     if _wish.remembering:
         return
     if _wish.several_ranks and "mpi4py.MPI" in sys.modules:
-        from mpi4py import MPI
-
+        from catenary.base.mpi import MPI
         from catenary.cases.terminal import console
 
         console.complain(f"interrupted by {signal.Signals(number).name}")

@@ -16,8 +16,8 @@ def versions() -> dict[str, str]:
     """
     import h5py
     import mpi4py
-    from mpi4py import MPI
 
+    from catenary.base.mpi import MPI
     from catenary.base.petsc import PETSc
 
     hdf5 = ".".join(str(part) for part in h5py.h5.get_libversion())

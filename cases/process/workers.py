@@ -186,7 +186,7 @@ def _share(
     function: Callable[[T, Any], Any], items: Sequence[T], comm: Any, stop: Callable[[], bool]
 ) -> Iterator[Outcome]:
     """Outcomes of the items of this rank. Not collective."""
-    from mpi4py import MPI
+    from catenary.base.mpi import MPI
 
     for number in range(comm.rank, len(items), comm.size):
         if stop():

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from mpi4py import MPI
-
 import catenary.solver.kernels
+from catenary.base.mpi import MPI
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.problem import problem_of
 from catenary.cases.scene.scene import Scene

@@ -117,7 +117,7 @@ def on_as_many(scene: Scene, comm: Any, run: Callable[[Any], T]) -> T:
     """
     if comm.size == 1 or scene.window.mode == OFF:
         return run(comm)
-    from mpi4py import MPI
+    from catenary.base.mpi import MPI
 
     if comm.rank == 0:
         logger.warning(

@@ -16,8 +16,8 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from mpi4py import MPI
 
+from catenary.base.mpi import MPI
 from catenary.base.parallel import wait_for_all
 from catenary.cases.run.planning.needs import needs_with_mesh
 from catenary.cases.run.scene_mesh import mesh_of

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from mpi4py import MPI
 
+from catenary.base.mpi import MPI
 from catenary.solver.contact.contact_wire import Candidates, ContactWires
 from catenary.solver.contact.contacts import (
     Across,

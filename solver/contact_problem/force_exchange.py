@@ -11,8 +11,8 @@ from enum import IntEnum
 from typing import Any, NamedTuple
 
 import numpy as np
-from mpi4py import MPI
 
+from catenary.base.mpi import MPI
 from catenary.base.petsc import event
 from catenary.solver.contact.line_response import Bounds, LineResponse
 

@@ -13,8 +13,8 @@ from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
-from mpi4py import MPI
 
+from catenary.base.mpi import MPI
 from catenary.base.parallel import total
 from catenary.base.petsc import PETSc
 from catenary.solver.integrators.line_state import AlphaSteps, LineState, PredictedLineState, Steps

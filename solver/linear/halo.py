@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from mpi4py import MPI
 
+from catenary.base.mpi import MPI
 from catenary.solver.model.partition import Ownership
 
 

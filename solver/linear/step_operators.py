@@ -10,10 +10,10 @@ import logging
 from typing import Any, NamedTuple
 
 import numpy as np
-from mpi4py import MPI
 from scipy import sparse
 
 from catenary.base.errors import NotConverged, RunBroken
+from catenary.base.mpi import MPI
 from catenary.base.petsc import PETSc, event
 from catenary.solver.linear.factors.station_factors import StationFactors
 from catenary.solver.linear.halo import Halo, Subdomain

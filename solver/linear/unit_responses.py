@@ -10,10 +10,10 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from mpi4py import MPI
 from scipy import linalg
 
 from catenary.base.errors import RunBroken
+from catenary.base.mpi import MPI
 from catenary.solver.kernels import native
 from catenary.solver.linear.stations.like_stations import LikeStations
 from catenary.solver.model.alike import kinds_of

@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from mpi4py import MPI
 
 from catenary.base.errors import NotConverged
+from catenary.base.mpi import MPI
 from catenary.base.parallel import on_root
 from catenary.solver.contact.forces_on_line import ForcesOnLine
 from catenary.solver.contact.train.head_states import Heads

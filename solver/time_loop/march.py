@@ -18,10 +18,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from mpi4py import MPI
 
 from catenary.base.errors import CatenaryError, InputError, RunBroken
 from catenary.base.freed_memory import give_back
+from catenary.base.mpi import MPI
 from catenary.base.petsc import PETSc
 from catenary.solver.contact.contact_wire import ContactWires
 from catenary.solver.contact.train.pantographs import Pantographs, nominal_height_rule

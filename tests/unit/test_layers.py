@@ -155,6 +155,13 @@ def test_a_mesh_library_is_imported_in_one_file(module: str, only: str) -> None:
     assert users == {only}
 
 
+def test_mpi_starts_in_one_way() -> None:
+    """What imports it from mpi4py itself starts a lone process as one of a job."""
+    start = {"solver/base/mpi.py", "solver/base/lone_process.py", "solver/base/parallel.py"}
+    users = {str(path.relative_to(ROOT)) for path in FILES if "mpi4py.MPI" in imports_of(path)}
+    assert users == start
+
+
 FILE_WRITERS = ("h5py", "meshio", "gmsh", "catenary.postproc", "matplotlib", "jinja2")
 
 

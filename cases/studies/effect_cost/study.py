@@ -11,9 +11,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from mpi4py import MPI
-
 from catenary.base.errors import InputError, RunBroken
+from catenary.base.mpi import MPI
 from catenary.cases.process.interrupts import Phase
 from catenary.cases.run.prepared import rest_of
 from catenary.cases.scene.checks.effects import RELATIVE_MOTION, needs_relative_motion

@@ -147,7 +147,7 @@ class _Check:
 
     def __call__(self, case: HardCase, comm: Any) -> Checked:
         """Collective."""
-        from mpi4py import MPI
+        from catenary.base.mpi import MPI
 
         one = _OneCase(case, MPI.COMM_SELF, self.short)
         checked: Checked = on_root(comm, one.checked, takes_long=True)

@@ -11,9 +11,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
-from mpi4py import MPI
 from scipy.sparse.linalg import splu
 
+from catenary.base.mpi import MPI
 from catenary.cases.studies.waves.theory import HIGHEST
 from catenary.meshgen.build import make_mesh
 from catenary.meshgen.hardware import Droppers, SteadyArms, Supports

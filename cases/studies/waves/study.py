@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from mpi4py import MPI
 
 from catenary.base.errors import RunBroken
+from catenary.base.mpi import MPI
 from catenary.cases.result_folder.output_folder import refuse_earlier, refuse_table
 from catenary.cases.run.excited_run import ExcitedRun
 from catenary.cases.run.runner import run_case

@@ -14,9 +14,9 @@ from typing import NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
-from mpi4py import MPI
 
 from catenary.base.errors import InputError, RunBroken
+from catenary.base.mpi import MPI
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.problem import problem_of
 from catenary.cases.scene.scene import Scene

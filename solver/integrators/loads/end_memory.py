@@ -12,9 +12,9 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from mpi4py import MPI
 
 from catenary.base.errors import InputError
+from catenary.base.mpi import MPI
 from catenary.solver.integrators.line_state import AlphaAhead, LineState
 from catenary.solver.kernels import native
 from catenary.solver.linear.halo import Subdomain

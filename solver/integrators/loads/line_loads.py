@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from mpi4py import MPI
 from scipy import sparse
 
+from catenary.base.mpi import MPI
 from catenary.solver.integrators.line_state import LineState
 from catenary.solver.integrators.loads.end_memory import NO_MEMORIES, EndMemories, Memories
 from catenary.solver.kernels import aligned_arrays, native

@@ -1,0 +1,10 @@
+"""MPI, started as this process was. Every module takes MPI from here."""
+
+from __future__ import annotations
+
+from catenary.base.lone_process import settings
+
+with settings():
+    from mpi4py import MPI
+
+__all__ = ["MPI"]
