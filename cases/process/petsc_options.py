@@ -70,10 +70,11 @@ def start_petsc(arguments: Sequence[str]) -> None:
     """
     import petsc4py
 
+    from catenary.base.lone_process import settings
     from catenary.base.python_signals import python_signals_kept
 
     running = "petsc4py.PETSc" in sys.modules
-    with python_signals_kept():
+    with python_signals_kept(), settings():
         petsc4py.init(["catenary", "-skip_petscrc", *arguments])
     from catenary.base.petsc import PETSc
 

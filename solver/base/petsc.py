@@ -12,9 +12,10 @@ from typing import NamedTuple
 
 import petsc4py
 
+from catenary.base.lone_process import settings
 from catenary.base.python_signals import python_signals_kept
 
-with python_signals_kept():
+with python_signals_kept(), settings():  # PETSc starts MPI unless it runs
     if "petsc4py.PETSc" not in sys.modules:
         # An argument, as PETSc looks for the files before it reads the variable PETSC_OPTIONS.
         petsc4py.init(["catenary", "-skip_petscrc"])
