@@ -50,6 +50,9 @@ class Draft:
         InputError
             If no scene has such a key, or if it leads through something that is no table.
         """
+        values = list(values)
+        if not values:
+            return self
         raw, given = self._copy(), list(self.given)
         for key, value, where in values:
             if not is_known(key, known_keys(Scene)):

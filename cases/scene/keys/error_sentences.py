@@ -26,7 +26,7 @@ def refusal(origin: Origin, key: str, value: object, why: str) -> Fault:
     return Fault(key, f"{key} is {number}{in_unit} {origin.of(key)}; {why}")
 
 
-def unknown_key(key: str, where: str, known: list[str]) -> str:
+def unknown_key(key: str, where: str, known: Sequence[str]) -> str:
     """The sentence for an unknown key."""
     near = nearest(key, known)
     if key.startswith("petsc."):

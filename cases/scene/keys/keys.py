@@ -18,19 +18,19 @@ from catenary.solver.effects import all_effects as effects
 
 # Stands for an index into a list of tables or for a name that the scene chooses.
 ANY = "*"
-# A longer key is no misspelt one.
 # Tables of a scene that its line, and how that is stepped, do not depend on.
 OF_THE_TRAIN = ("case", "train", "pantographs", "contact", "evaluation", "output", "test")
+# A longer key is no misspelt one.
 _LONGEST = 200
 
 
-def known_keys(model: type[BaseModel], location: Sequence[int | str] = ()) -> list[str]:
+def known_keys(model: type[BaseModel], location: Sequence[int | str] = ()) -> tuple[str, ...]:
     """Dotted keys of a table and of all tables below it, ``*`` for what the scene names.
 
     Where there are several kinds of table, the keys of all of them, or only of those that
     ``location``, as pydantic gives it, leads through.
     """
-    return list(_known_keys(model, tuple(location), tuple(effects.registry())))
+    return _known_keys(model, tuple(location), tuple(effects.registry()))
 
 
 @functools.cache
@@ -141,8 +141,9 @@ def without_kinds(
     return parts, field
 
 
-def is_known(key: str, known: list[str]) -> bool:
-    """Whether a dotted key matches one of ``known``."""
+@functools.lru_cache(maxsize=256)
+def is_known(key: str, known: tuple[str, ...]) -> bool:
+    """Whether a dotted key matches one of ``known``; studies ask for the same keys again."""
     parts = key.split(".")
     return key in known or any(_matches(parts, candidate.split(".")) for candidate in known)
 
@@ -155,7 +156,7 @@ def _matches(parts: list[str], pattern: list[str]) -> bool:
     )
 
 
-def nearest(key: str, known: list[str]) -> str | None:
+def nearest(key: str, known: Sequence[str]) -> str | None:
     """The known key that ``key`` most likely stands for, None if nothing comes near.
 
     In this order: the same last part in another table, a similar one in the same table, a similar
