@@ -30,7 +30,7 @@ PLACED = {"catenary": "cases/api", "catenary.base": "solver/base"}
 KERNELS = "solver/kernels"
 # Sources that take longest to compile, by how they begin.
 BINDINGS = f"{KERNELS}/python/"
-LONGEST = (*(f"{KERNELS}/stations/{of}" for of in ("avx2", "baseline", "scenes")), BINDINGS)
+LONGEST = (*(f"{KERNELS}/stations/{of}" for of in ("avx2", "avx512", "baseline")), BINDINGS)
 OBJECTS, SANITIZED_OBJECTS = "build/kernels", "build/sanitized/objects"
 
 # No target is named: a wheel runs on every processor of its architecture, and a source that has

@@ -1,8 +1,10 @@
 #include "stations/before_target.hpp"
 #include "stations/targets.hpp"
 #define CATENARY_TARGET baseline
-#ifdef CATENARY_AVX2
+#ifdef CATENARY_X86_TARGETS
 #define CATENARY_GENERAL_ONLY
 #pragma GCC optimize("O1")  // in two thirds of the time; steps take 1.06 to 1.14 as long
+#else
+#include "stations/scene_blocks.hpp"
 #endif
 #include "stations/target.hpp"

@@ -15,9 +15,11 @@
     std::unique_ptr<Kernels> make_for_scenes(const Layout& rows, const Layout& factors); \
     }
 CATENARY_DECLARE(baseline)
-#ifdef CATENARY_AVX2
+#ifdef CATENARY_X86_TARGETS
 CATENARY_DECLARE(avx2)
 CATENARY_DECLARE_FOR_SCENES(avx2)
+CATENARY_DECLARE(avx512)
+CATENARY_DECLARE_FOR_SCENES(avx512)
 #else
 CATENARY_DECLARE_FOR_SCENES(baseline)
 #endif
@@ -37,11 +39,13 @@ struct Target {
 const std::vector<Target>& of_processor() {
     static const std::vector<Target> found = [] {
         std::vector<Target> targets;
-#ifdef CATENARY_AVX2
+#ifdef CATENARY_X86_TARGETS
         targets.push_back({"baseline", baseline::make, nullptr});
         __builtin_cpu_init();
         if (__builtin_cpu_supports("x86-64-v3"))
             targets.push_back({"avx2", avx2::make, avx2::make_for_scenes});
+        if (__builtin_cpu_supports("x86-64-v4"))
+            targets.push_back({"avx512", avx512::make, avx512::make_for_scenes});
 #else
         targets.push_back({"baseline", baseline::make, baseline::make_for_scenes});
 #endif
