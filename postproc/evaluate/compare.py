@@ -162,8 +162,14 @@ def _judged(one: Criterion | None) -> str:
 def _row(label: str, values: Sequence[float]) -> str:
     first, *others = values
     cells = [f"{fixed(value, 4):>14}" for value in values]
-    # To add zero makes no negative zero.
-    return f"{label:34}" + "".join(cells + [f"{value - first + 0.0:14.3e}" for value in others])
+    return f"{label:34}" + "".join(
+        cells + [f"{_difference(value - first):>14}" for value in others]
+    )
+
+
+def _difference(value: float) -> str:
+    """A difference with four decimals, as a power of ten where these would hide it."""
+    return fixed(value, 4) if not 0.0 < abs(value) < 1e-3 else f"{value:.1e}"
 
 
 def _by_spans(runs: Sequence[Results]) -> list[str]:
@@ -240,6 +246,6 @@ def _histories(a: Results, b: Results, letter: str) -> str:
         if np.isnan(largest):
             break
     return (
-        f"{of_all}Largest difference of the contact force histories: {largest:.3e} N "
+        f"{of_all}Largest difference of the contact force histories: {_difference(largest)} N "
         f"at t = {a.time_at(at):.4f} s ({a.pantograph_names()[whose]})."
     )
