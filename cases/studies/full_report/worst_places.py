@@ -60,7 +60,7 @@ def _blocks(results: Results, places: WorstPlaces, causes: Causes) -> Iterator[T
     for first, spots, words in _KINDS:
         for spot in spots(places)[:1]:
             said = words.format(at=spot.place, v=spot.value, m=spot.median)
-            items = candidates(causes.at(spot.x), spot.stands_out)
+            items = candidates(causes.at(spot), spot.stands_out)
             yield Text(f"{said}{out(spot.stands_out)}.", "note", first, items)
     everywhere = causes.of_line()
     if everywhere:
