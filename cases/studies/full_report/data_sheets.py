@@ -20,6 +20,7 @@ from catenary.meshgen.mesh import LineMesh
 from catenary.meshgen.slowest_wave import slowest_wave_of
 from catenary.meshgen.wires import Role, Wire
 from catenary.postproc.evaluate.wording import stiffness_words
+from catenary.postproc.files.own_files import PICTURES
 from catenary.postproc.report.pictures.figures import COLOURS, FewTicks, new_figure, own_style, tidy
 from catenary.postproc.report.sections.section import EvaluatedRun, Picture, Section, Text, number
 from catenary.postproc.report.study_table import StudyTable, texts_table
@@ -210,11 +211,11 @@ def pantographs(scene: SceneOfRun, run: EvaluatedRun) -> Section:
         kinds.setdefault(said["kind"], (placement, said["description"]))
     pictures = [
         Picture(
-            f"pantograph_{n}",
+            file,
             f"Pantograph {_plain(name)}, {_how_drawn(one[0].data)}.",
             partial(_drawn, one[0].data),
         )
-        for n, (name, one) in enumerate(kinds.items(), start=1)
+        for file, (name, one) in zip(PICTURES["pantographs"], kinds.items(), strict=False)
     ]
     return Section("Data sheet of the pantographs", _pantograph_blocks(kinds), pictures)
 
