@@ -102,7 +102,7 @@ def _geometry(rest: LineAtRest, line: Line) -> Iterator[list[Any]]:
 def _courses(
     mesh: LineMesh, places: np.ndarray, wires: Sequence[Wire], x: np.ndarray
 ) -> np.ndarray:
-    """Lateral places and heights of wires at rest, (wires, 2, n) [m], NaN where one is absent."""
+    """Lateral positions and heights of wires at rest, (wires, 2, n) [m], NaN where absent."""
     found = np.full((len(wires), 2, x.size), np.nan)
     for of_wire, wire in zip(found, wires, strict=True):
         for nodes in mesh.pieces(wire.name):

@@ -109,8 +109,8 @@ def _of_spots(title: str, spots: Sequence[Spot], words: str, causes: Causes) -> 
 
 
 def candidates(said: Sequence[str], is_out: bool | None) -> Sequence[str]:
-    """Candidates of a place, or that there is none; one like the others needs none."""
-    return said or ([] if is_out is False else [NONE])
+    """Candidates of a place, or that there is none for one that stands out."""
+    return said or ([NONE] if is_out else [])
 
 
 def _told(said: Sequence[str], is_out: bool | None) -> list[str]:
