@@ -273,6 +273,7 @@ def test_the_validation_of_the_installation(folder: Path, tmp_path: Path) -> Non
     assert "differ from the reference solutions by at most 5.0 %" in said
     beyond = said.index("Figures beyond their limits")
     assert said.index("31.25", beyond) < said.index("Judged figures (2)", beyond)
+    assert "standard deviation" in said[beyond:] and "error bar" not in said[beyond:]
     done = CliRunner().invoke(app, ["report", str(tmp_path), "--validation", str(folder)])
     assert done.exit_code == 2 and "is no record of `catenary validate`" in done.output
 

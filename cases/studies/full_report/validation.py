@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from catenary.base.errors import InputError
-from catenary.cases.studies.reference.judgement import FAILED, NOT_JUDGED, table_of
+from catenary.cases.studies.reference.judgement import FAILED, NOT_JUDGED, read_table
 from catenary.cases.studies.reference.pages import VALIDATION
 from catenary.postproc.report.sections.section import EvaluatedRun, Folded, Section, Text
 from catenary.postproc.report.study_table import StudyTable, texts_table
@@ -67,7 +67,7 @@ def section(statement: Mapping[str, Any] | None, run: EvaluatedRun) -> Section:
         return Section(_HEADING, [Text(text)])
     figures = statement["figures"]
     title = f"Judged figures ({len(figures)})"
-    folded = [Folded(title, table_of(figures, ""))] if figures else []
+    folded = [Folded(title, read_table(figures, ""))] if figures else []
     return Section(_HEADING, _blocks(statement, run), folded=folded)
 
 
@@ -81,5 +81,5 @@ def _blocks(statement: Mapping[str, Any], run: EvaluatedRun) -> Iterator[Text | 
     yield texts_table(["", "step", "result"], rows, {0})
     failed = [row for row in statement["figures"] if row["verdict"] == FAILED]
     if failed:
-        yield table_of(failed, "Figures beyond their limits")
+        yield read_table(failed, "Figures beyond their limits")
     yield Text(" ".join(statement["closing"]))

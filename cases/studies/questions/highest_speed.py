@@ -443,7 +443,7 @@ def draw(study: SpeedStudy) -> Figure | None:
         # Limits of all criteria whose names begin so, as one look of dashed lines.
         for places in _limits(study, criterion):
             axes.plot(*zip(*places, strict=True), "--", color=figures.LIMIT, linewidth=1.0)
-        figures.tidy(axes, "", STATISTICS[statistic].meaning)
+        figures.tidy(axes, "", STATISTICS[statistic].meaning.replace(", ", ",\n"))
     if any(_limits(study, criterion) for _, criterion in _PANELS):
         panels[0].plot([], [], "--", color=figures.LIMIT, linewidth=1.0, label="limit")
     figures.legend_above(panels[0], columns=min(len(names) * len(looks) + 1, 4))
