@@ -62,6 +62,14 @@ def report(
             help="Folder of `catenary plan --cost -o STUDY`, whose costs stand beside the effects.",
         ),
     ] = None,
+    validation: Annotated[
+        Path | None,
+        typer.Option(
+            "--validation",
+            metavar="STUDY",
+            help="Folder of `catenary validate -o STUDY`, whose statement is part of the report.",
+        ),
+    ] = None,
 ) -> None:
     """Serial."""
     records = _records(folder)
@@ -72,10 +80,12 @@ def report(
         measured_errors,
     )
     from catenary.cases.studies.full_report.sections import full_sections
+    from catenary.cases.studies.full_report.validation import statement_in
     from catenary.postproc.read.results import Results
     from catenary.postproc.report.report import write_report
     from catenary.postproc.report.sections.run_facts import INPUT
 
+    statement = None if validation is None else statement_in(validation)
     with Results(folder, records) as results:
         try:
             scene = SceneOfRun(results)
@@ -90,7 +100,7 @@ def report(
     costs: tuple[dict[str, str], str] = ({}, "")
     if cost is not None and scene is not None:
         costs = measured_costs(scene, cost), str(cost)
-    entries, text = full_sections(scene, costs), scene and scene.input_text
+    entries, text = full_sections(scene, costs, statement), scene and scene.input_text
     beside = {INPUT: text} if text else {}
     written = write_report(
         folder,

@@ -26,7 +26,7 @@ def turned(scene: Scene) -> Scene:
     """The scene whose train runs the other way. Not collective.
 
     Trains run towards greater x, so that the line is mirrored in place of the train: x becomes
-    L - x, with L its length; heights and lateral places stay. The train is the same seen from
+    L - x, with L its length; heights and lateral positions stay. The train is the same seen from
     itself: its first pantograph leads, and it starts as far before the evaluated stretch as it
     did, or where the running range begins if that is nearer. Heads, winds and curves act alike on
     both sides, so that the contact force is that of the train on the line as it stands. Random
@@ -121,7 +121,7 @@ def _turn_line(line: dict[str, Any], scene: Scene, length: float) -> None:
 
 
 def _turned_stagger(given: Sequence[float], n_spans: int) -> list[float]:
-    """Lateral places at the supports from the other end; one number alternates."""
+    """Lateral positions at the supports from the other end; one number alternates."""
     if len(given) > 1:
         return list(reversed(given))
     return [given[0] if n_spans % 2 == 0 else -given[0]]

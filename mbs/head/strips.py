@@ -2,7 +2,7 @@
 
 Coordinates of a head, in this order: the heights of strips on springs of their own, the head's
 height, its roll about the track, its pitch across it, the bending of its strips (`flexure`). A
-strip touches the wire at a height z + l phi + p theta: l [m] is the lateral place of the wire on
+strip touches the wire at a height z + l phi + p theta: l [m] is the lateral position of the wire on
 it, p [m] the strip's place ahead of the head's centre, phi and theta roll and pitch [rad], which
 lift what is left of and ahead of the
 centre. Angles are small: 0.1 rad would be an error of 0.5 %.
@@ -98,7 +98,7 @@ class HeadParts:
     ----------
     masses : (n,) [kg] or [kg m2]
     stiffness, damping : (n + 1, n + 1)
-    touch : (s, n) by how much each coordinate raises each contact, the lateral place left out;
+    touch : (s, n) by how much each coordinate raises each contact, the lateral position left out;
         wires that touch one strip have a row each
     level : (n,) 1 for heights, 0 for angles
     roll : number of the roll's coordinate, -1 without it

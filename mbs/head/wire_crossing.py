@@ -12,7 +12,7 @@ from catenary.solver.kernels import native
 
 
 class CrossingPath(ABC):
-    """Lateral places of wires on the strips of a pantograph.
+    """Lateral positions of wires on the strips of a pantograph.
 
     Attributes
     ----------
@@ -39,7 +39,7 @@ class CrossingPath(ABC):
 
 
 class LateralPath(CrossingPath):
-    """Lateral places of the wire on the strips of a pantograph as functions of time.
+    """Lateral positions of the wire on the strips of a pantograph as functions of time.
 
     The wire runs straight from support to support.
 
@@ -85,7 +85,7 @@ class LateralPath(CrossingPath):
 
 
 class SeveralPaths(CrossingPath):
-    """Lateral places of several contact wires on the strips of a pantograph.
+    """Lateral positions of several contact wires on the strips of a pantograph.
 
     ``place`` and ``rate`` (s w,) are those of `LateralPath` for w wires, strip by strip.
     """
@@ -104,7 +104,7 @@ class SeveralPaths(CrossingPath):
 
 
 class FollowedPath(CrossingPath):
-    """Lateral places of wires that move sideways, whose motion each step finds.
+    """Lateral positions of wires that move sideways, whose motion each step finds.
 
     Parameters
     ----------

@@ -14,8 +14,8 @@ springs k (secondary), p (primary), q (secondary, sideways); dampers act like sp
     M y''  = -sum_i q d_i                          I_w w'' = -a sum_i s_i q d_i
     I_r r'' = -h sum_i q d_i - 2 k b^2 r + M g h r,     d_i = y + s_i a w + h r - v_i
 
-u_i and v_i are the track's height and lateral place below bogie i, the mean of its wheelsets; h is
-the height of the body's centre of mass above the springs, 2 b their distance across. Bogies are
+u_i and v_i are the track's height and lateral position below bogie i, the mean of its wheelsets; h
+is the height of the body's centre of mass above the springs, 2 b their distance across. Bogies are
 held sideways and do not roll. (V. K. Garg, R. V. Dukkipati, Dynamics of Railway Vehicle Systems,
 1984, chapter 3.)
 """

@@ -295,7 +295,7 @@ def _straight(
 
 
 def _beside(x: np.ndarray, ends: np.ndarray, clamps: list[Wire | None]) -> np.ndarray:
-    """Lateral places of the wires that pieces are clamped to, from the first over to the last."""
+    """Lateral positions of the wires that pieces are clamped to, from the first to the last."""
     sides = [clamp.points(x)[:, 1] for clamp in clamps if clamp is not None]
     if not sides:
         return np.zeros(x.size)

@@ -222,7 +222,7 @@ class LineData(Spans):
         return min(heights) - max(sags, default=0.0)
 
     def contact_sideways(self, x: np.ndarray) -> list[np.ndarray]:
-        """Lateral places of each contact wire at places ``x``, shape as ``x`` [m].
+        """Lateral positions of each contact wire at places ``x``, shape as ``x`` [m].
 
         Those of a free line; of others the stagger, which wires are near to.
         """

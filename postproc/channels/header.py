@@ -136,7 +136,7 @@ def static_datasets(
 
 
 def _registration(line: Line, mesh: LineMesh, form: Equilibrium) -> dict[str, np.ndarray]:
-    """Forces of steady arms at rest, and lateral places of the contact wires where they move so.
+    """Forces of steady arms at rest, and lateral positions of the contact wires where they move so.
 
     Without lateral motion arms carry the radial force of the stagger; nothing for straight wires.
     """

@@ -116,7 +116,7 @@ def _statistics(runs: Sequence[_Evaluated]) -> list[str]:
     lines += [
         "line",
         _row("  max uplift at arms [mm]", [1e3 * one.supports.maximum for one in found]),
-        _row("  droppers slackened", [one.droppers.n_slackened for one in found]),
+        _row("  droppers slackened", [one.droppers.n_slackened for one in found], 0),
         _row("  max dropper force [N]", [one.droppers.maximum for one in found]),
         _row("  min dropper force [N]", [one.droppers.minimum for one in found]),
     ]
@@ -159,11 +159,17 @@ def _judged(one: Criterion | None) -> str:
     return f"{fixed(one.value, 2)} {one.unit} {_WORDS[one.passed]}{mark}"
 
 
-def _row(label: str, values: Sequence[float]) -> str:
+def _row(label: str, values: Sequence[float], digits: int = 4) -> str:
     first, *others = values
-    cells = [f"{fixed(value, 4):>14}" for value in values]
-    # To add zero makes no negative zero.
-    return f"{label:34}" + "".join(cells + [f"{value - first + 0.0:14.3e}" for value in others])
+    cells = [f"{fixed(value, digits):>14}" for value in values]
+    return f"{label:34}" + "".join(
+        cells + [f"{_difference(value - first, digits):>14}" for value in others]
+    )
+
+
+def _difference(value: float, digits: int = 4) -> str:
+    """A difference with so many decimals, as a power of ten where these would hide it."""
+    return fixed(value, digits) if not 0.0 < abs(value) < 1e-3 else f"{value:.1e}"
 
 
 def _by_spans(runs: Sequence[Results]) -> list[str]:
@@ -240,6 +246,6 @@ def _histories(a: Results, b: Results, letter: str) -> str:
         if np.isnan(largest):
             break
     return (
-        f"{of_all}Largest difference of the contact force histories: {largest:.3e} N "
+        f"{of_all}Largest difference of the contact force histories: {_difference(largest)} N "
         f"at t = {a.time_at(at):.4f} s ({a.pantograph_names()[whose]})."
     )

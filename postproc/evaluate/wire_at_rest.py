@@ -72,7 +72,7 @@ def _height_at(profile: ContactProfile, x: np.ndarray) -> np.ndarray:
 def _lateral(
     profiles: list[ContactProfile], x: np.ndarray, lowest: np.ndarray
 ) -> tuple[np.ndarray | None, float | None]:
-    """Lateral places and sweep of wires where they are met."""
+    """Lateral positions and sweep of wires where they are met."""
     places, swept, length = [], 0.0, 0.0
     for profile in profiles:
         if profile.y is None:

@@ -10,6 +10,7 @@ import logging
 import os
 import re
 import time
+from collections.abc import Iterable
 from pathlib import Path
 
 from catenary.solver.time_loop.views.channels import CHANNELS, ENERGIES
@@ -18,32 +19,43 @@ logger = logging.getLogger("catenary.record")
 
 RUN_FILE = "run.h5"
 FIELD_FILES = ("fields.h5", "fields.xdmf")
-_PICTURES = (
-    *("contact_force", "strip_forces", "wire_forces", "statistics", "histogram", "uplift"),
-    *("droppers", "static", "plan_view", "energy"),
-    *(
-        f"channel_{channel.name}"
-        for channel in (*CHANNELS.values(), *ENERGIES.values())
-        if (channel.values or channel.energy) and not channel.own_picture
+# Pictures that each section of a report may have, without their ends; a report refuses others.
+PICTURES: dict[str, tuple[str, ...]] = {
+    "force": (
+        *("contact_force", "strip_forces", "wire_forces", "lateral_place", "statistics"),
+        "histogram",
     ),
+    "spectrum": ("spectrum", "contact_height"),
+    "waves": ("space_time",),
+    "motion": ("uplift", "droppers", "energy"),
+    "worst": ("worst_span", "worst_dropper", "longest_slack"),
+    "rest": ("static",),
+    "line": ("line",),
+    "above": ("plan_view",),
+    "pantographs": tuple(f"pantograph_{n}" for n in range(1, 17)),
+}
+CHANNEL_PICTURE = "channel_"  # and the name of a channel without a picture of its own
+_OF_CHANNELS = tuple(
+    f"{CHANNEL_PICTURE}{channel.name}"
+    for channel in (*CHANNELS.values(), *ENERGIES.values())
+    if (channel.values or channel.energy) and not channel.own_picture
 )
+# Those of versions before.
+_EARLIER = ("worst_support",)
+# All but input.toml, which a user may have changed.
 REPORT_FILES = (
-    *("summary.json", "report.html", "droppers.csv", "registration.csv"),
-    *(f"{name}.png" for name in _PICTURES),
-)
-_OF_FULL_REPORTS = (
-    *("lateral_place", "spectrum", "contact_height", "space_time", "line"),
-    *("worst_span", "worst_dropper", "longest_slack"),
-    *(f"pantograph_{n}" for n in range(1, 17)),
-)
-# What `catenary report` leaves besides, but for its input.toml, which a user may have changed.
-FULL_REPORT_FILES = (
-    *("report.pdf", "report_interactive.html"),
-    *(f"{name}.svg" for name in (*_PICTURES, *_OF_FULL_REPORTS)),
+    *("summary.json", "droppers.csv", "registration.csv"),
+    *("report.html", "report_interactive.html", "report.pdf"),
+    *(
+        f"{name}.{kind}"
+        for names in (*PICTURES.values(), _OF_CHANNELS, _EARLIER)
+        for name in names
+        for kind in ("png", "svg")
+    ),
 )
 # What a sweep leaves beside a run's files.
 VARIANT_FILE = "variant.json"
-OWN_FILES = (RUN_FILE, *FIELD_FILES, *REPORT_FILES, *FULL_REPORT_FILES, VARIANT_FILE)
+OWN_FILES = (RUN_FILE, *FIELD_FILES, *REPORT_FILES, VARIANT_FILE)
 
 _PART = re.compile(r"\.(?P<name>.+)\.\d+\.part")
 # A report may be written beside a run; its files are made in less [s].
@@ -63,16 +75,22 @@ def new_part(path: Path) -> Path:
     return part
 
 
-def remove_stale(folder: Path) -> None:
-    """Remove what an earlier run left beside its result file, which is replaced already."""
-    for name in OWN_FILES:
-        if name == RUN_FILE:
-            continue
+def remove_stale(folder: Path, names: Iterable[str] = OWN_FILES[1:]) -> None:
+    """Remove files that an earlier run or report left.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of the run.
+    names : iterable of str, optional
+        The files; all but the result file without it.
+    """
+    for name in names:
         try:
             (folder / name).unlink(missing_ok=True)
         except OSError as error:  # a folder of this name is not ours
             logger.warning(
-                "%s of an earlier run could not be removed (%s)", folder / name, error.strerror
+                "%s of earlier results could not be removed (%s)", folder / name, error.strerror
             )
 
 

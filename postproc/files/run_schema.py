@@ -287,7 +287,7 @@ CONSTANTS: dict[str, Table] = {
         ("contact_node",), "m", "height of the contact wires at rest", "contact_x"
     ),
     "static/contact_y": Table(
-        ("contact_node",), "m", "lateral place of the contact wires at rest", "contact_x",
+        ("contact_node",), "m", "lateral position of the contact wires at rest", "contact_x",
         optional=True,
     ),
     "static/elasticity_x": Table(("elasticity_place",), "m", f"{_PLACE} of the unit force"),
@@ -299,7 +299,7 @@ CONSTANTS: dict[str, Table] = {
         "lift of each contact wire under a unit force on it alone", "elasticity_x", may_be_nan=True,
     ),
     "static/arm_stagger": Table(
-        (ARM,), "m", "lateral place of the wire at steady arms", optional=True
+        (ARM,), "m", "lateral position of the wire at steady arms", optional=True
     ),
     "static/arm_force": _force(
         (ARM, "radial_lift_along"), "force of steady arms at rest", optional=True

@@ -37,7 +37,7 @@ class ForceChart:
         self._axes, self._data, self._first = axes, data, rows[0]
         shown = data.force[rows[0] : rows[1]]
         low, high = float(shown.min(initial=0.0)), float(shown.max(initial=1.0))
-        axes.set(xlabel="place along the track [m]", ylabel="force [N]")
+        axes.set(xlabel="position along the track [m]", ylabel="force [N]")
         axes.set_ylim(1.05 * low, 1.05 * high)
         steps = np.outer([1.0, 10.0, 100.0, 1000.0], [1.0, 2.0, 5.0]).ravel()
         axes.xaxis.set_major_locator(MultipleLocator(steps[steps > width / _MOST_MARKS].min()))

@@ -17,7 +17,12 @@ from catenary.postproc.evaluate.statistics import RunStatistics
 from catenary.postproc.evaluate.verdict import Criterion
 from catenary.postproc.evaluate.wording import counted
 from catenary.postproc.files.disk import write_into
-from catenary.postproc.files.own_files import REPORT_FILES
+from catenary.postproc.files.own_files import (
+    CHANNEL_PICTURE,
+    PICTURES,
+    REPORT_FILES,
+    remove_stale,
+)
 from catenary.postproc.read.records import Records
 from catenary.postproc.read.results import Results
 from catenary.postproc.report import csv_tables
@@ -83,7 +88,8 @@ def write_report(
     """Write summary, report, pictures and dropper table of a run into a folder. Not collective.
 
     Each file appears whole or not at all. The summary is written before the first picture is
-    drawn, and a picture that cannot be drawn is left out with a remark.
+    drawn, and a picture that cannot be drawn is left out with a remark. Files of an earlier report
+    that are not written again are removed.
 
     Parameters
     ----------
@@ -101,7 +107,7 @@ def write_report(
         Errors of quantities that a study measured, in their units, and the study, as
         ``EvaluatedRun`` has them.
     vector : bool, optional
-        Whether pictures are SVG files instead of PNG files, which are removed.
+        Whether pictures are SVG files instead of PNG files.
     on_paper : bool, optional
         Whether ``report.pdf`` is written too.
     interactive : bool, optional
@@ -137,7 +143,7 @@ def write_report(
             content["registration.csv"] = registration.csv()
         files = write_into(out, {"summary.json": summary, **content})
         shown = {
-            entry.name: _with_lists(entry.make(run))
+            entry.name: _with_lists(entry.name, entry.make(run))
             for entry in (quick_sections() if entries is None else entries)
             if entry.applies(run)
         }
@@ -152,10 +158,7 @@ def write_report(
         if on_paper:
             content["report.pdf"] = pdf(html)
         files += write_into(out, content)
-        # The same pictures as the run drew them.
-        earlier = {Path(name).with_suffix(".png").name for name in pictures if vector}
-        for name in earlier.intersection(REPORT_FILES):
-            (out / name).unlink(missing_ok=True)
+    remove_stale(out, set(REPORT_FILES).difference(path.name for path in files))
     return Report(files, criteria, run.verdict if run.results.complete else None)
 
 
@@ -199,10 +202,21 @@ def drawings(results: Results, statistics: RunStatistics) -> Iterator[Picture]:
             yield from entry.make(run).pictures
 
 
-def _with_lists(section: Section) -> Section:
-    """The section with its parts in lists, which several pages go through."""
+def _with_lists(name: str, section: Section) -> Section:
+    """The section of a name with its parts in lists, which several pages go through.
+
+    Raises
+    ------
+    ValueError
+        If ``PICTURES`` lacks one of its pictures, which no later report would remove.
+    """
     _, blocks, pictures, folded = section
-    return section._replace(blocks=list(blocks), pictures=list(pictures), folded=list(folded))
+    pictures = list(pictures)
+    unknown = {one.name for one in pictures}.difference(PICTURES.get(name, ()))
+    unknown = {one for one in unknown if not one.startswith(CHANNEL_PICTURE)}
+    if unknown:
+        raise ValueError(f"own_files.PICTURES of section {name} lacks {sorted(unknown)}")
+    return section._replace(blocks=list(blocks), pictures=pictures, folded=list(folded))
 
 
 def _painted(sections: Iterable[Section], kind: str) -> dict[str, bytes]:

@@ -112,7 +112,7 @@ class ContactWires:
         return len(self.ranges)
 
     def course(self, wire: int) -> tuple[np.ndarray, np.ndarray]:
-        """Places along the track (n,) and lateral places (n,) of a wire at rest [m], straight in
+        """Places along the track (n,) and lateral positions (n,) of a wire at rest [m], straight in
         between: of supports without lateral motion, with it of all nodes."""
         if self._at_rest:
             first, end = self.ranges[wire]

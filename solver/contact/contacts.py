@@ -15,7 +15,7 @@ from catenary.solver.linear.unit_responses import ShortColumns
 class Sideways(NamedTuple):
     """Unknowns (v, theta_z) of the contact wires' nodes on a rank: their numbers ``local``
     (n_nodes, 2), 0 where another rank owns them; whether this one does, ``owned``; what they are at
-    ``rest``, lateral places [m] and slopes [-]. Without rows where no lateral motion is
+    ``rest``, lateral positions [m] and slopes [-]. Without rows where no lateral motion is
     simulated."""
 
     local: np.ndarray

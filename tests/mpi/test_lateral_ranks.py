@@ -19,7 +19,7 @@ COMM = MPI.COMM_WORLD
 
 
 class Seen(Observer):
-    """Keeps contact forces and lateral places, on rank 0, and this rank's arm uplifts."""
+    """Keeps contact forces and lateral positions, on rank 0, and this rank's arm uplifts."""
 
     def __init__(self) -> None:
         self.rows: list[tuple[np.ndarray, np.ndarray]] = []

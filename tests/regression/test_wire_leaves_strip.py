@@ -53,7 +53,7 @@ def test_a_wire_that_leaves_a_strip_is_named_everywhere(tmp_path: Path) -> None:
     farthest = int(np.abs(place).argmax())
     assert own["max_place_mm"] == 1e3 * place[farthest] and own["time_s"] == time[farthest]
     assert own["strip_half_length_mm"] == 1e3 * HALF
-    criterion = "lateral place of the contact wire on the strips"
+    criterion = "lateral position of the contact wire on the strips"
     (judged,) = [row for row in summary["acceptance"] if row["criterion"] == criterion]
     assert judged["passed"] is False and judged["value"] == abs(own["max_place_mm"])
     assert judged["limit"] == 1e3 * HALF and summary["passed"] is False

@@ -38,6 +38,9 @@ from catenary.cases.studies.full_report.scene_of_run import (
     measured_costs,
     measured_errors,
 )
+from catenary.cases.studies.reference.judgement import FAILED, PASSED
+from catenary.cases.studies.reference.pages import write_validation
+from catenary.cases.studies.reference.validation import Step, Validation
 from catenary.postproc.files.own_files import OWN_FILES
 from catenary.postproc.read.results import Results
 from catenary.postproc.report.pictures import interactive
@@ -107,7 +110,7 @@ def test_all_sections_of_a_run_with_data_sheets(folder: Path) -> None:
     tree = html5lib.parse((folder / "report.html").read_text(), namespaceHTMLElements=False)
     assert [one.get("id") for one in tree.iter("h2")] == [
         "acceptance", "checks", "force", "spectrum", "waves", "motion", "worst", "places", "rest",
-        "line", "above", "pantographs", "effects", "run", "signatures",
+        "line", "above", "pantographs", "effects", "run", "validation", "signatures",
     ]  # fmt: skip
     pictures = {path.stem for path in folder.glob("*.svg")}
     assert pictures >= {"spectrum", "contact_height", "space_time", "worst_span",
@@ -240,6 +243,39 @@ def test_a_scene_of_another_version_costs_the_data_sheets_alone(
     page = (tmp_path / "report.html").read_text()
     assert 'id="worst"' in page and 'id="line"' not in page and 'id="pantographs"' not in page
     assert not (tmp_path / "input.toml").exists()
+
+
+@pytest.mark.process
+@pytest.mark.usefixtures("quick_reports")
+def test_the_validation_of_the_installation(folder: Path, tmp_path: Path) -> None:
+    shutil.copy(folder / "run.h5", tmp_path / "run.h5")
+    invoke("report", str(tmp_path))
+    assert "No validation of this installation is at hand" in words_of(
+        (tmp_path / "report.html").read_text()
+    )
+    row = dict.fromkeys(
+        ("configuration", "of", "quantity", "value", "reference", "difference", "error_bar",
+         "within_bar", "lower", "upper", "verdict", "clause", "compared")
+    )  # fmt: skip
+    row |= {"quantity": "std_N", "value": 31.5, "reference": 30.0, "difference": 1.5}
+    failed = row | {"configuration": "ac_one", "verdict": FAILED, "upper": 31.25}
+    steps = [
+        Step("Reference models", [row | {"verdict": PASSED}, failed]),
+        Step("Test", [], "no"),
+    ]
+    installation = {"program": "catenary 0.0.1", "machine": "Linux"}
+    write_validation(tmp_path, Validation(steps, installation))
+    invoke("report", str(tmp_path), "--validation", str(tmp_path))
+    said = words_of((tmp_path / "report.html").read_text())
+    assert "Statement of catenary 0.0.1 on Linux. It is not one of the program of this run" in said
+    assert "1 Reference models 1 of 2 judged figures are within their limits." in said
+    assert "2 Test not judged: no" in said
+    assert "differ from the reference solutions by at most 5.0 %" in said
+    beyond = said.index("Figures beyond their limits")
+    assert said.index("31.25", beyond) < said.index("Judged figures (2)", beyond)
+    assert "standard deviation" in said[beyond:] and "error bar" not in said[beyond:]
+    done = CliRunner().invoke(app, ["report", str(tmp_path), "--validation", str(folder)])
+    assert done.exit_code == 2 and "is no record of `catenary validate`" in done.output
 
 
 def study(folder: Path, case: str, **changes: object) -> Path:

@@ -121,7 +121,7 @@ def test_all_criteria_hold_where_each_does(monkeypatch: pytest.MonkeyPatch) -> N
     whole = found.holds[0]
     assert whole.criterion == ALL and whole.stopped_by == ("first",)
     assert whole.stretches[0].slowest == 210 and 299 <= whole.stretches[0].fastest < 300
-    assert "fails in both directions: first." in as_text(found)
+    assert "stopped in both directions by: first." in as_text(found)
     assert "its own mirror image" in as_text(found)
     row = table_of_criteria(found).records()[1]
     assert row["criterion"] == "first" and row["value"] == row["fails_at_km_h"] == 300
@@ -159,7 +159,7 @@ def test_the_direction_that_fails_first_ends_a_stretch(monkeypatch: pytest.Monke
     assert [(round(s.slowest), round(s.fastest)) for s in peak.stretches] == [
         (200, 275), (281, 300), (306, 360),
     ]  # fmt: skip
-    assert "km/h fails backward: ends." in as_text(found)
+    assert "km/h stopped in the backward direction by: ends." in as_text(found)
     row = table_of_criteria(found).records()[1]
     assert row["direction"] == BACKWARD
     assert row["highest_backward_km_h"] < row["highest_forward_km_h"]

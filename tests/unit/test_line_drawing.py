@@ -25,7 +25,7 @@ def invoke(*words: str) -> Any:
     [
         ("re330_stitched", ["stitched: side view, heights 20 times", "stitch wire"]),
         ("overlap", ["simple: side view, heights 100 times", "cross-section at 495 m"]),
-        ("tramway", ["single: side view, heights", "plan view, lateral places"]),
+        ("tramway", ["single: side view, heights", "plan view, lateral positions"]),
     ],
 )
 def test_a_drawing_shows_the_three_views(case: str, drawn: list[str], tmp_path: Path) -> None:

@@ -56,6 +56,29 @@ addEventListener("load", async () => {
 """
 
 
+# Tells how many marks every plot has, how wide it and its place are, and where the names of axes
+# end and their ticks begin.
+NARROW = """
+<script>
+addEventListener("load", async () => {
+  await new Promise(done => setTimeout(done, 400));
+  const said = [...document.querySelectorAll(".plot")].map(plot => {
+    const boxes = what => [...plot.querySelectorAll(what)].map(one => one.getBoundingClientRect());
+    return {name: plot.ariaLabel, marks: plot.querySelectorAll(".lines path, .points path").length,
+            needs: plot.parentElement.scrollWidth, has: plot.parentElement.clientWidth,
+            titles: boxes(".ytitle").map(box => [box.left, box.right]),
+            ticks: Math.min(...boxes(".ytick text").map(box => box.left))};
+  });
+  parent.postMessage(JSON.stringify(said), "*");
+});
+</script>
+"""
+PHONE = """
+<iframe src="{page}" style="border: 0; width: 400px; height: 900px"></iframe><pre id="found"></pre>
+<script>onmessage = event => found.textContent = event.data;</script>
+"""
+
+
 class Visit(NamedTuple):
     """A page in the browser: what it became, the addresses it asked for, and its console."""
 
@@ -84,6 +107,14 @@ def visit(page: Path, folder: Path) -> Visit:
     return Visit(done.stdout, asked, [line for line in lines if "CONSOLE" in line])
 
 
+def said(seen: Visit) -> list[dict[str, Any]]:
+    """What a script found of the plots."""
+    found = re.search('<pre id="found">(.*?)</pre>', seen.page, re.DOTALL)
+    assert found is not None
+    plots: list[dict[str, Any]] = json.loads(html.unescape(found[1]))
+    return plots
+
+
 @pytest.fixture(scope="module")
 def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("report")
@@ -99,9 +130,7 @@ def test_every_plot_is_drawn_and_zoomed(report: Path, tmp_path: Path) -> None:
     copy.write_text(page.replace("</body>", f"{ZOOM}</body>"), encoding="utf-8")
     seen = visit(copy, tmp_path)
     assert not seen.asked and not seen.console
-    found = re.search('<pre id="found">(.*?)</pre>', seen.page, re.DOTALL)
-    assert found is not None
-    plots: list[dict[str, Any]] = json.loads(html.unescape(found[1]))
+    plots = said(seen)
     assert len(plots) == page.count('<div class="plot"') > 10
     for plot in plots:
         assert plot["marks"] > 0, plot["name"]
@@ -109,6 +138,21 @@ def test_every_plot_is_drawn_and_zoomed(report: Path, tmp_path: Path) -> None:
             # The frame is 0.4 of the panel; a pixel of the panel's least side is 1 % of it.
             assert end - start == pytest.approx(0.4 * (high - low), abs=0.02 * (high - low))
             assert low < start < end < high
+
+
+def test_plots_fit_a_phone(report: Path, tmp_path: Path) -> None:
+    page = (report / "report_interactive.html").read_text(encoding="utf-8")
+    copy, phone = tmp_path / "report.html", tmp_path / "phone.html"
+    copy.write_text(page.replace("</body>", f"{NARROW}</body>"), encoding="utf-8")
+    phone.write_text(PHONE.format(page=copy.name), encoding="utf-8")
+    seen = visit(phone, tmp_path)
+    assert not seen.console
+    plots = said(seen)
+    assert len(plots) == page.count('<div class="plot"') > 10
+    for plot in plots:
+        assert plot["marks"] > 0 and plot["needs"] == plot["has"] < 400, plot
+        ((left, right),) = plot["titles"]
+        assert 0.0 <= left < right <= plot["ticks"], plot
 
 
 def test_the_plain_form_asks_for_nothing(report: Path, tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""`catenary static` shows what steady arms do: radial forces, slopes, slews, lateral places."""
+"""`catenary static` shows what steady arms do: radial forces, slopes, slews, lateral positions."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The motion of a wire over place and time, and its spectrum, of waves that are given."""
+"""The motion of a wire in space and time, and its spectrum, of waves that are given."""
 
 from __future__ import annotations
 

@@ -210,7 +210,7 @@ def test_a_wire_beside_the_strip_is_not_touched() -> None:
 
 @pytest.mark.parametrize("rolls", [False, True])
 def test_a_head_under_two_wires_is_that_head_at_two_places(rolls: bool) -> None:
-    """Heights and compliances of contacts follow from those of a strip by the lateral places."""
+    """Heights and compliances of contacts follow from those of a strip by the lateral positions."""
     roll = Turning(2.0, 600.0, 4.0)
     data = LumpedData((7.2, 15.0), (4200.0, 50.0), (10.0, 90.0), Strips(2, 0.5), roll)
     places = (0.3, -0.2)

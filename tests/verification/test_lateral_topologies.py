@@ -82,7 +82,7 @@ def test_wires_of_any_topology_rest_in_the_lateral_plane(name: str) -> None:
 
 
 class Forces(Observer):
-    """Keeps forces and lateral places."""
+    """Keeps forces and lateral positions."""
 
     def __init__(self) -> None:
         self.rows: list[np.ndarray] = []

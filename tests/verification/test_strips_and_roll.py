@@ -32,7 +32,7 @@ LEFT = 0.03 * np.exp(-10.0)
 
 
 def straight(place: float, offsets: tuple[float, ...] = (0.0,)) -> LateralPath:
-    """A wire that stays at one lateral place [m]."""
+    """A wire that stays at one lateral position [m]."""
     return LateralPath(np.array([0.0, 1e4]), (place, place), 100.0, offsets, 70.0)
 
 

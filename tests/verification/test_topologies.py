@@ -211,7 +211,7 @@ def test_each_of_several_overlaps_hangs_as_it_does_alone(topology: str) -> None:
 
 
 def near(mesh: LineMesh, form: Equilibrium, wire: str, middle: float, reach: float) -> np.ndarray:
-    """Places, lateral places and heights of a wire within a reach of a place, (3, n) [m]."""
+    """Places, lateral positions and heights of a wire within a reach of a place, (3, n) [m]."""
     nodes = mesh.wires[wire][np.abs(mesh.x(mesh.wires[wire]) - middle) < reach]
     return np.stack([mesh.x(nodes), np.abs(mesh.points[nodes, 1]), form.height[nodes]])
 

@@ -57,7 +57,7 @@ class Excited:
 @serial_verb(
     "waves",
     help="Analyse wave propagation along a line. A train, a moving force, a pulse or a hammer "
-    "excites them: motion over place and time, in the frame of the train, and over "
+    "excites them: motion in space and time, in the frame of the train, and over "
     "wavenumber and frequency, energy ahead and behind, beside the waves, pass bands and "
     "group velocities of the periodic line. `catenary separation` shows how two pantographs "
     "act on each other.",

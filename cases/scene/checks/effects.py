@@ -113,7 +113,7 @@ def check_effect_data(scene: Scene) -> Iterator[Fault]:
 
 
 def check_idle(scene: Scene, line: LineData) -> Iterator[Fault]:
-    """Masses of arms and clamps, lateral places of clamped wires, errors of droppers and further
+    """Masses of arms and clamps, lateral positions of clamped wires, errors of droppers and further
     overlaps of which there are none.
 
     Of an effect that the scene writes as false data may stand there.
@@ -153,7 +153,7 @@ def _idle_clamps(scene: Scene) -> Iterator[Fault]:
 
 
 def _lateral_places(scene: Scene) -> Iterator[Fault]:
-    """Lateral places of free wires that lie where the wires do to which they are clamped."""
+    """Lateral positions of free wires that lie where the wires do to which they are clamped."""
     wires = scene.line.wires or []
     names = {wire.name for wire in wires}
     links = scene.line.links or []
@@ -171,8 +171,8 @@ def _lateral_places(scene: Scene) -> Iterator[Fault]:
         ):
             idle = ["sideways_m"]
             why = (
-                f"without stagger_m or course_m {wire.name} has the lateral place of the wire to "
-                "which it is clamped"
+                f"without stagger_m or course_m {wire.name} has the lateral position of the wire "
+                "to which it is clamped"
             )
         else:
             continue

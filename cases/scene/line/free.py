@@ -66,11 +66,11 @@ class FreeWireTable(WireTable):
         Annotated[list[Sideways], OneOrMore, Field(min_length=1, max_length=20_001)] | None
     ) = Field(
         None,
-        description="lateral place at the supports, alternating, or one for each; if absent "
+        description="lateral position at the supports, alternating, or one for each; if absent "
         "line.stagger_m of contact wires, that of the wire that it is clamped to, or "
         "line.messenger_stagger_m",
     )
-    sideways_m: float = Field(0.0, ge=-5, le=5, description="added to all its lateral places")
+    sideways_m: float = Field(0.0, ge=-5, le=5, description="added to all its lateral positions")
     course_m: list[Point] | None = Field(
         None,
         min_length=2,

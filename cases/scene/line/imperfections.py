@@ -50,8 +50,8 @@ class HeightTable(Table):
     )
     by_place: _Course | None = Field(
         None,
-        description="pairs of place along the track [m] and height [m], joined by a cubic spline; "
-        "beyond them the height stays",
+        description="pairs of position along the track [m] and height [m], joined by a cubic "
+        "spline; beyond them the height stays",
     )
 
     @model_validator(mode="after")

@@ -214,8 +214,8 @@ def _tensioned(
 def _courses(
     line: LineTable, table: FreeWireTable, role: Role, masts: np.ndarray
 ) -> tuple[Course | None, Course | None]:
-    """Heights and lateral places of a wire along the line; None where the wires that it is clamped
-    to say them."""
+    """Heights and lateral positions of a wire along the line; None where the wires that it is
+    clamped to say them."""
     if table.course_m is not None:
         along, sideways, height = np.array(table.course_m).T
         if table.from_supports_m is not None:
@@ -380,7 +380,7 @@ def dropper_tables(table: LineTable) -> dict[str, DropperTable]:
 
 
 def staggered(given: list[float], n_spans: int) -> tuple[float, ...]:
-    """Lateral places at all supports: one number alternates [m]."""
+    """Lateral positions at all supports: one number alternates [m]."""
     if len(given) > 1:
         return tuple(given)
     side = given[0]

@@ -73,7 +73,7 @@ class MotionTable(Table):
     )
     by_place: Course | None = Field(
         None,
-        description="pairs of place along the track [m] and deviation [m], joined by a cubic "
+        description="pairs of position along the track [m] and deviation [m], joined by a cubic "
         "spline: the track as a curve",
     )
     by_place_file: str | None = Field(

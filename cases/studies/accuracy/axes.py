@@ -118,7 +118,7 @@ def contacts(scene: Scene) -> list[Level]:
     damped = (*_NEWMARK, "numerics.newmark_gamma=0.55", "numerics.newmark_beta=0.28")
     return [
         *(
-            _level(f"linear_{k:g}", *_ELASTIC, f"{law}linear", f"{stiffness}{k:g}", quick=quick)
+            _level(f"linear_{k:.0f}", *_ELASTIC, f"{law}linear", f"{stiffness}{k:g}", quick=quick)
             for k, quick in ((2e4, False), (5e4, True), (1e5, False), (2e5, True), (1e6, False))
         ),
         _level("hertz", *_ELASTIC, f"{law}hertz"),

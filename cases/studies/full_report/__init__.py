@@ -1,1 +1,1 @@
-"""The full report of a run: its data sheets, its line to scale, its worst places seen closely."""
+"""The full report of a run: data sheets, line to scale, worst places seen closely, validation."""

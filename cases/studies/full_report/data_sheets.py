@@ -20,6 +20,7 @@ from catenary.meshgen.mesh import LineMesh
 from catenary.meshgen.slowest_wave import slowest_wave_of
 from catenary.meshgen.wires import Role, Wire
 from catenary.postproc.evaluate.wording import stiffness_words
+from catenary.postproc.files.own_files import PICTURES
 from catenary.postproc.report.pictures.figures import COLOURS, FewTicks, new_figure, own_style, tidy
 from catenary.postproc.report.sections.section import EvaluatedRun, Picture, Section, Text, number
 from catenary.postproc.report.study_table import StudyTable, texts_table
@@ -101,7 +102,7 @@ def _geometry(rest: LineAtRest, line: Line) -> Iterator[list[Any]]:
 def _courses(
     mesh: LineMesh, places: np.ndarray, wires: Sequence[Wire], x: np.ndarray
 ) -> np.ndarray:
-    """Lateral places and heights of wires at rest, (wires, 2, n) [m], NaN where one is absent."""
+    """Lateral positions and heights of wires at rest, (wires, 2, n) [m], NaN where absent."""
     found = np.full((len(wires), 2, x.size), np.nan)
     for of_wire, wire in zip(found, wires, strict=True):
         for nodes in mesh.pieces(wire.name):
@@ -210,11 +211,11 @@ def pantographs(scene: SceneOfRun, run: EvaluatedRun) -> Section:
         kinds.setdefault(said["kind"], (placement, said["description"]))
     pictures = [
         Picture(
-            f"pantograph_{n}",
+            file,
             f"Pantograph {_plain(name)}, {_how_drawn(one[0].data)}.",
             partial(_drawn, one[0].data),
         )
-        for n, (name, one) in enumerate(kinds.items(), start=1)
+        for file, (name, one) in zip(PICTURES["pantographs"], kinds.items(), strict=False)
     ]
     return Section("Data sheet of the pantographs", _pantograph_blocks(kinds), pictures)
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import partial
+from typing import Any
 
 import numpy as np
 
 from catenary.base.errors import InputError
-from catenary.cases.studies.full_report import data_sheets, worst_places
+from catenary.cases.studies.full_report import data_sheets, validation, worst_places
 from catenary.cases.studies.full_report.scene_of_run import SceneOfRun
 from catenary.postproc.report.report import SECTIONS
 from catenary.postproc.report.sections import dynamics, run_facts
@@ -25,7 +26,7 @@ _LARGEST = 1e7
 
 
 def _waves(scene: SceneOfRun, run: EvaluatedRun) -> Section:
-    """Motion of the contact wire over place and time, from the snapshots of the run."""
+    """Motion of the contact wire in space and time, from the snapshots of the run."""
     # Snapshots of films are read as waves are.
     from catenary.cases.studies.waves import pictures
     from catenary.cases.studies.waves.seen import waves_seen
@@ -33,7 +34,7 @@ def _waves(scene: SceneOfRun, run: EvaluatedRun) -> Section:
     from catenary.postproc.film.film_data import film_data
     from catenary.postproc.film.snapshots import Snapshots
 
-    heading, results = "Waves over place and time", run.results
+    heading, results = "Waves in space and time", run.results
     try:
         data = film_data(results)
         folder, until = results.path.parent, float(data.time[-1])
@@ -47,13 +48,15 @@ def _waves(scene: SceneOfRun, run: EvaluatedRun) -> Section:
     except InputError as error:
         return Section(heading, [Text(f"There is no picture: {error}.")])
     supports = results.line("support_x")
-    text = "Velocity of the lowest contact wire over place and time, and the pantographs' courses."
+    text = "Velocity of the lowest contact wire in space and time, and the pantographs' courses."
     picture = Picture("space_time", text, lambda: pictures.space_time(seen, theory, supports))
     return Section(heading, [], [picture])
 
 
 def full_sections(
-    scene: SceneOfRun | None, costs: tuple[Mapping[str, str], str] = ({}, "")
+    scene: SceneOfRun | None,
+    costs: tuple[Mapping[str, str], str] = ({}, ""),
+    statement: Mapping[str, Any] | None = None,
 ) -> list[SectionEntry]:
     """The sections of a full report in their order.
 
@@ -61,6 +64,7 @@ def full_sections(
     ----------
     scene : of the run; None leaves out what needs it
     costs : of its effects, as ``run_facts.effects`` takes them
+    statement : of the installation, as ``validation.section`` takes it
     """
     effects = SectionEntry("effects", partial(run_facts.effects, costs=costs))
     worst = partial(worst_places.section, scene)
@@ -73,6 +77,7 @@ def full_sections(
         if scene.has_train:
             sheet = partial(data_sheets.pantographs, scene)
             behind["above"] = [SectionEntry("pantographs", sheet, full=True)]
+    behind["run"] = [SectionEntry("validation", partial(validation.section, statement), full=True)]
     last = SectionEntry("signatures", partial(run_facts.signatures, text), full=True)
     return [
         *(

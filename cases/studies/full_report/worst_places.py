@@ -60,7 +60,7 @@ def _blocks(results: Results, places: WorstPlaces, causes: Causes) -> Iterator[T
     for first, spots, words in _KINDS:
         for spot in spots(places)[:1]:
             said = words.format(at=spot.place, v=spot.value, m=spot.median)
-            items = candidates(causes.at(spot.x), spot.stands_out)
+            items = candidates(causes.at(spot), spot.stands_out)
             yield Text(f"{said}{out(spot.stands_out)}.", "note", first, items)
     everywhere = causes.of_line()
     if everywhere:
@@ -166,6 +166,6 @@ def _passage(results: Results, spot: Spot) -> Figure:
     axes.axhline(0.0, color="#6b6b6b", linewidth=0.7)
     axes.margins(x=0.0)
     who = "leading pantograph" if results.n_pantographs > 1 else "pantograph"
-    tidy(axes, f"position of the {who} relative to this place [m]", "dropper force [N]")
+    tidy(axes, f"position of the {who} relative to the dropper [m]", "dropper force [N]")
     legend_above(axes)
     return figure

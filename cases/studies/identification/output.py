@@ -24,7 +24,7 @@ def parameters_table(found: Identification) -> StudyTable:
         Column("parameter", "parameter"),
         Column("unit", "unit"),
         Column("prior", "prior", ".6g"),
-        Column("prior_deviation", "+-", ".3g"),
+        Column("prior_deviation", "+-", ".6g"),
         Column("shown", "found", ">", in_files=False),
         Column("found"),
         Column("deviation", "+-", ".2g"),

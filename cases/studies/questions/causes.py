@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from catenary.cases.studies.questions.worst import Passage, dropper_likes, spans_in_stretch
+from catenary.cases.studies.questions.worst import Passage, Spot, dropper_likes, spans_in_stretch
 from catenary.meshgen.wires import Role
 from catenary.postproc.read.results import Results
 from catenary.solver.effects.all_effects import simulated
@@ -22,8 +22,8 @@ _NEAR, _LONGER = 0.1, 0.05
 # A reflection that keeps less of its amplitude is no candidate [-].
 _FELT = 0.01
 # Elasticity beyond that of other spans [-], height beyond them [m] and rest force of droppers
-# beyond their likes [-] from which on these are candidates.
-_SOFTER, _HIGHER, _HEAVIER = 0.1, 5e-3, 0.5
+# beyond their likes and gusts stronger than on other spans [-] from which on these are candidates.
+_SOFTER, _HIGHER, _HEAVIER, _GUSTIER = 0.1, 5e-3, 0.5, 0.1
 # Lift under a unit force below which a contact wire is held [m/N].
 _ANCHORED = 1e-9
 _POINTS = 101  # at which profiles of spans are compared
@@ -118,18 +118,23 @@ class Causes:
             *self._elastic(passage.span),
             *self._profile(passage.span),
             *self._droppers_at_rest(passage.start, passage.end),
-            *self._gusts(passage.span, passage.pantograph),
+            *(
+                self._gusts(passage.span, passage.pantograph)
+                if passage.std > passage.median
+                else ()
+            ),
         ]
 
-    def at(self, x: float) -> list[str]:
-        """Sentences on an arm or a dropper at a place [m]; its own span is looked at."""
+    def at(self, spot: Spot) -> list[str]:
+        """Sentences on an arm or a dropper; its own span is looked at."""
+        x = spot.x
         span = int(np.clip(np.searchsorted(self._masts, x, "right") - 1, 0, self._masts.size - 2))
         reach = 0.5 * float(self._masts[span + 1] - self._masts[span])
         return [
             *self._near(x - reach, x + reach),
             *self._elastic(span),
             *self._droppers_at_rest(x - reach, x + reach),
-            *self._gusts(span, 0),
+            *(self._gusts(span, 0) if spot.value > spot.median else ()),
         ]
 
     def of_line(self) -> list[str]:
@@ -287,10 +292,12 @@ class Causes:
                 )
 
     def _gusts(self, span: int, pantograph: int) -> Iterator[str]:
-        """Force of the gusts on a span when a pantograph comes, beside that on the others."""
+        """Gusts that are stronger on a span when a pantograph comes than on the others."""
         found = self._gust_forces.get(pantograph, {})
-        if span in found:
-            usual = float(np.median(list(found.values())))
+        if span not in found or len(found) < _FEWEST:
+            return
+        usual = float(np.median(list(found.values())))
+        if found[span] > (1.0 + _GUSTIER) * usual:
             yield (
                 f"gusts press or lift the wires of the span by up to {found[span]:.0f} N as it is "
                 f"passed, median of all spans {usual:.0f} N"

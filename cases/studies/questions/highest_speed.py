@@ -28,6 +28,7 @@ from catenary.cases.studies.sweep.output import remarks_of, table_of
 from catenary.cases.studies.sweep.together import Marching
 from catenary.cases.studies.sweep.variants import DIRECTION, VariedKey
 from catenary.cases.studies.sweep.variants import product as variants_of
+from catenary.postproc.evaluate.wording import decimals_that_tell, fixed
 from catenary.postproc.report.pictures import figures
 from catenary.postproc.report.study_table import Column, Row, StudyTable, write_files
 
@@ -330,8 +331,10 @@ def table_of_criteria(study: SpeedStudy) -> StudyTable:
         Column("highest_km_h", "to [km/h]", ".1f"),
         Column("fails_at_km_h", "fails at", ".1f"),
         Column("direction", "direction"),
-        Column("value", "with", ".4g"),
-        Column("limit", "limit", ".4g"),
+        Column("value"),
+        Column("limit"),
+        Column("shown_value", "with", in_files=False),
+        Column("shown_limit", "limit", in_files=False),
         Column("unit", "unit"),
         Column("more_stretches_km_h", "holds again"),
         *(Column(f"highest_{way}_km_h") for way in DIRECTIONS),
@@ -343,6 +346,8 @@ def table_of_criteria(study: SpeedStudy) -> StudyTable:
 def _cells(one: Holds, slowest: float) -> Row:
     first = one.stretches[0] if one.stretches else None
     value, limit = one.fails_by or (None, None)
+    digits = decimals_that_tell(value, limit, 2)
+    shown = [None if own is None else fixed(own, digits) for own in (value, limit)]
     return {
         "criterion": one.criterion,
         "holds_from_km_h": None if first is None else first.slowest,
@@ -350,6 +355,8 @@ def _cells(one: Holds, slowest: float) -> Row:
         "fails_at_km_h": slowest if first is None else first.fails_at,
         "value": value,
         "limit": limit,
+        "shown_value": shown[0],
+        "shown_limit": shown[1],
         "direction": one.direction,
         **{f"highest_{way}_km_h": one.highest.get(way) for way in DIRECTIONS},
         "unit": one.unit,
@@ -373,8 +380,10 @@ def as_text(study: SpeedStudy) -> str:
         if first.fails_at is None:
             answer += ", the end of the range."
         else:
-            way = "in both directions" if whole.direction == BOTH else whole.direction
-            answer += f"; at {first.fails_at:.1f} km/h fails {way}: {'; '.join(whole.stopped_by)}."
+            both = whole.direction == BOTH
+            way = "in both directions" if both else f"in the {whole.direction} direction"
+            by = "; ".join(whole.stopped_by)
+            answer += f"; at {first.fails_at:.1f} km/h stopped {way} by: {by}."
     n_speeds = len(study.ended) // len(study.directions)
     lines = [f"{study.case}, {n_speeds} speeds {where}. {answer}", ""]
     lines += [table_of_criteria(study).text(), ""]
@@ -434,7 +443,7 @@ def draw(study: SpeedStudy) -> Figure | None:
         # Limits of all criteria whose names begin so, as one look of dashed lines.
         for places in _limits(study, criterion):
             axes.plot(*zip(*places, strict=True), "--", color=figures.LIMIT, linewidth=1.0)
-        figures.tidy(axes, "", STATISTICS[statistic].meaning)
+        figures.tidy(axes, "", STATISTICS[statistic].meaning.replace(", ", ",\n"))
     if any(_limits(study, criterion) for _, criterion in _PANELS):
         panels[0].plot([], [], "--", color=figures.LIMIT, linewidth=1.0, label="limit")
     figures.legend_above(panels[0], columns=min(len(names) * len(looks) + 1, 4))

@@ -104,13 +104,13 @@ def _of_spots(title: str, spots: Sequence[Spot], words: str, causes: Causes) -> 
     for one in spots:
         said = words.format(at=one.place, v=one.value, m=one.median)
         lines.append(f"  {said}{out(one.stands_out)}")
-        lines += _told(causes.at(one.x), one.stands_out)
+        lines += _told(causes.at(one), one.stands_out)
     return lines
 
 
 def candidates(said: Sequence[str], is_out: bool | None) -> Sequence[str]:
-    """Candidates of a place, or that there is none; one like the others needs none."""
-    return said or ([] if is_out is False else [NONE])
+    """Candidates of a place, or that there is none for one that stands out."""
+    return said or ([NONE] if is_out else [])
 
 
 def _told(said: Sequence[str], is_out: bool | None) -> list[str]:
@@ -139,7 +139,7 @@ def _spans_table(passages: Sequence[Passage], causes: Causes, names: Sequence[st
 
 def _supports_table(arms: Sequence[Spot], causes: Causes) -> StudyTable:
     heads = ("x_m", "wire", "max_uplift_mm", "median_mm", "stands_out", "causes")
-    return _table(heads, ((*one[1:], causes.at(one.x)) for one in arms))
+    return _table(heads, ((*one[1:], causes.at(one)) for one in arms))
 
 
 def _droppers_table(places: WorstPlaces, causes: Causes) -> StudyTable:
@@ -150,7 +150,7 @@ def _droppers_table(places: WorstPlaces, causes: Causes) -> StudyTable:
         stands_out = (times is not None and times.stands_out) or one.stands_out
         slack_s = 0.0 if times is None else times.value
         values = one.value, one.median, least, slack_s, stands_out
-        cells.append((one.x, one.wire, *values, causes.at(one.x)))
+        cells.append((one.x, one.wire, *values, causes.at(one)))
     heads = ("x_m", "wire", "max_N", "usual_max_N", "min_N", "slack_s", "stands_out", "causes")
     return _table(heads, cells)
 

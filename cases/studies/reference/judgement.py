@@ -95,21 +95,36 @@ def judged_row(
     bounds : least and largest value, None if there are none
     rule : has ``clause`` and ``compared``; None if there are no bounds
     """
-    known = QUANTITIES.get(quantity)
     row: dict[str, Any] = dict.fromkeys(column.name for column in COLUMNS)
     row |= {"configuration": where, "of": of, "quantity": quantity, "value": value}
-    row |= {"meaning": known.meaning if known else quantity, "verdict": NOT_JUDGED, "mark": ""}
+    row["verdict"] = NOT_JUDGED
     if bounds is not None and rule is not None:
         lower, upper = row["lower"], row["upper"] = bounds
         row["verdict"] = PASSED if lower <= value <= upper else FAILED
         row["clause"], row["compared"] = rule["clause"], rule["compared"]
-        row["mark"] = "" if rule["compared"] else UNCOMPARED
-    return row
+    return row | _words(row)
+
+
+def _words(row: Mapping[str, Any]) -> dict[str, str]:
+    """What readers see of a row beside what files have of it."""
+    known = QUANTITIES.get(row["quantity"])
+    mark = UNCOMPARED if row["compared"] is False else ""
+    return {"meaning": known.meaning if known else row["quantity"], "mark": mark}
 
 
 def table_of(rows: Sequence[dict[str, Any]], title: str) -> StudyTable:
     """The rows as a table."""
     return StudyTable(COLUMNS, rows, title)
+
+
+def read_table(rows: Sequence[Mapping[str, Any]], title: str) -> StudyTable:
+    """The rows for readers, also those of a file, without columns that are empty throughout.
+
+    Whether a figure is within the reference's bar is counted elsewhere, and seen from both.
+    """
+    rows = [{**row, **_words(row), "within_bar": None} for row in rows]
+    filled = [one for one in COLUMNS if any(row[one.name] not in (None, "") for row in rows)]
+    return StudyTable(filled, rows, title)
 
 
 def any_failed(rows: Sequence[Mapping[str, Any]]) -> bool:

@@ -9,7 +9,14 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from catenary.cases.studies.reference.judgement import FAILED, NOT_JUDGED, counts, judged, table_of
+from catenary.cases.studies.reference.judgement import (
+    FAILED,
+    NOT_JUDGED,
+    counts,
+    judged,
+    read_table,
+    table_of,
+)
 from catenary.cases.studies.reference.others_results import Others
 from catenary.cases.studies.reference.validation import Step, Validation
 from catenary.postproc.evaluate.wording import UNCOMPARED_SAYS
@@ -76,7 +83,7 @@ def validation_text(found: Validation) -> str:
         lines.append(f"{number}. {step.title}: {_said(step)}")
         failed = [row for row in step.rows if row["verdict"] == FAILED]
         if failed:
-            lines.append(table_of(failed, "").text())
+            lines.append(read_table(failed, "").text())
     return "\n".join([*lines, "", *_closing(found)])
 
 
@@ -126,7 +133,7 @@ def _sections(found: Validation) -> Iterator[Section]:
     for number, step in enumerate(found.steps, start=1):
         blocks: list[Text | StudyTable] = [Text(_said(step))]
         if rows := _shown(step):
-            blocks.append(table_of(rows, ""))
+            blocks.append(read_table(rows, ""))
         yield Section(f"{number}. {step.title}", blocks)
 
 
@@ -135,7 +142,7 @@ def _markdown(found: Validation) -> str:
     for number, step in enumerate(found.steps, start=1):
         parts.append(f"## {number}. {step.title}\n\n{_said(step)}")
         if rows := _shown(step):
-            parts.append(table_of(rows, "").markdown())
+            parts.append(read_table(rows, "").markdown())
     return "\n\n".join(["# Validation by EN 50318", *parts, *_closing(found)]) + "\n"
 
 

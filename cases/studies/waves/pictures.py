@@ -1,4 +1,4 @@
-"""Waves as pictures: over place and time, in the frame of the train, over wavenumber."""
+"""Waves as pictures: in space and time, in the frame of the train, over wavenumber."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _WIDEST, _MOST = 1.2, 1600
 def space_time(
     seen: WavesSeen, theory: WaveTheory, supports: np.ndarray, what: str = "pantographs"
 ) -> Figure:
-    """Velocity of the contact wire over place and time, with supports and wave speeds, and with
+    """Velocity of the contact wire in space and time, with supports and wave speeds, and with
     the course of what moves, pantographs or a force."""
     figure = figures.new_figure(6.4)
     axes = figure.add_subplot()
@@ -45,7 +45,7 @@ def space_time(
         axes.axvline(x, color=figures.LIGHT, linewidth=0.6, zorder=1)
     axes.set_xlim(seen.x[0], seen.x[-1])
     axes.set_ylim(seen.time[0], seen.time[-1])
-    figures.tidy(axes, "place along the track [m]", "time [s]")
+    figures.tidy(axes, "position along the track [m]", "time [s]")
     figures.legend_above(axes, 3)
     return figure
 

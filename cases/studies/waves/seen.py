@@ -1,4 +1,4 @@
-"""Motion of the contact wire in a run, over place and time, and over their frequencies; energy of
+"""Motion of the contact wire in a run, in space and time, and over their frequencies; energy of
 the line ahead of its train, under it and behind it. Both are found from snapshots of the uplift."""
 
 from __future__ import annotations

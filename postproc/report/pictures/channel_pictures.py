@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from catenary.postproc.files.own_files import CHANNEL_PICTURE
 from catenary.postproc.read.results import Results
 from catenary.postproc.report.pictures.envelope import thinned, thinned_ranges
 from catenary.postproc.report.pictures.figures import (
@@ -56,7 +57,7 @@ def _picture_of(results: Results, channel: Channel) -> Figure | None:
 
 def picture_name(channel: Channel) -> str:
     """Name of a channel's picture without its end."""
-    return f"channel_{channel.name}"
+    return f"{CHANNEL_PICTURE}{channel.name}"
 
 
 def _sentence(channel: Channel) -> str:

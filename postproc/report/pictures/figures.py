@@ -37,8 +37,9 @@ RUN_IN, WORST = "#fff4cc", "#fbd9b5"
 WIDTH = 9.0
 _RESOLUTION = 130
 # Room around panels whose layout is not computed [inch]: tick labels of six characters and a
-# label at the left; a legend or a title above; tick labels and a label below.
-_LEFT, _RIGHT, _ABOVE, _BELOW = 0.9, 0.12, 0.32, 0.52
+# label at the left; half a tick label at the right; a legend or a title above; tick labels and a
+# label below.
+_LEFT, _RIGHT, _ABOVE, _BELOW = 0.9, 0.2, 0.32, 0.52
 # Between panels that share their x axis, whose inner tick labels are not drawn.
 _SHARED_GAP = 0.44
 # Intervals between ticks at most, along x and y, and their sizes: a tick with its label and its

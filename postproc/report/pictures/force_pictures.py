@@ -237,14 +237,14 @@ def force_histogram(results: Results, statistics: RunStatistics) -> Figure:
 
 @own_style()
 def lateral_places(results: Results) -> Figure:
-    """Lateral place of each contact wire on each strip along the track, and where strips end."""
+    """Lateral position of each contact wire on each strip along the track, and where strips end."""
     shown = {
         p: [(word or "contact wire", column) for word, column in zip(words, own, strict=True)]
         for p, (words, own) in enumerate(
             zip(results.contact_names(), map(_all_of, results.contact_columns()), strict=True)
         )
     }
-    label = "place on the strip, to the left [m]"
+    label = "position on the strip, to the left [m]"
     figure, panels = panels_along_track(results, "lateral_place", shown, label)
     for axes, half_length in zip(panels, results.facts_of("strip_half_length"), strict=True):
         if np.isfinite(half_length):

@@ -248,14 +248,16 @@ def _annotations(axes: Axes, own: str) -> Iterator[dict[str, Any]]:
                "showarrow": False, "yshift": 10 if above else -10, "font": font}  # fmt: skip
     title = axes.get_title(loc="left")
     if title:
-        yield {"text": title.replace("\n", "<br>"), "x": 0.0, "y": 1.0, "xref": f"x{own} domain",
-               "xanchor": "left", "yref": f"y{own} domain", "yanchor": "bottom",
-               "showarrow": False, "align": "left"}  # fmt: skip
+        # That of a narrow panel at the right may be longer than the panel.
+        side, x = ("right", 1.0) if axes.get_position().x0 > 0.5 else ("left", 0.0)
+        yield {"text": title.replace("\n", "<br>"), "x": x, "y": 1.0, "xref": f"x{own} domain",
+               "xanchor": side, "yref": f"y{own} domain", "yanchor": "bottom",
+               "showarrow": False, "align": side}  # fmt: skip
 
 
 def _named(label: object) -> dict[str, str]:
     text = str(label)
-    return {} if text.startswith("_") else {"name": text}
+    return {} if label is None or text.startswith("_") else {"name": text}
 
 
 def _numbers(values: Any) -> list[float | None]:

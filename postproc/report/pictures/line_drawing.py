@@ -23,7 +23,7 @@ _COLOUR = {
     Role.AUXILIARY: COLOURS[2],
     Role.STITCH: COLOURS[3],
 }
-# Exaggerations of heights and lateral places, and sizes of figure and panels [inch].
+# Exaggerations of heights and lateral positions, and sizes of figure and panels [inch].
 _FACTORS = (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000)
 _WIDTH, _HEIGHT = 9.0, 6.7
 _LEFT, _LONG, _CROSS = 0.8, 5.6, 1.75
@@ -143,10 +143,10 @@ def _plan_view(
     _wires(axes, line, mesh, points, 1)
     factor = _to_scale(axes, points, stretch, 1, _PLAN, reach)
     _masts(axes, line)
-    axes.set_xlabel("along the track [m]")
+    axes.set_xlabel("position along the track [m]")
     axes.set_ylabel("to the left [m]")
     width = "" if half_head is None else "; shaded: working length of the pan head"
-    axes.set_title(f"plan view, lateral places {_times(factor)}{width}", loc="left", fontsize=10)
+    axes.set_title(f"plan view, lateral positions {_times(factor)}{width}", loc="left", fontsize=10)
 
 
 def _cross_section(

@@ -66,7 +66,7 @@ def _pictures(run: EvaluatedRun) -> Iterator[Picture]:
         text = "Shares of the contact wires in the contact force, below 20 Hz."
         yield Picture("wire_forces", text, lambda: forces.wire_forces(results))
     if results.has("lateral_place"):
-        text = "Lateral place of the contact wires on the strips."
+        text = "Lateral position of the contact wires on the strips."
         yield Picture("lateral_place", text, lambda: lateral_places(results))
     known = len(statistics.pantographs) - len(statistics.complaints)
     if known > 1:  # of one the table says it all

@@ -117,7 +117,8 @@ def from_above(run: EvaluatedRun) -> Section:
     results = run.results
     text = "The line at rest from above, and its steady arms."
     picture = Picture("plan_view", text, lambda: plan_view(results))
-    return Section("Line from above", _lateral(results), [picture], _registration(results))
+    heading = "Line from above" if results.has_static("contact_y") else "Steady arms"
+    return Section(heading, _lateral(results), [picture], _registration(results))
 
 
 def _lateral(results: Results) -> Iterator[Text]:
@@ -127,7 +128,7 @@ def _lateral(results: Results) -> Iterator[Text]:
     low, high = (number(float(end)) for end in (arms.tension.min(), arms.tension.max()))
     n_pushed = np.count_nonzero(arms.pushed)
     yield Text(
-        f"The {counted(len(arms.x), 'steady arm')} pull the wires at rest by "
+        f"The {counted(len(arms.x), 'steady arm')} pull the wires at rest with "
         f"{low if low == high else f'{low} to {high}'} N"
         + (f"; {n_pushed} of them are pushed, with a negative force." if n_pushed else ".")
     )
@@ -137,9 +138,9 @@ def _lateral(results: Results) -> Iterator[Text]:
     for name, wire in results.contact_profiles().items():
         assert wire.y is not None
         own = wire.y[(wire.x >= first) & (wire.x <= last)]
-        words = name.replace("_", " ").capitalize()
+        words = name.replace("_", " ")
         yield Text(
-            f"{words} lies between {own.min():.3f} and {own.max():.3f} m to the left of the "
+            f"The {words} lies between {own.min():.3f} and {own.max():.3f} m to the left of the "
             "track's axis in the running spans."
         )
 

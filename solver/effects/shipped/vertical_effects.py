@@ -347,7 +347,7 @@ register(
     Effect(
         "vehicle_motion",
         "motion of the vehicle under its pantographs",
-        "height and lateral place of the pantographs' bases as functions of time and place",
+        "height and lateral position of the pantographs' bases as functions of time and place",
         "given motion, or spectra of track irregularities (FRA; ORE B176)",
         default=False,
         applies=lambda p: p.train.vehicle is not None,

@@ -217,8 +217,8 @@ CHANNELS: dict[str, Channel] = {
         Channel(
             "lateral_place",
             "m",
-            "lateral place of a contact wire on a strip, to the left of the strip's middle, strip "
-            "by strip in the order of the wires; NaN where it is not on the strip",
+            "lateral position of a contact wire on a strip, to the left of the strip's middle, "
+            "strip by strip in the order of the wires; NaN where it is not on the strip",
             CONTACT,
             lambda sources: sources.pantographs.lateral_place,
             when=lambda train: bool(train.laws and train.laws.lateral),

@@ -70,16 +70,16 @@ IDLE = {
         "line.wires.1.stagger_m is [0.1] m on the command line (--set); nothing holds "
         "auxiliary_wire sideways but the wires to which both of its ends are clamped",
     ),
-    "lateral place beside a wire between clamps": (
+    "lateral position beside a wire between clamps": (
         FREE,
         ["line.wires.1.sideways_m=0.1"],
         "line.wires.1.sideways_m is 0.1 m on the command line (--set); nothing holds "
         "auxiliary_wire",
     ),
-    "lateral place beside a wire with one clamp": (
+    "lateral position beside a wire with one clamp": (
         FREE,
         ["line.wires.2.sideways_m=0.1"],
-        "without stagger_m or course_m stitch_wire has the lateral place of the wire to which it",
+        "without stagger_m or course_m stitch_wire has the lateral position of the wire to which",
     ),
     "seed of heights that are given": (
         SOUND,

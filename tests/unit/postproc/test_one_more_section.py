@@ -8,6 +8,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from catenary.postproc.evaluate import statistics
+from catenary.postproc.files.own_files import PICTURES
 from catenary.postproc.read.results import Results
 from catenary.postproc.report.pictures import figures
 from catenary.postproc.report.report import SECTIONS, drawings, write_report
@@ -46,6 +47,9 @@ def test_a_section_is_one_function(
 ) -> None:
     entries = [*SECTIONS, SectionEntry("speed", speed_section)]
     monkeypatch.setattr("catenary.postproc.report.report.SECTIONS", entries)
+    with pytest.raises(ValueError, match=r"PICTURES of section speed lacks .'course'"):
+        write_report(run_folder, tmp_path)
+    monkeypatch.setitem(PICTURES, "speed", ("course",))
     files = {path.name for path in write_report(run_folder, tmp_path).files}
     assert "course.png" in files
     page = (tmp_path / "report.html").read_text()

@@ -15,6 +15,7 @@ from catenary.postproc.files.disk import broken_write
 from catenary.postproc.files.disk_errors import reason, remedy
 from catenary.postproc.files.own_files import (
     OWN_FILES,
+    PICTURES,
     REPORT_FILES,
     part_of,
     remove_parts,
@@ -176,13 +177,28 @@ def test_a_reports_files_are_all_declared(tmp_path: Path, make_march: Any, recor
     path = record_run(tmp_path / "run.h5", make_march(), energy_every=20)
     written = {one.name for one in write_report(path, tmp_path).files}
     assert written <= set(REPORT_FILES)
-    # Pictures of parts that not every run has.
+    # All else is declared because other runs have it.
     lateral = "lateral_place", "lateral_displacement"
-    ends = (f"channel_{name}.png" for name in (*GAUGES, *lateral, "stop_force"))
-    assert set(REPORT_FILES) - written <= {
-        *("strip_forces.png", "wire_forces.png", "plan_view.png", "registration.csv"),
-        *ends,
-    }
+    missing = {f"channel_{name}" for name in (*GAUGES, *lateral, "stop_force")}
+    missing |= {"strip_forces", "wire_forces", "lateral_place", "plan_view", "worst_support"}
+    for section in ("spectrum", "waves", "worst", "line", "pantographs"):
+        missing |= set(PICTURES[section])
+    drawn = {name for name in REPORT_FILES if name.endswith(".png")}
+    assert drawn - written <= {f"{name}.png" for name in missing}
+
+
+def test_an_earlier_reports_files_go_and_a_users_stay(
+    tmp_path: Path, make_march: Any, record_run: Any
+) -> None:
+    from catenary.postproc.report.report import write_report
+
+    path = record_run(tmp_path / "run.h5", make_march(n_steps=300))
+    mine = {"run.h5", "input.toml", "variant.json", "notes.pdf", "worst_supports.csv"}
+    for name in (*mine - {"run.h5"}, *REPORT_FILES):
+        (tmp_path / name).write_text("x")
+    written = {one.name for one in write_report(path, tmp_path, vector=True).files}
+    assert {"uplift.svg", "report.html"} <= written
+    assert {one.name for one in tmp_path.iterdir()} == mine | written
 
 
 def test_a_report_that_cannot_be_written_is_a_sentence(
