@@ -32,6 +32,7 @@ from catenary.cases.studies.sweep.jobs import (
     scene_of,
 )
 from catenary.cases.studies.sweep.variants import DIRECTION, Variant
+from catenary.postproc.evaluate.wording import duration
 from catenary.postproc.files.run_schema import DONE, INTERRUPTED
 
 # Variants of a piece of work at most: some seconds, that a stop may cost. Of few variants pieces
@@ -151,8 +152,8 @@ def _ended(
                 ended += [Ended(v, *row) for v, row in zip(piece, rows, strict=True)]
             spent, n_left = time.perf_counter() - begin, len(variants) - len(ended)
             progress(
-                f"[{len(ended)}/{len(variants)}] {spent:.0f} s gone, about "
-                f"{spent / len(ended) * n_left:.0f} s left"
+                f"[{len(ended)}/{len(variants)}] {duration(spent)} gone, about "
+                f"{duration(spent / len(ended) * n_left)} left"
             )
     except Interrupted:
         ended.append(Ended(variants[len(ended)], INTERRUPTED))
