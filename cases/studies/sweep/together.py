@@ -31,7 +31,7 @@ from catenary.cases.studies.sweep.jobs import (
     interrupted,
     scene_of,
 )
-from catenary.cases.studies.sweep.variants import DIRECTION, Variant
+from catenary.cases.studies.sweep.variants import Variant
 from catenary.postproc.evaluate.wording import duration
 from catenary.postproc.files.run_schema import DONE, INTERRUPTED
 
@@ -180,7 +180,7 @@ def pieces_of_work(variants: Sequence[Variant], size: int) -> list[list[Variant]
 def _of_the_line(variant: Variant) -> tuple[str, ...]:
     """The changes of a variant that its line depends on: its direction and assignments."""
     changes = (one for one in variant.assignments if one.split(".")[0] not in OF_THE_TRAIN)
-    return (variant.varied.get(DIRECTION, ""), *changes)
+    return (variant.direction, *changes)
 
 
 @dataclass
