@@ -16,10 +16,9 @@ from scipy.sparse.csgraph import minimum_spanning_tree
 from scipy.spatial.distance import cdist
 
 from catenary.base.errors import InputError
-from catenary.mbs.frame import SPACE
 from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.mechanism.pantograph_data import HOLDER, MultibodyData, stand
-from catenary.mbs.rigid.bodies import Motion, rotation_matrix
+from catenary.mbs.rigid.bodies import SPACE, Motion, rotation_matrix
 from catenary.mbs.rigid.joints import Constant, PrescribedPoint
 from catenary.mbs.rigid.statics import equilibrium
 

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
 
 from catenary.base.errors import InputError
-from catenary.postproc.evaluate.statistics import RunStatistics
-from catenary.postproc.read.results import Results
-from catenary.postproc.report.report import drawings
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from catenary.postproc.evaluate.statistics import RunStatistics
+    from catenary.postproc.read.results import Results
+    from catenary.postproc.report.sections.section import Picture
 
 
 class Pictures:
@@ -31,6 +32,11 @@ class Pictures:
         self._results = results
         self._evaluated = evaluated
 
+    def _drawings(self) -> Iterator[Picture]:
+        from catenary.postproc.report.report import drawings
+
+        return drawings(self._results, self._evaluated())
+
     @property
     def names(self) -> tuple[str, ...]:
         """Pictures that the report of this run has, by the names of their files.
@@ -40,7 +46,7 @@ class Pictures:
         >>> "droppers" in run.plot.names
         True
         """
-        return tuple(name for name, *_ in drawings(self._results, self._evaluated()))
+        return tuple(name for name, *_ in self._drawings())
 
     def __call__(self, name: str) -> Figure:
         """The picture of a name out of ``names``.
@@ -65,7 +71,7 @@ class Pictures:
         """
         from catenary.postproc.report.pictures.figures import fitted
 
-        for own, _, draw in drawings(self._results, self._evaluated()):
+        for own, _, draw in self._drawings():
             if own == name and (figure := draw()) is not None:
                 return fitted(figure)
         raise InputError(f"the run has no picture {name}; it has {', '.join(self.names)}")

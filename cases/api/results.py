@@ -9,21 +9,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+# Of what evaluates a run, each method loads its own: to open a folder takes none of it.
 from catenary.base.errors import InputError
-from catenary.cases.scene.load import Draft
 from catenary.pictures import Pictures
-from catenary.postproc.evaluate import filters
-from catenary.postproc.evaluate import statistics as stats
-from catenary.postproc.evaluate.acceptance import criteria_of
-from catenary.postproc.evaluate.statistics import RunStatistics
 from catenary.postproc.read.results import Results
-from catenary.postproc.report.summary import summarise
-from catenary.scenes import Scene
 from catenary.solver.time_loop.views import channels
 
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
+
+    from catenary.postproc.evaluate.statistics import RunStatistics
+    from catenary.scenes import Scene
 
 # Name of the dimension of a channel's columns, by the part that a column is of.
 _COLUMNS = {
@@ -105,12 +102,17 @@ class Run:
         >>> run.scene["train.speed_km_h"]
         250.0
         """
+        from catenary.cases.scene.load import Draft
+        from catenary.scenes import Scene
+
         file = "the scene of the run" if self._folder is None else str(self._results.path)
         return Scene(Draft(self._results.attributes["config"], file, recorded=True))
 
     @cached_property
     def _evaluated(self) -> RunStatistics:
-        return stats.evaluate(self._results)
+        from catenary.postproc.evaluate.statistics import evaluate
+
+        return evaluate(self._results)
 
     @cached_property
     def summary(self) -> dict[str, Any]:
@@ -121,6 +123,9 @@ class Run:
         >>> run.summary["case"], run.summary["speed_km_h"]
         ('en50318_2002', 250.0)
         """
+        from catenary.postproc.evaluate.acceptance import criteria_of
+        from catenary.postproc.report.summary import summarise
+
         criteria = criteria_of(self._results, self._evaluated)
         return summarise(self._results, self._evaluated, criteria)
 
@@ -313,6 +318,8 @@ class Run:
         force = self.force
         stored = self._results.stored_filtered_force()
         if stored is None:
+            from catenary.postproc.evaluate import filters
+
             stored = filters.low_pass(force.values, self._results.dt), dict(filters.ABOUT)
         values, about = stored
         return force.copy(data=values).assign_attrs(about).rename("filtered_force")
@@ -360,11 +367,13 @@ class Run:
         """
         import xarray as xr
 
+        from catenary.postproc.evaluate.statistics import slackens_at_all
+
         results, found = self._results, self._evaluated.droppers
         dim = _COLUMNS[channels.DROPPER]
         names = np.array([*results.roles], dtype=str)
         upper, lower = results.dropper_wires().T
-        slack = (found.lowest <= 0.0) & stats.slackens_at_all(results)
+        slack = (found.lowest <= 0.0) & slackens_at_all(results)
         of_force = {"units": "N"}
         recorded = {"force": self.channel("dropper_force")} if results.has("dropper_force") else {}
         return xr.Dataset(

@@ -286,7 +286,7 @@ def _array_script(
     from catenary.cases.run.planning.needs import total_needs
     from catenary.cases.run.planning.slurm_script import array_script
     from catenary.cases.studies.case_study import make_plan
-    from catenary.cases.studies.sweep.sweep import sweep_of
+    from catenary.cases.studies.sweep.sweep import whole_runs_of
 
     chosen, options = words.split()
     if study:
@@ -296,7 +296,7 @@ def _array_script(
         verb = ["run", *told, "--study"]
     else:
         variants = read_variants(vary, named)
-        jobs = sweep_of(words.draft()[0], variants, out).jobs
+        jobs = whole_runs_of(words.draft()[0], variants, out).jobs
         verb = ["sweep", *told, *(word for text in vary or [] for word in ("--vary", text))]
         verb += [] if named is None else ["--variants", str(named.absolute())]
     needs = total_needs(each.scene for each in jobs)

@@ -11,8 +11,6 @@ import os
 import resource
 import sys
 
-from catenary.base.parallel import launched_by_mpirun
-
 
 def choose() -> None:
     """Set what Python and libraries read when they are loaded. Not collective."""
@@ -33,11 +31,6 @@ def choose() -> None:
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     # A crash ends the process: Open MPI's handler, which prints a trace, may wait for ever.
     os.environ.setdefault("OMPI_MCA_opal_signal", "")
-    # One process alone starts no others: Open MPI need not start its daemon beside it for them.
-    os.environ.setdefault("OMPI_MCA_ess_singleton_isolated", "1")
-    if not launched_by_mpirun():
-        # Nor need it try the networks of a cluster, a third of its start.
-        os.environ.setdefault("OMPI_MCA_pml", "ob1")
 
 
 # Address space that program and libraries take before any data, with a margin; a report of a short

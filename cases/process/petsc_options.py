@@ -109,8 +109,8 @@ def options_of(table: Mapping[str, Any]) -> Iterator[list[str]]:
 def idle_names() -> set[str]:
     """The options that PETSc holds and never looked up. Not collective.
 
-    petsc4py does not expose PetscOptionsUsed, which is public in ``petscoptions.h`` and is called
-    through ctypes.
+    PetscOptionsUsed is public in ``petscoptions.h``, and called through ctypes: petsc4py 3.18 lacks
+    ``Options.used``, which newer versions have.
     """
     from catenary.base.petsc import PETSc
 

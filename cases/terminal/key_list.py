@@ -18,7 +18,7 @@ from catenary.cases.scene.keys.keys import ANY, kind_of, tables_in
 from catenary.cases.scene.keys.units import unit_of
 from catenary.cases.scene.keys.usual_values import USUAL, Usual, usual_range
 from catenary.postproc.standards.library import DEFAULT, editions_of, shipped
-from catenary.postproc.standards.supplies import SYSTEMS
+from catenary.postproc.standards.quantities import SYSTEMS
 from catenary.solver.effects import all_effects as effects
 
 # Words that a check takes, where the key's type is plain text.

@@ -11,8 +11,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from catenary.base.errors import InputError
-from catenary.mbs.frame import SPACE
 from catenary.solver.kernels import native
+
+# Name of the frame at rest, to which bodies can be joined as well.
+SPACE = "space"
 
 Vector = Sequence[float] | np.ndarray
 

@@ -1,7 +1,8 @@
 """Facts of a run in SI units: derived once from its problem, stored in its result file.
 
 One table for the writer, the reader, their checks and the documentation. To add a fact, add a row
-to ``FACTS``; whatever evaluates a run reads it with ``Results.fact`` or ``Results.facts_of``.
+to ``FACTS``; whatever evaluates a run reads it with ``Results.fact`` or ``Results.facts_of``. A
+reader needs no effects and no line: what facts are derived with is loaded when they are derived.
 """
 
 from __future__ import annotations
@@ -12,14 +13,11 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from catenary.meshgen.slowest_wave import slowest_wave
 from catenary.meshgen.wires import Role, Wire
-from catenary.solver.effects.all_effects import simulated
 from catenary.solver.problem.contact_laws import ContactLaw, HertzLaw, LinearLaw
 from catenary.solver.problem.ends import Periodic
 from catenary.solver.problem.integrator_parameters import Integration, integration_of
 from catenary.solver.time_loop.views.channels import PANTOGRAPH, RUN
-from catenary.solver.wind.spectra import PEAK
 
 if TYPE_CHECKING:
     from catenary.meshgen.mesh import LineMesh
@@ -77,6 +75,8 @@ def facts_of(problem: Problem, mesh: LineMesh, dropper_length: np.ndarray) -> di
     dropper_length : ndarray, shape (n_droppers,)
         Length of droppers at rest [m].
     """
+    from catenary.solver.effects.all_effects import simulated
+
     source = Derivation(problem, mesh, dropper_length, simulated(problem))
     return {name: np.asarray(fact.of(source), dtype=float) for name, fact in FACTS.items()}
 
@@ -136,8 +136,16 @@ def _stiffness_under(law: ContactLaw, force: float) -> float:
     return math.inf
 
 
+def _slowest_wave(source: Derivation) -> float:
+    from catenary.meshgen.slowest_wave import slowest_wave
+
+    return slowest_wave(source.problem.line)
+
+
 def _strongest_gust(source: Derivation) -> float:
     """Of gusts whose drag is linearised, over the mean wind."""
+    from catenary.solver.wind.spectra import PEAK
+
     wind = source.laws.wind
     if wind is None or wind.gusts is None or wind.quadratic:
         return NONE
@@ -214,7 +222,7 @@ FACTS: dict[str, Fact] = {
         "m/s",
         "speed of the contact wire's slowest wave at the start, that of a string unless supports "
         "and bending stiffness carry it; of several the smallest",
-        lambda source: slowest_wave(source.problem.line),
+        _slowest_wave,
         low=_POSITIVE,
         high=1e6,
     ),

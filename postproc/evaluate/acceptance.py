@@ -9,7 +9,7 @@ from catenary.postproc.evaluate.verdict import Criterion, judge, quantities_of, 
 from catenary.postproc.read.results import Results
 from catenary.postproc.standards.book import Conditions, RuleBook
 from catenary.postproc.standards.library import DEFAULT, book_named, books_of_entries
-from catenary.postproc.standards.supplies import KMH
+from catenary.postproc.standards.quantities import KMH
 
 _STOPS = "uplift_stops"  # the effect by which steady arms have stops
 

@@ -21,7 +21,7 @@ from catenary.postproc.evaluate.statistics import (
 )
 from catenary.postproc.evaluate.wire_at_rest import WireAtRest, wire_at_rest
 from catenary.postproc.read.results import Results
-from catenary.postproc.standards.supplies import KMH
+from catenary.postproc.standards.quantities import KMH
 from catenary.solver.problem.watched_links import TENSION
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from catenary.postproc.evaluate.observations import Observation
 from catenary.postproc.standards.book import Conditions, LimitRow, Rule, RuleBook
-from catenary.postproc.standards.supplies import SYSTEMS
+from catenary.postproc.standards.quantities import SYSTEMS
 
 _MET = {"<=": operator.le, "<": operator.lt, ">=": operator.ge, ">": operator.gt}
 

@@ -14,14 +14,13 @@ import os
 from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import h5py
 import numpy as np
 
 from catenary.base.errors import InputError
 from catenary.postproc.channels.facts import FACTS
-from catenary.postproc.channels.header import Header
 from catenary.postproc.channels.line_record import GZIP, GZIP_LEVEL, LineRecord
 from catenary.postproc.files import dimensions
 from catenary.postproc.files.disk import (
@@ -65,7 +64,10 @@ from catenary.postproc.files.run_schema import (
 )
 from catenary.solver.time_loop.views import channels
 from catenary.solver.time_loop.views.channels import Channel
-from catenary.solver.time_loop.views.observers import Stage
+
+if TYPE_CHECKING:
+    from catenary.postproc.channels.header import Header
+    from catenary.solver.time_loop.views.observers import Stage
 
 logger = logging.getLogger("catenary.results")
 

@@ -19,8 +19,7 @@ from catenary.postproc.channels.facts import FACTS
 from catenary.postproc.channels.facts import WIRE as CONTACT_WIRE
 from catenary.postproc.channels.line_record import LineRecord, from_table
 from catenary.postproc.standards.library import DEFAULT, books_of_entries, editions_of
-from catenary.postproc.standards.quantities import LIMIT_KEYS
-from catenary.postproc.standards.supplies import SYSTEMS
+from catenary.postproc.standards.quantities import LIMIT_KEYS, SYSTEMS
 from catenary.solver.time_loop.views import channels
 from catenary.solver.time_loop.views.channels import Channel
 from catenary.solver.waves.excitation import excitation_of_facts

@@ -15,6 +15,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, TextIO
 
+from catenary.postproc.evaluate.wording import duration
 from catenary.postproc.files.run_schema import DONE
 from catenary.solver.time_loop.views.observers import Observer, Stage, StepView
 
@@ -138,13 +139,3 @@ class Progress(Observer):
     def _replace_line(self, text: str) -> None:
         self._stream.write(f"\r{text}\x1b[K")
         self._stream.flush()
-
-
-def duration(seconds: float) -> str:
-    """A time as a person says it: ``42 s``, ``3 min 20 s``, ``2 h 05 min``."""
-    whole = round(seconds)
-    if whole < 60:
-        return f"{whole} s"
-    if whole < 3600:
-        return f"{whole // 60} min {whole % 60:02d} s"
-    return f"{whole // 3600} h {whole % 3600 // 60:02d} min"

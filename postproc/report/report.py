@@ -38,7 +38,7 @@ from catenary.postproc.report.sections.section import (
     number,
 )
 from catenary.postproc.report.summary import as_json, summarise
-from catenary.postproc.standards.supplies import KMH
+from catenary.postproc.standards.quantities import KMH
 
 logger = logging.getLogger("catenary.report")
 

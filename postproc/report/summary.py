@@ -20,7 +20,7 @@ from catenary.postproc.evaluate.statistics import PantographStatistics, RunStati
 from catenary.postproc.evaluate.verdict import Criterion, verdict
 from catenary.postproc.files.disk import plain
 from catenary.postproc.read.results import Results
-from catenary.postproc.standards.supplies import KMH
+from catenary.postproc.standards.quantities import KMH
 
 
 def summarise(

@@ -22,8 +22,7 @@ from pydantic import (
 )
 
 from catenary.base.errors import InputError
-from catenary.postproc.standards.quantities import LIMIT_KEYS, PANTOGRAPH, QUANTITIES
-from catenary.postproc.standards.supplies import SYSTEMS
+from catenary.postproc.standards.quantities import LIMIT_KEYS, PANTOGRAPH, QUANTITIES, SYSTEMS
 
 # Speeds in km/h come from m/s with a rounding error: 200 km/h is 55.555... m/s.
 _ROUNDING = 1e-9

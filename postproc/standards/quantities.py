@@ -1,12 +1,15 @@
-"""Quantities that a rule book may judge, and keys of a scene that may limit them.
+"""Quantities that a rule book may judge, keys of a scene that may limit them, and supply systems.
 
 ``evaluate.observations`` takes the quantities from a run. Books, their checks and the documents
-read these two tables alone.
+read these tables alone.
 """
 
 from __future__ import annotations
 
 from typing import NamedTuple
+
+SYSTEMS = {"ac": "AC", "dc_3kv": "DC 3 kV", "dc_1500v": "DC 1.5 kV"}
+KMH = 3.6  # km/h in 1 m/s; books state limits over the speed in km/h
 
 # Parts of a run that a quantity has a value for.
 RUN, PANTOGRAPH = "run", "pantograph"

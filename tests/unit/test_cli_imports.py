@@ -117,20 +117,55 @@ OF_OTHERS = {
 }
 
 
-def test_a_run_loads_filters_and_pictures_after_its_march(tmp_path: Path) -> None:
-    out = str(tmp_path / "out")
+def printed(program: str, *words: str) -> Any:
+    """The JSON that a program prints last, in a process of its own."""
     done = subprocess.run(
-        [sys.executable, "-c", OF_A_RUN, "en50318_2002", "-o", out, "--short"],
+        [sys.executable, "-c", program, *words],
         capture_output=True,
         text=True,
         timeout=300,
         check=True,
         env=dict(os.environ),
     )
-    code, begun, ended = json.loads(done.stdout.splitlines()[-1])
-    assert code == 0, done.stderr
+    return json.loads(done.stdout.splitlines()[-1])
+
+
+@pytest.fixture(scope="module")
+def ran(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[Any]]:
+    """The folder of a run, and what its process printed."""
+    out = tmp_path_factory.mktemp("ran") / "out"
+    return out, printed(OF_A_RUN, "en50318_2002", "-o", str(out), "--short")
+
+
+def test_a_run_loads_filters_and_pictures_after_its_march(ran: tuple[Path, list[Any]]) -> None:
+    code, begun, ended = ran[1]
+    assert code == 0
     assert {"petsc4py", "h5py"} <= set(begun)
     assert not (REPORTED | NEVER | OF_OTHERS) & set(begun)
     assert {"catenary.solver.schemes.one_solve", "catenary.mbs.lumped"} <= set(begun)
     assert REPORTED <= set(ended)
     assert not NEVER & set(ended)
+
+
+# Prints the modules that are loaded when a folder is open: those of the process that looks through
+# it first are among them.
+OPENED = """
+import json, sys, catenary
+run = catenary.open(sys.argv[1])
+opened = list(sys.modules)
+run.statistics, run.scene
+print(json.dumps([opened, list(sys.modules)]))
+"""
+OF_EVALUATIONS = {
+    "scipy",
+    "catenary.cases.scene.scene",
+    "catenary.postproc.evaluate.statistics",
+    "catenary.solver.effects.all_effects",
+}
+
+
+def test_a_folder_is_opened_without_what_evaluates_it(ran: tuple[Path, list[Any]]) -> None:
+    opened, evaluated = printed(OPENED, str(ran[0]))
+    assert not (OF_EVALUATIONS | {"matplotlib", "jinja2"}) & set(opened)
+    assert "catenary.postproc.read.guard" in opened
+    assert OF_EVALUATIONS <= set(evaluated)

@@ -31,7 +31,7 @@ from catenary.cases.studies.questions.highest_speed import (
 )
 from catenary.cases.studies.sweep.jobs import AS_USUAL, Ended
 from catenary.cases.studies.sweep.together import Marching
-from catenary.cases.studies.sweep.variants import DIRECTION, Variant, text_of
+from catenary.cases.studies.sweep.variants import Variant, text_of
 
 pytestmark = pytest.mark.usefixtures("quick_reports")
 
@@ -62,7 +62,7 @@ def searched(
         for variant in variants:
             speed = float(variant.varied[KEY])
             marched.append(speed)
-            if variant.varied[DIRECTION] == BACKWARD:
+            if variant.direction == BACKWARD:
                 assert backward is not None
                 speed += backward
             rows = [

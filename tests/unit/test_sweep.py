@@ -20,6 +20,7 @@ from catenary.cases.cli.main import app
 from catenary.cases.result_folder import output_folder
 from catenary.cases.run.planning.needs import needs_before_meshing
 from catenary.cases.run.runner import run_case
+from catenary.cases.studies.merged_sweeps import merge
 from catenary.cases.studies.records import read_record
 from catenary.cases.studies.sweep.jobs import STATISTICS, Ended, Job, RunOptions, make_jobs
 from catenary.cases.studies.sweep.output import as_text, draw, key_in_words, table_of, write
@@ -325,6 +326,25 @@ def test_rows_have_one_line_per_pantograph_and_one_per_broken_variant() -> None:
     assert "BROKE: it broke" in as_text(ended)
 
 
+def test_each_row_names_its_variant_where_keys_are_varied_beside_named_ones(
+    tmp_path: Path,
+) -> None:
+    variants = product([parse_vary("train.speed_km_h=200,300")], {"soft": [], "hard": []})
+    ended = [replace(fake("", {}, float(n)), variant=one) for n, one in enumerate(variants, 1)]
+    rows = table_of(ended).records()
+    assert [(row["variant"], row["named"], row["train.speed_km_h"]) for row in rows] == [
+        ("soft__speed_km_h_200", "soft", 200), ("soft__speed_km_h_300", "soft", 300),
+        ("hard__speed_km_h_200", "hard", 200), ("hard__speed_km_h_300", "hard", 300),
+    ]  # fmt: skip
+    # The parts of a job array, which share names in the file.
+    for name, part in (("a", ended[::2]), ("b", ended[1::2])):
+        write(tmp_path / name, CASE, part, None)
+    merged = merge([tmp_path / "a", tmp_path / "b"]).record
+    by_name = {row["variant"]: row["std_N"] for row in merged["rows"]}
+    assert by_name == {one.variant.name: float(n) for n, one in enumerate(ended, 1)}
+    assert {one["name"] for one in merged["variants"]} == set(by_name)
+
+
 def curves_of(figure: Figure) -> dict[str, list[tuple[float, float]]]:
     """Points of the curves in a figure's first panel, by label."""
     return {
@@ -361,14 +381,17 @@ def test_varied_values_keep_their_types(tmp_path: Path) -> None:
     """Numbers, truth values, words and lists in JSON; plain text in CSV."""
     varied = {
         "train.speed_km_h": "250", "numerics.dt_s": "5e-4", "effects.head_roll": "true",
-        "contact.law": "hertz", "line.span_m": "[50, 60]", "variant": "007",
+        "contact.law": "hertz", "line.span_m": "[50, 60]",
     }  # fmt: skip
-    write(tmp_path, CASE, [fake("a", varied, 3.0)], ["std_N"])
+    one = fake("a", varied, 3.0)
+    write(tmp_path, CASE, [replace(one, variant=replace(one.variant, named="007"))], ["std_N"])
     (row,) = json.loads((tmp_path / "sweep.json").read_text())["rows"]
-    assert [row[key] for key in varied] == [250, 5e-4, True, "hertz", [50, 60], "007"]
+    assert [row[key] for key in varied] == [250, 5e-4, True, "hertz", [50, 60]]
+    assert row["named"] == "007"
     assert type(row["train.speed_km_h"]) is int
     (cells,) = csv.DictReader((tmp_path / "sweep.csv").read_text().splitlines())
-    assert [cells[key] for key in varied] == ["250", "0.0005", "true", "hertz", "[50, 60]", "007"]
+    assert [cells[key] for key in varied] == ["250", "0.0005", "true", "hertz", "[50, 60]"]
+    assert cells["named"] == "007"
 
 
 def test_what_failed_is_told_by_name(tmp_path: Path) -> None:
@@ -390,7 +413,7 @@ def test_what_failed_is_told_by_name(tmp_path: Path) -> None:
         ("contact.stiffness_N_per_m", "contact: stiffness [N/m]"),
         ("pantographs.lumped.static_force_N", "lumped: force on the wire at rest [N]"),
         ("mesh.elements_per_gap", "mesh: elements per gap"),
-        ("variant", "variant"),
+        ("named", "named"),
     ],
 )
 def test_axes_are_in_the_fields_words(key: str, words: str) -> None:

@@ -63,7 +63,7 @@ def test_named_variants_come_before_the_varied_keys_that_win() -> None:
     variants = product([parse_vary("a.x=1,2")], {"soft": ["c.k=1"], "hard": ["c.k=9", "c.d=0"]})
     assert [v.name for v in variants] == ["soft__x_1", "soft__x_2", "hard__x_1", "hard__x_2"]
     assert variants[2].assignments == ("c.k=9", "c.d=0", "a.x=1")
-    assert variants[2].varied == {"variant": "hard", "a.x": "1"}
+    assert (variants[2].varied, variants[2].named) == ({"a.x": "1"}, "hard")
     assert product([], {"only": ["c.k=1"]}) == [Variant("only", ("c.k=1",), {})]
 
 

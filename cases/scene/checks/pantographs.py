@@ -16,7 +16,7 @@ from catenary.cases.scene.scene import Scene
 from catenary.cases.scene.train.mechanism import ActuatorTable
 from catenary.cases.scene.train.pantograph import LumpedTable, MultibodyTable, wanted_force
 from catenary.cases.scene.train.train import MotionTable, vehicle_of
-from catenary.mbs.frame import SPACE
+from catenary.mbs.rigid.bodies import SPACE
 from catenary.meshgen.topologies.line_data import LineData
 
 if TYPE_CHECKING:

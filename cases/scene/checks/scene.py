@@ -38,7 +38,7 @@ from catenary.meshgen.topologies.line_data import LineData
 from catenary.postproc.record.snapshots.blocks import OTHER_PARTS
 from catenary.postproc.standards.book import RuleBook, book_of
 from catenary.postproc.standards.library import DEFAULT, book_named, editions_of, shipped
-from catenary.postproc.standards.supplies import SYSTEMS
+from catenary.postproc.standards.quantities import SYSTEMS
 from catenary.solver.effects.effect import Limit
 
 # Two heads cannot stand closer on a roof; their contacts would also share one finite element.

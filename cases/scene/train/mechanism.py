@@ -14,7 +14,7 @@ from pydantic import AfterValidator, Field, model_validator
 
 from catenary.cases.scene.keys.table import Table, ascending, exactly_one
 from catenary.cases.scene.train.head import SomeInertia, SomeMass
-from catenary.mbs.frame import SPACE
+from catenary.mbs.rigid.bodies import SPACE
 
 Coordinate = Annotated[float, Field(ge=-100, le=100)]
 Point = Annotated[list[Coordinate], Field(min_length=3, max_length=3)]

@@ -24,9 +24,9 @@ from catenary.cases.scene.input.faults import shown
 from catenary.cases.scene.scene import Scene
 from catenary.cases.scene.turned import BACKWARD, DIRECTIONS, FORWARD, has_mirrored_line, turned
 from catenary.cases.studies.sweep.jobs import STATISTICS, Ended
-from catenary.cases.studies.sweep.output import remarks_of, table_of
+from catenary.cases.studies.sweep.output import DIRECTION, remarks_of, table_of
 from catenary.cases.studies.sweep.together import Marching
-from catenary.cases.studies.sweep.variants import DIRECTION, VariedKey
+from catenary.cases.studies.sweep.variants import VariedKey
 from catenary.cases.studies.sweep.variants import product as variants_of
 from catenary.postproc.evaluate.wording import decimals_that_tell, fixed
 from catenary.postproc.report.pictures import figures
@@ -180,7 +180,7 @@ def find_speeds(
     def march(own: Sequence[float]) -> None:
         vary = [VariedKey(KEY, tuple(f"{speed:.8g}" for speed in own))]
         variants = [
-            replace(one, name=f"{one.name}__{way}", varied={DIRECTION: way, **one.varied})
+            replace(one, name=f"{one.name}__{way}", direction=way)
             for way in marched
             for one in variants_of(vary, {})
         ]
@@ -455,7 +455,7 @@ def _limits(study: SpeedStudy, criterion: str) -> list[list[tuple[float, float]]
     """Speed and limit [km/h], the criterion's unit, of each criterion whose name begins so."""
     limits: dict[tuple[str, str], list[tuple[float, float]]] = {}
     for one in study.ended:
-        way = one.variant.varied[DIRECTION]
+        way = one.variant.direction
         for row in one.summary.get("acceptance", []):
             if row["criterion"].startswith(criterion) and row["limit"] is not None:
                 place = (float(one.variant.varied[KEY]), float(row["limit"]))

@@ -18,7 +18,7 @@ import numpy as np
 
 from catenary.cases.studies.records import KeptRows
 from catenary.cases.studies.sweep.jobs import HISTORIES
-from catenary.cases.studies.sweep.variants import NAMES, Variant
+from catenary.cases.studies.sweep.variants import Variant
 from catenary.postproc.evaluate import filters
 from catenary.postproc.files.dimensions import CONVENTIONS
 from catenary.postproc.files.disk import appears_whole, opened, unwritten
@@ -136,7 +136,7 @@ class KeptHistories(KeptRows):
                 return
             shapes = [shape for piece in pieces for shape in _shapes(piece)]
             n_steps, n = np.max(shapes, axis=0, initial=1).tolist()
-            keys = dict.fromkeys(key for one in variants for key in one.varied if key != NAMES)
+            keys = dict.fromkeys(key for one in variants for key in one.varied)
             varied = {key: _numbers([one.varied.get(key, "") for one in variants]) for key in keys}
             row_of = {one.name: row for row, one in enumerate(variants)}
             with _written(self._path) as file:

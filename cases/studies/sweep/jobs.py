@@ -15,7 +15,7 @@ from catenary.cases.scene.keys.keys import nearest
 from catenary.cases.scene.load import Draft, load_scene, read_draft
 from catenary.cases.scene.scene import Scene
 from catenary.cases.scene.turned import BACKWARD, turned
-from catenary.cases.studies.sweep.variants import DIRECTION, NAMES, Variant
+from catenary.cases.studies.sweep.variants import Variant
 from catenary.postproc.report.study_table import Column
 
 # Statistics in a sweep's table: of a row's pantograph, and of the line.
@@ -152,7 +152,7 @@ def all_ended(ended: Sequence[Ended], what: str = "study") -> list[Ended]:
 
 def _assigned(variant: Variant) -> list[Assigned]:
     """The assignments of a variant, each with what gave it."""
-    own = len(variant.assignments) - sum(key not in (NAMES, DIRECTION) for key in variant.varied)
+    own = len(variant.assignments) - len(variant.varied)
     by_name = f"by the variant {variant.name}"
     return [
         Assigned(text, "--vary", "on the command line (--vary)")
@@ -247,7 +247,7 @@ def scene_of(draft: Draft, variant: Variant, several: bool) -> Scene:
     _refuse_petsc(variant)
     try:
         scene = load_scene(draft, varied=_assigned(variant))
-        return turned(scene) if variant.varied.get(DIRECTION) == BACKWARD else scene
+        return turned(scene) if variant.direction == BACKWARD else scene
     except UnfitScene:
         raise
     except InputError as error:

@@ -15,7 +15,7 @@ from catenary.cases.scene.keys.keys import ANY
 from catenary.cases.scene.keys.units import SUFFIXES, unit_of
 from catenary.cases.studies.sweep import force_histograms
 from catenary.cases.studies.sweep.jobs import OF_LINE, OF_PANTOGRAPH, STATISTICS, Ended
-from catenary.cases.studies.sweep.variants import NAMES
+from catenary.cases.studies.sweep.variants import Variant
 from catenary.cases.terminal.key_list import Key, keys_of_a_scene
 from catenary.cases.terminal.terminal_text import labelled
 from catenary.postproc.report.pictures import figures
@@ -30,6 +30,8 @@ from catenary.postproc.report.study_table import (
 
 TABLE, RECORD, PICTURE = "sweep.csv", "sweep.json", "sweep.png"
 PARQUET = "sweep.parquet"
+# Columns of what variants differ by and is no key: their names in a file, the train's direction.
+NAMED, DIRECTION = "named", "direction"
 PLOTTED = ("mean_N", "std_N", "max_N", "min_N", "max_uplift_mm")
 _MOST_LABELS = 10  # curves that a legend can name
 _LONGEST = 48  # a longer meaning of a key explains more than an axis has room for
@@ -38,16 +40,17 @@ _LONGEST = 48  # a longer meaning of a key explains more than an axis has room f
 def table_of(ended: Sequence[Ended]) -> StudyTable:
     """One row per variant and pantograph; a variant that broke has one without figures.
 
-    Columns: ``variant``, the varied keys with values of their own types, ``outcome``,
-    ``pantograph``, ``STATISTICS``, ``rules`` (the books that judge), ``passed`` (their verdict,
-    None if not judged), ``failed`` (the criteria that failed), ``judged`` (all that were judged),
+    Columns: ``variant`` (its name, as of its folder), ``named`` (its name in a file, if keys are
+    varied beside it), the varied keys with values of their own types, ``outcome``, ``pantograph``,
+    ``STATISTICS``, ``rules`` (the books that judge), ``passed`` (their verdict, None if not
+    judged), ``failed`` (the criteria that failed), ``judged`` (all that were judged),
     ``not_judged`` (those without data), ``remarks`` (what decides the results), ``wall_s``.
     """
     keys = varied_keys(ended)
     rows = []
     for one in ended:
         head: dict[str, Any] = {"variant": one.variant.name, "outcome": one.outcome}
-        head |= {key: _typed(key, one.variant.varied.get(key)) for key in keys}
+        head |= {**dict.fromkeys(keys), **_columns_of(one.variant)}
         failed = failed_criteria(one.summary)
         head |= {"passed": one.summary.get("passed"), "failed": failed, "remarks": one.remarks}
         head |= {"judged": _criteria(one.summary, (False, True))}
@@ -64,7 +67,7 @@ def table_of(ended: Sequence[Ended]) -> StudyTable:
             rows.append(row | _of_line(one.summary))
     columns = [
         Column("variant", "variant"),
-        *(Column(key) for key in keys if key != "variant"),
+        *map(Column, keys),
         Column("outcome"),
         Column("pantograph", "pantograph"),
         *STATISTICS.values(),
@@ -77,12 +80,15 @@ def table_of(ended: Sequence[Ended]) -> StudyTable:
     return StudyTable(columns, rows)
 
 
-def _typed(key: str, text: str | None) -> Any:
-    """The value that a varied key takes, as a scene reads it; None if the variant has none."""
-    if text is None or key == NAMES:
-        return text
-    value = parse_assignment(f"{key}={text}", "--vary")[1]
-    return None if value is REMOVED else value
+def _columns_of(variant: Variant) -> dict[str, Any]:
+    """What tells a variant from others: its name in a file, its direction, and the values of varied
+    keys as a scene reads them."""
+    named = {NAMED: variant.named, DIRECTION: variant.direction}
+    columns: dict[str, Any] = {name: text for name, text in named.items() if text}
+    for key, text in variant.varied.items():
+        value = parse_assignment(f"{key}={text}", "--vary")[1]
+        columns[key] = None if value is REMOVED else value
+    return columns
 
 
 def failed_criteria(summary: Mapping[str, Any]) -> list[str]:
@@ -107,8 +113,8 @@ def _of_line(summary: dict[str, Any]) -> dict[str, Any]:
 
 
 def varied_keys(ended: Sequence[Ended]) -> list[str]:
-    """Keys that any of the variants varies, in the order of their first appearance."""
-    return list(dict.fromkeys(key for one in ended for key in one.variant.varied))
+    """Columns that tell variants apart, varied keys foremost, as they first appear."""
+    return list(dict.fromkeys(key for one in ended for key in _columns_of(one.variant)))
 
 
 def as_text(ended: Sequence[Ended]) -> str:

@@ -33,7 +33,7 @@ from catenary.cases.scene.problem import resolved
 from catenary.cases.studies.records import is_whole, read_record, read_table, write_record
 from catenary.cases.studies.sweep.jobs import AS_USUAL, Ended, Job, RunOptions
 from catenary.cases.terminal.runs_bar import RunsBar
-from catenary.postproc.evaluate.wording import fixed
+from catenary.postproc.evaluate.wording import duration, fixed
 from catenary.postproc.files.disk import plain
 from catenary.postproc.files.own_files import VARIANT_FILE as RECORD
 from catenary.postproc.files.run_schema import DONE, INTERRUPTED
@@ -119,7 +119,9 @@ def run_jobs(
             ahead = spent / n_run * (len(left) - n_run)
             place = f"{places[number]}:" if several else "   "
             bar.ended()
-            bar.say(f"{place} {_figures(one)}; {spent:.0f} s gone, about {ahead:.0f} s left")
+            bar.say(
+                f"{place} {_figures(one)}; {duration(spent)} gone, about {duration(ahead)} left"
+            )
     came = {number: one for number, one in sorted(ended.items()) if one.outcome != INTERRUPTED}
     missing = [job for number, job in enumerate(jobs) if number not in came]
     return [*came.values(), *(Ended(job.variant, INTERRUPTED) for job in missing[:1])]

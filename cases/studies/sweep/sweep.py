@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 from catenary.base.errors import InputError
 from catenary.cases.result_folder.output_folder import refuse_earlier, refuse_impossible
@@ -26,19 +26,39 @@ if TYPE_CHECKING:
     from catenary.cases.studies.sweep.together import Ensemble
 
 
-class Sweep(NamedTuple):
-    """Variants of a case, the jobs of those that can be run, and how the others ended; or, of a
-    sweep that keeps statistics alone, an ``ensemble``."""
+class WholeRuns(NamedTuple):
+    """Variants of a case, each of which leaves a run in a folder of its own.
+
+    Attributes
+    ----------
+    variants : in their order
+    jobs : of those that can be run
+    refused : how the others ended
+    """
 
     variants: Sequence[Variant]
     jobs: list[Job]
     refused: list[Ended]
-    ensemble: Ensemble | None = None
 
     @property
     def first(self) -> Scene:
         """The scene of the first variant that can be run."""
-        return self.jobs[0].scene if self.ensemble is None else self.ensemble.first
+        return self.jobs[0].scene
+
+    def run(
+        self, out: Path, comm: Any, options: RunOptions, part: Part | None = None
+    ) -> list[Ended]:
+        """Run what is not done yet, and say how the variants ended; those of a ``part`` alone, if
+        it is given, without the refused ones. Collective."""
+        from catenary.cases.studies.sweep.run_jobs import run_jobs
+
+        if part is not None:
+            return run_jobs(part.of(self.jobs), out, comm, options)
+        return in_order(self.variants, run_jobs(self.jobs, out, comm, options), self.refused)
+
+
+Sweep: TypeAlias = "WholeRuns | Ensemble"
+"""Whole runs of variants, or an ensemble that keeps statistics alone."""
 
 
 def sweep_of(
@@ -53,28 +73,48 @@ def sweep_of(
 ) -> Sweep:
     """A sweep of a case into a folder, all scenes checked. Not collective.
 
-    With ``only_statistics`` there is no run of a variant on the disk, but for ``histories``, and
-    scenes are checked when it is their turn.
+    With ``only_statistics`` it is an ensemble: there is no run of a variant on the disk, but for
+    ``histories``, and scenes are checked when it is their turn.
 
     Raises
     ------
     InputError
         If one of ``histories`` is none, or whole runs are kept, which have them; as
-        ``jobs_and_refused``, or if the folder has the table of a sweep with variants that this one
-        has not, and ``force`` is not given.
+        ``whole_runs_of``.
     """
     check_histories(histories)
-    if histories and not only_statistics:
-        raise InputError("--histories goes with --only-statistics: whole runs keep all in run.h5")
-    if only_statistics:
-        from catenary.cases.studies.sweep.together import ensemble_of
+    if not only_statistics:
+        if histories:
+            raise InputError(
+                "--histories goes with --only-statistics: whole runs keep all in run.h5"
+            )
+        return whole_runs_of(draft, variants, out, full_report=full_report, force=force)
+    from catenary.cases.studies.sweep.together import ensemble_of
 
-        ensemble = ensemble_of(draft, variants, histories)
-        refuse_other_sweep(out, variants, force)
-        return Sweep(variants, [], [], ensemble)
-    jobs, refused = jobs_and_refused(draft, variants, full_report)
+    ensemble = ensemble_of(draft, variants, histories)
     refuse_other_sweep(out, variants, force)
-    return Sweep(variants, jobs, refused)
+    return ensemble
+
+
+def whole_runs_of(
+    draft: Draft,
+    variants: Sequence[Variant],
+    out: Path,
+    *,
+    full_report: bool = False,
+    force: bool = False,
+) -> WholeRuns:
+    """A sweep into a folder whose variants leave whole runs. Not collective.
+
+    Raises
+    ------
+    InputError
+        As ``jobs_and_refused``, or if the folder has the table of a sweep with variants that this
+        one has not, and ``force`` is not given.
+    """
+    runs = WholeRuns(variants, *jobs_and_refused(draft, variants, full_report))
+    refuse_other_sweep(out, variants, force)
+    return runs
 
 
 def run_sweep(
@@ -106,13 +146,12 @@ def run_sweep(
     if show is not None:
         show = show or output.PLOTTED
     with held(out, comm, command):
-        if sweep.ensemble is not None:
-            on_root(comm, lambda: refuse_earlier(out, options.force))
-        ended = in_order(sweep.variants, _run(sweep, out, comm, options), sweep.refused)
+        on_root(comm, lambda: refuse_earlier(out, options.force))
+        ended = sweep.run(out, comm, options)
         files = on_root(
             comm, lambda: output.write(out, name, ended, show, histogram), takes_long=True
         )
-    if sweep.ensemble is not None and sweep.ensemble.histories:
+    if not isinstance(sweep, WholeRuns) and sweep.histories:
         files += [path for path in (out / "histories.h5",) if path.is_file()]
     return ended, files
 
@@ -126,23 +165,10 @@ def run_part(sweep: Sweep, part: Part, out: Path, comm: Any, options: RunOptions
     from catenary.base.parallel import on_root
     from catenary.cases.studies.sweep import output
 
-    ended = _run(sweep, out, comm, options, part)
+    ended = sweep.run(out, comm, options, part)
     name, folder = sweep.first.case.name, out / part.folder
     on_root(comm, lambda: output.write(folder, name, ended, None), takes_long=True)
     return ended
-
-
-def _run(
-    sweep: Sweep, out: Path, comm: Any, options: RunOptions, part: Part | None = None
-) -> list[Ended]:
-    """Run what is not done yet of a sweep or a part of it. Collective."""
-    if sweep.ensemble is None:
-        from catenary.cases.studies.sweep.run_jobs import run_jobs
-
-        return run_jobs(sweep.jobs if part is None else part.of(sweep.jobs), out, comm, options)
-    from catenary.cases.studies.sweep.together import run_ensemble
-
-    return run_ensemble(sweep.ensemble, out, comm, options, part)
 
 
 def refuse_other_sweep(out: Path, variants: Sequence[Variant], force: bool) -> None:

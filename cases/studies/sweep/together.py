@@ -31,7 +31,8 @@ from catenary.cases.studies.sweep.jobs import (
     interrupted,
     scene_of,
 )
-from catenary.cases.studies.sweep.variants import DIRECTION, Variant
+from catenary.cases.studies.sweep.variants import Variant
+from catenary.postproc.evaluate.wording import duration
 from catenary.postproc.files.run_schema import DONE, INTERRUPTED
 
 # Variants of a piece of work at most: some seconds, that a stop may cost. Of few variants pieces
@@ -55,6 +56,63 @@ class Ensemble(NamedTuple):
     variants: Sequence[Variant]
     first: Scene
     histories: tuple[str, ...] = ()
+
+    @property
+    def refused(self) -> list[Ended]:
+        """None is known before it is its turn."""
+        return []
+
+    def run(
+        self, out: Path | None, comm: Any, options: RunOptions, part: Part | None = None
+    ) -> list[Ended]:
+        """March what is not done yet, and say how variants ended, in their order. Collective.
+
+        An interruption ends the list early; its last entry says so. A variant that cannot be run,
+        or breaks, stops no other.
+
+        Parameters
+        ----------
+        out : folder in which pieces of work are kept, None to keep none
+        part : of the pieces of work, all if None
+        """
+        size = max(_LEAST, min(_MOST, -(-len(self.variants) // _PIECES)))
+        pieces = pieces_of_work(self.variants, size)
+        if part is not None:
+            pieces = part.of(pieces)
+        told = json.dumps(self.draft.table(), sort_keys=True, default=str)
+        case = hashlib.sha256(told.encode()).hexdigest()
+
+        def depends_on(piece: Sequence[Variant]) -> list[Any]:
+            assignments = [[variant.name, *variant.assignments] for variant in piece]
+            return [case, assignments, *self.histories]
+
+        kept, histories = KeptRows(out, options.force), None
+        files: Sequence[Path | None] = [None] * len(pieces)
+        if self.histories:
+            assert out is not None
+            from catenary.cases.studies.sweep.histories import KeptHistories
+
+            sweep = hashlib.sha256(json.dumps(list(map(depends_on, pieces))).encode()).hexdigest()
+            folder = None if part is None else part.folder
+            kept = histories = KeptHistories(out, self.histories, sweep, options.force, folder)
+            files = [histories.file_of(depends_on(piece)) for piece in pieces]
+        n_at_once = at_once(options.n_jobs, comm)
+        if comm.size > 1:  # a march is one rank's: all without -j would do the same
+            n_at_once = comm.size
+        outcomes = kept.each(
+            _March(self),
+            list(zip(pieces, files, strict=True)),
+            lambda item: depends_on(item[0]),
+            n_at_once,
+            comm,
+            partial(start_petsc, list(options.petsc)),
+        )
+        ended = in_order(self.variants, _ended(outcomes, pieces, options.progress), ())
+        if histories is not None and not interrupted(ended):
+            variants = [one.variant for one in ended]
+            own = {file: piece for file, piece in zip(files, pieces, strict=True) if file}
+            on_root(comm, lambda: histories.join(variants, own), takes_long=True)
+        return ended
 
 
 def ensemble_of(
@@ -80,59 +138,6 @@ def ensemble_of(
     raise InputError(f"variant {variants[0].name}: {refused}") from refused
 
 
-def run_ensemble(
-    ensemble: Ensemble, out: Path | None, comm: Any, options: RunOptions, part: Part | None = None
-) -> list[Ended]:
-    """March what is not done yet, and say how variants ended, in their order. Collective.
-
-    An interruption ends the list early; its last entry says so. A variant that cannot be run, or
-    breaks, stops no other.
-
-    Parameters
-    ----------
-    out : folder in which pieces of work are kept, None to keep none
-    part : of the pieces of work, all if None
-    """
-    size = max(_LEAST, min(_MOST, -(-len(ensemble.variants) // _PIECES)))
-    pieces = pieces_of_work(ensemble.variants, size)
-    if part is not None:
-        pieces = part.of(pieces)
-    told = json.dumps(ensemble.draft.table(), sort_keys=True, default=str)
-    case = hashlib.sha256(told.encode()).hexdigest()
-
-    def depends_on(piece: Sequence[Variant]) -> list[Any]:
-        assignments = [[variant.name, *variant.assignments] for variant in piece]
-        return [case, assignments, *ensemble.histories]
-
-    kept, histories = KeptRows(out, options.force), None
-    files: Sequence[Path | None] = [None] * len(pieces)
-    if ensemble.histories:
-        assert out is not None
-        from catenary.cases.studies.sweep.histories import KeptHistories
-
-        sweep = hashlib.sha256(json.dumps(list(map(depends_on, pieces))).encode()).hexdigest()
-        folder = None if part is None else part.folder
-        kept = histories = KeptHistories(out, ensemble.histories, sweep, options.force, folder)
-        files = [histories.file_of(depends_on(piece)) for piece in pieces]
-    n_at_once = at_once(options.n_jobs, comm)
-    if comm.size > 1:  # a march is one rank's: all without -j would do the same
-        n_at_once = comm.size
-    outcomes = kept.each(
-        _March(ensemble),
-        list(zip(pieces, files, strict=True)),
-        lambda item: depends_on(item[0]),
-        n_at_once,
-        comm,
-        partial(start_petsc, list(options.petsc)),
-    )
-    ended = in_order(ensemble.variants, _ended(outcomes, pieces, options.progress), ())
-    if histories is not None and not interrupted(ended):
-        variants = [one.variant for one in ended]
-        own = {file: piece for file, piece in zip(files, pieces, strict=True) if file}
-        on_root(comm, lambda: histories.join(variants, own), takes_long=True)
-    return ended
-
-
 def _ended(
     outcomes: Iterable[Outcome],
     pieces: Sequence[Sequence[Variant]],
@@ -151,8 +156,8 @@ def _ended(
                 ended += [Ended(v, *row) for v, row in zip(piece, rows, strict=True)]
             spent, n_left = time.perf_counter() - begin, len(variants) - len(ended)
             progress(
-                f"[{len(ended)}/{len(variants)}] {spent:.0f} s gone, about "
-                f"{spent / len(ended) * n_left:.0f} s left"
+                f"[{len(ended)}/{len(variants)}] {duration(spent)} gone, about "
+                f"{duration(spent / len(ended) * n_left)} left"
             )
     except Interrupted:
         ended.append(Ended(variants[len(ended)], INTERRUPTED))
@@ -179,13 +184,13 @@ def pieces_of_work(variants: Sequence[Variant], size: int) -> list[list[Variant]
 def _of_the_line(variant: Variant) -> tuple[str, ...]:
     """The changes of a variant that its line depends on: its direction and assignments."""
     changes = (one for one in variant.assignments if one.split(".")[0] not in OF_THE_TRAIN)
-    return (variant.varied.get(DIRECTION, ""), *changes)
+    return (variant.direction, *changes)
 
 
 @dataclass
 class Marching:
     """Marches variants of a case again and again; ``out``, ``comm`` and ``options`` are those of
-    ``run_ensemble``."""
+    ``Ensemble.run``."""
 
     draft: Draft
     out: Path | None
@@ -202,7 +207,7 @@ class Marching:
         Interrupted
             If a signal came.
         """
-        ended = run_ensemble(ensemble_of(self.draft, variants), self.out, self.comm, self.options)
+        ended = ensemble_of(self.draft, variants).run(self.out, self.comm, self.options)
         self.options = self.options._replace(force=False)  # which would forget these
         return all_ended(ended)
 

@@ -8,7 +8,7 @@ import json
 import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -23,9 +23,6 @@ from catenary.postproc.files.csv_text import begins_formula
 MAX_VARIANTS = 10_000
 MOST_LETTERS = 200  # in a variant's name
 _LONGEST_SLUG = 100  # folder names may have 255 bytes; room for what a user puts around them
-# Columns beside those of the varied keys that are no keys: names of variants in a file, and the
-# direction of the train, whose scene is turned for the one backward.
-NAMES, DIRECTION = "variant", "direction"
 _OPENING, _CLOSING, _QUOTES = "[{", "]}", "\"'"
 
 
@@ -38,11 +35,15 @@ class Variant:
     name : names the variant and its folder
     assignments : ``key=value`` each, applied to the case in this order
     varied : varied key -> the value's text, for tables and axes
+    named : its name in a file of variants, if keys are varied too
+    direction : of the train, whose scene is turned for the one backward; empty if none is chosen
     """
 
     name: str
     assignments: tuple[str, ...]
     varied: Mapping[str, str] = field(default_factory=dict)
+    named: str = ""
+    direction: str = ""
 
 
 class VariedKey(NamedTuple):
@@ -208,8 +209,8 @@ def product(varied: Sequence[VariedKey], named: Mapping[str, Sequence[str]]) -> 
             words = [name] if name else []
             words += [f"{labels[key]}_{value}" for key, value in chosen.items()]
             own = tuple(f"{key}={value}" for key, value in chosen.items())
-            columns = {NAMES: name, **chosen} if name and chosen else chosen
-            variants.append(Variant("__".join(words), (*assignments, *own), columns))
+            of_file = name if chosen else ""
+            variants.append(Variant("__".join(words), (*assignments, *own), chosen, of_file))
     return _with_own_folders(variants)
 
 
@@ -244,7 +245,7 @@ def _with_own_folders(variants: list[Variant]) -> list[Variant]:
             name = f"{slug(variant.name)}-{number}"
             number += 1
         taken.add(name.lower())
-        result.append(Variant(name, variant.assignments, variant.varied))
+        result.append(replace(variant, name=name))
     return result
 
 

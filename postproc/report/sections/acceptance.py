@@ -11,7 +11,7 @@ from catenary.postproc.evaluate.verdict import Criterion, labels
 from catenary.postproc.evaluate.wording import decimals_that_tell
 from catenary.postproc.report.sections.section import EvaluatedRun, Section, Text, number
 from catenary.postproc.report.study_table import StudyTable, texts_table
-from catenary.postproc.standards.supplies import KMH
+from catenary.postproc.standards.quantities import KMH
 
 _RELATIONS = {"<=": "≤", "<": "<", ">=": "≥", ">": ">"}
 NAN = float("nan")

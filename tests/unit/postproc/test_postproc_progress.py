@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from catenary.base.parallel import set_up_logging
-from catenary.postproc.record.progress import Progress, duration
+from catenary.postproc.record.progress import Progress
 from catenary.solver.time_loop.views.channels import TrainLayout
 from catenary.solver.time_loop.views.observers import Stage
 
@@ -142,10 +142,3 @@ def test_quiet_runs_and_other_ranks_show_nothing(rank: int, quiet: bool) -> None
         assert clock.looks == looks
     finally:
         root.handlers, root.level, root.propagate = before
-
-
-@pytest.mark.parametrize(
-    ("seconds", "said"), [(0.4, "0 s"), (59.4, "59 s"), (200, "3 min 20 s"), (7500, "2 h 05 min")]
-)
-def test_times_are_said_as_people_say_them(seconds: float, said: str) -> None:
-    assert duration(seconds) == said

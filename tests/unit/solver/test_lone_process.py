@@ -53,3 +53,19 @@ def test_processes_share_no_folder_that_one_could_take_from_another(tmp_path: Pa
         check=True,
     )
     assert done.stdout == "[]\n"
+
+
+@pytest.mark.process
+def test_the_program_hands_nothing_of_it_to_jobs_that_it_submits() -> None:
+    """SLURM gives a job the environment of ``sbatch``: its ranks need the networks."""
+    program = (
+        "import os\n"
+        "from catenary.base.lone_process import SETTINGS, world\n"
+        "from catenary.cases.process.library_settings import choose\n"
+        "choose(); world()\n"
+        "print(set(SETTINGS) & set(os.environ))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True
+    )
+    assert done.stdout == "set()\n"
