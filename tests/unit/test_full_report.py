@@ -345,6 +345,7 @@ def test_a_report_shows_measured_costs_of_effects(folder: Path, tmp_path: Path) 
     assert "--cost STUDY" not in words
 
 
+@pytest.mark.process
 def test_costs_of_another_case_or_of_other_effects_are_refused(
     folder: Path, tmp_path: Path
 ) -> None:
