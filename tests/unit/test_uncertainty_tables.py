@@ -140,6 +140,12 @@ def test_pictures_show_their_runs(sample: dict[str, Any] | None) -> None:
     assert sum(bar.get_height() for bar in histogram.axes[0].patches) == 60
 
 
+def test_few_samples_of_two_pantographs_have_no_curve_of_convergence() -> None:
+    few, enough = (run_table(table_of(some(range(1, n + 1))).records()) for n in (9, 10))
+    assert len(few.done) == 18 and output.convergence(few, ["std_N"]) is None
+    assert output.convergence(enough, ["std_N"]) is not None
+
+
 def test_what_is_no_table_of_runs_is_one_sentence(tmp_path: Path) -> None:
     (tmp_path / "empty.csv").write_text("")
     (tmp_path / "other.csv").write_text("x,y\n1,2\n")

@@ -33,7 +33,7 @@ from catenary.postproc.report.study_table import Column, Content, StudyTable, wr
 _MOST_KEYS, _MOST_STATISTICS, _MOST_POINTS, _MOST_LINES = 6, 5, 5000, 1000
 _UPPER = 0.95  # quantile that is drawn
 _MANY = 300  # points that are drawn small
-_STEPS = 25  # points of a curve of convergence
+_STEPS, _LEAST_SAMPLES = 25, 10  # points of a curve of convergence, and where it begins
 
 
 def drawn_statistics(table: RunTable, wanted: Sequence[str] = ()) -> list[str]:
@@ -115,20 +115,18 @@ def parallel_coordinates(table: RunTable, wanted: Sequence[str] = ()) -> Figure 
 def convergence(table: RunTable, wanted: Sequence[str] = ()) -> Figure | None:
     """Mean and 95 % quantile with their bounds over the number of samples; None of fewer than 10.
 
-    Samples are taken in their order, independent ones only.
+    Samples are taken in their order, independent ones only, of the first pantograph.
     """
     table = independent_runs(table)
-    statistics = drawn_statistics(table, wanted)
-    if not statistics or len(table.done) < 10:
+    first = {name: next(iter(table.of(name).items())) for name in drawn_statistics(table, wanted)}
+    samples = {name: rows[name].dropna().to_numpy(float) for name, (_, rows) in first.items()}
+    samples = {name: x for name, x in samples.items() if len(x) >= _LEAST_SAMPLES}
+    if not samples:
         return None
-    figure = figures.new_figure(0.6 + 2.0 * len(statistics))
-    panels = figure.subplots(len(statistics), 1, sharex=True, squeeze=False)[:, 0]
-    for axes, name in zip(panels, statistics, strict=True):
-        pantograph, rows = next(iter(table.of(name).items()))
-        x = rows[name].dropna().to_numpy(float)
-        if len(x) < 10:
-            continue
-        counts = np.unique(np.geomspace(10, len(x), _STEPS).round().astype(int))
+    figure = figures.new_figure(0.6 + 2.0 * len(samples))
+    panels = figure.subplots(len(samples), 1, sharex=True, squeeze=False)[:, 0]
+    for axes, (name, x) in zip(panels, samples.items(), strict=True):
+        counts = np.unique(np.geomspace(_LEAST_SAMPLES, len(x), _STEPS).round().astype(int))
         means = np.array([student(x[:n]) for n in counts])
         uppers = np.array([quantile(x[:n], _UPPER) for n in counts])
         for number, (label, found) in enumerate(
@@ -137,7 +135,7 @@ def convergence(table: RunTable, wanted: Sequence[str] = ()) -> Figure | None:
             figures.curve(axes, counts, found[:, 0], number, label, ".-")
             for bound in (found[:, 1], found[:, 2]):
                 figures.curve(axes, counts, bound, number, None, "--", 0.7)
-        _panel(axes, "", _meaning(name), pantograph)
+        _panel(axes, "", _meaning(name), first[name][0])
     panels[-1].set_xlabel("number of samples; dashed: 95 % confidence", fontsize="small")
     panels[-1].set_xscale("log")
     panels[-1].xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
