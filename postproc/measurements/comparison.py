@@ -252,7 +252,7 @@ class _Comparing:
         within = (at >= begin) & (at <= end)
         if np.count_nonzero(within) < 20:
             raise InputError(
-                f"{passage.name} has places from {at[0]:.1f} to {at[-1]:.1f} m, and the run is "
+                f"{passage.name} has positions from {at[0]:.1f} to {at[-1]:.1f} m, and the run is "
                 f"compared from {begin:g} to {end:g} m: they share nothing"
             )
         at, force = at[within], force[within]
@@ -326,7 +326,7 @@ class _Comparing:
         if found.shift.differs(0.0, _SHIFT):
             shift, way = found.shift, "far along the track" if found.shift.value > 0 else "far back"
             by = f"{abs(shift.value):.2f} m too {way} (+- {shift.deviation:.2g} m)"
-            text = f"{name}: places are {by} at {found.middle:.0f} m"
+            text = f"{name}: positions are {by} at {found.middle:.0f} m"
             if passage.by_time:
                 early = "ahead" if shift.value > 0 else "behind"
                 text += f": the clock is {abs(shift.value) / run.speed:.3f} s {early}"
@@ -334,7 +334,7 @@ class _Comparing:
         length = found.length
         if found.drift.differs(0.0, _DRIFTED / length):
             drift = found.drift
-            what = "clock or speed" if passage.by_time else "places"
+            what = "clock or speed" if passage.by_time else "positions"
             by = f"{1e3 * drift.value:+.2f} in 1000 (+- {1e3 * drift.deviation:.2g})"
             over = f"{drift.value * length:+.2f} m over {length:.0f} m"
             text = f"{name}: {what} drift by {by}, {over}"

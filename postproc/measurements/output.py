@@ -160,7 +160,7 @@ def write(folder: Path, found: Comparison) -> list[Path]:
 def _sections(found: Comparison) -> Iterator[Section]:
     errors = [Text(one.text, "bad", "Error: ") for one in found.findings]
     yield Section("Errors", [*errors, Text(WHOSE)] if errors else [Text(NO_ERRORS, "good")])
-    force = Picture(_FORCE, "Contact forces below the cut-off, on the run's places")
+    force = Picture(_FORCE, "Contact forces below the cut-off, at the run's positions")
     table = replace(figures_table(found), title="")
     yield Section("Figures", [table], [force] if found.overlays else [])
     if found.uplift is not None:
