@@ -366,6 +366,85 @@ def test_a_search_knows_which_line_cannot_hang(evaluated: Any) -> None:
     assert found.found.value < found.shipped.value
 
 
+def test_an_evolution_begins_with_lines_that_hang(evaluated: Any) -> None:
+    """Sags that change each by itself make droppers slack: of changes of 20 mm hardly a line hangs.
+    The first generation takes sums of them which leave forces at rest."""
+
+    def calm(scene: Scene) -> dict[str, Any]:
+        assert scene.line.dropper is not None and scene.line.dropper.pre_sag_mm is not None
+        try:
+            least_forces(scene)
+        except InputError as error:
+            return {BROKE: str(error)}
+        return summary(40.0 + 0.2 * (scene.line.dropper.pre_sag_mm[4] - 15.0) ** 2)
+
+    evaluated(calm)
+    task = task_of(
+        set=FORWARD,
+        variables=[{"key": "line.dropper.pre_sag_mm", "change": [-60.0, 60.0]}],
+        search={"methods": ["cma"], "most_runs": 150},
+    )
+    plan = study.make_plan(sagging(), task)
+    (found,) = study.optimise(plan)
+    first = found.history[1:9]
+    assert sum(bool(point.broke) for point in first) <= 2
+    # Deviations of the bounds' own scale: 0.15 of 120 mm, one by one.
+    random = np.random.default_rng(1).normal(0.0, 18.0, (20, plan.variables.low.size))
+    member = plan.scenes.members[0]
+    alone = [calm(plan.scenes.scene(member, plan.variables.values(one))) for one in random]
+    assert sum(BROKE in own for own in alone) >= 18
+    assert found.shipped.value == pytest.approx(120.0) and found.found.value < 60.0
+
+
+@pytest.mark.parametrize(("of", "by"), [("each", 1.0 / 3.0), ("speed", 2.0)])
+def test_what_is_shipped_bounds_what_gets_worse(of: str, by: float, evaluated: Any) -> None:
+    """A kilogram d lowers 30 N at 250 km/h and raises the leading and the trailing pantograph at
+    200 km/h, 20 + d and 10 + 3 d. A tenth more of each is d = 1/3, of the worst at its speed 2."""
+
+    def formula(scene: Scene) -> dict[str, Any]:
+        d = masses(scene)[0] - 7.2
+        fast = scene.train.speed_km_h == 250.0
+        found = summary(30.0 - d if fast else 20.0 + d)
+        found["pantographs"].append(
+            {
+                **found["pantographs"][0],
+                "name": "trailing",
+                "std_N": 1.0 if fast else 10.0 + 3.0 * d,
+            }
+        )
+        return found
+
+    evaluated(formula)
+    task = task_of(
+        set={"directions": ["forward"], "speeds_km_h": [200.0, 250.0]},
+        variables=[{"key": HEAD, "entries": [[1]], "change": [-5.0, 5.0]}],
+        objective={"speeds_km_h": [250.0]},
+        constraints=[{"statistic": "std_N", "at_most": 1.1, "of_shipped": of}],
+    )
+    (found,) = study.optimise(study.make_plan(draft(), task))
+    assert found.values[HEAD][0] == pytest.approx(7.2 + by, abs=1e-3)
+    assert found.found.value == pytest.approx(30.0 - by, abs=1e-3)
+    with pytest.raises(InputError, match=r"set.speeds_km_h, which has no 230"):
+        task_of(objective={"speeds_km_h": [230.0]})
+
+
+def test_a_search_may_be_coarser_than_its_checks() -> None:
+    task = task_of(
+        set=FORWARD,
+        variables=[{"key": "line.dropper.pre_sag_mm", "change": [-5.0, 5.0]}],
+        search={"values": ["numerics.dt_s=0.01"]},
+    )
+    plan = study.make_plan(sagging(), task)
+    member = plan.scenes.members[0]
+    assert plan.scenes.scene(member).numerics.dt_s == 0.01
+    assert {own.scenes.scene(member).numerics.dt_s for own in plan.checks} == {0.005, 0.0025}
+    assert "numerics.dt_s=0.01" in plan.warnings[0]
+    # 0.1 mm might be 0.1 m in the file of a case; a search means it.
+    plan.scenes.scene(member, {"line.dropper.pre_sag_mm": [0.1, *SAG[1:]]})
+    with pytest.raises(InputError, match="is it 0.1 m"):
+        draft(**{"line.dropper.pre_sag_mm": [0.1, *SAG[1:]]}).scene()
+
+
 # --- what is told --------------------------------------------------------------------------------
 
 

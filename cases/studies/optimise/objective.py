@@ -10,15 +10,19 @@ import numpy as np
 
 from catenary.base.errors import InputError
 from catenary.cases.studies.optimise.droppers import least_forces
-from catenary.cases.studies.optimise.task import ObjectiveTable
+from catenary.cases.studies.optimise.task import ConstraintTable, ObjectiveTable
 from catenary.cases.studies.optimise.variables import Variables
 from catenary.cases.studies.scene_sets.evaluation import BROKE, Evaluation, Wanted, values_of
-from catenary.cases.studies.scene_sets.scene_set import BoundTable, SceneSet
+from catenary.cases.studies.scene_sets.scene_set import SceneSet
 
 # A violation of a constraint smaller than this share of its scale is round-off of a search.
 SLACK = 1e-6
 # Scale of forces of droppers at rest [N].
 _FORCE_AT_REST = 100.0
+# Steps of slopes of forces at rest, over those of runs: without sudden slackening anywhere.
+_OF_STEP = 0.05
+# Least margin of such forces from which changes are scaled, in their scale.
+_LEAST_REST = 0.05
 # Of the shipped value: the objective of a point whose runs broke, which a search leaves again.
 _OF_BROKEN = 10.0
 
@@ -77,7 +81,7 @@ class Problem:
     scenes: SceneSet
     variables: Variables
     objective: ObjectiveTable
-    constraints: Sequence[BoundTable]
+    constraints: Sequence[ConstraintTable]
     least_dropper_force: float
     evaluation: Evaluation
     most_runs: int | None
@@ -87,6 +91,7 @@ class Problem:
     def __post_init__(self) -> None:
         self._first_run = self.evaluation.n_runs
         self._scale, self._sizes = 1.0, (1, 0)
+        self._bounds: list[tuple[np.ndarray, np.ndarray]] = []
         start = self.shipped
         if start.broke:
             raise InputError(f"the case as shipped has no figures to begin with: {start.broke}")
@@ -174,11 +179,77 @@ class Problem:
             objective = np.full(n_objective, _OF_BROKEN)
             return Point(change, objective, np.full(n_margins, -1.0), np.inf, broke)
         whole = [one for one in found if not isinstance(one, str)]
-        objective = np.concatenate([own for own, _ in whole])
-        margins = np.concatenate([*(own for _, own in whole), self._at_rest(change)])
+        counted = [own for (own, _), one in zip(whole, self._counts, strict=True) if one]
+        objective = np.concatenate(counted)
+        bounded = [[values[i] for _, values in whole] for i in range(len(self.constraints))]
+        if not self._bounds:  # this is the case as shipped
+            self._bounds = [
+                self._bound(one, values)
+                for one, values in zip(self.constraints, bounded, strict=True)
+            ]
+        margins = np.concatenate(
+            [
+                *(
+                    sign_scale * (np.concatenate(values) - bound)
+                    for values, (bound, sign_scale) in zip(bounded, self._bounds, strict=True)
+                ),
+                self._at_rest(change),
+            ]
+        )
         self._sizes = objective.size, margins.size
         value = float(objective.max() if self.is_worst else objective.mean())
         return Point(change, objective / self._scale, margins, value)
+
+    def _bound(
+        self, one: ConstraintTable, shipped: Sequence[np.ndarray]
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Bounds of the values of a constraint, as shipped one array a scene, and what makes a
+        margin of the distance from them: its sign over its scale."""
+        sign = 1.0 if one.at_least is not None else -1.0
+        bound = one.at_least if one.at_least is not None else one.at_most
+        assert bound is not None
+        values = np.concatenate(shipped)
+        if one.of_shipped is None:
+            return np.full(values.size, bound), np.full(values.size, sign / one.scale)
+        if one.of_shipped == "speed":
+            members = zip(self.scenes.members, shipped, strict=True)
+            speeds = np.concatenate(
+                [np.full(own.size, member.speed or 0.0) for member, own in members]
+            )
+            for speed in np.unique(speeds):
+                own = speeds == speed
+                values[own] = -sign * np.max(-sign * values[own])
+        return bound * values, sign / np.where(values == 0.0, 1.0, np.abs(values))
+
+    @property
+    def _counts(self) -> list[bool]:
+        """Of which scenes the objective is."""
+        speeds = self.objective.speeds_km_h
+        return [speeds is None or member.speed in speeds for member in self.scenes.members]
+
+    def natural_steps(self, spread: float) -> np.ndarray:
+        """Changes, (n, n), a column each, of which random sums leave droppers taut.
+
+        The shares by which a sum with standard normal factors scatters are at most ``spread`` of
+        the width of bounds, and forces of droppers at rest scatter by half of what they are above
+        the least one. Alone a sag that moves by some millimetres makes neighbours slack. Makes no
+        runs.
+        """
+        own = self.variables
+        width = own.high - own.low
+        information = np.diag(1.0 / (spread * width) ** 2)
+        rest = self._at_rest(np.zeros(width.size))
+        if rest.size:
+            by = _OF_STEP * np.where(own.steps <= own.high, own.steps, -own.steps)
+            slopes = np.column_stack(
+                [
+                    (self._at_rest(_moved(np.zeros(width.size), i, step)) - rest) / step
+                    for i, step in enumerate(by)
+                ]
+            )
+            slopes /= 0.5 * np.maximum(rest, _LEAST_REST)[:, None]
+            information += slopes.T @ slopes
+        return np.linalg.cholesky(np.linalg.inv(information))
 
     def _at_rest(self, change: np.ndarray) -> np.ndarray:
         """Margins of the droppers of the first scene's line at rest; it hangs, as its run did."""
@@ -192,18 +263,13 @@ class Problem:
         runs = self.evaluation.n_runs - self._first_run
         self.say(f"    {runs} runs: {self.objective.statistic} {point.value:.4g}{state}")
 
-    def _figures(self, summary: dict[str, Any]) -> tuple[np.ndarray, np.ndarray] | str:
-        """Objective and margins of a run, or why it has none."""
+    def _figures(self, summary: dict[str, Any]) -> tuple[np.ndarray, list[np.ndarray]] | str:
+        """Objective and values of each constraint of a run, or why it has none."""
         objective = values_of(summary, self.objective.statistic)
         bounded = [values_of(summary, one.statistic) for one in self.constraints]
         if objective is None or None in bounded:
             return str(summary.get(BROKE, "the run has no such statistic"))
-        margins = [
-            one.margin(value) / one.scale
-            for one, values in zip(self.constraints, bounded, strict=True)
-            for value in values or ()
-        ]
-        return np.array(objective), np.array(margins)
+        return np.array(objective), [np.array(values) for values in bounded]
 
 
 def _moved(change: np.ndarray, i: int, by: float) -> np.ndarray:

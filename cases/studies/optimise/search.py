@@ -11,7 +11,7 @@ import numpy as np
 from catenary.cases.studies.optimise.objective import Point, Problem, Spent
 from catenary.cases.studies.optimise.task import CMA, GRADIENT, SearchTable
 
-# First standard deviation of the evolution strategy, over the width of the bounds.
+# Greatest first standard deviation of the evolution strategy, over the width of the bounds.
 _FIRST_SPREAD = 0.15
 _MOST_ITERATIONS = 200
 # Iterations of SLSQP that must gain something together.
@@ -114,27 +114,33 @@ def _by_evolution(problem: Problem, table: SearchTable) -> None:
     """CMA-ES (N. Hansen, arXiv:1604.00772), all points of a generation at once.
 
     It ranks points and needs no slopes; those that violate constraints stand behind all others, in
-    the order of their violation (K. Deb, Comput. Methods Appl. Mech. Engrg. 186, 2000).
+    the order of their violation (K. Deb, Comput. Methods Appl. Mech. Engrg. 186, 2000), and those
+    beyond bounds or that broke by how far they are.
     """
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # on what it could plot if other packages were there
         import cma
 
-    low = problem.variables.low
-    width = problem.variables.high - low
+    low, high = problem.variables.low, problem.variables.high
+    steps = problem.natural_steps(_FIRST_SPREAD)
     options = {
-        "bounds": [0.0, 1.0],
         "seed": table.seed + 1,  # it takes 0 for the time of the day
         "tolfun": table.precision,
         "tolfunhist": table.precision,
         "verbose": -9,
     }
-    strategy = cma.CMAEvolutionStrategy(-low / width, _FIRST_SPREAD, options)
+    strategy = cma.CMAEvolutionStrategy(np.zeros(low.size), 1.0, options)
     scale = abs(problem.history[0].value) or 1.0
     while not strategy.stop():
         asked = strategy.ask()
-        found = problem.points([low + np.clip(one, 0.0, 1.0) * width for one in asked])
-        strategy.tell(asked, [_rank(point, scale) for point in found])
+        wanted = [steps @ one for one in asked]
+        found = problem.points([np.clip(one, low, high) for one in wanted])
+        ranks = []
+        for share, change, point in zip(asked, wanted, found, strict=True):
+            beyond = np.linalg.norm((change - point.change) / (high - low))
+            far = _BEHIND * np.linalg.norm(share) if point.broke else 0.0
+            ranks.append(_rank(point, scale) + beyond + far)
+        strategy.tell(asked, ranks)
 
 
 def _rank(point: Point, scale: float) -> float:

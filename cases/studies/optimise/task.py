@@ -57,6 +57,19 @@ class ObjectiveTable(Table):
     over: Literal["worst", "mean"] = Field(
         "worst", description="the greatest value of all pantographs of all scenes, or their mean"
     )
+    speeds_km_h: list[float] | None = Field(
+        None, min_length=1, description="of the set's speeds those that count; all if absent"
+    )
+
+
+class ConstraintTable(BoundTable):
+    """A bound of every pantograph of every scene, or of their change."""
+
+    of_shipped: Literal["each", "speed"] | None = Field(
+        None,
+        description="the bound is a share of the value as shipped: of each pantograph of each "
+        "scene, or of the worst one at its speed",
+    )
 
 
 class SearchTable(Table):
@@ -77,6 +90,11 @@ class SearchTable(Table):
     short: bool = Field(
         False, description="search on the case shortened by its [test] table, and check on all"
     )
+    values: list[str] = Field(
+        default_factory=list,
+        max_length=100,
+        description="key=value of the search alone, such as a longer step; checks have the case's",
+    )
     seed: Seed = Field(1, description="of the evolution strategy")
 
 
@@ -95,7 +113,7 @@ class OptimiseTask(Table):
     set: SetTable = Field(default_factory=SetTable, description="the scenes")
     variables: list[VariableTable] = Field(min_length=1, max_length=100, description="variables")
     objective: ObjectiveTable = Field(default_factory=ObjectiveTable, description="objective")
-    constraints: list[BoundTable] = Field(
+    constraints: list[ConstraintTable] = Field(
         default_factory=list, max_length=100, description="constraints"
     )
     least_dropper_force_N: float = Field(
@@ -103,3 +121,14 @@ class OptimiseTask(Table):
     )
     search: SearchTable = Field(default_factory=SearchTable, description="the search")
     checks: ChecksTable = Field(default_factory=ChecksTable, description="checks of the optimum")
+
+    @model_validator(mode="after")
+    def _of_the_set(self) -> OptimiseTask:
+        known = self.set.speeds_km_h or []
+        for speed in self.objective.speeds_km_h or []:
+            if speed not in known:
+                raise ValueError(
+                    f"must have the speeds of its objective in set.speeds_km_h, which has no "
+                    f"{speed:g}"
+                )
+        return self
