@@ -227,7 +227,7 @@ def _listed(vary: Mapping[str, Sequence[Any]] | None) -> list[Variant]:
         )
         for key, values in vary.items()
     ]
-    variants = product(varied, {})
+    variants = product(varied, {}, "in vary")
     check_keys(variants, "in vary")
     return variants
 

@@ -15,11 +15,12 @@ import pytest
 from scipy import stats
 
 from catenary.base.errors import InputError
-from catenary.cases.scene.load import load_scene
+from catenary.cases.scene.load import load_scene, read_draft
 from catenary.cases.scene.problem import line_of
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.sampling.samples import sample_name, samples
 from catenary.cases.studies.sampling.tables import SamplingTable, read_sampling, sampling_of
+from catenary.cases.studies.sweep.jobs import scene_of
 from catenary.cases.studies.sweep.variants import Variant
 
 CASE = "en50318_2002"
@@ -253,6 +254,15 @@ def test_entries_of_a_list_vary_by_their_numbers(scene: Scene) -> None:
     beyond = {"pantographs.reference.masses_kg.2": {"type": "uniform", "least": 1, "most": 2}}
     with pytest.raises(InputError, match="the list has 2 entries, numbered from 0"):
         drawn(scene, n=2, keys=beyond)
+
+
+@pytest.mark.parametrize("key", [SPEED, "pantographs.reference.masses_kg.0"])
+def test_a_sample_out_of_bounds_is_told_with_its_file(key: str, scene: Scene) -> None:
+    found = drawn(scene, n=2, keys={key: {"type": "uniform", "least": 1e6, "most": 2e6}})
+    with pytest.raises(
+        InputError, match=rf"^variant sample_000001: {key} is .* in {FILE}; it must"
+    ):
+        scene_of(read_draft(CASE), found[0], several=True)
 
 
 def test_more_samples_begin_with_the_same_ones(scene: Scene) -> None:

@@ -63,6 +63,14 @@ def test_pieces_of_work_have_one_line_and_stay_when_more_variants_come() -> None
     assert few == more[:10]
 
 
+@pytest.mark.parametrize("only_statistics", [True, False])
+def test_a_value_out_of_bounds_is_told_as_python_gave_it(
+    only_statistics: bool, scene: catenary.Scene
+) -> None:
+    with pytest.raises(InputError, match=r"^train.speed_km_h is 5000 in vary; it must be at most"):
+        catenary.sweep(scene, {"train.speed_km_h": [5000]}, only_statistics=only_statistics)
+
+
 def test_the_table_is_that_of_whole_runs(scene: catenary.Scene, table: pd.DataFrame) -> None:
     same(table, catenary.sweep(scene, VARY))
 

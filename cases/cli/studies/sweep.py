@@ -167,14 +167,20 @@ def read_variants(vary: Sequence[str] | None, named: Path | None) -> list[Varian
     InputError
         If there are none, or if a key is none of a scene.
     """
-    from catenary.cases.studies.sweep.variants import check_keys, parse_vary, product, read_named
+    from catenary.cases.studies.sweep.variants import (
+        VARY,
+        check_keys,
+        parse_vary,
+        product,
+        read_named,
+    )
 
     if not vary and named is None:
         raise InputError(
             "there is nothing to vary: give --vary key=v1,v2,..., --variants or --sample"
         )
     varied = [parse_vary(text) for text in vary or []]
-    check_keys(product(varied, {}), "on the command line (--vary)")
+    check_keys(product(varied, {}), VARY)
     table = {} if named is None else read_named(named)
     check_keys(product([], table), f"in {named}")
     return product(varied, table)

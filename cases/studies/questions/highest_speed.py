@@ -182,7 +182,7 @@ def find_speeds(
         variants = [
             replace(one, name=f"{one.name}__{way}", direction=way)
             for way in marched
-            for one in variants_of(vary, {})
+            for one in variants_of(vary, {}, "among the speeds")
         ]
         places = product(judged, own)
         found = marching.of(variants)

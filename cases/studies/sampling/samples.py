@@ -71,7 +71,9 @@ def samples(sampling: SamplingTable, scene: Scene, file: str) -> list[Variant]:
         assigned.append([f"{key}={text}" for text in texts])
     names = list(columns)
     return [
-        Variant(sample_name(number), assignments, dict(zip(names, values, strict=True)))
+        Variant(
+            sample_name(number), assignments, dict(zip(names, values, strict=True)), where=where
+        )
         for number, (assignments, values) in enumerate(
             zip(zip(*assigned, strict=True), zip(*columns.values(), strict=True), strict=True), 1
         )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -71,7 +71,6 @@ def sensitivity_of(
     comm: Any,
     *,
     droppers: bool = False,
-    progress: Callable[[str], None] = lambda line: None,
 ) -> Sensitivity:
     """Differentiate the statistics of a scene. Not collective: one process.
 
@@ -81,7 +80,6 @@ def sensitivity_of(
     keys : of the parameters; the usual ones if there are none and ``droppers`` is not set
     droppers : whether the length of each dropper in the evaluated stretch is a parameter
     comm : mpi4py communicator of this process alone
-    progress : called with a line for each parameter
 
     Raises
     ------
@@ -98,7 +96,6 @@ def sensitivity_of(
     changes: list[Change] = []
     kept, left_out = [], {}
     for parameter in parameters:
-        progress(parameter.key)
         try:
             changes.append(change_by(parameter, scenes, at_rest, now, comm))
         except InputError as error:
@@ -109,7 +106,6 @@ def sensitivity_of(
             kept.append(parameter)
     found: Sensitivity | None = None
     for part in parts_of(changes, at_rest, now):
-        progress("march")
         marched = march_with_tangents(comm, at_rest, changes[part])
         if found is None:
             found = _without_parameters(marched, at_rest)

@@ -155,7 +155,7 @@ def _assigned(variant: Variant) -> list[Assigned]:
     own = len(variant.assignments) - len(variant.varied)
     by_name = f"by the variant {variant.name}"
     return [
-        Assigned(text, "--vary", "on the command line (--vary)")
+        Assigned(text, "--vary", variant.where)
         if number >= own
         else Assigned(text, f"variant {variant.name}:", by_name)
         for number, text in enumerate(variant.assignments)

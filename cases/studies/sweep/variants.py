@@ -23,6 +23,7 @@ from catenary.postproc.files.csv_text import begins_formula
 MAX_VARIANTS = 10_000
 MOST_LETTERS = 200  # in a variant's name
 _LONGEST_SLUG = 100  # folder names may have 255 bytes; room for what a user puts around them
+VARY = "on the command line (--vary)"
 _OPENING, _CLOSING, _QUOTES = "[{", "]}", "\"'"
 
 
@@ -37,6 +38,7 @@ class Variant:
     varied : varied key -> the value's text, for tables and axes
     named : its name in a file of variants, if keys are varied too
     direction : of the train, whose scene is turned for the one backward; empty if none is chosen
+    where : where the values of varied keys are written, for sentences
     """
 
     name: str
@@ -44,6 +46,7 @@ class Variant:
     varied: Mapping[str, str] = field(default_factory=dict)
     named: str = ""
     direction: str = ""
+    where: str = VARY
 
 
 class VariedKey(NamedTuple):
@@ -182,7 +185,9 @@ def _split(text: str) -> list[str]:
     return [*parts, text[start:].strip()]
 
 
-def product(varied: Sequence[VariedKey], named: Mapping[str, Sequence[str]]) -> list[Variant]:
+def product(
+    varied: Sequence[VariedKey], named: Mapping[str, Sequence[str]], where: str = VARY
+) -> list[Variant]:
     """All combinations of the varied keys' values, each under every named variant.
 
     The last key varies fastest. Without named variants the keys alone make the variants.
@@ -210,7 +215,8 @@ def product(varied: Sequence[VariedKey], named: Mapping[str, Sequence[str]]) -> 
             words += [f"{labels[key]}_{value}" for key, value in chosen.items()]
             own = tuple(f"{key}={value}" for key, value in chosen.items())
             of_file = name if chosen else ""
-            variants.append(Variant("__".join(words), (*assignments, *own), chosen, of_file))
+            told = "__".join(words), (*assignments, *own), chosen
+            variants.append(Variant(*told, named=of_file, where=where))
     return _with_own_folders(variants)
 
 

@@ -9,9 +9,9 @@
 
 namespace catenary {
 
-/// What passes read and fill.
+/// Arrays that both passes read and fill.
 struct PassArrays {
-    std::span<double> factor;            ///< what products with K read, see `ProductArrays`
+    std::span<double> factor;            ///< operand of products with K, see `ProductArrays`
     std::span<double> velocity;          ///< the same of products with C; may be empty
     std::span<const double> loads;       ///< [N] of all that is solved for; may be empty
     std::span<double> answer;            ///< accelerations of all that is solved for

@@ -27,7 +27,7 @@ struct KnownMasks {
     KnownMasks(const Layout&, const Layout&) {}
 };
 
-/// The same found at run time. What a square has is asked before each: a processor knows the
+/// The same found at run time. Each square is asked for its nonzeros: a processor predicts the
 /// answer, which is that of the station before.
 struct GivenMasks {
     static constexpr bool is_known = false;

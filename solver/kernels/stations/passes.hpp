@@ -5,18 +5,18 @@
 
 namespace catenary::CATENARY_TARGET {
 
-/// What is done with the unknowns of a station: they are the answer of a solve, or accelerations by
-/// which the motion goes on.
+/// Use of a station's unknowns: stored as the answer of a solve, or taken as accelerations by which
+/// Newmark's or the generalized-alpha method moves the station.
 enum class Then { kStore, kNewmark, kAlpha };
 inline Then then_of(const Work& work) {
     if (work.right) return Then::kStore;
     return work.motion.known ? Then::kAlpha : Then::kNewmark;
 }
-// What is done is an argument of passes: a constant of these types where a pass is compiled for it.
+// Passes take it as an argument, a constant of these types where a pass is compiled for it alone.
 using Newmark = std::integral_constant<Then, Then::kNewmark>;
 using IsProduct = std::false_type;
 
-/// What a chain works on, by values that a compiler keeps in registers.
+/// Arrays and coefficients of a chain, held by value so that a compiler keeps them in registers.
 template <class Blocks>
 struct Chained {
     using X = typename Blocks::X;
@@ -116,9 +116,9 @@ struct Chained {
     CATENARY_INLINE void add_behind(Sums<X>& sums, int64_t i, int step, const X& behind) const {
         blocks.add_beside(sums, kept(joined.at(i)) + (step > 0 ? 0 : blocks.beside_size), behind);
     }
-    /// Leave in `answer` what is left of a right-hand side after the stations outwards are
-    /// eliminated. What is given on to the station inwards is S^-1 times that at the end of a chain
-    /// and where factors are sparse, else what is left itself.
+    /// Leave in `answer` the right-hand side of the Schur complement S, after the stations outwards
+    /// are eliminated. The station inwards gets S^-1 times it at the end of a chain and where
+    /// factors are sparse, else that right-hand side itself.
     CATENARY_INLINE X eliminate(int64_t i, int step, Sums<X> sums, const X& outward,
                                 bool is_first) const {
         if (blocks.is_sparse || is_first)
@@ -166,8 +166,8 @@ struct Chained {
         blocks.store(at, own);
         return own;
     }
-    /// Take a station from one prediction to the next. What was solved for is its acceleration but
-    /// for damping on mass, and for its share of x if the right-hand side was made by M.
+    /// Take a station from one prediction to the next. The solution is its acceleration but for
+    /// damping on mass, and for its share of x if the right-hand side was made by M.
     template <class T>
     CATENARY_INLINE void go_on(int64_t i, X solution, T then) const {
         const Changes& c = changes;

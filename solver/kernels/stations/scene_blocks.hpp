@@ -6,7 +6,7 @@
 
 namespace catenary::CATENARY_TARGET {
 
-/// What a number of a packed block joins, and where it stands.
+/// A number of a packed block: the unknowns that it joins, and where it stands.
 struct Numbered {
     Joint joint;
     int at = 0;

@@ -277,7 +277,7 @@ void TangentSteps::step_chain(const LinearChain& chain, const HeadChange& change
         }
         free[i] = value;
     }
-    // What a force takes off the state changes with the masses.
+    // The answer of the state to a force changes with the masses.
     for (int64_t j = 0; changes && j < s; ++j)
         for (int64_t i = 0; i < n; ++i) {
             double answer = 0.0;

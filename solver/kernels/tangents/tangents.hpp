@@ -74,7 +74,7 @@ struct Tangent {
     CATENARY_RECORD(free, loads, matrices, rest, links, heads, drives, law, start, speed, results)
 };
 
-/// What tangents need of the march besides its steps.
+/// Tangents of a march, the parts of it that they read, and the counts that they fill in.
 struct MarchTangents {
     std::vector<Tangent> all;
     /// Of each head that is no linear chain two others like it, whose state is free to be changed.
