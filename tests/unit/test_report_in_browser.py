@@ -66,8 +66,9 @@ addEventListener("load", async () => {
     const boxes = what => [...plot.querySelectorAll(what)].map(one => one.getBoundingClientRect());
     return {name: plot.ariaLabel, marks: plot.querySelectorAll(".lines path, .points path").length,
             needs: plot.parentElement.scrollWidth, has: plot.parentElement.clientWidth,
-            titles: boxes(".ytitle").map(box => [box.left, box.right]),
-            ticks: Math.min(...boxes(".ytick text").map(box => box.left))};
+            axes: ["y", "y2"].filter(axis => boxes(`.${axis}title`).length).map(axis => [
+              ...boxes(`.${axis}title`).flatMap(box => [box.left, box.right]),
+              Math.min(...boxes(`.${axis}tick text`).map(box => box.left))])};
   });
   parent.postMessage(JSON.stringify(said), "*");
 });
@@ -151,8 +152,9 @@ def test_plots_fit_a_phone(report: Path, tmp_path: Path) -> None:
     assert len(plots) == page.count('<div class="plot"') > 10
     for plot in plots:
         assert plot["marks"] > 0 and plot["needs"] == plot["has"] < 400, plot
-        ((left, right),) = plot["titles"]
-        assert 0.0 <= left < right <= plot["ticks"], plot
+        assert plot["axes"]
+        for left, right, ticks in plot["axes"]:
+            assert 0.0 <= left < right <= ticks, plot
 
 
 def test_the_plain_form_asks_for_nothing(report: Path, tmp_path: Path) -> None:
