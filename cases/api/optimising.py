@@ -192,7 +192,7 @@ def tolerance(
     ...     "set": {"directions": ["forward"]},
     ...     "errors": [{"name": "tension", "kind": "tension", "level": 2.0, "most": 4.0}],
     ...     "criteria": [{"statistic": "std_N", "at_most": 35.0}],
-    ...     "samples": {"number": 2, "probability": 0.6, "worst_case": False},
+    ...     "samples": {"probability": 0.6, "confidence": 0.6, "worst_case": False},
     ... }
     >>> table = catenary.tolerance(catenary.load("en50318_2002", short=True), task)
     >>> table.level.tolist()

@@ -10,6 +10,7 @@ import pytest
 from measuring import COMM, check
 
 from catenary.cases.run.runner import run_case
+from catenary.cases.scene.input.case_files import find_case
 from catenary.cases.scene.load import Draft, read_draft
 from catenary.cases.scene.turned import BACKWARD
 from catenary.cases.studies.optimise import study as optimising
@@ -111,7 +112,8 @@ def test_tolerance_of_a_run_is_that_of_brute_force() -> None:
     nominal = evaluate([draft.scene()])[0]["pantographs"][0]["std_N"]
     errors = {"name": "tension", "kind": "tension", "level": 2.0, "most": 16.0}
     bound = {"statistic": "std_N", "at_most": 1.02 * nominal}
-    samples = {"number": 6, "probability": 0.8, "resolution": 0.13, "worst_case": False}
+    samples = {"number": 6, "probability": 0.55, "confidence": 0.8, "resolution": 0.13}
+    samples["worst_case"] = False
     tables = {"errors": [errors], "criteria": [bound], "samples": samples}
     task = read_task(tables | {"set": {"directions": ["forward"]}}, ToleranceTask)
     plan = tolerating.make_plan(draft, task)
@@ -123,7 +125,8 @@ def test_tolerance_of_a_run_is_that_of_brute_force() -> None:
         scenes = [draft.assigned((k, v, "") for k, v in own.items()).scene() for own in values]
         return sum(one["pantographs"][0]["std_N"] <= 1.02 * nominal for one in evaluate(scenes))
 
-    # Of six, one may fail. Halves of 16 %: 2 % is the resolution.
+    # Of six, one may fail: no more do with a probability of 0.16 where 55 % of the lines keep it.
+    # Halves of 16 %: 2 % is the resolution.
     assert 0.0 < found.level < 16.0
     assert kept(found.level) == found.kept >= 5
     assert kept(found.level + 2.0) < 5
@@ -151,3 +154,25 @@ def test_dropper_lengths_calm_the_benchmark_at_320_km_h() -> None:
         assert max(by) < -0.20
         assert min(row.optimum["min_N"] for row in own) > 34.0
     assert len(found.said) == 1 and found.said[0].startswith("max_uplift_mm gets worse")
+
+
+@pytest.mark.study
+@pytest.mark.timeout(3600)
+def test_an_evolution_calms_the_benchmark_where_it_is_worst_and_no_speed_gets_worse() -> None:
+    """From 250 to 330 km/h, one and two pantographs: a fifth less at 320 km/h in some 330 runs."""
+    forces = [[250, 132.4], [275, 145.6], [300, 160.29], [320, 173.35], [330, 180.1]]
+    key = "pantographs.three_masses.static_force_by_speed"
+    task = read_task(find_case("ac_simple").parent / "droppers_by_speed.toml", OptimiseTask)
+    plan = optimising.make_plan(read_draft("ac_simple").assigned([(key, forces, "")]), task)
+    (found,) = optimising.optimise(plan)
+    assert found.n_runs <= 350 and not found.found.violation
+    for name in (AS_IS, FINER_MESH, SHORTER_STEP, UNSEEN):
+        for speed in task.set.speeds_km_h or []:
+            own = [row for row in found.rows if row.check == name and f" {speed:g} " in row.scene]
+            before, after = (
+                max(figures["std_N"] for figures in design)
+                for design in ([row.shipped for row in own], [row.optimum for row in own])
+            )
+            print(f"{name}, {speed:g} km/h: {before:.1f} to {after:.1f} N")
+            # The search ended at 320 km/h with -22 %, on lines with errors with -20 %.
+            assert after < (0.81 if speed == 320.0 else 1.0) * before

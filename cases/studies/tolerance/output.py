@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from catenary.cases.studies.tolerance.study import ALL, CONFIDENCE, Plan, Tolerance
+from catenary.cases.studies.tolerance.study import ALL, EACH, Plan, Tolerance
 from catenary.postproc.report.study_table import Column, Content, StudyTable, write_files
 
 TABLE, RECORD, PAGE = "tolerance.csv", "tolerance.json", "tolerance.md"
@@ -19,7 +19,7 @@ def write(out_dir: Path, plan: Plan, found: Sequence[Tolerance]) -> list[Path]:
     record = {
         "case": plan.name,
         "task": plan.task.model_dump(exclude_none=True),
-        "tolerances": [asdict(one) | {"least_share": one.least_share} for one in found],
+        "tolerances": [asdict(one) for one in found],
     }
     content: dict[str, Content] = {TABLE: table_of(found), RECORD: record}
     return write_files(out_dir, content | {PAGE: markdown(plan, found)})
@@ -50,6 +50,7 @@ def table_of(found: Sequence[Tolerance]) -> StudyTable:
         Column("least_share", "share at least", ".3f"),
         Column("linear", "worst case by slopes +-", ".3g"),
         Column("checked", "as run +-", ".3g"),
+        Column("lost_at", "a line loses it at +-", ".3g"),
     )
     return StudyTable(columns, rows, "Tolerances by criterion")
 
@@ -61,15 +62,18 @@ def _level(one: Tolerance) -> str:
 
 
 def installer_table(plan: Plan, found: Sequence[Tolerance]) -> StudyTable:
-    """How far each error may go for all criteria that the line keeps without errors."""
+    """How far each error may go for all criteria at once that the line keeps without errors."""
     rows = []
-    together = _tightest([one for one in found if one.error == ALL])
+    together = _of_each([one for one in found if one.error == ALL])
     for group in plan.groups:
-        own = _tightest([one for one in found if one.error == group.table.name])
+        own = [one for one in found if one.error == group.table.name]
+        each = _of_each(own)
         row = {"error": group.table.name, "unit": group.unit, "n": len(group.names)}
-        row |= {"alone": "none", "by": "", "together": ""}
-        if own is not None:
-            row |= {"alone": _level(own), "by": own.criterion}
+        row |= {"alone": "none", "lost_at": None, "by": "", "together": ""}
+        row["worst"] = None
+        if each is not None:
+            row |= {"alone": _level(each), "lost_at": each.lost_at, "by": _first_to_fail(own)}
+            row["worst"] = each.linear if np.isfinite(each.linear or 0.0) else None
         if together is not None:
             level = together.level * group.table.level
             row["together"] = f"{'at least ' if together.at_most else ''}{level:.3g}"
@@ -78,19 +82,28 @@ def installer_table(plan: Plan, found: Sequence[Tolerance]) -> StudyTable:
         Column("error", "error"),
         Column("n", "number", "d"),
         Column("alone", "alone +-", ">"),
+        Column("worst", "worst case by slopes +-", ".3g"),
+        Column("lost_at", "a line fails at +-", ".3g"),
         Column("together", "all together +-", ">"),
         Column("unit", "unit"),
         Column("by", "first criterion to fail alone"),
     ]
-    if together is None:
-        del columns[3]
+    absent = {"worst"} if not plan.task.samples.worst_case else set()
+    absent |= {"together"} if together is None else set()
+    columns = [column for column in columns if column.name not in absent]
     return StudyTable(columns, rows, "What an installer may have")
 
 
-def _tightest(found: Sequence[Tolerance]) -> Tolerance | None:
-    """The least tolerance of criteria that the line keeps without errors, None if it keeps none."""
+def _of_each(found: Sequence[Tolerance]) -> Tolerance | None:
+    """The tolerance for all criteria at once that the line keeps without errors, None for none."""
     kept = [one for one in found if one.level or one.kept]
-    return min(kept, key=lambda one: (one.level, one.at_most), default=None)
+    return next((one for one in kept if one.criterion == EACH), kept[0] if kept else None)
+
+
+def _first_to_fail(found: Sequence[Tolerance]) -> str:
+    """The criterion with the least tolerance of those that the line keeps without errors."""
+    kept = [one for one in found if one.criterion != EACH and (one.level or one.kept)]
+    return min(kept, key=lambda one: (one.level, one.at_most)).criterion
 
 
 def remarks(plan: Plan, found: Sequence[Tolerance]) -> list[str]:
@@ -100,15 +113,22 @@ def remarks(plan: Plan, found: Sequence[Tolerance]) -> list[str]:
     for name in lost:
         said.append(f"{name} is not kept without errors, and no tolerance counts for it")
     samples = plan.task.samples
+    fail = f"at most {samples.allowed} of them fail" if samples.allowed else "none of them fails"
     said.append(
-        f"tolerances are for {100 * samples.probability:g} % of the lines by {samples.number} "
-        f"samples, to {100 * samples.resolution:g} % of the greatest that was looked at; `share at "
-        f"least` is the lower bound at {100 * CONFIDENCE:g} % confidence"
+        f"at least {100 * samples.probability:g} % of all lines keep the criteria within their "
+        f"tolerance, with {100 * samples.confidence:g} % confidence: so show {samples.n} samples "
+        f"if {fail}; tolerances are found to {100 * samples.resolution:g} % of the greatest that "
+        "was looked at"
     )
     if samples.worst_case:
         said.append(
             "`by slopes` is linear in the errors, `as run` the line with just these errors: where "
-            "both differ much, slopes do not hold so far"
+            "both differ much, slopes do not hold so far, and other lines are worse"
+        )
+    if any(one.lost_at is not None for one in found):
+        said.append(
+            "a line that was run, of the samples or of the worst case, fails at the tolerance of "
+            "that name: the worst of all lines fails below it"
         )
     return said
 

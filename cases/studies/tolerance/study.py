@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -72,18 +72,17 @@ def names_of(margins: Sequence[Margins]) -> list[str]:
     return found
 
 
-def least(margins: Sequence[Margins], name: str) -> float:
-    """The least margin of a criterion of all runs of a line; of one that broke minus infinity."""
-    return min(min(one.get(name, one.get("", [np.inf]))) for one in margins)
+def least(margins: Sequence[Margins], *names: str) -> float:
+    """The least margin of criteria of all runs of a line; of one that broke minus infinity."""
+    return min(min(one.get(name, one.get("", [np.inf]))) for one in margins for name in names)
 
 
 ALL = "all together"
+EACH = "each of them"
 # Slopes are those of errors of this share of the tolerance from which all are scaled.
 _STEP = 0.1
 # Samples are run in parts, so that a level at which many fail is left early.
 _PART = 25
-# Of the lower bound of a share that is told beside it.
-CONFIDENCE = 0.95
 
 
 @dataclass(frozen=True)
@@ -92,13 +91,18 @@ class Tolerance:
 
     Attributes
     ----------
-    criterion, error, unit : which
+    criterion, error, unit : which; ``EACH`` is all criteria at once that the line keeps without
+        errors
     level : largest tolerance at which enough samples keep the criterion, in the error's unit, or
         of all together in tolerances of the task; 0 if the line without errors does not keep it
     at_most : whether that is the greatest that was looked at
     kept, n_samples : samples that keep it at that level, of how many
+    least_share : lower bound of the share of all lines that keep it there (C. Clopper, E. Pearson,
+        Biometrika 26, 1934)
     linear : tolerance in the worst case by slopes, infinite without slopes; None if not asked for
     checked : largest tolerance at which the line with that worst case keeps the criterion
+    lost_at : least tolerance at which a line that was run, of the samples or of the worst case, is
+        known to lose it, below which the true worst case lies; None if none does
     """
 
     criterion: str
@@ -108,18 +112,10 @@ class Tolerance:
     at_most: bool
     kept: int
     n_samples: int
+    least_share: float
     linear: float | None = None
     checked: float | None = None
-
-    @property
-    def least_share(self) -> float:
-        """Lower bound of the share of lines that keep it, at 95 % (C. Clopper, E. Pearson,
-        Biometrika 26, 1934)."""
-        from scipy.stats import beta
-
-        if not self.kept:
-            return 0.0
-        return float(beta.ppf(1.0 - CONFIDENCE, self.kept, self.n_samples - self.kept + 1))
+    lost_at: float | None = None
 
 
 @dataclass(frozen=True)
@@ -184,10 +180,10 @@ def find_tolerances(
     search = _Search(plan, Evaluation(pool, kept), say)
     found: list[Tolerance] = []
     for varied in search.varied:
-        for criterion in search.criteria:
-            one = search.tolerance(varied, criterion)
+        for one in search.tolerances(varied):
             say(f"{one.error}, {one.criterion}: {one.level:.3g} {one.unit}")
             found.append(one)
+    say(f"{search.evaluation.n_runs} runs")
     return found
 
 
@@ -223,13 +219,14 @@ class _Search:
     evaluation: Evaluation
     say: Callable[[str], None]
     varied: list[_Varied] = field(default_factory=list)
+    _weak: dict[str, set[int]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         task = self.plan.task
         self.nominal = self._margins([{}])[0]
         self.criteria = names_of(self.nominal)
         random = [
-            group.random(np.random.default_rng([task.samples.seed, number]), task.samples.number)
+            group.random(np.random.default_rng([task.samples.seed, number]), task.samples.n)
             for number, group in enumerate(self.plan.groups)
         ]
         for group, own in zip(self.plan.groups, random, strict=True):
@@ -246,18 +243,59 @@ class _Search:
     def samples(self) -> SamplesTable:
         return self.plan.task.samples
 
-    def tolerance(self, varied: _Varied, criterion: str) -> Tolerance:
-        """The tolerance of some errors for a criterion."""
-        n = self.samples.number
-        head = criterion, varied.name, varied.unit
+    def tolerances(self, varied: _Varied) -> list[Tolerance]:
+        """Tolerances of some errors for each criterion, and for all at once if there are several
+        that the line keeps without errors."""
+        found = [self._tolerance(varied, name) for name in self.criteria]
+        held = [one for one in found if one.level or one.kept]
+        if len(held) > 1:
+            together = self._by_samples(varied, EACH, *(one.criterion for one in held))
+            linear, checked, lost_at = (
+                min((value for value in values if value is not None), default=None)
+                for values in zip(
+                    *((one.linear, one.checked, one.lost_at) for one in [*held, together]),
+                    strict=True,
+                )
+            )
+            found.append(replace(together, linear=linear, checked=checked, lost_at=lost_at))
+        return found
+
+    def _tolerance(self, varied: _Varied, criterion: str) -> Tolerance:
         if least(self.nominal, criterion) < 0.0:
-            return Tolerance(*head, 0.0, False, 0, n)
-        level, at_most = self._bisect(varied.most, lambda s: self._holds(varied, s, criterion))
-        kept = n - self._failures(varied, level, criterion, n) if level else n
-        linear = checked = None
-        if self.samples.worst_case:
-            linear, checked = self._worst_case(varied, criterion)
-        return Tolerance(*head, level, at_most, kept, n, linear, checked)
+            head = criterion, varied.name, varied.unit
+            return Tolerance(*head, 0.0, False, 0, self.samples.n, 0.0)
+        found = self._by_samples(varied, criterion, criterion)
+        if not self.samples.worst_case:
+            return found
+        linear, checked, lost_at = self._worst_case(varied, criterion)
+        lost = [level for level in (found.lost_at, lost_at) if level is not None]
+        return replace(found, linear=linear, checked=checked, lost_at=min(lost, default=None))
+
+    def _by_samples(self, varied: _Varied, name: str, *criteria: str) -> Tolerance:
+        """The tolerance at which enough samples keep all of some criteria."""
+        from scipy.stats import beta
+
+        n = self.samples.n
+        allowed = self.samples.allowed
+        lost: list[float] = []
+
+        def holds(level: float) -> bool:
+            failed = self._failures(varied, level, criteria, allowed)
+            if failed:
+                lost.append(level)
+            does = failed <= allowed
+            self.say(
+                f"    {varied.name} +-{level:.3g} {varied.unit}: {name} "
+                f"{'kept' if does else 'not kept'}"
+            )
+            return does
+
+        level, at_most = self._bisect(varied.most, holds)
+        kept = n - self._failures(varied, level, criteria, n) if level else n
+        share = float(beta.ppf(1.0 - self.samples.confidence, kept, n - kept + 1))
+        lost_at = min(lost, default=None)
+        head = name, varied.name, varied.unit
+        return Tolerance(*head, level, at_most, kept, n, share, lost_at=lost_at)
 
     def _bisect(self, most: float, holds: Callable[[float], bool]) -> tuple[float, bool]:
         """The largest level that holds, 0 always does; whether that is the greatest of all."""
@@ -269,21 +307,23 @@ class _Search:
             low, high = (middle, high) if holds(middle) else (low, middle)
         return low, False
 
-    def _holds(self, varied: _Varied, level: float, criterion: str) -> bool:
-        n = self.samples.number
-        allowed = int(np.floor((1.0 - self.samples.probability) * n + 1e-9))
-        holds = self._failures(varied, level, criterion, allowed) <= allowed
-        said = "kept" if holds else "not kept"
-        self.say(f"    {varied.name} +-{level:.3g} {varied.unit}: {criterion} {said}")
-        return holds
+    def _failures(self, varied: _Varied, level: float, criteria: Sequence[str], enough: int) -> int:
+        """Samples that do not keep criteria at a level; counting ends above ``enough``.
 
-    def _failures(self, varied: _Varied, level: float, criterion: str, enough: int) -> int:
-        """Samples that do not keep a criterion at a level; counting ends above ``enough``."""
+        Those that failed at other levels come first, so that a level which does not hold is left
+        early.
+        """
+        weak = self._weak.setdefault(varied.name, set())
+        order = sorted(range(self.samples.n), key=lambda number: number not in weak)
         failed = 0
-        for first in range(0, self.samples.number, _PART):
-            numbers = range(first, min(first + _PART, self.samples.number))
-            margins = self._margins([varied.values(level, varied.sample(i)) for i in numbers])
-            failed += sum(least(own, criterion) < 0.0 for own in margins)
+        for first in range(0, len(order), _PART):
+            numbers = order[first : first + _PART]
+            lines = self._margins([varied.values(level, varied.sample(i)) for i in numbers])
+            own = [
+                i for i, line in zip(numbers, lines, strict=True) if least(line, *criteria) < 0.0
+            ]
+            weak.update(own)
+            failed += len(own)
             if failed > enough:
                 break
         return failed
@@ -299,8 +339,9 @@ class _Search:
         n = len(members)
         return [found[i * n : (i + 1) * n] for i in range(len(lines))]
 
-    def _worst_case(self, varied: _Varied, criterion: str) -> tuple[float, float]:
-        """Tolerance by slopes, and the largest one that the line with that worst case keeps.
+    def _worst_case(self, varied: _Varied, criterion: str) -> tuple[float, float, float | None]:
+        """Tolerance by slopes, the largest one that the line with that worst case keeps, and the
+        least one at which it is known to lose the criterion.
 
         To first order the margin of a run falls from m by the sum of |slope| times tolerance. The
         errors that make it fall so are run then.
@@ -316,11 +357,17 @@ class _Search:
             worst.append(-np.sign(slopes[first, begin : begin + n]))
             begin += n
 
+        lost: list[float] = []
+
         def holds(level: float) -> bool:
             margins = self._margins([varied.values(level, worst)])[0]
-            return least(margins, criterion) >= 0.0
+            does = least(margins, criterion) >= 0.0
+            if not does:
+                lost.append(level)
+            return does
 
-        return float(levels[first]), self._bisect(varied.most, holds)[0]
+        checked = self._bisect(varied.most, holds)[0]
+        return float(levels[first]), checked, min(lost, default=None)
 
     def _slopes(self, varied: _Varied, criterion: str) -> tuple[np.ndarray, np.ndarray]:
         """Margins without errors, (n_margins,), and their slopes by each error over its tolerance

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Literal
 
+import numpy as np
 from pydantic import Field, model_validator
 
 from catenary.cases.scene.keys.table import Table
@@ -73,7 +75,16 @@ class SamplesTable(Table):
     probability: float = Field(
         0.99, gt=0.5, lt=1, description="share of the installed lines that keep a criterion"
     )
-    number: int = Field(100, ge=2, le=100_000, description="random lines at each level")
+    confidence: float = Field(
+        0.95, ge=0.5, lt=1, description="with which the samples show that share"
+    )
+    number: int | None = Field(
+        None,
+        ge=2,
+        le=100_000,
+        description="random lines at each level; if absent the fewest that show the share if all "
+        "keep the criterion, 299 for 99 % at 95 % confidence",
+    )
     seed: Seed = Field(1, description="of the errors, the same at all levels")
     resolution: float = Field(
         0.04, gt=0.001, le=0.5, description="of a tolerance, as a share of the greatest"
@@ -81,6 +92,36 @@ class SamplesTable(Table):
     worst_case: bool = Field(
         True, description="also the worst case, by slopes of all errors near the evaluated stretch"
     )
+
+    @model_validator(mode="after")
+    def _enough(self) -> SamplesTable:
+        if self.number is not None and self.number < self.fewest:
+            raise ValueError(
+                f"must have number = {self.fewest} at least, which show "
+                f"{100 * self.probability:g} % at {100 * self.confidence:g} % confidence if none "
+                f"fails, but has {self.number}"
+            )
+        return self
+
+    @property
+    def fewest(self) -> int:
+        """Samples that show the share if none fails: p^n is at most 1 - confidence."""
+        return max(2, math.ceil(math.log(1.0 - self.confidence) / math.log(self.probability)))
+
+    @property
+    def n(self) -> int:
+        """Number of random lines."""
+        return self.number or self.fewest
+
+    @property
+    def allowed(self) -> int:
+        """How many of the samples may fail: the most whose lower bound of Clopper and Pearson is
+        not below the share."""
+        from scipy.stats import binom
+
+        failures = np.arange(self.n)
+        shown = binom.cdf(failures, self.n, 1.0 - self.probability) <= 1.0 - self.confidence
+        return int(np.count_nonzero(shown)) - 1
 
 
 class ToleranceTask(Table):
