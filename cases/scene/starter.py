@@ -12,7 +12,7 @@ from pathlib import Path
 from catenary.base.errors import InputError
 from catenary.cases.scene.input.case_files import CASE_FILE, find_case
 from catenary.cases.scene.input.csv_files import span_table
-from catenary.cases.scene.input.plain_text import decode, plain, read_whole
+from catenary.cases.scene.input.plain_text import plain, read_text, read_whole
 from catenary.cases.scene.input.toml_input import read_toml
 from catenary.cases.scene.keys.usual_values import USUAL, Usual
 from catenary.cases.scene.load import load_scene
@@ -136,7 +136,7 @@ def starting_text(kind: str, name: str, spans: Sequence[float] = (), droppers: b
         ) from error
     of_case = read_toml(path).get("case", {})
     source = str(of_case.get("source", "") if isinstance(of_case, dict) else "")
-    text = decode(read_whole(path, str(path)), str(path))
+    text = read_text(path, str(path))
     for old, new in begun.changes:
         assert text.count(old) == 1, f"{path} has {old!r} {text.count(old)} times"
         text = text.replace(old, new)

@@ -17,9 +17,11 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from catenary.base.errors import InputError
 from catenary.base.parallel import on_root
 from catenary.cases.process.interrupts import Interrupted
 from catenary.cases.process.workers import Outcome, each, in_order
+from catenary.cases.scene.input.plain_text import read_text
 from catenary.postproc.files.disk import plain, write_all
 
 logger = logging.getLogger("catenary.sweep")
@@ -60,6 +62,28 @@ def read_table(path: Path) -> dict[str, Any] | None:
     except (ValueError, RecursionError):
         content = None
     return content if is_whole(path, isinstance(content, dict)) else None
+
+
+def read_study(path: Path, verb: str) -> dict[str, Any]:
+    """The JSON table that a verb has left. Not collective.
+
+    Parameters
+    ----------
+    path : its file
+    verb : the command that writes it, for sentences
+
+    Raises
+    ------
+    InputError
+        If there is no such file, or something else in it.
+    """
+    try:
+        found = json.loads(read_text(path, f"{path}, the record of `{verb}`,"))
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"{path} is no record of `{verb}`: it is no JSON") from error
+    if not isinstance(found, dict):
+        raise InputError(f"{path} is no record of `{verb}`: it holds no table")
+    return found
 
 
 def is_whole(path: Path, whole: bool) -> bool:

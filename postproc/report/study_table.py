@@ -39,6 +39,8 @@ class Column(NamedTuple):
         """A value as readers see it; ``unknown`` is printed for None."""
         if value is None:
             return unknown
+        if isinstance(value, bool):
+            return "yes" if value else "no"
         if not self.format:
             return str(cell(value))
         text = format(value, self.format)

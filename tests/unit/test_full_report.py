@@ -275,7 +275,8 @@ def test_the_validation_of_the_installation(folder: Path, tmp_path: Path) -> Non
     assert said.index("31.25", beyond) < said.index("Judged figures (2)", beyond)
     assert "standard deviation" in said[beyond:] and "error bar" not in said[beyond:]
     done = CliRunner().invoke(app, ["report", str(tmp_path), "--validation", str(folder)])
-    assert done.exit_code == 2 and "is no record of `catenary validate`" in done.output
+    assert done.exit_code == 2
+    assert "the record of `catenary validate`, cannot be read: no such file" in done.output
 
 
 def study(folder: Path, case: str, **changes: object) -> Path:
@@ -301,8 +302,13 @@ def test_measured_errors_of_the_same_step_and_mesh(tmp_path: Path) -> None:
         measured_errors(scene_of(1e-3, 5), tmp_path)
     with pytest.raises(InputError, match="a study of curve, the run is one of ac_simple"):
         measured_errors(scene_of(1e-3, 8), study(tmp_path, "curve"))
-    (tmp_path / "accuracy.json").write_text("[]")
-    with pytest.raises(InputError, match="is no record of `catenary accuracy`"):
+    file = tmp_path / "accuracy.json"
+    for wrong, why in (("[]", "it holds no table"), ("[" * 100_000, "it is no JSON"), ("{}", "it")):
+        file.write_text(wrong)
+        with pytest.raises(InputError, match=f"is no record of `catenary accuracy`: {why}"):
+            measured_errors(scene_of(1e-3, 8), tmp_path)
+    file.unlink()
+    with pytest.raises(InputError, match="`catenary accuracy`, cannot be read: no such file"):
         measured_errors(scene_of(1e-3, 8), tmp_path)
 
 

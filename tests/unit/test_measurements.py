@@ -357,7 +357,7 @@ def test_a_validation_takes_a_comparison_as_its_line_test(
     assert any_failed(step.rows)
     assert "m.csv beside" in step.told and "Error: pantograph: the measured force" in step.told
     (tmp_path / "measurement.json").write_text("{}")
-    with pytest.raises(InputError, match="is no record of `catenary compare` with a measurement"):
+    with pytest.raises(InputError, match="is no record of `catenary compare RUN measured.csv`"):
         line_test(tmp_path)
 
 

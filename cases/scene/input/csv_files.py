@@ -17,7 +17,7 @@ from typing import Any
 
 from catenary.base.errors import InputError
 from catenary.cases.scene.input.faults import Fault, Origin, shown
-from catenary.cases.scene.input.plain_text import decode, read_whole
+from catenary.cases.scene.input.plain_text import read_text
 from catenary.cases.scene.input.toml_input import read_toml
 from catenary.postproc.standards.book import book_of
 
@@ -214,7 +214,7 @@ def _rows(path: Path, where: str, columns: dict[str, bool]) -> list[tuple[int, d
 
     ``columns`` says which there may be, and whether they must be there.
     """
-    text = decode(read_whole(path, f"{where}; it"), f"{where}; it")
+    text = read_text(path, f"{where}; it")
     semicolons = ";" in text
     named: list[str] = []
     rows: list[tuple[int, dict[str, float]]] = []
@@ -266,7 +266,7 @@ def _check_names(where: str, named: list[str], columns: dict[str, bool]) -> None
 
 def _pairs(path: Path, where: str, raw: dict[str, Any]) -> list[list[float]]:
     """Two columns of numbers; comments after #, and one line of names before the numbers."""
-    text = decode(read_whole(path, f"{where}; it"), f"{where}; it")
+    text = read_text(path, f"{where}; it")
     pairs: list[list[float]] = []
     named = False
     for number, cells in enumerate(csv.reader(text.splitlines()), start=1):

@@ -68,6 +68,11 @@ def decode(content: bytes, name: str) -> str:
         ) from None
 
 
+def read_text(path: Path, name: str) -> str:
+    """The text of a file in UTF-8, as ``read_whole`` and ``decode``."""
+    return decode(read_whole(path, name), name)
+
+
 def steers(letter: str) -> bool:
     """Whether a character does something else than to be seen."""
     if letter.isprintable() or letter in _WRITTEN:

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from catenary.base.errors import InputError
 from catenary.cases.scene.input.faults import COMMAND_LINE, shown
-from catenary.cases.scene.input.plain_text import DEEPEST, decode, plain, read_whole
+from catenary.cases.scene.input.plain_text import DEEPEST, plain, read_text
 
 # A key part and its dot; more of them in a row make a table that is nested too deeply, which would
 # take the parser a time that grows with their square.
@@ -25,7 +25,7 @@ def read_toml(path: Path) -> dict[str, Any]:
     InputError
         If the file cannot be read or is not TOML.
     """
-    text = decode(read_whole(path, str(path)), str(path))
+    text = read_text(path, str(path))
     deep = _DEEP_KEY.search(text)
     if deep is not None:
         line = text.count("\n", 0, deep.start() + 1) + 1

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -17,6 +16,7 @@ from catenary.cases.scene.problem import problem_of, resolved
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.accuracy import output as accuracy
 from catenary.cases.studies.effect_cost import output as effect_cost
+from catenary.cases.studies.records import read_study
 from catenary.postproc.read.results import Results
 from catenary.postproc.report.sections.run_facts import INPUT
 from catenary.solver.effects.all_effects import active, registry
@@ -141,11 +141,11 @@ def measured_costs(scene: SceneOfRun, folder: Path) -> dict[str, str]:
 
 def _rows_of(path: Path, verb: str, scene: Scene) -> list[dict[str, Any]]:
     """The rows of the record of a study of a scene's case."""
+    record = read_study(path, verb)
     try:
-        record = json.loads(path.read_text(encoding="utf-8"))
         rows, case = list(record["rows"]), record["case"]
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise InputError(f"{path} is no record of `{verb}`: {error}") from error
+    except (KeyError, TypeError) as error:
+        raise InputError(f"{path} is no record of `{verb}`: it has no rows of a case") from error
     if case != scene.case.name:
         raise InputError(f"{path} is a study of {case}, the run is one of {scene.case.name}")
     return rows

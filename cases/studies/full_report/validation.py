@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 from catenary.base.errors import InputError
+from catenary.cases.studies.records import read_study
 from catenary.cases.studies.reference.judgement import FAILED, NOT_JUDGED, read_table
 from catenary.cases.studies.reference.pages import VALIDATION
 from catenary.postproc.report.sections.section import EvaluatedRun, Folded, Section, Text
@@ -35,8 +35,8 @@ def statement_in(folder: Path) -> dict[str, Any]:
         If there is no such statement.
     """
     path = folder / f"{VALIDATION}.json"
+    found = read_study(path, "catenary validate")
     try:
-        found = json.loads(path.read_text(encoding="utf-8"))
         return {
             "installation": {
                 key: str(found["installation"][key]) for key in ("program", "machine")
@@ -45,8 +45,8 @@ def statement_in(folder: Path) -> dict[str, Any]:
             "figures": [row for row in found["figures"] if row["verdict"] != NOT_JUDGED],
             "closing": [str(text) for text in found["closing"]],
         }
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise InputError(f"{path} is no record of `catenary validate`: {error}") from error
+    except (KeyError, TypeError) as error:
+        raise InputError(f"{path} is no record of `catenary validate`: it is incomplete") from error
 
 
 def section(statement: Mapping[str, Any] | None, run: EvaluatedRun) -> Section:

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from catenary.base.errors import InputError
-from catenary.cases.scene.input.plain_text import decode, plain, read_whole
+from catenary.cases.scene.input.plain_text import plain, read_text
 from catenary.cases.studies.measured.description import Measured
 
 LEAST_SAMPLES = 20
@@ -25,7 +25,7 @@ def read_table(path: Path) -> pd.DataFrame:
     InputError
         If it is none.
     """
-    text = decode(read_whole(path, str(path)), str(path))
+    text = read_text(path, str(path))
     semicolons = ";" in text
     try:
         return pd.read_csv(

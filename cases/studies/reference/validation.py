@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import json
 import platform
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -14,6 +13,7 @@ from typing import Any
 from catenary.base.errors import InputError, RunBroken
 from catenary.cases.scene.input.case_files import find_case
 from catenary.cases.scene.load import load_scene
+from catenary.cases.studies.records import read_study
 from catenary.cases.studies.reference.configurations import RECORDED, configurations
 from catenary.cases.studies.reference.convergence import LINE, UPLIFT, figures_of
 from catenary.cases.studies.reference.judgement import (
@@ -96,16 +96,14 @@ def line_test(folder: Path | None) -> Step:
     rule = limits()["line_test"]
     if folder is None:
         return Step(rule["title"], [], rule["why"])
-    path = folder / SUMMARY
+    path, verb = folder / SUMMARY, "catenary compare RUN measured.csv"
+    record = read_study(path, verb)
     try:
-        record = json.loads(path.read_text(encoding="utf-8"))
         run, errors = record["run"], [one["text"] for one in record["errors"]]
         rows = [_measured_row(Path(run).parent.name, one) for one in record["figures"]]
         told = f"{record['measured']} beside {run}."
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise InputError(
-            f"{path} is no record of `catenary compare` with a measurement: {error}"
-        ) from error
+    except (KeyError, TypeError) as error:
+        raise InputError(f"{path} is no record of `{verb}`: it is incomplete") from error
     return Step(rule["title"], rows, " ".join([told, *(f"Error: {text}." for text in errors)]))
 
 
