@@ -26,6 +26,13 @@ def with_minus(text: str) -> str:
     return re.sub(r"(?<!\S)-(?=\d)", "\u2212", text)
 
 
+def wire_words(name: str) -> str:
+    """A wire's name as words; wires of the second section of an overlap are told from the first."""
+    words = name.replace("_", " ")
+    of_first = words.removesuffix(" next")
+    return words if of_first == words else f"{of_first} (next section)"
+
+
 def capital(text: str) -> str:
     """``text`` with a capital first letter, the others as they are."""
     return text[:1].upper() + text[1:]

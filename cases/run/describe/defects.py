@@ -26,7 +26,7 @@ from catenary.cases.scene.run.incidents import (
 from catenary.cases.scene.scene import Scene
 from catenary.meshgen.line import Line
 from catenary.meshgen.wires import Role
-from catenary.postproc.evaluate.wording import counted
+from catenary.postproc.evaluate.wording import counted, wire_words
 from catenary.solver.problem.problem import Problem
 
 
@@ -45,7 +45,7 @@ def defect_facts(scene: Scene, problem: Problem) -> list[dict[str, Any]]:
     for fitting in scene.line.fittings if "fittings" in problem.effects else []:
         over = f" over {fitting.length_m:g} m" if fitting.length_m else ""
         says = f"{fitting.kind.replace('_', ' ')} of {fitting.mass_kg:g} kg{over} on the "
-        says += f"{_named(fitting.wire)} at {fitting.at_m:g} m"
+        says += f"{wire_words(fitting.wire)} at {fitting.at_m:g} m"
         place = {"at_m": fitting.at_m, "wire": fitting.wire}
         found.append({"type": fitting.kind, **place, "says": says})
     for defect in scene.defects:
@@ -59,10 +59,6 @@ _WHAT = {
     "running_surface": "running surface of the contact wire",
     "dropper_lengths": "errors of the droppers' lengths",
 }
-
-
-def _named(wire: str) -> str:
-    return wire.replace("_", " ")
 
 
 def _heights(table: HeightTable, line: Line) -> str:
@@ -106,21 +102,21 @@ def _defect(table: Defect, line: Line) -> dict[str, Any]:
             lost = f"has lost {100 * table.lost_share:g} % of its section"
             where = f"from {table.from_m:g} to {table.to_m:g} m"
             place = {"at_m": table.from_m, "wire": table.wire}
-            return {**place, "says": f"the {_named(table.wire)} {lost} {where}"}
+            return {**place, "says": f"the {wire_words(table.wire)} {lost} {where}"}
         case WrongTensionTable():
             tension = table.factor * line.wire(table.wire).tension / 1e3
             hangs = (
                 f"hangs with {tension:.4g} kN, {table.factor:g} of what its droppers are cut for"
             )
-            return {"says": f"the {_named(table.wire)} {hangs}"}
+            return {"says": f"the {wire_words(table.wire)} {hangs}"}
         case HardSpotTable():
             parts = [f"{table.mass_kg:g} kg"] * bool(table.mass_kg)
             parts += [f"{table.stiffness_N_per_m:g} N/m"] * bool(table.stiffness_N_per_m)
-            where = f"on the {_named(table.wire)} at {table.at_m:g} m"
+            where = f"on the {wire_words(table.wire)} at {table.at_m:g} m"
             place = {"at_m": table.at_m, "wire": table.wire}
             return {**place, "says": f"hard spot of {' and '.join(parts)} {where}"}
         case KinkTable():
-            where = f"of the {_named(table.wire)} at {table.at_m:g} m"
+            where = f"of the {wire_words(table.wire)} at {table.at_m:g} m"
             place = {"at_m": table.at_m, "wire": table.wire}
             return {**place, "says": f"kink of {table.angle_deg:g} degrees {where}"}
 
@@ -157,7 +153,7 @@ def _sentence(table: Incident, line: Line) -> str:
         return f"dropper {table.dropper} of span {table.span}, at {x:g} m, breaks"
     if isinstance(table, TensionLossTable):
         left = table.share * line.wire(table.wire).tension / 1e3
-        name = table.wire.replace("_", " ")
+        name = wire_words(table.wire)
         return f"the tension of the {name} falls to {left:.4g} kN, {table.share:g} of what it was"
     return (
         f"pantograph {table.pantograph} is lowered: its static force goes over to "

@@ -19,7 +19,7 @@ from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import LineMesh
 from catenary.meshgen.slowest_wave import slowest_wave_of
 from catenary.meshgen.wires import Role, Wire
-from catenary.postproc.evaluate.wording import stiffness_words
+from catenary.postproc.evaluate.wording import stiffness_words, wire_words
 from catenary.postproc.files.own_files import PICTURES
 from catenary.postproc.report.pictures.figures import COLOURS, FewTicks, new_figure, own_style, tidy
 from catenary.postproc.report.sections.section import EvaluatedRun, Picture, Section, Text, number
@@ -51,7 +51,7 @@ def _line_blocks(problem: Problem, rest: LineAtRest) -> Iterator[StudyTable]:
     for wire, stiffness in zip(line.wires, bending, strict=True):
         alpha, beta = damping.per_component.get(wire.name, (damping.alpha, damping.beta))
         rows.append([
-            _plain(wire.name), wire.role.value, number(1e-3 * wire.tension, 2),
+            wire_words(wire.name), wire.role.value, number(1e-3 * wire.tension, 2),
             number(wire.mass_per_length, 3), stiffness,
             number(None if wire.axial_stiffness is None else 1e-6 * wire.axial_stiffness, 2),
             number(slowest_wave_of(line, wire), 1), f"{alpha:.3g}", f"{beta:.3g}",
@@ -116,7 +116,7 @@ def _courses(
 def _hardware(problem: Problem) -> Iterator[list[Any]]:
     line = problem.line
     for group in line.droppers:
-        joined = f"{_plain(group.upper)} to {_plain(group.lower)}"
+        joined = f"{wire_words(group.upper)} to {wire_words(group.lower)}"
         yield [f"droppers, {joined}", len(group.lower_x), _of_dropper(group.kind)]
     for arms in line.steady_arms:
         kind = arms.kind
@@ -133,20 +133,20 @@ def _hardware(problem: Problem) -> Iterator[list[Any]]:
                 f"stop at {1e3 * kind.uplift_stop:g} mm with {stiffness_words(kind.stop_stiffness)}"
             )
             parts.append(stop)
-        yield [f"steady arms on {_plain(arms.wire)}", len(arms.x), ", ".join(parts)]
+        yield [f"steady arms on {wire_words(arms.wire)}", len(arms.x), ", ".join(parts)]
     for supports in line.supports:
         yield [
-            f"supports of {_plain(supports.wire)}",
+            f"supports of {wire_words(supports.wire)}",
             len(supports.x),
             f"stiffness {stiffness_words(supports.stiffness)}",
         ]
     for clamps in line.clamps:
-        joined = f"{_plain(clamps.upper)} to {_plain(clamps.lower)}"
+        joined = f"{wire_words(clamps.upper)} to {wire_words(clamps.lower)}"
         held = f"stiffness {stiffness_words(clamps.stiffness)}, {clamps.mass:g} kg"
         yield [f"clamps, {joined}", len(clamps.x), held]
     for own in line.fittings:
         masses = _range(np.array(own.mass), 2)
-        yield [f"{own.kind} on {_plain(own.wire)}", len(own.x), f"{masses} kg"]
+        yield [f"{own.kind} on {wire_words(own.wire)}", len(own.x), f"{masses} kg"]
 
 
 def _of_wind(wind: Wind) -> Iterator[list[Any]]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from catenary.cases.studies.questions.worst import Passage, Spot, dropper_likes, spans_in_stretch
 from catenary.meshgen.wires import Role
+from catenary.postproc.evaluate.wording import wire_words
 from catenary.postproc.read.results import Results
 from catenary.solver.effects.all_effects import simulated
 from catenary.solver.statics.elasticity import elasticity
@@ -173,7 +174,7 @@ class Causes:
                     profile.x[-1]]  # fmt: skip
             for x in sorted(set(map(float, ends))):
                 if low <= x <= high:
-                    yield f"{name.replace('_', ' ')} begins or ends at {x:.0f} m (overlap, section)"
+                    yield f"{wire_words(name)} begins or ends at {x:.0f} m (overlap, section)"
 
     def _defect_end(self, defect: dict[str, Any]) -> float:
         """Where a defect ends along the track [m]: worn wires have a length."""

@@ -10,6 +10,7 @@ import numpy as np
 from catenary.postproc.evaluate import filters
 from catenary.postproc.evaluate import statistics as stats
 from catenary.postproc.evaluate.statistics import slack_times
+from catenary.postproc.evaluate.wording import wire_words
 from catenary.postproc.read.results import Results
 
 # A figure stands out if it exceeds the median of its likes by this many robust standard deviations
@@ -123,7 +124,7 @@ def worst_places(results: Results) -> WorstPlaces:
 def _of_several(wires: Sequence[str]) -> list[str]:
     """Names of wires as words, all empty if they are of one wire."""
     several = len(set(wires)) > 1
-    return [name.replace("_", " ") if several else "" for name in wires]
+    return [wire_words(name) if several else "" for name in wires]
 
 
 def spans_in_stretch(results: Results) -> list[int]:

@@ -14,6 +14,7 @@ from scipy import signal
 from catenary.base.errors import InputError
 from catenary.postproc.evaluate import filters
 from catenary.postproc.evaluate.statistics import RunStatistics
+from catenary.postproc.evaluate.wording import wire_words
 from catenary.postproc.read.results import Results
 from catenary.postproc.report.pictures.envelope import thinned
 from catenary.postproc.report.pictures.figures import (
@@ -177,7 +178,7 @@ def strip_forces(results: Results) -> Figure:
 def wire_forces(results: Results) -> Figure:
     """Share of each contact wire in the contact force along the track, 20 Hz low-pass."""
     shown = {
-        p: [(name.replace("_", " "), column) for name, column in own.items()]
+        p: [(wire_words(name), column) for name, column in own.items()]
         for p, own in enumerate(results.wire_columns())
     }
     channel, label = "contact_wire_force", "force on a contact wire [N]"

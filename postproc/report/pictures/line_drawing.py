@@ -14,6 +14,7 @@ from matplotlib.lines import Line2D
 from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import LineMesh
 from catenary.meshgen.wires import Role
+from catenary.postproc.evaluate.wording import wire_words
 from catenary.postproc.report.pictures.figures import COLOURS, GREY, LIGHT, own_style
 from catenary.solver.statics.form_finding.equilibrium import Equilibrium
 
@@ -97,7 +98,7 @@ def draw_line(
     names: dict[Role, str] = {}
     for wire in reversed(line.wires):
         alone = wire.role not in names
-        names[wire.role] = wire.name.replace("_", " ") if alone else f"{wire.role.value} wires"
+        names[wire.role] = wire_words(wire.name) if alone else f"{wire.role.value} wires"
     handles = [Line2D([], [], color=_COLOUR[role], label=name) for role, name in names.items()]
     figure.legend(handles=handles, loc="upper right", ncols=len(handles), frameon=False)
     return figure

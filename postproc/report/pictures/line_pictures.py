@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from catenary.postproc.evaluate.statistics import RunStatistics
+from catenary.postproc.evaluate.wording import wire_words
 from catenary.postproc.read.results import Results
 from catenary.postproc.report.pictures.envelope import thinned, thinned_ranges
 from catenary.postproc.report.pictures.figures import (
@@ -252,7 +253,7 @@ def plan_view(results: Results) -> Figure | None:
     profiles = results.contact_profiles()
     for number, (name, wire) in enumerate(profiles.items()):
         assert wire.y is not None
-        label = "contact wire" if len(profiles) == 1 else name.replace("_", " ")
+        label = "contact wire" if len(profiles) == 1 else wire_words(name)
         plan.plot(*wire.drawn(wire.y), color=colour(number), linewidth=1.2, label=label)
     plan.plot(registration.x, registration.stagger, "o", ms=3, color=GREY, label="steady arm")
     plan.axhline(0.0, color=GREY, linewidth=0.6, linestyle="--")

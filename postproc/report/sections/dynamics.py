@@ -9,6 +9,7 @@ import numpy as np
 from catenary.base.errors import InputError
 from catenary.postproc.evaluate import filters
 from catenary.postproc.evaluate.statistics import slack_times
+from catenary.postproc.evaluate.wording import wire_words
 from catenary.postproc.read.results import Results
 from catenary.postproc.report.sections.section import (
     EvaluatedRun,
@@ -115,7 +116,7 @@ def places(run: EvaluatedRun) -> Section:
 def _tables(run: EvaluatedRun) -> Iterator[StudyTable]:
     results, supports, droppers = run.results, run.statistics.supports, run.statistics.droppers
     limit = run.limit("arm_uplift")
-    wires = [name.replace("_", " ") for name in results.arm_wires()]
+    wires = [wire_words(name) for name in results.arm_wires()]
     several = len(set(wires)) > 1
     uplift = 1e3 * supports.uplift
     chosen = _extremes(supports.evaluated, {"": uplift}, uplift > limit)
@@ -131,7 +132,7 @@ def _tables(run: EvaluatedRun) -> Iterator[StudyTable]:
         note = _note(len(rows), int(supports.evaluated.sum()), "summary.json")
         yield texts_table([*heads, "margin [mm]"], rows, right, title, note)
     at_rest, slack = results.static("dropper_force"), slack_times(results)
-    names = [name.replace("_", " ") for name in results.roles]
+    names = [wire_words(name) for name in results.roles]
     carried = [names[wire] for wire in results.dropper_wires()[:, 1].tolist()]
     several = len(set(carried)) > 1
     # The least force of all that slacken is zero.

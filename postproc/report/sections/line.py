@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from catenary.postproc.evaluate.wording import counted
+from catenary.postproc.evaluate.wording import counted, wire_words
 from catenary.postproc.read.results import Results
 from catenary.postproc.report import csv_tables
 from catenary.postproc.report.csv_tables import DropperRow
@@ -99,7 +99,7 @@ def _droppers(
     cells = [
         [row.span, row.number, number(row.position, 3), number(row.x, 3), number(row.length, 3),
          number(row.force),
-         *((row.upper.replace("_", " "), row.lower.replace("_", " ")) if several else ())]
+         *((wire_words(row.upper), wire_words(row.lower)) if several else ())]
         for row in rows
     ]  # fmt: skip
     return texts_table(heads[first:], [row[first:] for row in cells], set(range(6 - first)), title)
@@ -138,7 +138,7 @@ def _lateral(results: Results) -> Iterator[Text]:
     for name, wire in results.contact_profiles().items():
         assert wire.y is not None
         own = wire.y[(wire.x >= first) & (wire.x <= last)]
-        words = name.replace("_", " ")
+        words = wire_words(name)
         yield Text(
             f"The {words} lies between {own.min():.3f} and {own.max():.3f} m to the left of the "
             "track's axis in the running spans."
