@@ -365,12 +365,12 @@ def lost_way(run: Watched) -> float:
 Told = Mapping[str, Mapping[str, Sequence[str]]]
 # Criteria that nearly all cases have, and the heads of their columns.
 _COLUMNS = {
-    "largest contact force [N]": "force [N]",
-    "largest lift [m]": "lift [m]",
-    "energy from nothing": "energy made",
-    "the same at half the step": "at half the step",
-    "difference after halving the step twice to once": "refinement",
-    "fixed-point correction, head height [m]": "schemes [m]",
+    "largest contact force [N]": ("force [N]", ".0f"),
+    "largest lift [m]": ("lift [m]", ".2g"),
+    "energy from nothing": ("energy made", ".2g"),
+    "the same at half the step": ("at half the step", ".2g"),
+    "difference after halving the step twice to once": ("refinement", ".2g"),
+    "fixed-point correction, head height [m]": ("schemes [m]", ".2g"),
 }
 # Criteria without a figure.
 _PLAIN = ("runs to its end", "everything is finite", "the fixed-point correction breaks")
@@ -398,14 +398,14 @@ def page(cases: Sequence[HardCase], found: Sequence[Criterion], told: Told) -> s
     columns = [
         Column("case", "case"),
         Column("words", "what is hard; *a right answer*"),
-        *(Column(name, head, ".2g") for name, head in _COLUMNS.items()),
+        *(Column(name, *shown) for name, shown in _COLUMNS.items()),
         *(Column(name, name) for name in ("others", "remarks", "kept")),
     ]
     rows = []
     for case in cases:
         own = {row.name: row for row in found if row.case == case.name}
         others = "; ".join(
-            f"{row.name} {row.value:.3g}"
+            f"{row.name} {float(f'{row.value:.3g}'):g}"  # three digits, powers from a million on
             for name, row in own.items()
             if name not in _COLUMNS and (name not in _PLAIN or not row.passed)
         )
