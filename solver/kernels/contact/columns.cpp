@@ -94,7 +94,7 @@ void put_columns(const Node* nodes, std::span<const double> data, const double (
         filled[0] = std::min(filled[0], filled[1]);
         return;
     }
-    // Windows of neighbours are nearly the same: what both fill is written once.
+    // Windows of neighbours are nearly the same: their common part is written once.
     clear(answer, filled[0], std::min(filled[1], low));
     clear(answer, std::max(filled[0], end), filled[1]);
     double* whole = part(answer, low, end).data();

@@ -1,4 +1,4 @@
-// Where contacts are on wires, and what answers to forces there.
+// Places of contacts on wires, and answers to forces there.
 #include <array>
 #include <cmath>
 
@@ -17,7 +17,7 @@ std::array<double, 4> shape_values(double xi, double length) {
             length * (cube - square)};
 }
 
-/// Derivatives dN/dx [1/m], of those of rotations [-].
+/// Derivatives dN/dx: of the functions of deflections [1/m], of rotations [-].
 std::array<double, 4> shape_slopes(double xi, double length) {
     const double square = xi * xi;
     return {6 * (square - xi) / length, 1 - 4 * xi + 3 * square, 6 * (xi - square) / length,

@@ -27,7 +27,7 @@ void solve_two(const System& system, int64_t first, int64_t second) {
     solution[second] = y;
 }
 
-/// Factors of the rows and columns `index`, with what was row order[i] as row i.
+/// LU factors of the rows and columns `index`; row i of the factors was row order[i].
 void eliminate(const Array2<double>& matrix, std::span<const int64_t> index,
                const Array2<double>& a, std::span<int64_t> order) {
     const int64_t m = size(index);

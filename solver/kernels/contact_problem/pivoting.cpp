@@ -12,8 +12,8 @@ namespace {
 
 /// Shares go from 0 to 1; paths on a grid of some of that take the fewest steps.
 constexpr double kFirstGrid = 0.25;
-/// What may be missing in a row, of the largest right-hand side; and, as that makes the problem
-/// jump from shares to shares, what shares and tensions may disagree by.
+/// Tolerance of a row's residual relative to the largest right-hand side; and, as that makes the
+/// problem jump from shares to shares, tolerance of the agreement of shares with tensions.
 constexpr double kRounding = 1e-12, kAgreement = 10.0 * kRounding;
 /// Rows of bends along one direction differ by this at most, of their largest number.
 constexpr double kAlike = 1e-9;
@@ -144,11 +144,12 @@ Pivoted pivot_from(const System& system, const Signs& signs, const Room& room) {
     return {false, most, n_turned, 0};
 }
 
-/// Finds what share of each leader's dependents is released: all below no tension, none above it.
+/// Search for the released share of each leader's dependents: 1 where the leader's tension would be
+/// negative, 0 where it is positive.
 ///
-/// With shares given, what is left is a problem with a P-matrix whose solution goes continuously
-/// with them; so there are shares that agree with it. They are sought for the leaders that went
-/// round in a circle; others keep all or nothing, as the set has it, unless their tension then
+/// With shares given, the rest is a problem with a P-matrix whose solution goes continuously with
+/// them; so there are shares that agree with it. They are sought for the leaders that the pivoting
+/// cycled through; others keep all or nothing, as the set has it, unless their tension then
 /// disagrees.
 class Shares : public Map {
   public:
@@ -165,7 +166,7 @@ class Shares : public Map {
         for (int64_t i = 0; i < n_; ++i) {
             if (signs_.behind[i] == 1) leaders_[n_leaders_++] = i - 1;
             shares_[i] = room_.acts[i] ? 1.0 : 0.0;
-            // Near what was right for the shares before.
+            // Near the active set of the shares before.
             room_.acts[i] = signs_.always[i] || system_.solution[i] > 0.0;
             none_[i] = 0;
         }
