@@ -47,7 +47,7 @@ class Head:
     first: int
     """Number of its first contact among those of the train."""
     added_force: float
-    """What regulates the lift adds to the static force now [N]; put for one without regulation."""
+    """Force that the regulation now adds to the static force [N]; put without a regulation."""
     def bend(self, bending: object) -> None:
         """Let strips bend, see ``flexure.Bending``."""
 

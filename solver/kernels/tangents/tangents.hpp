@@ -47,8 +47,8 @@ struct HeadChange {
     CATENARY_RECORD(matrix, by_drive, by_head, inverse, state, beside, step)
 };
 
-/// Derivatives of the contact law at n contacts: of own, offset, by_depth and by_rate (4, n), and
-/// of a Hertzian law those of K, n, chi and the least speed (4,); nothing if they do not change.
+/// Derivatives of the contact law at n contacts: of own, offset, by_depth and by_rate (4, n), and,
+/// of a Hertzian law, of K, n, chi and the least speed (4,); empty if they do not change.
 struct LawChange {
     Array2<const double> tangents;
     std::span<const double> hertz;
@@ -91,7 +91,7 @@ class TangentSteps : public Steps {
   public:
     /// Throws std::invalid_argument if a head is no linear chain and has no others like it.
     TangentSteps(StepParts parts, Block block, MarchTangents tangents);
-    /// Take steps as `Steps::take`; those that are left to others have no tangents.
+    /// Take steps as `Steps::take`; steps that are left to others have no tangents.
     Taken take(int64_t first, int64_t end);
 
   private:
@@ -133,7 +133,7 @@ class TangentSteps : public Steps {
     std::vector<const LinearChain*> chains_;    ///< of heads that are such
     std::vector<std::vector<double>> before_;   ///< states of the heads before the step
     std::vector<std::vector<double>> pressed_;  ///< contact forces that their laws read then
-    std::vector<double> row_;                   ///< room for what drives a head
+    std::vector<double> row_;                   ///< room for the drive of a head
     std::vector<std::vector<double>> free_;     ///< derivatives of heads without contact
     /// Displacements and velocities of the line, and sums of these and of accelerations.
     std::vector<double> displacement_, velocity_, sum_;
