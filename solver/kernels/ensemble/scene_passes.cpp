@@ -1,4 +1,4 @@
-// Free steps of several scenes, and what is looked at in all of them at once.
+// Free steps of several scenes, with reserves and extremes of all of them at once.
 #include "ensemble/scene_passes.hpp"
 
 #include <algorithm>
@@ -33,7 +33,7 @@ Scenes& at(double* numbers) {
     return *reinterpret_cast<Scenes*>(numbers);
 }
 
-/// Fill in the reserve of each link from `begin` to `end` in all scenes, from those at rest.
+/// Fill in the reserve of each link from `begin` to `end` in all scenes, from the reserves at rest.
 CATENARY_FOR_TARGETS
 void find_reserves(const Motion& motion, const Links& links, const double* rest, int64_t begin,
                    int64_t end, double* result) {

@@ -2,14 +2,14 @@
 // Free steps of a line in several scenes side by side, which share its matrices and factors.
 //
 // Numbers of an unknown in all scenes follow each other, so that a number of a matrix is read once
-// for `kScenes` of them: memory and broadcasts are what a step of one scene waits for.
+// for `kScenes` of them: a step of one scene waits for memory and broadcasts.
 #include <array>
 
 #include "motion/two_passes.hpp"
 
 namespace catenary {
 
-/// Extremes of what a line shows in several scenes since each of them began.
+/// Extremes of a line's outputs in several scenes since each of them began.
 struct LineExtremes {
     std::span<const int64_t> arms;  ///< unknowns of vertical displacement at steady arms
     Links droppers;
@@ -21,7 +21,7 @@ struct LineExtremes {
 
 class ScenePasses : private Around {
   public:
-    /// Arrays of `parts` are those of all scenes. Throws std::invalid_argument if no kernels were
+    /// Arrays of `parts` are for all scenes. Throws std::invalid_argument if no kernels were
     /// compiled for a layout, or the method is not Newmark's.
     explicit ScenePasses(PassParts parts);
 

@@ -28,7 +28,7 @@ struct KnownMasks {
 };
 
 /// The same found at run time. Each square is asked for its nonzeros: a processor predicts the
-/// answer, which is that of the station before.
+/// answer, as it is the same for the station before.
 struct GivenMasks {
     static constexpr bool is_known = false;
     int pitch;
@@ -226,7 +226,7 @@ struct Blocks : Masks {
     }
     CATENARY_INLINE static void add_symmetric_here(Sums<X>& sums, const double* numbers,
                                                    const Mask& mask, const X& x) {
-        X crossing = X::all(0.0);  // what the transpose makes, of kinds 2 and 3
+        X crossing = X::all(0.0);  // products of kinds 2 and 3 with the transpose
         each<kN>([&](auto i) CATENARY_HOT {
             const V turned_here = turned(x.piece[i]);
             add_square<i, i>(sums, numbers, mask[i][i], x);

@@ -1,6 +1,6 @@
 #pragma once
-// All kernels for one target. A target is what a processor is told to be: files that include this
-// set it by a pragma, after the headers of the standard library.
+// All kernels for one target. A target is an instruction set: files that include this set it by a
+// pragma, after the headers of the standard library.
 #include "stations/known_layouts.hpp"
 #include "stations/passes.hpp"
 
