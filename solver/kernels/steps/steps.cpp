@@ -75,7 +75,7 @@ int64_t Steps::find_forces(int64_t number) {
     }
 }
 
-/// Add what the forces do to line and heads.
+/// Move line and heads by the forces, and fill in the outputs.
 void Steps::finish(int64_t n_compensations) {
     const SmallProblem& problem = parts_.problem;
     const int64_t n = size(problem.found.depth);
@@ -100,7 +100,7 @@ void Steps::check() const {
     check_numbers(parts_.train_outputs.head_height, "heights of heads");
 }
 
-/// What pantographs show, the line, and further channels.
+/// Fill the row of a step: outputs of pantographs, of the line, and further channels.
 void Steps::show(int64_t number) {
     std::span<double> row = block_.rows[number];
     auto next = [&row](size_t n) {
