@@ -52,7 +52,7 @@ void add_to_motion(double force, const double* __restrict answer, int64_t n, dou
     }
 }
 
-/// The same of one scene among others: its numbers stand apart.
+/// The same for one scene in lanes: its numbers are `spacing` apart.
 void add_to_lane(double force, const double* __restrict answer, int64_t n, int64_t spacing,
                  double* __restrict x, double* __restrict y, double* __restrict z,
                  const double* gains) {

@@ -89,7 +89,7 @@ void place(const Contacts& contacts) {
     for (int64_t i = 0; i < size(contacts.touches); ++i) {
         Touch& touch = contacts.touches[i];
         if (touch.present == 0.0) {
-            // Where there is no wire on a strip nothing answers.
+            // A strip without a wire has no answers.
             clear(by_force[i], touch.filled[0], touch.filled[1]);
             if (slope.columns > 0) clear(slope[i], touch.filled[0], touch.filled[1]);
             touch.filled[0] = touch.filled[1] = 0;

@@ -78,15 +78,15 @@ void find_bends(const System& system, const Room& room) {
         }
 }
 
-/// How pivoting ended: whether a set was right, the rounds to get there, and how many rows were
-/// turned before it went round in a circle of sets.
+/// Outcome of pivoting: whether a set solves the problem, the rounds, the number of turned rows,
+/// and how many of these were before a cycle of sets.
 struct Pivoted {
     bool found;
     int64_t rounds, n_turned, since;
 };
 
-/// Since when turned rows have come back to the set that there is, each an even number of times;
-/// `n_turned` if they have not.
+/// Number of turned rows before the cycle that ends at the present set: from there on each row is
+/// turned an even number of times. `n_turned` if there is no cycle.
 int64_t circle_since(std::span<const int64_t> turned, std::span<bool> odd) {
     const int64_t n_turned = size(turned);
     std::ranges::fill(odd, false);
@@ -100,7 +100,7 @@ int64_t circle_since(std::span<const int64_t> turned, std::span<bool> odd) {
     return n_turned;
 }
 
-/// Go from set to set, from `room.acts` on, until one is right.
+/// Pivot from set to set, from `room.acts` on, until one solves the problem or comes again.
 Pivoted pivot_from(const System& system, const Signs& signs, const Room& room) {
     const auto& [matrix, right, solution] = system;
     const auto& [always, behind] = signs;
@@ -130,7 +130,7 @@ Pivoted pivot_from(const System& system, const Signs& signs, const Room& room) {
     };
     int64_t n_turned = 0;
     for (int64_t rounds = 1; rounds < most; ++rounds) {
-        // Each set has one that follows it, so sets that come again do so for ever.
+        // Each set determines the next one, so a set that comes again is in a cycle.
         const int64_t since = circle_since(turned.first(n_turned), room.pivoting.marks[0].first(n));
         if (since < n_turned) return {false, rounds, n_turned, since};
         solve_on(system, acts, room);
@@ -175,7 +175,7 @@ class Shares : public Map {
             for (int64_t leader : leaders()) is_sought_[leader] = true;
     }
 
-    /// Find them; whether there are such. The solution is that for them.
+    /// Find the shares and the solution for them; whether they exist.
     bool find() {
         while (true) {
             int64_t n = 0;

@@ -29,10 +29,10 @@ class ScenePasses : private Around {
     /// but that links have other reserves at rest (n, kScenes) [N].
     void track(const TrackedLinks& tracked, Array2<const double> rest,
                std::vector<std::span<double>> reserves);
-    /// Make room to look at so many links.
+    /// Make room for the reserves of so many links.
     void make_room(size_t n_links);
     void step();
-    /// Take the present motion into extremes, of the scenes that `moves` says.
+    /// Take the present motion into the extremes of scenes with `moves`.
     void take(const LineExtremes& extremes, const std::array<bool, kScenes>& moves);
     /// Put a scene's line at rest.
     void rest(int scene) const;

@@ -16,7 +16,7 @@ struct PassArrays {
     std::span<const double> loads;       ///< [N] of all that is solved for; may be empty
     std::span<double> answer;            ///< accelerations of all that is solved for
     Motion motion;                       ///< of the rank's own unknowns
-    std::span<double> known, predicted;  ///< known accelerations, predicted velocities, or nothing
+    std::span<double> known, predicted;  ///< known accelerations, predicted velocities, or empty
     CATENARY_RECORD(factor, velocity, loads, answer, motion, known, predicted)
 };
 

@@ -8,7 +8,7 @@ namespace catenary {
 
 namespace {
 
-/// Looks from one search for the largest motion to the next, once it has grown for as many.
+/// Searches for the largest motion are at every so many looks, and at each of the first so many.
 constexpr int64_t kPeakEvery = 64;
 /// Shares of the parts of a window behind the train and ahead in which motion fades.
 constexpr double kBehind = 0.85, kAhead = 0.6;

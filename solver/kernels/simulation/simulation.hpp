@@ -3,8 +3,8 @@
 //
 // It is read from a file, see `prepare`: factors, states, links, heads, and the inputs of each step
 // that depend on time. A host takes steps, changes speed, lift, forces on heads and the motion of
-// bases between them, and keeps states to come back to. A step allocates nothing and waits for
-// nobody.
+// bases between them, and keeps states to come back to. A step allocates no memory and never
+// waits.
 #include <string>
 
 #include "heads/sprung_head.hpp"

@@ -73,7 +73,7 @@ struct Blocks : Masks {
 
     using Masks::Masks;
 
-    /// Unknowns from a place on; both halves of a vector hold those of a piece of two.
+    /// Unknowns from a place on; a piece of two is in both halves of its vector.
     CATENARY_INLINE X load(const double* from) const {
         X x = load_once(from);
         if constexpr (kHalf)
@@ -170,7 +170,7 @@ struct Blocks : Masks {
         return __builtin_shufflevector(found, found, 0, 1, 0, 1);
 #endif
     }
-    /// Numbers of the next product, if it is there: those of two unknowns are followed by zeros.
+    /// Numbers of the next product; a product of two unknowns is padded with zeros.
     CATENARY_INLINE static V next(const double*& numbers) {
         const V found = read<kVector, kVector>(numbers);
         numbers += kVector;

@@ -73,7 +73,7 @@ void invert_pivot(Matrix pivot) {
     invert(pivot);
 }
 
-/// Factors by number, found again by what they were made from.
+/// Factors by number, found again by the factor before and the kind of the station.
 class Known {
   public:
     Known(int64_t width, int64_t n_kinds, int64_t n)

@@ -102,7 +102,7 @@ constexpr bool holds(const Mask& mask, const Mask& other) {
     return true;
 }
 
-/// Which unknowns of a station the blocks of rows, or of factors, join. See `station_layout.py`.
+/// Sparsity of a station's blocks of rows, or of factors. See `station_layout.py`.
 struct Layout {
     int unknowns = 0;
     Mask own{};               ///< of a row's diagonal block; of factors S^-1 and -B^T S^-1

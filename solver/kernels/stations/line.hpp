@@ -28,7 +28,7 @@ struct Table {
     const double* at(int64_t station) const { return numbers + begins[station]; }
 };
 
-/// Where stations begin in vectors, and of which station type each is; none if all are alike.
+/// Begins of stations in vectors, and the station type of each; null if all are alike.
 struct Places {
     const int64_t* starts = nullptr;
     const uint8_t* station_type = nullptr;
@@ -130,9 +130,9 @@ std::unique_ptr<Kernels> kernels_for_scenes(const Layout& rows, const Layout& fa
 /// Kernels that make products only, and kernels that solve only.
 std::unique_ptr<Kernels> kernels_of_rows(const Layout& rows);
 std::unique_ptr<Kernels> kernels_of_factors(const Layout& factors);
-/// Names of the processors that kernels were compiled for, and this one can be: the best last.
+/// Names of the targets that kernels were compiled for and this processor can run, the best last.
 std::vector<std::string> targets();
-/// Choose one of these; whether there is such a one.
+/// Choose one of these; whether it exists.
 bool set_target(const std::string& name);
 
 /// Work around the passes of a step: before both, and after each stretch of the pass back.

@@ -6,7 +6,7 @@
 
 namespace catenary::CATENARY_TARGET {
 
-/// Kernels of the lanes that rows take, whatever they join.
+/// General kernels for the lanes of these rows, with masks found at run time.
 template <int W = 2>
 std::unique_ptr<Kernels> make_general(const Layout& rows, const Layout& factors) {
     if (rows.pieces().lanes() == W)

@@ -91,7 +91,7 @@ void Steps::finish(int64_t n_compensations) {
     check();
 }
 
-/// Look whether the step has left numbers, in builds that look for faults.
+/// Check that the results of a step are finite, in builds that look for faults.
 void Steps::check() const {
     const auto& [x, y, z, shares, spacing] = parts_.shown.motion;
     for (auto numbers : {x, y, z}) check_numbers(numbers, "the line's motion");

@@ -22,7 +22,7 @@ struct StepParts {
     std::span<double> strips;  ///< all strips as functions of the forces, see `Head::predict`
     SmallProblem problem;      ///< of a step's forces
     StepLaw law;               ///< of the contacts
-    std::span<double> lateral_place;  ///< (n,) where wires are on the strips [m], or nothing
+    std::span<double> lateral_place;  ///< (n,) places of wires on the strips [m], or empty
     std::span<int64_t> switched;      ///< room for the numbers of links with a compensation
     TrainOutputs train_outputs;       ///< part of `outputs` that a step fills in
     std::span<const double> outputs;  ///< all outputs of pantographs

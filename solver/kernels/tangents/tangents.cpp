@@ -38,7 +38,7 @@ void add_up(const MatrixTerm& term, std::span<const double> displacement,
         result[i] = by_d * displacement[i] + by_v * velocity[i] + by_a * acceleration[i];
 }
 
-/// The contact forces that a head's laws read, or nothing.
+/// Contact forces that a head's laws read; empty without laws.
 std::span<double> laws_of(const Head& head) {
     const auto* sprung = dynamic_cast<const SprungHead*>(&head);
     return sprung ? sprung->laws().pressed : std::span<double>{};
@@ -47,7 +47,8 @@ std::span<double> laws_of(const Head& head) {
 /// By how much a state is changed to differentiate a step: heights and their rates little beside
 /// the bends of tables, and much beside round-off.
 constexpr double kMoved[] = {1e-4, 1e-2, 1.0}, kDriven = 1.0;
-/// How much nearer it is moved if a law bends by more than such a part in between, and at least.
+/// Factor of a smaller change, for laws that bend by more than the part `kBent` in between; a
+/// change below `kNearest` is taken in any case.
 constexpr double kNearer = 1e-2, kBent = 1e-5, kNearest = 1e-3;
 /// Weights of a derivative of the fourth order, see set_up.py.
 constexpr double kStencil[] = {1.0 / 12.0, -8.0 / 12.0, 8.0 / 12.0, -1.0 / 12.0};
