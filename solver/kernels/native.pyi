@@ -1,4 +1,4 @@
-"""Kernels of the time loop, compiled from C++: what the extension offers, for type checkers."""
+"""Kernels of the time loop, compiled from C++: names and types of the extension."""
 
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -41,13 +41,13 @@ REGULATION_MEMORY: np.dtype[np.void]
 LOWERING_MEMORY: np.dtype[np.void]
 
 class Head:
-    """A pantograph that steps by Newmark's method, of any model: ``HeadArrays`` and what the model
-    takes besides are kept, and read and written in place."""
+    """A pantograph that steps by Newmark's method, of any model. It keeps ``HeadArrays`` and the
+    further arrays of the model, and reads and writes them in place."""
 
     first: int
-    """Number of its first contact among those of the train."""
+    """Number of its first contact among the train's contacts."""
     added_force: float
-    """What regulates the lift adds to the static force now [N]; put for one without regulation."""
+    """Force that the regulation now adds to the static force [N]; put without a regulation."""
     def bend(self, bending: object) -> None:
         """Let strips bend, see ``flexure.Bending``."""
 
@@ -193,8 +193,8 @@ class Layout:
         """Numbers of a packed row."""
 
 def are_compiled(rows: Layout, factors: Layout) -> bool:
-    """Whether kernels were compiled for stations of such rows and factors; others are stepped by
-    general ones, which ask what is joined."""
+    """Whether kernels were compiled for stations of such rows and factors; general kernels step
+    others, with masks found at run time."""
 
 def are_compiled_for_scenes(rows: Layout, factors: Layout) -> bool:
     """Whether this processor has kernels that step several scenes side by side."""
@@ -234,8 +234,8 @@ class FreeSteps:
         """Fill in the velocities that others read in products with C, if there are such."""
 
 class TwoPasses(FreeSteps):
-    """The same with what they are made of, see ``StationPasses``; arrays are kept, and read and
-    written in place."""
+    """Free steps with their arrays, see ``StationPasses``, which they keep, read and write in
+    place."""
 
     def __init__(
         self, rows: Sequence[Layout], factors: Sequence[Layout], parts: object
@@ -275,7 +275,7 @@ class Steps(BlockSteps):
         """Take the steps of the block from number ``first`` on up to before ``end``."""
 
     def write(self, path: str, ahead: object) -> None:
-        """Write a file with all that they are made of, and what is ``Ahead``."""
+        """Write a file with the parts of the steps, and the inputs ``Ahead``."""
 
 SCENES: int
 
@@ -292,7 +292,7 @@ class Ensemble:
         self, rows: Sequence[Layout], factors: Sequence[Layout], parts: object, extremes: object
     ) -> None: ...
     def track(self, links: object, rest: np.ndarray, reserves: Sequence[np.ndarray]) -> None:
-        """Fill ``reserves`` (n,) of links in each lane, from those at ``rest`` (n, SCENES) [N]."""
+        """Fill ``reserves`` (n,) of links in each lane; at rest ``rest`` (n, SCENES) [N]."""
 
     def rest(self, lane: int) -> None:
         """Put the line of a lane at rest."""
@@ -333,7 +333,7 @@ class Simulation:
 
     def __init__(self, path: str) -> None: ...
     def step(self, n: int = 1) -> bool:
-        """Take n steps; False if the end of the line, or of what the file tells, came before.
+        """Take n steps; False if the end of the line, or of the file's inputs, came before.
 
         Raises
         ------
@@ -353,9 +353,9 @@ class Simulation:
 
     @property
     def inputs(self) -> np.ndarray:
-        """What is added to each pantograph from the next step on, (n,) of ``lift_force`` to the
-        static force and ``head_force`` on the head, upward [N], and of its base the height
-        ``base`` [m], ``base_velocity`` [m/s] and ``base_acceleration`` [m/s2]; all 0 at first."""
+        """Inputs of each pantograph (n,), added from the next step on: ``lift_force`` to the static
+        force and ``head_force`` on the head, upward [N], and of its base the height ``base``
+        [m], ``base_velocity`` [m/s] and ``base_acceleration`` [m/s2]; all 0 at first."""
 
     @property
     def time(self) -> float:
@@ -375,7 +375,7 @@ class Simulation:
 
     @property
     def n_steps_left(self) -> int:
-        """Steps for which the file tells what they depend on."""
+        """Steps left for which the file has inputs."""
 
     @property
     def contact_force(self) -> np.ndarray:
@@ -394,13 +394,13 @@ class Simulation:
         """Of each strip, strips of one pantograph after another (n_strips,) [N]."""
 
 def targets() -> list[str]:
-    """Processors that kernels were compiled for and that this one can be, the best last."""
+    """Targets that kernels were compiled for and this processor can run, the best last."""
 
 def set_target(name: str) -> bool:
-    """Let what is made from now on use the kernels of one of these; whether there is such a one."""
+    """Use the kernels of one of these for lines made from now on; whether it exists."""
 
 def flush_subnormals() -> int:
-    """Let this thread take subnormal numbers for zero, if it can; what it did before."""
+    """Let this thread take subnormal numbers for zero, if it can; returns the mode before."""
 
 def restore_subnormals(before: int) -> None:
-    """Let it do what it did before."""
+    """Restore the mode before."""

@@ -50,7 +50,7 @@ template <class T>
 int64_t size(std::span<T> array) {
     return static_cast<int64_t>(array.size());
 }
-/// Those from `begin` to `end`.
+/// The numbers from `begin` to before `end`.
 template <class T>
 std::span<T> part(std::span<T> array, int64_t begin, int64_t end) {
     return array.subspan(begin, end - begin);

@@ -1,5 +1,5 @@
 #pragma once
-// What builds that look for faults check besides bounds (`build_ext --sanitize`).
+// Checks besides bounds in builds that look for faults (`build_ext --sanitize`).
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>

@@ -1,5 +1,5 @@
 #pragma once
-// Products of complex numbers without regard to what is infinite, as loops of vectors have them.
+// Products of complex numbers without the checks for infinity, so that loops are vectorised.
 #include <complex>
 
 namespace catenary {

@@ -4,10 +4,10 @@
 
 namespace catenary {
 
-/// Let this thread take subnormal numbers for zero, operands and results, where the processor is
-/// one that can be told so. What it did before, for `restore_subnormals`.
+/// Let this thread take subnormal numbers for zero, operands and results, where the processor can.
+/// Returns the mode before, for `restore_subnormals`.
 uint64_t flush_subnormals();
-/// Let it do what it did before.
+/// Restore the mode before.
 void restore_subnormals(uint64_t before);
 
 }  // namespace catenary

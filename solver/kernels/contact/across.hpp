@@ -5,7 +5,7 @@
 
 namespace catenary {
 
-/// Where wires are across the track at n contacts: place y + v [m], its total rate
+/// Lateral motion of wires at n contacts: place y + v [m], its total rate
 /// dv/dt + V (dy/dx + dv/dx) [m/s] and displacement v [m]. Empty without lateral motion.
 struct Across {
     std::span<double> place, rate, moved;

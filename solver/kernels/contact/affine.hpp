@@ -6,8 +6,8 @@
 namespace catenary {
 
 /// Heights and their rates at n contacts: `place` (n,) [m] and `rate` (n,) [m/s] without forces,
-/// `by_force` (n, n) [m/N] and `rate_by_force` (n, n) [m/(N s)]: what forces add to those of a
-/// line, and take off those of heads and off depths.
+/// `by_force` (n, n) [m/N] and `rate_by_force` (n, n) [m/(N s)]: their increase by forces
+/// for a line, their decrease for heads and depths.
 struct Affine {
     std::span<double> place, rate;
     Array2<double> by_force, rate_by_force;

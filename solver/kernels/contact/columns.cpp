@@ -52,7 +52,7 @@ void add_to_motion(double force, const double* __restrict answer, int64_t n, dou
     }
 }
 
-/// The same of one scene among others: its numbers stand apart.
+/// The same for one scene in lanes: its numbers are `spacing` apart.
 void add_to_lane(double force, const double* __restrict answer, int64_t n, int64_t spacing,
                  double* __restrict x, double* __restrict y, double* __restrict z,
                  const double* gains) {
@@ -94,7 +94,7 @@ void put_columns(const Node* nodes, std::span<const double> data, const double (
         filled[0] = std::min(filled[0], filled[1]);
         return;
     }
-    // Windows of neighbours are nearly the same: what both fill is written once.
+    // Windows of neighbours are nearly the same: their common part is written once.
     clear(answer, filled[0], std::min(filled[1], low));
     clear(answer, std::max(filled[0], end), filled[1]);
     double* whole = part(answer, low, end).data();

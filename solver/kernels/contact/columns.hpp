@@ -9,8 +9,8 @@ namespace catenary {
 /// Make the numbers from `low` to `high` zero, if there are any.
 void clear(std::span<double> answer, int64_t low, int64_t high);
 
-/// Make `answer` the weighted columns of two nodes beside each other, two of each, and zero
-/// elsewhere. `filled` is the range outside of which it is zero, before and after.
+/// Put the weighted sum of the columns of two neighbouring nodes, two of each, into `answer`, zero
+/// elsewhere. `filled` is the range outside of which it is zero, before and after the call.
 void put_columns(const Node* nodes, std::span<const double> data, const double (&weights)[4],
                  std::span<double> answer, int64_t (&filled)[2]);
 

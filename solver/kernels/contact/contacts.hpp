@@ -1,5 +1,5 @@
 #pragma once
-// Contacts of a rank's part of a line: where they are, what answers to forces there.
+// Contacts of a rank's part of a line: their places, and answers to forces there.
 #include "base/record.hpp"
 #include "contact/across.hpp"
 #include "contact/touch.hpp"
@@ -22,7 +22,7 @@ struct Answers {
     CATENARY_RECORD(by_force, slope)
 };
 
-/// What answers are worth within a step.
+/// Gains of answers within a step.
 struct Gains {
     double train_speed;         ///< V of the convective part of rates [m/s]
     double position, velocity;  ///< of an acceleration [s2], [s]
@@ -57,7 +57,7 @@ struct LinkColumns {
 ///
 /// the work of the discrete motion by average acceleration.
 struct ContactWork {
-    std::span<double> total;           ///< (1,) [J], of what this rank owns of the wires
+    std::span<double> total;           ///< (1,) [J], by the wires' unknowns that this rank owns
     std::span<double> force;           ///< after the step before [N]
     Array2<int64_t> local;             ///< (n, 4) of the contacts then, and
     Array2<double> value;              ///< their functions
@@ -97,10 +97,10 @@ struct Contacts {
                     link_columns, work, sideways, across)
 };
 
-/// Make `touches` those at places `x` (n,) [m], each on its own wire. A node belongs to the element
+/// Locate the `touches` at places `x` (n,) [m], each on its own wire. A node belongs to the element
 /// that it ends.
 void locate(std::span<const double> x, const Wires& wires, std::span<Touch> touches);
-/// Make the touches those at the places of the contacts, and the answers those to forces there.
+/// Locate the touches at the places of the contacts, and fill in the answers to forces there.
 void place(const Contacts& contacts);
 /// Fill in the owned share of the wire's height [m] and of its total rate dw/dt + V dw/dx [m/s] at
 /// each contact.

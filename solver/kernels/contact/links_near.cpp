@@ -32,12 +32,12 @@ double spread(int64_t link, const Links& links, std::span<const double> answer) 
     return total;
 }
 
-/// What a unit of acceleration of a link's stretch adds to its reserve.
+/// Increase of a link's reserve by a unit of acceleration of its stretch [N s2/m].
 double per_acceleration(const Reserve& law, const Gains& gains) {
     return law.stiffness * gains.position + law.damping * gains.velocity;
 }
 
-/// Fill in what contacts and one of `links` do to each other.
+/// Fill in the couplings of contacts with one of `links`.
 void put_couplings(const LinkRows& rows, int64_t at, const Links& links, int64_t link,
                    const Contacts& contacts) {
     const auto& [by_force, by_slope] = contacts.answers;
@@ -54,7 +54,7 @@ void put_couplings(const LinkRows& rows, int64_t at, const Links& links, int64_t
     }
 }
 
-/// What contacts within the bounds may leave of a link's reserve [N].
+/// Least reserve of a link under contact forces within the bounds [N].
 double least_reserve(int64_t link, const Contacts& contacts, const Bounds& bounds) {
     const Followed& followed = contacts.followed;
     const Gains& gains = contacts.gains;
@@ -82,7 +82,7 @@ int64_t watch(const Contacts& contacts, const Share& share) {
     const auto far = std::ranges::upper_bound(laws, highest->x + reach, {}, &Reserve::place);
     const int64_t first = std::max<int64_t>(near - laws.begin(), moving[0]);
     const int64_t last = std::min<int64_t>(far - laws.begin(), moving[1]);
-    // Mostly none is near its margin by itself: then those beyond reach are not looked at.
+    // Mostly none is near its margin by itself: then links beyond reach are not looked at.
     int64_t begin = first, end = last;
     if (any_beyond(part(reserve, moving[0], moving[1]), margin)) {
         begin = moving[0];

@@ -1,4 +1,4 @@
-// Where contacts are, and what forces and heights a step shows.
+// Places of contacts, and forces and heights as outputs.
 #include "contact/outputs.hpp"
 
 #include <algorithm>

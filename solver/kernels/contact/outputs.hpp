@@ -1,13 +1,13 @@
 #pragma once
-// Where contacts are along the track, and what a step shows of pantographs and strips.
+// Places of contacts along the track, and outputs of pantographs and strips.
 #include "base/arrays.hpp"
 #include "base/record.hpp"
 #include "contact/affine.hpp"
 
 namespace catenary {
 
-/// Which contacts a strip has, and which strips a pantograph: numbers of the first ones, and of
-/// all; (n_strips + 1,), (n_pantographs + 1,).
+/// First contact of each strip, first strip of each pantograph, and the number of all at the end:
+/// (n_strips + 1,), (n_pantographs + 1,).
 struct StripEnds {
     std::span<const int64_t> of_strip, of_pantograph;
     CATENARY_RECORD(of_strip, of_pantograph)
@@ -22,7 +22,7 @@ struct TrainOutputs {
     CATENARY_RECORD(ends, contact_force, head_height, wire_height, strip_force, contact_wire_force)
 };
 
-/// Fill in the outputs of n contacts: `force` (n,) [N], what of it is `reported` (n,), `heads` as
+/// Fill in the outputs from n contacts: `force` (n,) and `reported` force (n,) [N], `heads` as
 /// functions of forces, `depth` (n,) [m]. A pantograph's force is the sum over its contacts,
 /// heights are means over its strips; of several wires over a strip the lowest counts.
 void write_outputs(const TrainOutputs& outputs, std::span<const double> force,

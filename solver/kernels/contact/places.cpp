@@ -1,4 +1,4 @@
-// Where contacts are on wires, and what answers to forces there.
+// Places of contacts on wires, and answers to forces there.
 #include <array>
 #include <cmath>
 
@@ -17,7 +17,7 @@ std::array<double, 4> shape_values(double xi, double length) {
             length * (cube - square)};
 }
 
-/// Derivatives dN/dx [1/m], of those of rotations [-].
+/// Derivatives dN/dx: of the functions of deflections [1/m], of rotations [-].
 std::array<double, 4> shape_slopes(double xi, double length) {
     const double square = xi * xi;
     return {6 * (square - xi) / length, 1 - 4 * xi + 3 * square, 6 * (xi - square) / length,
@@ -89,7 +89,7 @@ void place(const Contacts& contacts) {
     for (int64_t i = 0; i < size(contacts.touches); ++i) {
         Touch& touch = contacts.touches[i];
         if (touch.present == 0.0) {
-            // Where there is no wire on a strip nothing answers.
+            // A strip without a wire has no answers.
             clear(by_force[i], touch.filled[0], touch.filled[1]);
             if (slope.columns > 0) clear(slope[i], touch.filled[0], touch.filled[1]);
             touch.filled[0] = touch.filled[1] = 0;

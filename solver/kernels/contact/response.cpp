@@ -16,7 +16,7 @@ double answer_at(const int64_t (&local)[4], const double (&weights)[4],
     return total;
 }
 
-/// Fill in heights, rates and what forces add to both; whether heights and rates are finite.
+/// Fill in heights, rates and the increase of both by forces; whether heights and rates are finite.
 bool meet(const Contacts& contacts, const Affine& line) {
     const auto& [by_force, by_slope] = contacts.answers;
     const auto& touches = contacts.touches;

@@ -1,11 +1,11 @@
 #pragma once
-// A rank's share of the small problem of a step: what the line answers to contacts and links.
+// A rank's share of the small problem of a step: answers of the line to contacts and links.
 #include "contact/affine.hpp"
 #include "contact/contacts.hpp"
 
 namespace catenary {
 
-/// What adds up over ranks besides answers.
+/// Sums over ranks besides the answers.
 struct Flags {
     double rows;     ///< links with a row
     double stop;     ///< wishes to stop
@@ -27,24 +27,24 @@ struct LinkRows {
     }
     /// Its reserve without contact forces [N].
     double& reserve(int64_t k) const { return numbers(k, 1); }
-    /// What a unit force at contact i adds to its reserve [-].
+    /// Increase of its reserve by a unit force at contact i [-].
     double& reaction(int64_t k, int64_t i) const { return numbers(k, 2 + i); }
-    /// What its unit compensation takes off height [m/N] and rate [m/(N s)] there.
+    /// Decrease of height [m/N] and rate [m/(N s)] at contact i by its unit compensation.
     double& lift(int64_t k, int64_t i) const { return numbers(k, 2 + n_contacts() + i); }
     double& rise(int64_t k, int64_t i) const { return numbers(k, 2 + 2 * n_contacts() + i); }
     CATENARY_RECORD(numbers)
 };
 
-/// Within which forces whatever switches has a row: contacts that all push up to `push` (n,) and
-/// pull up to `pull` (n,) [N], 0 of those that only push, and compensations elsewhere that take up
-/// to `loss` (1,) [N] off a reserve.
+/// Bounds of forces within which every link that switches has a row: contacts that all push up to
+/// `push` (n,) and pull up to `pull` (n,) [N], 0 of contacts that only push, and compensations
+/// elsewhere that take up to `loss` (1,) [N] off a reserve.
 struct Bounds {
     std::span<double> push, pull, loss;
     CATENARY_RECORD(push, pull, loss)
 };
 
-/// What a rank fills in, or the sum of all ranks: `flags` (1,), `present` (n,), 1 for a contact
-/// whose wire is on its strip and else 0, heights of the line, and rows of links.
+/// Share of one rank, or the sum of all ranks: `flags` (1,), `present` (n,), 1 for a contact whose
+/// wire is on its strip and else 0, heights of the line, and rows of links.
 struct Share {
     std::span<Flags> flags;
     std::span<double> present;
@@ -57,9 +57,9 @@ struct Share {
 /// Fill in a rank's share; the motion is that without forces of contacts and of links that switch.
 void respond(const Contacts& contacts, const Share& share);
 
-/// Number of links that may switch within the bounds of a share, dependents included; a row each,
-/// as far as they fit, those of dependents behind those of their leaders. Contacts touch those
-/// within reach. -1 if a reserve is not finite.
+/// Fill in a row for each link that may switch within the bounds of a share, as far as rows fit;
+/// rows of dependents follow their leaders'. Contacts act on links within reach only. Returns the
+/// number of these links, dependents included; -1 if a reserve is not finite.
 int64_t watch(const Contacts& contacts, const Share& share);
 
 }  // namespace catenary

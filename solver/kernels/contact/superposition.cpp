@@ -1,4 +1,4 @@
-// What forces of contacts and links add to the motion, and the work that they do.
+// Superposition of the answers to forces of contacts and links, and the work of contact forces.
 #include "contact/columns.hpp"
 #include "contact/contacts.hpp"
 

@@ -27,7 +27,7 @@ void solve_two(const System& system, int64_t first, int64_t second) {
     solution[second] = y;
 }
 
-/// Factors of the rows and columns `index`, with what was row order[i] as row i.
+/// LU factors of the rows and columns `index`; row i of the factors was row order[i].
 void eliminate(const Array2<double>& matrix, std::span<const int64_t> index,
                const Array2<double>& a, std::span<int64_t> order) {
     const int64_t m = size(index);
@@ -96,7 +96,7 @@ int64_t settle(const System& system, const Signs& signs, int64_t max_rounds, con
         acts[i] = behind[i] ? acts[i - behind[i]] : always[i] || right[i] > 0.0;
     int64_t kept_at = 1;
     for (int64_t rounds = 1; rounds <= max_rounds; ++rounds) {
-        // Each set has one that follows it: sets come back for ever once one does. One is kept for
+        // Each set determines the next one: a set that comes again is in a cycle. One is kept for
         // twice as many rounds as the one before it (R. P. Brent, BIT 20 (1980) 176-184).
         if (rounds == kept_at) {
             std::ranges::copy(acts, before.begin());

@@ -14,8 +14,8 @@ constexpr double kTolerance = 1e-10;
 /// some m/s, a few roundings of 4e-16 to 9e-16 each. No force is known better than that times the
 /// slope.
 constexpr double kKnown = 5e-15;
-/// Where so many tangents do not do, round-off is looked at: large terms may cancel in depths and
-/// rates, of which each is known to some roundings of itself.
+/// Where so many tangents do not do, the tolerance takes in round-off: large terms may cancel in
+/// depths and rates, and each term is known to some roundings of itself.
 constexpr int64_t kUsualTangents = 12;
 constexpr double kRounding = 8.0 * std::numeric_limits<double>::epsilon();
 

@@ -1,12 +1,12 @@
 #pragma once
-// The forces of a step on one rank, as far as they are found without help.
+// Forces of a step on one rank, as far as kernels find them.
 #include <optional>
 
 #include "contact_problem/small_problem.hpp"
 
 namespace catenary {
 
-/// What is counted over steps, as in `schemes.Counters`.
+/// Counts of the work of steps, as in `schemes.Counters`.
 struct Counts {
     int64_t steps;     ///< that were taken
     int64_t rounds;    ///< of the active-set iteration
@@ -21,12 +21,12 @@ inline constexpr int64_t kLeft = -1, kTooSmall = -2;
 /// Tangents of a step at most: Newton's method on a law doubles its digits with each.
 inline constexpr int64_t kMostTangents = 50;
 
-/// Whether contact forces and compensations that were found with tangents are those of the law,
-/// which was linearised under them since; `number` tangents did not do before.
+/// Whether contact forces and compensations that were found with tangents agree with the law, which
+/// was linearised under them since; `number` tangents did not do before.
 bool agrees(const Affine& gap, const LinkRows& rows, std::span<const double> force,
             std::span<const double> compensation, const MarchedHertzLaw& law, int64_t number);
 
-/// The contact law, and what is reported of its forces.
+/// The contact law and its reported forces.
 struct StepLaw {
     std::optional<MarchedHertzLaw> marched;  ///< the law, unless it is linear
     ReportedForces reported;
@@ -40,7 +40,7 @@ struct StepLaw {
 int64_t find_forces(double time, const SmallProblem& problem, const StepLaw& law,
                     std::span<int64_t> switched, Counts& counts);
 
-/// Double the bounds of what may switch.
+/// Double the bounds within which links that may switch have rows.
 void widen(const Bounds& bounds);
 
 }  // namespace catenary

@@ -1,5 +1,5 @@
 #pragma once
-// Contact laws: tangents, and what is reported of forces.
+// Contact laws: tangents, and reported forces.
 #include "base/arrays.hpp"
 #include "base/record.hpp"
 
@@ -29,16 +29,16 @@ struct MarchedHertzLaw {
 /// Linearise the law at depths [m] and rates [m/s], (n,) each.
 void linearise(const MarchedHertzLaw& marched, std::span<const double> depth,
                std::span<const double> rate);
-/// Remember at the end of a step how fast those come who do not touch.
+/// Store at the end of a step the rates at which open gaps close.
 void remember(const MarchedHertzLaw& marched, std::span<const double> depth,
               std::span<const double> rate);
 
-/// Which forces of n contacts are reported at the end of a step.
+/// Forces of n contacts as reported at the end of a step.
 struct ReportedForces {
-    double gamma;                ///< weight of the new force in what is reported; 0 reports itself
+    double gamma;                ///< weight of the new force in the reported one; 0 reports itself
     double from_time;            ///< from which on a reported force that pulls ends the run [s]
     std::span<double> latest;    ///< forces of the latest step [N], (n,) if gamma is not 0
-    std::span<double> reported;  ///< what is reported of it (n,) [N]
+    std::span<double> reported;  ///< reported forces (n,) [N]
     CATENARY_RECORD(gamma, from_time, latest, reported)
 };
 /// Whether the contact law holds for forces (n,) at `time` [s]; if so they are remembered. A law

@@ -12,8 +12,8 @@ namespace {
 
 /// Shares go from 0 to 1; paths on a grid of some of that take the fewest steps.
 constexpr double kFirstGrid = 0.25;
-/// What may be missing in a row, of the largest right-hand side; and, as that makes the problem
-/// jump from shares to shares, what shares and tensions may disagree by.
+/// Tolerance of a row's residual relative to the largest right-hand side; and, as that makes the
+/// problem jump from shares to shares, tolerance of the agreement of shares with tensions.
 constexpr double kRounding = 1e-12, kAgreement = 10.0 * kRounding;
 /// Rows of bends along one direction differ by this at most, of their largest number.
 constexpr double kAlike = 1e-9;
@@ -78,15 +78,15 @@ void find_bends(const System& system, const Room& room) {
         }
 }
 
-/// How pivoting ended: whether a set was right, the rounds to get there, and how many rows were
-/// turned before it went round in a circle of sets.
+/// Outcome of pivoting: whether a set solves the problem, the rounds, the number of turned rows,
+/// and how many of these were before a cycle of sets.
 struct Pivoted {
     bool found;
     int64_t rounds, n_turned, since;
 };
 
-/// Since when turned rows have come back to the set that there is, each an even number of times;
-/// `n_turned` if they have not.
+/// Number of turned rows before the cycle that ends at the present set: from there on each row is
+/// turned an even number of times. `n_turned` if there is no cycle.
 int64_t circle_since(std::span<const int64_t> turned, std::span<bool> odd) {
     const int64_t n_turned = size(turned);
     std::ranges::fill(odd, false);
@@ -100,7 +100,7 @@ int64_t circle_since(std::span<const int64_t> turned, std::span<bool> odd) {
     return n_turned;
 }
 
-/// Go from set to set, from `room.acts` on, until one is right.
+/// Pivot from set to set, from `room.acts` on, until one solves the problem or comes again.
 Pivoted pivot_from(const System& system, const Signs& signs, const Room& room) {
     const auto& [matrix, right, solution] = system;
     const auto& [always, behind] = signs;
@@ -130,7 +130,7 @@ Pivoted pivot_from(const System& system, const Signs& signs, const Room& room) {
     };
     int64_t n_turned = 0;
     for (int64_t rounds = 1; rounds < most; ++rounds) {
-        // Each set has one that follows it, so sets that come again do so for ever.
+        // Each set determines the next one, so a set that comes again is in a cycle.
         const int64_t since = circle_since(turned.first(n_turned), room.pivoting.marks[0].first(n));
         if (since < n_turned) return {false, rounds, n_turned, since};
         solve_on(system, acts, room);
@@ -144,11 +144,12 @@ Pivoted pivot_from(const System& system, const Signs& signs, const Room& room) {
     return {false, most, n_turned, 0};
 }
 
-/// Finds what share of each leader's dependents is released: all below no tension, none above it.
+/// Search for the released share of each leader's dependents: 1 where the leader's tension would be
+/// negative, 0 where it is positive.
 ///
-/// With shares given, what is left is a problem with a P-matrix whose solution goes continuously
-/// with them; so there are shares that agree with it. They are sought for the leaders that went
-/// round in a circle; others keep all or nothing, as the set has it, unless their tension then
+/// With shares given, the rest is a problem with a P-matrix whose solution goes continuously with
+/// them; so there are shares that agree with it. They are sought for the leaders that the pivoting
+/// cycled through; others keep all or nothing, as the set has it, unless their tension then
 /// disagrees.
 class Shares : public Map {
   public:
@@ -165,7 +166,7 @@ class Shares : public Map {
         for (int64_t i = 0; i < n_; ++i) {
             if (signs_.behind[i] == 1) leaders_[n_leaders_++] = i - 1;
             shares_[i] = room_.acts[i] ? 1.0 : 0.0;
-            // Near what was right for the shares before.
+            // Near the active set of the shares before.
             room_.acts[i] = signs_.always[i] || system_.solution[i] > 0.0;
             none_[i] = 0;
         }
@@ -174,7 +175,7 @@ class Shares : public Map {
             for (int64_t leader : leaders()) is_sought_[leader] = true;
     }
 
-    /// Find them; whether there are such. The solution is that for them.
+    /// Find the shares and the solution for them; whether they exist.
     bool find() {
         while (true) {
             int64_t n = 0;

@@ -1,23 +1,24 @@
 #pragma once
-// What finds a step's forces where the active set cycles: pivoting, and dependents that carry in
+// Solution of the small problem where the active set cycles: pivoting, and dependents that carry in
 // part.
 //
 // Contacts and links alone are a linear complementarity problem with a P-matrix, which pivoting
-// solves. Bends of one link, and a wheel that slips one way or the other, have a row each, of which
-// some act only where others do, and some only where others do not. Sets are taken that belong to a
-// place along the link: with others the matrix is none. So a link goes from piece to piece of its
-// law, one at a time, and with a law that rises all over it does not come back to one: with all
-// rows before its own solved for, what it lacks has one sign to either side of where it stays.
+// solves. Bends of one link, and a wheel that slips one way or the other, have a row each; some of
+// these act only where others do, and some only where others do not. Only sets that belong to a
+// place along the link are taken: with others the matrix is no P-matrix. So a link goes from piece
+// to piece of its law, one at a time, and with a law that rises all over it does not come back to
+// one: with all rows before its own solved for, its residual has one sign to either side of where
+// it stays.
 //
-// Nor is the matrix one with dependents: what a dropper does across it is whole while it is taut
-// and nothing while it is slack, whatever its tension, so that it jumps where that passes zero. If
-// the jump tightens the dropper that slackens, it is neither taut nor slack. The step then ends
-// with its tension at zero and dependents that carry in part (docs/theory/lateral.md).
+// With dependents the matrix is no P-matrix either: the effect of a dropper across it is whole
+// while it is taut and none while it is slack, whatever its tension, so it jumps where that passes
+// zero. If the jump tightens the dropper that slackens, it is neither taut nor slack. The step then
+// ends with its tension at zero and dependents that carry in part (docs/theory/lateral.md).
 #include "contact_problem/active_set.hpp"
 
 namespace catenary {
 
-/// How forces were found.
+/// Outcome of the solution for forces.
 struct Found {
     int64_t rounds;  ///< that were needed; not positive if there is no solution
     bool pivoted;    ///< whether the active set cycled

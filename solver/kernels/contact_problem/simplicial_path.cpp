@@ -12,7 +12,7 @@ namespace catenary {
 namespace {
 
 /// Corners of the first simplex lie so around the start that no face of a grid holds a zero of a
-/// map with whole numbers in it, which would make two steps of a path equally good.
+/// map with whole numbers in it: two steps of a path would be equally good there.
 constexpr double kSkew = std::numbers::phi - 1.0;
 /// Each grid is so much finer than the one before.
 constexpr double kFiner = 0.25;
@@ -64,7 +64,7 @@ class Path {
         }
     }
 
-    /// Fill in the zero on level 1 of what is linear between corners; whether there is one.
+    /// Fill in the zero on level 1 of the interpolation between corners; whether there is one.
     bool arrive(std::span<double> zero) {
         for (int64_t k = 0; k <= n_; ++k) {
             put_column(k);
@@ -119,7 +119,7 @@ class Path {
     void solve(std::span<double> right, std::span<double> solution) const {
         solve_on({columns_, right, solution}, all_, room_);
     }
-    /// Which column leaves, none below 0.
+    /// Number of the column that leaves, -1 if none does.
     int64_t leaving() const {
         if (!all_finite(weights_) || !all_finite(change_)) return -1;
         int64_t leaves = -1;

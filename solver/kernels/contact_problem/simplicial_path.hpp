@@ -7,10 +7,10 @@
 //
 // The space and a level between 0 and 1 are cut into simplices (Freudenthal's triangulation), all
 // with their corners on the two levels. On level 0 stands z - start, on level 1 the map, between
-// them what is linear in each simplex. Its zeros are a path that starts at the one on level 0. It
-// cannot come back there, so it arrives at level 1 where the map points away from a point on a
-// large sphere around it. Finer grids from there on, each with a path of its own, leave a zero as
-// exact as wanted.
+// them the function that is linear in each simplex. Its zeros are a path that starts at the one on
+// level 0. It cannot come back there, so it arrives at level 1 where the map points away from a
+// point on a large sphere around it. Finer grids from there on, each with a path of its own, leave
+// a zero as exact as wanted.
 #include "contact_problem/room.hpp"
 
 namespace catenary {
@@ -29,7 +29,7 @@ class Map {
 /// `z` holds where to begin, and then the last place looked at; the better, the shorter the path.
 /// `width` is that of the first grid, in units of z; a largest component of `small` counts as zero.
 /// Returns whether the place is a zero: not if the path is too long, or the map no number on it.
-/// The room is for n dimensions, of which `room` may solve for n + 1 unknowns.
+/// `path` is for n dimensions, `room` for solves of n + 1 unknowns.
 bool find_zero(Map& of, std::span<double> z, double width, double small, const PathRoom& path,
                const Room& room);
 

@@ -1,5 +1,5 @@
 #pragma once
-// The small dense problem of a step: contact forces and switching links. The equations are those of
+// The small dense problem of a step: contact forces and switching links. For the equations see
 // solver/contact_problem/complementarity.py.
 #include "contact/response.hpp"
 #include "contact_problem/pivoting.hpp"
@@ -10,11 +10,11 @@ namespace catenary {
 /// Depth where there is no wire on a strip [m]: out of contact, whatever the law.
 inline constexpr double kNowhere = -1.0;
 
-/// What the small problem needs of all links of the line, by their numbers.
+/// Coupling of all links of the line in the small problem, by their numbers.
 struct Coupled {
-    Array2<const double> band;         ///< (n_links, 2 half + 1), band(e, d - e + half) is what a
-                                       ///< unit compensation of link e takes off the reserve of d
-    std::span<const double> released;  ///< what of what is beyond its reserve is a compensation
+    Array2<const double> band;         ///< (n_links, 2 half + 1): band(e, d - e + half) is the
+                                       ///< decrease of d's reserve by a unit compensation of e [-]
+    std::span<const double> released;  ///< share of -R > 0 that is the compensation, see `Reserve`
     std::span<const bool> slackens;    ///< whether it slackens, and is no stop that closes
     std::span<const int64_t> behind;   ///< of a dependent how many numbers its leader is before it
     std::span<double> drop;            ///< room to work, all zero before and after
@@ -23,7 +23,7 @@ struct Coupled {
 
 /// Room for a problem with up to k unknowns: contact forces, then compensations.
 struct Unknowns {
-    static constexpr bool kScratch = true;  ///< no step reads what the one before has left
+    static constexpr bool kScratch = true;  ///< no step reads numbers of the one before
     std::span<bool> always;                 ///< see `Signs`
     std::span<int64_t> behind;
     Array2<double> matrix;  ///< (k, k)
@@ -67,14 +67,14 @@ struct Solved {
 /// Find contact forces and compensations for a law's tangents.
 Solved solve(const SmallProblem& problem);
 
-/// Fill in the gap without forces, and what forces take off it; whether all of it is finite.
+/// Fill in the gap without forces, and its decrease by forces; whether all of it is finite.
 bool subtract(const Affine& heads, const Affine& line, std::span<const double> present,
               const Affine& gap);
 /// Whether contact forces (n,) alone take any of the first `count` links beyond its reserve.
 bool any_switched(const LinkRows& rows, int64_t count, const Coupled& coupled,
                   std::span<const double> force);
-/// Put the rows and columns of the first `count` links beside those of the n contacts, and which of
-/// them are behind a leader. `by_depth` and `by_rate` (n,) are what depth and rate are worth.
+/// Put the rows and columns of the first `count` links behind the ones of the n contacts, and how
+/// many rows each is behind its leader. `by_depth` and `by_rate` (n,) are as in `Tangents`.
 void couple(const LinkRows& rows, int64_t count, const Coupled& coupled,
             std::span<const double> by_depth, std::span<const double> by_rate,
             const Unknowns& unknowns);

@@ -5,11 +5,11 @@
 
 namespace catenary {
 
-/// A scene on its way: what takes its steps, and the steps of its block.
+/// A scene on its way: its steps, the next of its block and the end of it.
 struct March {
     Steps* steps = nullptr;  ///< none where no scene is
     int64_t next = 0, end = 0;
-    bool is_left = false;  ///< whether the forces of a step were not found, after which it stays
+    bool is_left = false;  ///< whether the forces of a step were not found; it stays then
 };
 
 class Ensemble {

@@ -1,4 +1,4 @@
-// Free steps of several scenes, and what is looked at in all of them at once.
+// Free steps of several scenes, with reserves and extremes of all of them at once.
 #include "ensemble/scene_passes.hpp"
 
 #include <algorithm>
@@ -23,7 +23,7 @@ Line line_of(const PassParts& parts) {
     return Line(std::move(kernels), parts.station_types, kScenes);
 }
 
-/// Numbers of all scenes, wherever they stand.
+/// Numbers of all scenes as a vector, aligned as doubles.
 typedef double Scenes __attribute__((vector_size(8 * kScenes), aligned(8), may_alias));
 
 const Scenes& at(const double* numbers) {
@@ -33,7 +33,7 @@ Scenes& at(double* numbers) {
     return *reinterpret_cast<Scenes*>(numbers);
 }
 
-/// Fill in the reserve of each link from `begin` to `end` in all scenes, from those at rest.
+/// Fill in the reserve of each link from `begin` to `end` in all scenes, from the reserves at rest.
 CATENARY_FOR_TARGETS
 void find_reserves(const Motion& motion, const Links& links, const double* rest, int64_t begin,
                    int64_t end, double* result) {
@@ -56,8 +56,8 @@ void find_reserves(const Motion& motion, const Links& links, const double* rest,
     }
 }
 
-/// Take forces of links with these reserves into their extremes, of scenes with `none` = 0; that is
-/// infinite of others.
+/// Take forces of links with these reserves into their extremes. `none` (kScenes,) is 0 of scenes
+/// that take part, infinite of the others.
 CATENARY_FOR_TARGETS
 void take_forces(std::span<const Reserve> laws, const double* reserves, const double* none,
                  double* least, double* largest) {

@@ -2,14 +2,14 @@
 // Free steps of a line in several scenes side by side, which share its matrices and factors.
 //
 // Numbers of an unknown in all scenes follow each other, so that a number of a matrix is read once
-// for `kScenes` of them: memory and broadcasts are what a step of one scene waits for.
+// for `kScenes` of them: a step of one scene waits for memory and broadcasts.
 #include <array>
 
 #include "motion/two_passes.hpp"
 
 namespace catenary {
 
-/// Extremes of what a line shows in several scenes since each of them began.
+/// Extremes of a line's outputs in several scenes since each of them began.
 struct LineExtremes {
     std::span<const int64_t> arms;  ///< unknowns of vertical displacement at steady arms
     Links droppers;
@@ -21,7 +21,7 @@ struct LineExtremes {
 
 class ScenePasses : private Around {
   public:
-    /// Arrays of `parts` are those of all scenes. Throws std::invalid_argument if no kernels were
+    /// Arrays of `parts` are for all scenes. Throws std::invalid_argument if no kernels were
     /// compiled for a layout, or the method is not Newmark's.
     explicit ScenePasses(PassParts parts);
 
@@ -29,10 +29,10 @@ class ScenePasses : private Around {
     /// but that links have other reserves at rest (n, kScenes) [N].
     void track(const TrackedLinks& tracked, Array2<const double> rest,
                std::vector<std::span<double>> reserves);
-    /// Make room to look at so many links.
+    /// Make room for the reserves of so many links.
     void make_room(size_t n_links);
     void step();
-    /// Take the present motion into extremes, of the scenes that `moves` says.
+    /// Take the present motion into the extremes of scenes with `moves`.
     void take(const LineExtremes& extremes, const std::array<bool, kScenes>& moves);
     /// Put a scene's line at rest.
     void rest(int scene) const;

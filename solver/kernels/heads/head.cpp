@@ -1,4 +1,4 @@
-// What all pantographs share that step by Newmark's method.
+// Base of all pantographs stepped by Newmark's method.
 #include "heads/head.hpp"
 
 #include <algorithm>
@@ -43,7 +43,7 @@ bool Head::is_held(const Drive& drive) {
         memory.phase = 1.0;
     }
     if (memory.phase < 2.0) return false;
-    // Forces do not move what is caught.
+    // Forces do not move a caught head.
     std::ranges::fill(arrays_.out, 0.0);
     std::ranges::fill(arrays_.out.first(n_strips_), memory.caught_at + drive.roof);
     std::ranges::fill(part(arrays_.out, n_strips_, 2 * n_strips_), drive.roof_velocity);
@@ -134,7 +134,8 @@ void Head::advance(std::span<const double> contact_force) {
     if (regulation_) catenary::regulate(*regulation_, measured(contact_force));
 }
 
-/// What a controller sees at the end of a step: mean height of the strips, or their force.
+/// Measured variable of the lift regulation at the end of a step: mean height of the strips [m], or
+/// the sum of their forces [N].
 double Head::measured(std::span<const double> contact_force) const {
     const bool of_height = regulation_->settings.front().of_height != 0.0;
     double total = 0.0;

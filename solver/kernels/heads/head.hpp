@@ -1,6 +1,6 @@
 #pragma once
-// What all pantographs share that step by Newmark's method: the row that drives a step, state,
-// strips, contact; and how one is lowered under way until it is caught, see mbs/lowering.py.
+// Base of all pantographs stepped by Newmark's method: the row that drives a step, state, strips,
+// contact; and the lowering under way until the head is caught, see mbs/lowering.py.
 //
 // A pantograph has n coordinates and s strips. Its state are positions, velocities and
 // accelerations one after the other (3 n,).
@@ -16,7 +16,7 @@
 
 namespace catenary {
 
-/// Of the strips' mean over what catches them.
+/// Memory of a lowering. Heights are of the strips' mean over the housing, which catches the head.
 struct LoweringMemory {
     double height;     ///< now [m]
     double caught_at;  ///< where it is caught [m], known from the lowering on
@@ -30,8 +30,8 @@ struct Lowering {
     CATENARY_RECORD(time, drop, memory)
 };
 
-/// What a step of a head depends on besides its state: the first numbers of a row that is known
-/// before. Upward is positive; a model reads those that it needs.
+/// Inputs of a head's step besides its state: the first numbers of a row that is known before the
+/// step. Upward is positive; a model reads the ones that it needs.
 struct Drive {
     double time;                 ///< at the end of the step [s]
     double force;                ///< on the last mass of a chain [N]
@@ -39,11 +39,11 @@ struct Drive {
     double base;                 ///< height of the base [m], over where it rests
     double base_velocity;        ///< [m/s]
     double base_acceleration;    ///< [m/s2]
-    double roof, roof_velocity;  ///< height of what catches a head that is lowered, over where it
-                                 ///< rests [m], and velocity [m/s]
+    double roof, roof_velocity;  ///< height of the housing that catches a lowered head, over where
+                                 ///< the housing rests [m], and velocity [m/s]
     double head_air;             ///< force of the air on the head [N]
     double arm_air;              ///< force of the air on the arm of a mechanism [N]
-    double bodies_air;  ///< what it lifts by the mechanism's bodies, in parts of the tables'
+    double bodies_air;  ///< lift by the air on the mechanism's bodies, in parts of the tables'
 };
 inline constexpr int64_t kDrive = sizeof(Drive) / sizeof(double);
 
@@ -100,7 +100,7 @@ class Head {
 
     int64_t n() const { return n_; }
     int64_t n_strips() const { return n_strips_; }
-    /// Number of its first contact among those of the train.
+    /// Number of its first contact among the train's contacts.
     int64_t first() const { return first_; }
     void set_first(int64_t contact) { first_ = contact; }
 
@@ -110,14 +110,14 @@ class Head {
     void regulate(const Regulation& regulation) { regulation_ = regulation; }
     /// Let the head be caught when it has been lowered.
     void lower(const Lowering& lowering) { lowering_ = lowering; }
-    /// What regulates the lift adds to the static force now [N].
+    /// Force that the regulation now adds to the static force [N].
     double added_force() const {
         return added_force_ + (regulation_ ? regulation_->memory.front().acting : 0.0);
     }
-    /// Put that of a controller that no kernel knows.
+    /// Put the added force [N] of a controller that no kernel knows.
     void set_added_force(double force) { added_force_ = force; }
 
-    /// How it is lowered, what bends, and what regulates the lift, if anything does.
+    /// Lowering, bending strips and regulation of the lift, each if there is one.
     const std::optional<Lowering>& lowering() const { return lowering_; }
     const std::optional<Bending>& bending() const { return bending_; }
     const std::optional<Regulation>& regulation() const { return regulation_; }
@@ -137,7 +137,7 @@ class Head {
                std::span<double> place) const;
     /// `step`, whose results are put into the train's `numbers` (2 n + 2 n^2,).
     bool predict(std::span<const double> drive, std::span<double> numbers, int64_t n_contacts);
-    /// What a unit of each contact force takes off the state, (3 n, s), in the latest step.
+    /// Decrease of the state by a unit of each contact force, (3 n, s), in the latest step.
     Array2<const double> answers() const { return {by_force_.data(), 3 * n_, n_strips_}; }
     /// `advance` with forces at all contacts of the train.
     void move(std::span<const double> force) { advance(part(force, first_, first_ + n_strips_)); }
@@ -147,9 +147,10 @@ class Head {
     virtual bool step_free(const Drive& drive) = 0;
     /// Remember the latest contact forces.
     virtual void remember(std::span<const double>) {}
-    /// Fill in what contact forces do to accelerations that come by `inverse` (n, n) of a matrix.
+    /// Fill in `out` and the answers to contact forces, with the `inverse` (n, n) of the matrix of
+    /// accelerations.
     void respond(Array2<const double> inverse);
-    /// What the regulated lift adds to a force, of which a part acts.
+    /// The acting part of the force that the regulation adds [N], 0 if no lift acts.
     double added(const Drive& drive) const {
         const double force = added_force();
         return force != 0.0 && drive.part > 0.0 ? drive.part * force : 0.0;
@@ -169,9 +170,9 @@ class Head {
     std::span<Number> state_part(std::span<Number> state, int64_t number) const {
         return part(state, number * n_, (number + 1) * n_);
     }
-    /// Whether the head is caught, which then moves with what holds it; fills `out` if so.
+    /// Whether the head is caught and moves with its housing; fills `out` if so.
     bool is_held(const Drive& drive);
-    /// Height of the strips' mean over what catches them under contact forces (s,) [N], [m].
+    /// Height of the strips' mean over the housing under contact forces (s,) [N], [m].
     double height_under(std::span<const double> contact_force) const;
     /// Let the strips touch where wires are.
     void aim(std::span<const double> drive);
@@ -183,12 +184,12 @@ class Head {
     int64_t n_, n_strips_, first_ = 0;
     double added_force_ = 0.0;
     std::vector<double> free_;
-    std::vector<double> by_force_;  ///< (3 n, s) what a unit of each contact force takes off it
+    std::vector<double> by_force_;  ///< (3 n, s) its decrease by a unit of each contact force
     std::optional<Bending> bending_;
     std::vector<double> shapes_, slopes_;  ///< room for modes
     std::optional<Regulation> regulation_;
     std::optional<Lowering> lowering_;
-    double roof_ = 0.0;  ///< height of what catches the head at the end of the step [m]
+    double roof_ = 0.0;  ///< height of the housing at the end of the step, as in `Drive` [m]
 };
 
 }  // namespace catenary

@@ -10,7 +10,7 @@ namespace catenary {
 
 namespace {
 
-/// Segments of tables mostly settle in two rounds; what goes round in circles is left there.
+/// Segments of tables mostly settle in two rounds; a cycle of segments is left after so many.
 constexpr int kMostRounds = 20;
 
 }  // namespace

@@ -29,7 +29,7 @@ struct HeadLaws {
     CATENARY_RECORD(ways, law, points, pressed)
 };
 
-/// Where a step starts from: Newmark's predictors and what else laws depend on.
+/// Start of a step: Newmark's predictors and the other variables of laws.
 struct StepStart {
     std::span<const double> position, velocity;  ///< predicted (n,)
     std::span<const double> acceleration;        ///< of the state (n,)

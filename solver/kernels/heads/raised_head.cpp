@@ -9,13 +9,13 @@ namespace catenary {
 
 namespace {
 
-/// What tables say at a height, as their columns follow each other.
+/// Values of the tables at a height, in the order of their columns.
 struct Columns {
     double mass, lift, slowing, carried, blown;
 };
 constexpr int64_t kMostColumns = sizeof(Columns) / sizeof(double), kLeastColumns = kMostColumns - 1;
 
-/// As `tables_at` fills it in: zero where tables have no column for what the air lifts.
+/// As `tables_at` fills it in: zero where tables have no column for the air's lift.
 struct Filled {
     std::array<double, kMostColumns> numbers{};
     std::span<double> first(int64_t n) { return part(std::span<double>(numbers), 0, n); }
@@ -48,7 +48,7 @@ bool RaisedHead::step_free(const Drive& drive) {
     double& force = this->force()[last];
     force += drive.part * (value.lift - mechanism_.weight) + added(drive) - value.slowing * speed -
              0.5 * slope.mass * speed * speed;
-    // The base carries the mechanism along, but less of it than what is raised if parts stay low.
+    // The base carries the mechanism along, but less mass than the raised one if parts stay low.
     force += (value.mass - value.carried) * drive.base_acceleration;
     force += drive.arm_air + drive.bodies_air * value.blown;
     matrix()(last, last) += value.mass + s.velocity * (value.slowing + slope.mass * speed) -

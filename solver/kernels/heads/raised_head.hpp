@@ -7,7 +7,7 @@ namespace catenary {
 
 struct ReducedMechanism {
     SplineTables tables;  ///< mass [kg], lift [N], damping [N s/m], carried mass [kg] and, of some,
-                          ///< what the air lifts [N], over the mechanism's height [m]
+                          ///< lift by the air [N], over the mechanism's height [m]
     double weight;        ///< of the head [N]
     double zero;          ///< the coordinate where the mechanism's height is zero [m]
     CATENARY_RECORD(tables, weight, zero)
@@ -22,7 +22,7 @@ class RaisedHead : public SprungHead {
     double height() const { return height_; }
 
   protected:
-    /// Whether that height is within the tables; what is not a number is left to those who couple.
+    /// Whether that height is within the tables; NaN passes, for the coupling to find.
     bool step_free(const Drive& drive) override;
 
   private:

@@ -8,7 +8,7 @@ namespace catenary {
 struct RegulationSettings {
     double of_height;    ///< 1 if the head's height is measured, 0 for the contact force
     double target;       ///< wanted value [m] or [N]
-    double part;         ///< what a step takes of the difference to what is filtered [-]
+    double part;         ///< share of the deviation that the filter takes in a step [-]
     double dt;           ///< step [s]
     double sample;       ///< time between samples [s]
     double least, most;  ///< added force [N]
@@ -23,7 +23,7 @@ struct ControlGains {
 struct RegulationMemory {
     double time;      ///< [s]
     double next;      ///< when the next sample is [s]
-    double filtered;  ///< what was measured
+    double filtered;  ///< measured value after the filter [m] or [N]
     double integral;  ///< of the error [.. s]
     double error;     ///< at the latest sample
     double samples;   ///< how many there were, -1 before the first step
@@ -38,8 +38,8 @@ struct Regulation {
     CATENARY_RECORD(settings, gains, memory, waiting)
 };
 
-/// Take in what is measured at the end of a step; put the added force of the next one. The integral
-/// stands while the force is at a limit and the error would drive it beyond.
+/// Take in the value measured at the end of a step; put the added force of the next one. The
+/// integral stands while the force is at a limit and the error would drive it beyond.
 void regulate(const Regulation& regulation, double measured);
 
 }  // namespace catenary

@@ -11,8 +11,8 @@ namespace catenary {
 struct SprungMasses {
     std::span<const double> masses;           ///< (n,)
     Array2<const double> stiffness, damping;  ///< (n, n)
-    std::span<const double> push;  ///< (n,) what an upward force on the strips' middle does to each
-                                   ///< coordinate
+    std::span<const double> push;  ///< (n,) force on each coordinate by an upward unit force on the
+                                   ///< strips' middle
     CATENARY_RECORD(masses, stiffness, damping, push)
 };
 
@@ -25,7 +25,7 @@ class SprungHead : public Head {
   protected:
     /// Predict (paper eq. 2.5), and put force and matrix of springs, dampers, masses and the air.
     void begin(const Drive& drive);
-    /// Add laws, find accelerations, and fill in what a step is asked for.
+    /// Add laws, find accelerations, and fill in state and answers without contact.
     void finish(const Drive& drive);
     void remember(std::span<const double> contact_force) override;
 

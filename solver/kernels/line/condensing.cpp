@@ -37,7 +37,7 @@ struct Room {
     std::vector<Complex> row;      ///< (b,) the row of L alone that is worked on
 };
 
-/// Factor row r, whose numbers stand from column r - width on; `first` is the first that is there.
+/// Factor row r, whose numbers begin at column r - width; `first` is its first column that exists.
 void factor_row(const Weighted& weighted, const Array3<const double>& bands, int64_t r,
                 int64_t first, Room& room) {
     const int64_t width = bands.columns - 1;

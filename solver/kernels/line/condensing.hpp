@@ -1,5 +1,5 @@
 #pragma once
-// Spans condensed to what they share with those beside them. See half_lines.py.
+// Spans condensed to the unknowns that they share with their neighbours. See half_lines.py.
 #include "base/arrays.hpp"
 #include "base/complex.hpp"
 

@@ -4,7 +4,7 @@
 
 namespace catenary {
 
-/// Fill `out` (m, k) with what lies at m points between two posts of k first-order Gauss-Markov
+/// Fill `out` (m, k) with values at m points between two posts of k first-order Gauss-Markov
 /// processes, which are `first` and `last` at the posts and decay as exp(-rate d), rates in 1/m.
 /// `steps` (m + 1,) are from the first post to the point after it, and so on to the last post [m];
 /// `normals` (m, k) standard normal numbers.

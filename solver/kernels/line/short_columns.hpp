@@ -5,16 +5,16 @@
 
 namespace catenary {
 
-/// What is wanted of the answers of n places, among unknowns of a stretch of the line.
+/// Windows of answers to forces at n places, among unknowns of a stretch of the line; (n,) each.
 struct Cuts {
-    std::span<const int64_t> low, high;     ///< it is to be zero before and from there on
-    std::span<const int64_t> begin, width;  ///< what is wanted
-    std::span<const int64_t> at;            ///< where that goes
+    std::span<const int64_t> low, high;     ///< the answer is to be zero before and from there on
+    std::span<const int64_t> begin, width;  ///< part that is copied
+    std::span<const int64_t> at;            ///< where it goes in `data`
     CATENARY_RECORD(low, high, begin, width, at)
 };
 
-/// Put the part of each answer that is wanted into `data`; what is outside of windows relative to
-/// the peak, at most. Of each place `answers` (n k, m) has k rows.
+/// Copy the wanted part of each answer into `data`. `answers` (n k, m) has k rows for each place.
+/// Returns the largest magnitude outside of a window, relative to its answer's peak.
 double cut_out(Array2<const double> answers, const Cuts& cuts, std::span<double> data);
 
 }  // namespace catenary

@@ -6,10 +6,10 @@
 
 namespace catenary {
 
-/// Transform numbers, which are in the order of reversed bits then. `turns` hold exp(-i pi k / h)
+/// Transform numbers in place, into the order of reversed bits. `turns` hold exp(-i pi k / h)
 /// at h + k for each power h below the length.
 void fourier_forth(std::span<Complex> numbers, std::span<const Complex> turns);
-/// From what `fourier_forth` leaves back to the numbers, times their count.
+/// Transform the result of `fourier_forth` back into the numbers, times their count.
 void fourier_back(std::span<Complex> numbers, std::span<const Complex> turns);
 
 }  // namespace catenary

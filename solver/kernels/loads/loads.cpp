@@ -28,7 +28,7 @@ double value_at(double time, int64_t kind, std::span<const double> numbers) {
     return total;
 }
 
-/// Fill in what changes by factors.
+/// Fill in the forces that change by factors.
 void put_changing(double time, const Changing& changing, std::span<const double> constant,
                   std::span<double> values) {
     for (Factor& factor : changing.factors)
@@ -43,7 +43,7 @@ void put_changing(double time, const Changing& changing, std::span<const double>
     }
 }
 
-/// Add what is linear in time between slices.
+/// Add loads that are linear in time between slices.
 void add_samples(double time, const Sampled& sampled, std::span<double> values) {
     for (const SampledLoad& load : sampled.loads) {
         const int64_t n = load.last - load.first;

@@ -1,5 +1,5 @@
 #pragma once
-// Loads in time on what a rank solves for. See line_loads.py.
+// Loads in time on the unknowns that a rank solves for. See line_loads.py.
 #include "loads/memories.hpp"
 
 namespace catenary {
@@ -7,8 +7,8 @@ namespace catenary {
 /// Kinds of `TimeFunction`.
 enum : int64_t { kConstant, kTable, kHarmonics };
 
-/// A function of time, with what it is at the latest time. Its numbers are those from `begin` to
-/// `end`, see `TimeFunction`.
+/// A function of time, with its value at the latest time. Its numbers are the ones from `begin` to
+/// before `end`, see `TimeFunction`.
 struct Factor {
     int64_t kind, begin, end;
     double value;
@@ -24,8 +24,9 @@ struct Changing {
     CATENARY_RECORD(places, begins, terms, forces, factors, numbers)
 };
 
-/// A load made ahead in slices, linear in time between them: its places are those from `first` to
-/// `last`, its times and its samples, slice by slice, those that begin there; `held` slices are.
+/// A load made ahead in slices, linear in time between them. Its places are the ones from `first`
+/// to before `last`; its times begin at `times` and its samples, slice by slice, at `samples`;
+/// `held` is the number of its slices.
 struct SampledLoad {
     int64_t first, last, times, samples, held;
 };
@@ -42,14 +43,14 @@ struct Sampled {
 /// All loads of a rank: `values` are their sum at the time clock[0] [s].
 struct Loads {
     std::span<double> clock, values;
-    std::span<const double> constant;  ///< what stays, as `values`
+    std::span<const double> constant;  ///< constant part, shape of `values`
     Changing changing;
     Sampled sampled;
     Memories memories;
     CATENARY_RECORD(clock, values, constant, changing, sampled, memories)
 };
 
-/// Make `values` those at the time of the clock.
+/// Fill in `values` at the time of the clock.
 void evaluate(const Loads& loads);
 
 }  // namespace catenary

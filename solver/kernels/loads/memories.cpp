@@ -25,7 +25,7 @@ void add_products(std::span<Complex> into, const Complex* one, const Complex* ot
     for (int64_t k = 0; k < n; ++k) result[k] += product(one[k], other[k]);
 }
 
-/// Add what the last step before `step` does by near lags to the sums of those to come.
+/// Add the terms of the last step before `step` by near lags to the sums of later steps.
 void fold_near(const MemoryTables& tables, const EndMemory& end, int64_t step) {
     const int64_t m = end.width, n = end.n_steps;
     const int64_t coming = std::min(kNear - 1, n - step);
@@ -39,7 +39,8 @@ void fold_near(const MemoryTables& tables, const EndMemory& end, int64_t step) {
     }
 }
 
-/// Add what `length` steps before `step` do by lags of as many, and up to twice as many.
+/// Add the terms of the `length` steps before `step` by lags of `length` to twice as many, to the
+/// sums of later steps.
 void fold_block(const MemoryTables& tables, const EndMemory& end, int64_t step, int64_t length,
                 int64_t spectra) {
     const int64_t m = end.width, n = end.n_steps, size = 2 * length;
@@ -68,8 +69,8 @@ void fold_block(const MemoryTables& tables, const EndMemory& end, int64_t step, 
     }
 }
 
-/// Add what the last step before `step` does by near lags, and blocks of steps that end there by
-/// far ones, to the sums of those to come.
+/// Add the terms of the last step before `step` by near lags, and of blocks of steps that end there
+/// by far ones, to the sums of later steps.
 void fold(const MemoryTables& tables, const EndMemory& end, int64_t step) {
     fold_near(tables, end, step);
     int64_t length = kNear, spectra = end.spectra;

@@ -14,14 +14,14 @@ struct EndMemory {
     int64_t width, n_steps;
     int64_t levels;   ///< doubles of kNear, itself included, that are lags of n steps
     int64_t past;     ///< (m, n) its accelerations [m/s2]
-    int64_t sums;     ///< (m, n) forces at each step by what is remembered yet [N], [N m]
+    int64_t sums;     ///< (m, n) forces at each step by the steps up to `done` [N], [N m]
     int64_t near;     ///< (m, m, kNear) Q of lags from zero on
-    int64_t spectra;  ///< (m / 2, m, 2 L) for each L, those of two rows of Q as one complex one
+    int64_t spectra;  ///< (m / 2, m, 2 L) for each L, two rows of Q as one complex one
     int64_t done;     ///< the latest step that is remembered
     double dt;        ///< [s]
 };
 
-/// What all ends of a rank remember.
+/// Memory of all ends of a rank.
 struct MemoryTables {
     std::span<EndMemory> ends;
     std::span<double> past, sums;
@@ -41,8 +41,8 @@ struct Memories {
     CATENARY_RECORD(into, own, latest, known, shares, tables)
 };
 
-/// Add the forces of all ends at a time [s] to `values`. The accelerations are those of the step
-/// before; a step that is repeated remembers them once.
+/// Add the forces of all ends at a time [s], minus `sums`, to `values`. The accelerations are the
+/// ones of the step before; a step that is repeated remembers them once.
 void remember(double time, std::span<double> values, const Memories& memories);
 /// Make up for `n_steps` whose accelerations are in the past, and for none after these.
 void recall(const MemoryTables& tables, int64_t n_steps);

@@ -70,7 +70,7 @@ double energy_of_switching(std::span<const double> displacement, const Links& li
     double energy = 0.0;
     for (int64_t link = begin; link < end; ++link) {
         const Reserve& law = links.law[link];
-        if (law.stiffness == 0.0) continue;  // of what slips nothing is stored
+        if (law.stiffness == 0.0) continue;  // dampers store no energy
         const double beyond = std::min(law.rest + law.stiffness * stretch_of(links, link), 0.0);
         energy -= law.released * beyond * beyond / (2.0 * law.stiffness);
         if (!(beyond < 0.0)) continue;

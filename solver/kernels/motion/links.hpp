@@ -4,13 +4,13 @@
 
 namespace catenary {
 
-/// What a link's reserve R = rest + stiffness e + damping e' is made of, with its stretch e: what
-/// is left until it switches [N]; and what a link does beyond.
+/// Law of a link with stretch e. Its reserve R = rest + stiffness e + damping e' [N] is left until
+/// it switches; its force is `carried` R, plus the compensation -`released` R where R < 0.
 struct Reserve {
     double rest, stiffness, damping;  ///< [N], [N/m], [N s/m], as long as it is as at rest
     double place;                     ///< along the track [m]
-    double released;                  ///< what of -R > 0 is the compensation
-    double carried;                   ///< what of R is force: all of it, or nothing
+    double released;                  ///< share of -R > 0 that is the compensation
+    double carried;                   ///< share of R that is force
 };
 
 /// n links: unknowns and weights of their direction, (n, m) each.
@@ -21,7 +21,7 @@ struct Links {
     CATENARY_RECORD(unknowns, weights, law)
 };
 
-/// What goes with links: those from begin[d] to begin[d + 1] go with link d.
+/// Dependents of links: of link d the `links` from begin[d] to before begin[d + 1].
 struct Dependents {
     Links links;
     std::span<const int64_t> begin;
@@ -53,12 +53,12 @@ void reserves(const Motion& motion, const Links& links, std::span<double> result
 /// Fill in the forces of links from `begin` to `end` [N], positive where they pull.
 void forces_within(const Motion& motion, const Links& links, int64_t begin, int64_t end,
                    std::span<double> result);
-/// Add what bends of links from `begin` to `end` do beyond them to forces [N]; of a bend that
-/// pushes `released` is below zero.
+/// Add the forces of bends beyond their reserves to the forces [N] of links from `begin` to `end`;
+/// `released` of a bend that pushes is below zero.
 void add_bends(const Motion& motion, const Dependents& bends, int64_t begin, int64_t end,
                std::span<double> result);
-/// What elastic energy lacks where links from `begin` to `end` have switched, and what goes with
-/// them [J], were they springs.
+/// Elastic energy that links from `begin` to `end` and their dependents add to that of K where they
+/// have switched [J]: negative of slack droppers, positive of closed stops, none of dampers.
 double energy_of_switching(std::span<const double> displacement, const Links& links,
                            const Dependents& dependents, int64_t begin, int64_t end);
 

@@ -1,4 +1,4 @@
-// What a step shows of a line.
+// Outputs of a line.
 #include "motion/shown.hpp"
 
 namespace catenary {

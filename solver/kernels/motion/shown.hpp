@@ -1,5 +1,5 @@
 #pragma once
-// What a step shows of a rank's part of a line.
+// Outputs of a rank's part of a line after a step.
 #include <algorithm>
 #include <vector>
 

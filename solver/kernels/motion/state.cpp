@@ -23,7 +23,7 @@ CATENARY_FOR_TARGETS
 void correct(std::span<double> displacement, std::span<double> velocity,
              std::span<double> acceleration, double position_factor, double velocity_factor,
              double damping_share) {
-    // Long lines wait for memory: what does not change is not written.
+    // Long lines wait for memory: unchanged accelerations are not written.
     const bool writes = damping_share != 0.0;
     for (size_t i = 0; i < displacement.size(); ++i) {
         const double v = velocity[i], a = acceleration[i] - damping_share * v;

@@ -7,7 +7,7 @@ namespace catenary {
 
 /// Displacement d = s0 x + s1 y + s2 z and velocity v = s3 y + s4 z at the end of the latest step,
 /// with x, y and z (n_local,) that a step carries on, and five shares. Numbers of an unknown are
-/// `spacing` behind those of the one before: more than one where scenes stand in lanes.
+/// `spacing` behind the numbers of the one before: more than one where scenes stand in lanes.
 struct Motion {
     std::span<double> x, y, z;
     std::span<const double> shares;

@@ -16,11 +16,11 @@ struct PassArrays {
     std::span<const double> loads;       ///< [N] of all that is solved for; may be empty
     std::span<double> answer;            ///< accelerations of all that is solved for
     Motion motion;                       ///< of the rank's own unknowns
-    std::span<double> known, predicted;  ///< known accelerations, predicted velocities, or nothing
+    std::span<double> known, predicted;  ///< known accelerations, predicted velocities, or empty
     CATENARY_RECORD(factor, velocity, loads, answer, motion, known, predicted)
 };
 
-/// A line of stations with what steps of it are made of.
+/// A line of stations with the arrays of its steps.
 struct PassParts {
     std::vector<std::pair<Layout, Layout>> layouts;  ///< of rows and factors, for each station type
     std::vector<std::vector<int>> station_types;     ///< see `Line`
@@ -70,10 +70,10 @@ class TwoPasses : private Around {
     std::optional<Window> window_;
 };
 
-/// Links that the pass back has left behind with each stretch: those from the first of both numbers
-/// of `ranges` (n_stretches + 1, 2) to the second have all their `unknowns` (n, m) among what is
-/// known by then. Unknowns of the rank's n_own stations begin at `starts` (n_own + 1,), so that few
-/// links wait for the next stretch. The last stretch is all that is left.
+/// Links that the pass back has left behind with each stretch: links from the first of both numbers
+/// of `ranges` (n_stretches + 1, 2) to the second have all their `unknowns` (n, m) solved by then.
+/// Unknowns of the rank's n_own stations begin at `starts` (n_own + 1,), so that few links wait for
+/// the next stretch. The last stretch is all that is left.
 void left_behind(std::span<const int64_t> starts, int64_t stretch, Array2<const int64_t> unknowns,
                  Array2<int64_t> ranges);
 

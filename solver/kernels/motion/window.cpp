@@ -8,9 +8,9 @@ namespace catenary {
 
 namespace {
 
-/// Looks from one search for the largest motion to the next, once it has grown for as many.
+/// Searches for the largest motion are at every so many looks, and at each of the first so many.
 constexpr int64_t kPeakEvery = 64;
-/// Shares of a window that fade, of what is behind the train and of what is ahead.
+/// Shares of the parts of a window behind the train and ahead in which motion fades.
 constexpr double kBehind = 0.85, kAhead = 0.6;
 
 /// The first number that is not below x, and the first that is above.
@@ -44,7 +44,7 @@ void find_peak(const Window& window, const Motion& motion) {
     window.peak[1] = largest_y;
 }
 
-/// Whether any of the stations from `begin` to `end` moves, or holds what is no number.
+/// Whether any of the stations from `begin` to `end` moves, or holds NaN.
 bool moves(const Window& window, const Motion& motion, int64_t begin, int64_t end) {
     const double of_x = window.by_motion * window.peak[0], of_y = window.by_motion * window.peak[1];
     begin = std::max(begin, window.at().begin);
@@ -58,7 +58,7 @@ struct Range {
     int64_t begin, end;
 };
 
-/// Stations that move, at least those of `least`.
+/// Stations that move, at least the range `least`.
 Range follow_motion(const Window& window, const Motion& motion, Range least) {
     const int64_t guard = window.guard;
     int64_t low = window.at().begin, high = window.at().end;
@@ -86,7 +86,7 @@ void rest(const Window& window, const Motion& motion, int64_t begin, int64_t end
     }
 }
 
-/// Make the window that from station `begin` to `end`; what leaves it comes to rest.
+/// Move the window to the stations from `begin` to `end`; stations that leave it come to rest.
 void move(const Window& window, const Motion& motion, int64_t begin, int64_t end) {
     const Ends before = window.at();
     rest(window, motion, before.begin, std::min(begin, before.end));
@@ -94,9 +94,9 @@ void move(const Window& window, const Motion& motion, int64_t begin, int64_t end
     turn_to(window, begin, end);
 }
 
-/// Damping at a share `into` of the way into what fades, in terms of its scale: it grows as the
-/// potential does that sends back least (D. E. Manolopoulos, J. Chem. Phys. 117, 2002), as far as
-/// that is finite.
+/// Damping at a share `into` of the way into the fading part, in terms of its scale: it grows as
+/// the transmission-free absorbing potential (D. E. Manolopoulos, J. Chem. Phys. 117, 2002), as far
+/// as that is finite.
 double damping(double into) {
     constexpr double c = 2.62206, taken = 0.98;
     constexpr double a = 1.0 - 16.0 / (c * c * c), b = (1.0 - 17.0 / (c * c * c)) / (c * c);
@@ -115,7 +115,7 @@ void slow_down(const Window& window, const Motion& motion, int64_t station, doub
     }
 }
 
-/// Slow down the outer part of what is behind the place `first` and ahead of `last` [m].
+/// Slow down the outer parts of the window behind the place `first` and ahead of `last` [m].
 ///
 /// Waves whose group velocity is nearly the train's stay there for long. In its frame their
 /// envelope obeys Schroedinger's equation, i a_t = -D / 2 a_xx, and damping that begins at once
@@ -175,7 +175,7 @@ void turn_to(const Window& window, int64_t begin, int64_t end) {
     const int64_t middle = middle_of(begin, end), n = window.n_stations();
     turn(window.kinds, window.turning, ends.middle, middle);
     ends = {begin, end, begin, end, middle};
-    // What a link that switches moves stays within the window; those at its ends do not switch.
+    // A link that switches moves stations within the window only; links at its ends do not switch.
     const int64_t inner = begin > 0 ? std::min(begin + window.guard, n) : begin,
                   outer = end < n ? std::max(end - window.guard, inner) : end;
     const int64_t first = window.links_before[inner], last = window.links_before[outer];

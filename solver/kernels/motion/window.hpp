@@ -18,11 +18,11 @@ struct Window {
     /// Share of the largest motion below which stations rest, 0 if spans decide; these spans.
     double by_motion, spans_behind, spans_ahead;
     double fading;                      ///< how much fades at a look [m2], see `fade`
-    bool is_exact;                      ///< whether what rests is made zero, or stays where it is
+    bool is_exact;                      ///< whether stations at rest are zeroed, or stay in place
     std::span<double> peak;             ///< largest of x and y of the motion
     std::span<const double> contacts;   ///< where they are [m]
     std::span<const double> loaded;     ///< first and last place with a load [m]
-    double margin;                      ///< how far around a step and what switches in it reach [m]
+    double margin;                      ///< reach of a step and of links that switch in it [m]
     std::span<const double> masts;      ///< where spans end [m]
     std::span<const double> low, high;  ///< where stations begin and end [m]
     std::span<const int64_t> starts;    ///< (n + 1,) first unknown of each
@@ -34,7 +34,7 @@ struct Window {
     Turning turning;
     std::span<int64_t> links;  ///< the first link that may switch and the one after the last
     Array2<int64_t> ranges;    ///< (2, 2) the same for the pass back, see `left_behind`
-    std::span<double> known;   ///< what the motion keeps besides x, y and z, or nothing
+    std::span<double> known;   ///< known accelerations beside x, y and z, if the motion has them
     CATENARY_RECORD(state, every, guard, by_motion, spans_behind, spans_ahead, fading, is_exact,
                     peak, contacts, loaded, margin, masts, low, high, starts, links_before, edges,
                     ends, kinds, turning, links, ranges, known)

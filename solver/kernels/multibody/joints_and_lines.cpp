@@ -89,7 +89,7 @@ std::vector<int64_t> independent_rows(Array2<const double> matrix, double depend
             }
         const double length = length_of(rest);
         if (!(length > dependent * whole)) continue;
-        // Rows beyond as many as there are columns are combinations whatever round-off says.
+        // Rows beyond the number of columns are combinations, whatever the round-off.
         if (static_cast<int64_t>(kept.size()) == most) break;
         const auto next = basis[static_cast<int64_t>(kept.size())];
         for (int64_t k = 0; k < width; ++k) next[k] = rest[k] / length;

@@ -15,7 +15,7 @@ struct BodyProduct {
     Vector3 normal;            ///< in the body's axes
     Vector3 at_start, at_end;  ///< in axes of `start` and `end` [m]
 };
-/// What fills in of m products, as in `Quantity` of mbs/rigid/kinematics.py.
+/// Results of m products, as in `Quantity` of mbs/rigid/kinematics.py.
 struct BodyProducts {
     std::span<double> value;  ///< (m,)
     Array2<double> jacobian;  ///< (m, 6 n)
@@ -40,7 +40,7 @@ struct BodyLines {
 void body_lines(const BodyMotion& motion, std::span<const BodyLine> lines, const BodyLines& result);
 
 /// Numbers of rows that are not combinations of rows before them, by Gram-Schmidt, done twice. A
-/// row of which less than the part `dependent` of its length is left is a combination.
+/// row is a combination if less than the part `dependent` of its length is left.
 std::vector<int64_t> independent_rows(Array2<const double> matrix, double dependent);
 
 }  // namespace catenary

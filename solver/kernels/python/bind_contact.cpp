@@ -1,4 +1,4 @@
-// What Python calls of contacts, and of the small problem of a step.
+// Python bindings of contacts, and of the small problem of a step.
 #include "contact/contacts.hpp"
 #include "contact/outputs.hpp"
 #include "contact/response.hpp"

@@ -1,4 +1,4 @@
-// What Python calls of marches side by side.
+// Python bindings of marches side by side.
 #include "ensemble/ensemble.hpp"
 #include "python/from_python.hpp"
 

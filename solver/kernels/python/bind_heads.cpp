@@ -1,4 +1,4 @@
-// What Python calls of pantographs: heads, and multibody systems.
+// Python bindings of pantographs: heads, and multibody systems.
 #include "heads/sprung_head.hpp"
 #include "heads/linear_chain.hpp"
 #include "heads/raised_head.hpp"
@@ -9,12 +9,12 @@ namespace catenary::python {
 
 namespace {
 
-/// What a head's arrays belong to.
+/// Owners of a head's arrays.
 struct Keeper {
     Kept kept;
 };
 
-/// A head that keeps them alive.
+/// A head that keeps its arrays alive.
 template <class Model>
 class HeldHead : public Model, public Keeper {
   public:

@@ -1,4 +1,4 @@
-// What Python calls of lines whose unknowns stand in stations.
+// Python bindings of lines whose unknowns stand in stations.
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
@@ -70,7 +70,7 @@ std::unique_ptr<Kernels> there(std::unique_ptr<Kernels> kernels) {
     return kernels;
 }
 
-/// A line with kernels for every station type, of `n` of which there are layouts.
+/// A line with kernels for the first `n` station types, which have layouts.
 template <class KernelsOf>
 Line line_of(size_t n, const MakeUps& station_types, KernelsOf kernels_of_type) {
     std::vector<std::unique_ptr<Kernels>> kernels;
@@ -87,7 +87,7 @@ class Products {
                         [&](size_t k) { return kernels_of_rows(layouts[k]); })),
           rows_(From<ProductArrays>::convert(rows, "rows", kept_)) {
         work_.product = rows_.product();
-        // Stations of the result stand as those of what is multiplied.
+        // Stations of the result stand as the stations of the operand.
         const int64_t n = size(rows_.kinds), first = rows_.first;
         if (!rows_.sections.starts.empty()) {
             const auto starts = rows_.sections.starts.subspan(first, n);
@@ -138,7 +138,7 @@ class Solves {
     Work work_;
 };
 
-/// Steps in two passes, and what they are made of.
+/// Steps in two passes that keep their arrays alive.
 class HeldPasses : public TwoPasses {
   public:
     HeldPasses(PassParts parts, Kept kept) : TwoPasses(std::move(parts)), kept_(std::move(kept)) {}

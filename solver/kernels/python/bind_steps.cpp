@@ -1,4 +1,4 @@
-// What Python calls of steps, their rows and errors, and of lines prepared for steps from outside.
+// Python bindings of steps, their rows and errors, and of lines prepared for steps from outside.
 #include "python/from_python.hpp"
 #include "schemes/step_error.hpp"
 #include "simulation/simulation.hpp"
@@ -9,7 +9,7 @@ namespace catenary::python {
 
 namespace {
 
-/// Steps, and what they are made of.
+/// Steps that keep their arrays alive.
 class HeldSteps : public Steps {
   public:
     HeldSteps(const py::object& parts, const py::object& block, Kept kept = {})
@@ -17,7 +17,7 @@ class HeldSteps : public Steps {
                 From<Block>::convert(block, "block", kept)),
           kept_(std::move(kept)) {}
 
-    /// Write them with what steps to come depend on, see `PreparedLine`.
+    /// Write them with the inputs of the steps to come, see `PreparedLine`.
     void write(const std::string& path, const py::object& ahead) const {
         Kept kept;
         const auto given = From<Ahead>::convert(ahead, "ahead", kept);
@@ -36,7 +36,7 @@ class HeldSteps : public Steps {
     Kept kept_;
 };
 
-/// Steps with tangents, and what they are made of.
+/// Steps with tangents that keep their arrays alive.
 class HeldTangentSteps : public TangentSteps {
   public:
     HeldTangentSteps(const py::object& parts, const py::object& block, const py::object& tangents,

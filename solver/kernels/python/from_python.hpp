@@ -20,11 +20,11 @@ namespace catenary::python {
 
 namespace py = pybind11;
 
-/// Keeps what arrays and records point to alive.
+/// Owners of the memory that arrays and records point to, kept alive.
 using Kept = std::vector<py::object>;
 
-// Sentences about what is wrong are made here once, not in each function that is offered: they were
-// most of what is compiled of it.
+// Error messages are made here once, not in each function that is offered: they were most of
+// the compiled code.
 
 [[gnu::noinline]] inline std::string numbered(size_t i, const std::string& function) {
     return "argument " + std::to_string(i + 1) + " of " + function;
@@ -33,7 +33,7 @@ using Kept = std::vector<py::object>;
     throw py::type_error(name +
                          " has the wrong type: " + std::string(py::str(py::type::of(given))));
 }
-/// An array that fits if it has so many dimensions; `type_of` is what its numbers are to be.
+/// The given array if it has so many dimensions; `type_of` is the type that its numbers must have.
 [[gnu::noinline]] inline py::array array_of(py::handle given, bool is_of_type,
                                             py::dtype (*type_of)(), const std::string& name,
                                             int n_dimensions, Kept& kept) {
@@ -66,7 +66,7 @@ struct Member {
     py::object value;
     std::string name;
 };
-/// The value of the first of some names, which is taken off them.
+/// The value of the first of some names. Takes this name off them.
 [[gnu::noinline]] inline Member next_member(py::handle record, std::string_view& names,
                                             const std::string& name) {
     const size_t end = std::min(names.find(','), names.size());
@@ -81,7 +81,7 @@ concept Record = requires(T record) {
     record.members();
 };
 
-/// What a value of Python is as a T; `name` is what a sentence calls it.
+/// Conversion of a Python value to a T; `name` is its name in error messages.
 template <class T>
 struct From {
     static T convert(py::handle given, const std::string& name, Kept& kept) {
@@ -209,7 +209,7 @@ class BoundFunction : public Bound {
     }
 
   private:
-    /// Convert what is given, which are the arguments from `begin` on.
+    /// Convert the given values, the arguments from `begin` on.
     template <size_t... I>
     void convert(const py::args& given, size_t begin, Kept& kept, std::index_sequence<I...>) {
         (..., (I >= begin && I < begin + given.size()
@@ -241,7 +241,7 @@ class FunctionKernel : public Kernel {
     R (*function_)(A...);
 };
 
-/// Let a module offer a function as a kernel; `does` is a sentence that says what it does.
+/// Let a module offer a function as a kernel; `does` is its docstring, one sentence.
 template <class R, class... A>
 void offer(py::module_& module, const char* name, R (*function)(A...), const char* does) {
     auto kernel = std::make_unique<FunctionKernel<R, A...>>(function);

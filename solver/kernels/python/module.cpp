@@ -1,5 +1,5 @@
-// The Python module catenary.solver.kernels.native, with what Python calls of arithmetic, of curves
-// and of the line: its motion, its loads, and what is made before a march.
+// The Python module catenary.solver.kernels.native, with the bindings of arithmetic, of curves and
+// of the line: its motion, its loads, and the preparation of a march.
 #include "base/compiler.hpp"
 #include "base/curves.hpp"
 #include "base/flush_to_zero.hpp"

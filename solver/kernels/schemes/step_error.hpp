@@ -1,5 +1,5 @@
 #pragma once
-// How wrong a step makes the contact forces. See step_error.py for the equation.
+// Error of the contact forces by one step. See step_error.py for the equation.
 #include "base/arrays.hpp"
 #include "base/record.hpp"
 
@@ -17,13 +17,13 @@ struct PastSteps {
 struct TriedStep {
     std::span<const double> depth, force;  ///< [m], [N]
     std::span<const double> stiffness;     ///< of the law's tangent [N/m]
-    std::span<const double> compliance;    ///< what a force takes off the depth within it [m/N]
+    std::span<const double> compliance;    ///< decrease of depth in the step by a unit force [m/N]
     CATENARY_RECORD(depth, force, stiffness, compliance)
 };
 
 /// Largest error of a contact force by a step to `time` [N].
 double step_error(const TriedStep& tried, const PastSteps& past, double time);
-/// Append a step to `time` to those of the past and drop the oldest.
+/// Append a step to `time` to the past steps and drop the oldest.
 void accept_step(const TriedStep& tried, const PastSteps& past, double time);
 
 }  // namespace catenary

@@ -1,7 +1,7 @@
 #pragma once
 // Records with all arrays that they point to, as a file.
 //
-// What arrays share in memory they share afterwards: overlapping ones are kept as one block of
+// Arrays that share memory still share it when read: overlapping ones are kept as one block of
 // bytes, and a record's array as a part of a block. Blocks stand in memory where they stood, modulo
 // pages of 4096 bytes, as arrays that are walked through side by side are placed for the caches.
 #include <algorithm>
@@ -27,7 +27,7 @@ concept RecordType = requires(T record) {
     record.members();
 };
 
-/// Lets a visitor have all that a value holds: `bytes(T&)` for plain values, `array(T*&, n)` for
+/// Pass all members of a value to a visitor: `bytes(T&)` for plain values, `array(T*&, n)` for
 /// arrays of n numbers, and `count(size_t&)` for lengths, upon which a reader resizes. Pointers to
 /// objects are left out. One with `scratch(bool)` is told where records are `kScratch`.
 template <class Visitor, class T>
@@ -122,7 +122,7 @@ class BlockFinder {
     bool is_scratch_ = false;
 };
 
-/// Writes what a record holds as bytes, with arrays as parts of blocks.
+/// Writer of a record's members as bytes, with arrays as parts of blocks.
 class ImageWriter {
   public:
     explicit ImageWriter(std::vector<MemoryBlock> blocks) : blocks_(std::move(blocks)) {}

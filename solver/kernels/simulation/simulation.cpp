@@ -66,7 +66,7 @@ void write_line(const std::string& path, PreparedLine& line) {
     write_record(path, header(), line);
 }
 
-/// What a state holds besides what changes in blocks.
+/// Part of a saved state besides inputs and blocks.
 struct Simulation::Place {
     int64_t n_done;
     Course course;
@@ -130,7 +130,7 @@ Simulation::Outcome Simulation::take_one() {
     return Outcome::kDone;
 }
 
-/// What the next step depends on: what the file tells, and what the host adds.
+/// Put the inputs of the next step: the file's plus the host's.
 void Simulation::drive_next() {
     const auto rows = line_.ahead.drives[n_done_ - line_.ahead.n_done];
     std::ranges::copy(rows.all(), drive_.begin());
@@ -146,7 +146,7 @@ void Simulation::drive_next() {
         drive.roof_velocity += input.base_velocity;
         drive.head_air += input.head_force;
         heads_[k]->set_added_force(input.lift_force);
-        // Rows of chains without a controller do not say which part of its force acts.
+        // Rows of chains without a controller do not state the part of its force that acts.
         if (input.lift_force != 0.0 && line_.heads[k].linear && !line_.heads[k].regulation)
             drive.part = 1.0;
     }

@@ -1,10 +1,10 @@
 #pragma once
 // A prepared line with its pantographs, stepped from outside: without Python, PETSc or MPI.
 //
-// What it is made of is a file, see `prepare`: factors, states, links, heads, and what each step is
-// told of the time. A host takes steps, changes speed, lift, forces on heads and the motion of
-// bases between them, and keeps states to come back to. A step allocates nothing and waits for
-// nobody.
+// It is read from a file, see `prepare`: factors, states, links, heads, and the inputs of each step
+// that depend on time. A host takes steps, changes speed, lift, forces on heads and the motion of
+// bases between them, and keeps states to come back to. A step allocates no memory and never
+// waits.
 #include <string>
 
 #include "heads/sprung_head.hpp"
@@ -15,7 +15,7 @@
 
 namespace catenary {
 
-/// A head as a file keeps it: its model by which of the optional records there are.
+/// A head in a file. The optional records that it has tell its model.
 struct HeadParts {
     HeadArrays arrays;
     int64_t first;
@@ -30,7 +30,7 @@ struct HeadParts {
     CATENARY_RECORD(arrays, first, linear, masses, laws, carrier, mechanism, bending, regulation,
                     lowering)
 };
-/// What a head is made of, and such a head.
+/// Parts of a head, and the head of such parts.
 HeadParts parts_of(const Head& head);
 std::unique_ptr<Head> head_of(const HeadParts& parts);
 
@@ -39,7 +39,7 @@ struct Tie {
     double stiffness, damping;  ///< [N/m], [N s/m]
 };
 
-/// What steps to come depend on.
+/// Inputs of the steps to come.
 struct Ahead {
     double dt;                    ///< [s]
     int64_t n_done;               ///< steps taken from time zero on
@@ -64,7 +64,7 @@ struct PreparedLine {
 /// Write a line to a file. Throws std::runtime_error if that fails.
 void write_line(const std::string& path, PreparedLine& line);
 
-/// What a host adds to a pantograph, from the next step on.
+/// Inputs of a pantograph that a host adds, from the next step on.
 struct Input {
     double lift_force = 0.0;         ///< added to the static force [N]
     double head_force = 0.0;         ///< upward on the head [N]
@@ -82,7 +82,7 @@ class Simulation {
     enum class Outcome {
         kDone,
         kNotFound,  ///< the forces of a step could not be found: nothing can be stepped further
-        kAtEnd,     ///< the line ends, or the file tells no further step what it depends on
+        kAtEnd,     ///< the line ends, or the file has no inputs for a further step
     };
     /// Take n steps, as far as that is possible.
     Outcome step(int64_t n);

@@ -28,7 +28,7 @@ struct KnownMasks {
 };
 
 /// The same found at run time. Each square is asked for its nonzeros: a processor predicts the
-/// answer, which is that of the station before.
+/// answer, as it is the same for the station before.
 struct GivenMasks {
     static constexpr bool is_known = false;
     int pitch;
@@ -73,7 +73,7 @@ struct Blocks : Masks {
 
     using Masks::Masks;
 
-    /// Unknowns from a place on; both halves of a vector hold those of a piece of two.
+    /// Unknowns from a place on; a piece of two is in both halves of its vector.
     CATENARY_INLINE X load(const double* from) const {
         X x = load_once(from);
         if constexpr (kHalf)
@@ -170,7 +170,7 @@ struct Blocks : Masks {
         return __builtin_shufflevector(found, found, 0, 1, 0, 1);
 #endif
     }
-    /// Numbers of the next product, if it is there: those of two unknowns are followed by zeros.
+    /// Numbers of the next product; a product of two unknowns is padded with zeros.
     CATENARY_INLINE static V next(const double*& numbers) {
         const V found = read<kVector, kVector>(numbers);
         numbers += kVector;
@@ -226,7 +226,7 @@ struct Blocks : Masks {
     }
     CATENARY_INLINE static void add_symmetric_here(Sums<X>& sums, const double* numbers,
                                                    const Mask& mask, const X& x) {
-        X crossing = X::all(0.0);  // what the transpose makes, of kinds 2 and 3
+        X crossing = X::all(0.0);  // products of kinds 2 and 3 with the transpose
         each<kN>([&](auto i) CATENARY_HOT {
             const V turned_here = turned(x.piece[i]);
             add_square<i, i>(sums, numbers, mask[i][i], x);

@@ -35,8 +35,8 @@ void copy(Given from, Matrix to) {
     std::copy(from.all().begin(), from.all().end(), to.all().begin());
 }
 
-/// Add to `pivot` what elimination of a station beside it leaves there: the product of the `block`
-/// that joins both and of what the other has `carried`.
+/// Add to `pivot` the Schur complement's term of an eliminated station beside it: the product of
+/// the `block` that joins both with the other's `carried`, -S^-1 B.
 CATENARY_FOR_TARGETS
 void condense(Given block, Given carried, Matrix pivot, std::span<double> row) {
     const int64_t n = pivot.rows;
@@ -53,7 +53,7 @@ void condense(Given block, Given carried, Matrix pivot, std::span<double> row) {
     }
 }
 
-/// Fill in what a station's unknowns are for those beyond: minus the product.
+/// Fill in `carried`, -S^-1 B, by which a station's unknowns follow from the station beyond.
 CATENARY_FOR_TARGETS
 void carry(Given inverse, Given block, Matrix carried) {
     const int64_t n = inverse.rows;
@@ -73,7 +73,7 @@ void invert_pivot(Matrix pivot) {
     invert(pivot);
 }
 
-/// Factors by number, found again by what they were made from.
+/// Factors by number, found again by the factor before and the kind of the station.
 class Known {
   public:
     Known(int64_t width, int64_t n_kinds, int64_t n)
@@ -133,7 +133,7 @@ class Known {
     std::vector<double> numbers_;              // of factors, with room for one that is tried
     std::vector<int32_t> kinds_, alike_;       // of each factor: its kind, and the one found before
     std::vector<int32_t> latest_;              // factor of each kind
-    std::vector<Entry> entries_;               // what follows factors
+    std::vector<Entry> entries_;               // followers of each factor
     std::vector<int32_t> first_entry_ = {-1};  // of none, and then of each factor
     std::vector<double> row_;
 };

@@ -7,8 +7,8 @@
 
 namespace catenary {
 
-/// Blocks of a symmetric matrix in a row of stations, of each kind of station: those that join it
-/// to the one before, its own, and those that join it to the one after, (k, b, b) each.
+/// Blocks of a symmetric matrix in a row of stations, one of each kind of station: the block with
+/// the station before, its own, and the block with the station after, (k, b, b) each.
 struct StationBlocks {
     Array3<const double> before, own, after;
     CATENARY_RECORD(before, own, after)
@@ -24,14 +24,14 @@ struct Eliminated {
 /// Eliminate stations of these `kinds` one after the other, from the first or from the last on.
 Eliminated eliminate(std::span<const int32_t> kinds, const StationBlocks& blocks, bool from_end);
 
-/// Where elimination from both ends meets: the kind of the station, and the factors of those before
-/// and after it, -1 if there is none.
+/// Where elimination from both ends meets: the kind of the station, and the factors of the stations
+/// before and after it, -1 if there is none.
 struct Meeting {
     int64_t kind, before, after;
 };
 
-/// Fill in S^-1 of the factors (m, 2, b, b) of meetings, whose neighbours have those `before` and
-/// `after`.
+/// Fill in S^-1 of the factors (m, 2, b, b) of meetings, whose neighbours have the factors `before`
+/// and `after`.
 void join(std::span<const Meeting> meetings, const StationBlocks& blocks,
           Array4<const double> before, Array4<const double> after, Array4<double> factors);
 

@@ -35,7 +35,7 @@ struct Target {
     Make make_for_scenes;  ///< null where vectors are too short for it
 };
 
-/// What this processor can be told to be, the best last.
+/// Targets that this processor can run, the best last.
 const std::vector<Target>& of_processor() {
     static const std::vector<Target> found = [] {
         std::vector<Target> targets;

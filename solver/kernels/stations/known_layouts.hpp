@@ -1,5 +1,5 @@
 #pragma once
-// Layouts that kernels are compiled for: those of the shipped kinds of lines.
+// Layouts that kernels are compiled for: the shipped kinds of lines.
 #include <initializer_list>
 
 #include "stations/layout.hpp"
@@ -58,7 +58,7 @@ constexpr Shipped kTensioned = [] {
     return of;
 }();
 
-/// Stations of which everything joins everything, plane by plane.
+/// Stations whose unknowns are all joined with each other, plane by plane.
 constexpr Shipped dense(int unknowns, int plane = kMostUnknowns) {
     Wires planes{};
     for (int u = 0; u < kMostUnknowns; ++u) planes[u] = static_cast<int8_t>(u / plane);
@@ -111,7 +111,8 @@ constexpr bool is_checked([[maybe_unused]] const Shipped& of) {
 
 /// The layout of the least products among those that kernels were compiled for which has all of a
 /// layout's: stations without kernels of their own take twice as long as with some that make as
-/// many products. If there is none its own squares, of which general kernels make all at once.
+/// many products. If there is none, the wanted one with all products of its squares: general
+/// kernels make all of a square at once.
 constexpr Layout fitting(const Layout& wanted) {
     Layout found = wanted;
     found.own = in_squares(wanted.pieces(), wanted.own);

@@ -93,7 +93,7 @@ struct Sums {
 };
 template <class X>
 CATENARY_INLINE Sums<X> sums_from(const X& x) {
-    return {x, X::all(-0.0)};  // what adds nothing, not even a sign
+    return {x, X::all(-0.0)};  // neutral in sums, even for -0.0
 }
 template <class X>
 CATENARY_INLINE Sums<X> no_sums() {

@@ -1,11 +1,11 @@
 #pragma once
 // How the unknowns of a station stand in vectors, and which products a block of a matrix needs.
 //
-// Unknowns follow each other in pieces, vectors of four lanes; what is left in the last one may be
-// two. A block of a matrix is a grid of squares, each of the rows of one piece and the columns of
-// another, and a square is the sum of four products, lane by lane, of its numbers with
+// Unknowns follow each other in pieces, vectors of four lanes; the last one may have two. A block
+// of a matrix is a grid of squares, each of the rows of one piece and the columns of another, and a
+// square is the sum of four products, lane by lane, of its numbers with
 //
-//     kind   what the lanes of x are      to which lanes of the sum
+//     kind   lanes of x                   lanes of the sum
 //     0      as they are                  as they are
 //     1      as they are                  0 and 1, 2 and 3 exchanged
 //     2      pairs 0,1 and 2,3 exchanged  as they are
@@ -13,8 +13,8 @@
 //
 // So x is exchanged once for all rows, and sums once when all columns are added. Where the columns
 // are a piece of two, x holds them twice; where the rows are, both halves of the sum are added up
-// in the end: of both, kinds 0 and 1 are enough. Which products are there is the mask of a block:
-// those that matrices lack are neither stored nor multiplied.
+// in the end: of both, kinds 0 and 1 are enough. The mask of a block tells which products it has:
+// the others are neither stored nor multiplied.
 #include <array>
 #include <cstdint>
 
@@ -43,7 +43,7 @@ constexpr int all_kinds(const Pieces& pieces, int i, int j) {
     return pieces.vector() == 2 || pieces.is_half(i) || pieces.is_half(j) ? 3 : 15;
 }
 
-/// What a lane of a product's numbers joins; -1 if there is none.
+/// Row and column that a lane of a product's numbers joins; -1 if there are none.
 struct Joint {
     int row = -1, column = -1;
 };
@@ -57,7 +57,7 @@ constexpr Joint joint_of(const Pieces& pieces, int i, int j, int kind, int lane)
     return found.row < pieces.unknowns && found.column < pieces.unknowns ? found : Joint{};
 }
 
-/// The mask of a block that joins what `joins(row, column)` says.
+/// The mask of a block that joins each row and column for which `joins(row, column)` is true.
 template <class Joins>
 constexpr Mask mask_of(const Pieces& pieces, const Joins& joins) {
     Mask mask{};
@@ -79,7 +79,7 @@ constexpr Mask in_squares(const Pieces& pieces, Mask mask) {
     return mask;
 }
 
-/// Of a symmetric block: the squares of which kernels read the numbers, for both halves.
+/// Mask of the upper half of a symmetric block, whose numbers kernels read for both halves.
 constexpr Mask upper(const Mask& mask) {
     Mask half = mask;
     for (int i = 0; i < kMostPieces; ++i)
@@ -102,7 +102,7 @@ constexpr bool holds(const Mask& mask, const Mask& other) {
     return true;
 }
 
-/// Which unknowns of a station the blocks of rows, or of factors, join. See `station_layout.py`.
+/// Sparsity of a station's blocks of rows, or of factors. See `station_layout.py`.
 struct Layout {
     int unknowns = 0;
     Mask own{};               ///< of a row's diagonal block; of factors S^-1 and -B^T S^-1
@@ -114,7 +114,7 @@ struct Layout {
 
     constexpr Pieces pieces() const { return {unknowns}; }
     /// Whether the pass forth reads less if it multiplies with S^-1 and the matrix's own B than
-    /// with -B^T S^-1, which is kept then.
+    /// with -B^T S^-1. Factors keep -B^T S^-1 only in the other case.
     constexpr bool is_sparse() const {
         return is_factors && n_products(upper(own)) + n_products(beside) <= n_products(own);
     }

@@ -71,7 +71,8 @@ void Line::outside(const Work& work, int64_t station, int station_type, Outside&
         }
 }
 
-/// Find what products need of the stations beside a chain, where these are of other station types.
+/// Fill in displacement and velocity of the stations beside a chain for its products, where these
+/// are of other station types.
 void Line::look_outside(const Work& work, Chain& chain, int station_type, int step) const {
     const Run& run = *chain.run;
     if (work.right) return;
@@ -93,7 +94,7 @@ void Line::multiply(const Work& work, int64_t begin, int64_t end, double* result
     }
 }
 
-/// One of two chains: how far it is, and what it has of the station before.
+/// One of two chains: how far it is, and the result of the station before.
 struct Line::Way {
     int step;              ///< 1 towards the end of the line, -1 towards its start
     int64_t next, left;    ///< next station, and how many are left

@@ -21,20 +21,20 @@
 
 namespace catenary {
 
-/// Numbers of stations, those of each kind once.
+/// Numbers of stations, stored once for each kind.
 struct Table {
     const int32_t* begins = nullptr;  ///< of each station the place of its first number
     const double* numbers = nullptr;
     const double* at(int64_t station) const { return numbers + begins[station]; }
 };
 
-/// Where stations begin in vectors, and of which station type each is; none if all are alike.
+/// Begins of stations in vectors, and the station type of each; null if all are alike.
 struct Places {
     const int64_t* starts = nullptr;
     const uint8_t* station_type = nullptr;
 };
 
-/// What products read. Station i of the line is `first` + i of `places`.
+/// Operands of a product. Station i of the line is `first` + i of `places`.
 struct Product {
     Table rows;
     int64_t first = 0;
@@ -43,17 +43,17 @@ struct Product {
 };
 
 struct Factored {
-    Table inverse;  ///< S^-1 alone if factors are sparse, else what a solve multiplies with
-    Table beside;   ///< the matrix's own blocks then
+    Table inverse;  ///< S^-1 alone if factors are sparse, else -B^T S^-1 as well
+    Table beside;   ///< the matrix's own blocks B
     Places places;
 };
 
-/// Stations that a step solves for, those that it takes on, and where elimination ends.
+/// Stations that a step solves for, stations that it moves, and where elimination ends.
 struct Ends {
     int64_t begin, end, low, high, middle;
 };
 
-/// What takes a state from one prediction to the next; see `changes_of`.
+/// Numbers that take a state from one prediction to the next; see `changes_of`.
 struct Changes {
     double dt, by_position, by_velocity, damping_share;
     /// Of the generalized-alpha method: shares of z and of the known acceleration.
@@ -71,8 +71,8 @@ struct StationMotion {
 /// Stations of one type beside each other, at equal distances in vectors.
 struct Run {
     int64_t begin = 0, end = 0;
-    /// Where station 0 would be if all had this station type: in what products read, in what is
-    /// solved for, in the motion.
+    /// Where station 0 would be if all had this station type: among the operands of products, among
+    /// the unknowns of a solve, in the motion.
     int64_t read = 0, solved = 0, own = 0;
 };
 
@@ -122,20 +122,20 @@ class Kernels {
     Layout rows, factors;
 };
 
-/// Kernels of these layouts: those that were compiled for them, or general ones; null if there are
-/// more unknowns than these take.
+/// Kernels of these layouts, compiled for them or general; null if there are more unknowns than
+/// general ones take.
 std::unique_ptr<Kernels> kernels_of(const Layout& rows, const Layout& factors);
 /// Kernels of `kScenes` scenes side by side, or null if none were compiled.
 std::unique_ptr<Kernels> kernels_for_scenes(const Layout& rows, const Layout& factors);
 /// Kernels that make products only, and kernels that solve only.
 std::unique_ptr<Kernels> kernels_of_rows(const Layout& rows);
 std::unique_ptr<Kernels> kernels_of_factors(const Layout& factors);
-/// Names of the processors that kernels were compiled for, and this one can be: the best last.
+/// Names of the targets that kernels were compiled for and this processor can run, the best last.
 std::vector<std::string> targets();
-/// Choose one of these; whether there is such a one.
+/// Choose one of these; whether it exists.
 bool set_target(const std::string& name);
 
-/// What else is done along with a step: before both passes, and after stretches of the pass back.
+/// Work around the passes of a step: before both, and after each stretch of the pass back.
 class Around {
   public:
     virtual ~Around() = default;
@@ -152,7 +152,7 @@ class Line {
     Line(std::vector<std::unique_ptr<Kernels>> kernels, std::vector<std::vector<int>> station_types,
          int scenes = 1);
 
-    /// Find the runs of stations that are solved for, n in all, of which motion begins at `low`.
+    /// Find the runs of the n stations of a solve. Arrays of motion begin at station `low`.
     void set_runs(const Work&, int64_t n, int64_t low);
     void multiply(const Work&, int64_t begin, int64_t end, double* result) const;
     void solve(const Work&, int64_t n, int64_t middle) const;

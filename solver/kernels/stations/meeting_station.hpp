@@ -5,11 +5,11 @@
 
 namespace catenary {
 
-/// Where elimination may end at several places, it may at every so many stations.
+/// Spacing of the stations where elimination may end, if it may at several.
 constexpr int64_t kMiddles = 16;
 
-/// Kinds of stations by where elimination ends: of each where that is further on, and where it is
-/// before; of each station at which it may end, one of kMiddles.
+/// Kinds of stations by where elimination ends: `to_end` (n,) if that is further on, `to_start`
+/// (n,) if it is before; `here` of each station where it may end, one of kMiddles.
 struct Turning {
     std::span<const int32_t> to_end, to_start, here;
     CATENARY_RECORD(to_end, to_start, here)

@@ -106,7 +106,7 @@ struct Chained {
     CATENARY_INLINE Sums<X> right(int64_t i) const {
         return sums_from(blocks.load_once(right_side + i * blocks.pitch));
     }
-    /// S^-1 times what is left of a right-hand side.
+    /// S^-1 times a right-hand side of the Schur complement S.
     CATENARY_INLINE X divided(int64_t i, const X& left) const {
         Sums<X> sums = no_sums<X>();
         blocks.add_inverse(sums, kept(inverse.at(i)), left);
@@ -133,7 +133,7 @@ struct Chained {
         if (blocks.is_sparse || chain.n == 0) return given_on;
         return divided(chain.first + step * (chain.n - 1), given_on);
     }
-    /// Unknowns from those of the station inwards, from which the chain comes.
+    /// Unknowns of a station from the unknowns of the station inwards, which is solved already.
     template <class T>
     CATENARY_INLINE X solved(int64_t i, int step, const X& inward, T then) const {
         double* at = answer + i * blocks.pitch;
@@ -156,8 +156,8 @@ struct Chained {
             go_on(i, own, then);
         return own;
     }
-    /// Unknowns of the station where both chains meet, from what is left of it and what the chain
-    /// from the end gives on.
+    /// Unknowns of the station where both chains meet, from its right-hand side after the chain
+    /// from the start, and from `after`, the last S^-1 r of the chain from the end.
     CATENARY_INLINE X met(int64_t middle, const X& after) const {
         double* at = answer + middle * blocks.pitch;
         Sums<X> sums = sums_from(blocks.load_once(at));
@@ -333,7 +333,7 @@ class KernelsOf final : public Kernels {
     Blocks blocks_;
 };
 
-/// Kernels of one kind of blocks for what steps of Newmark's family spend their time with, which is
+/// Kernels of one kind of blocks for the calls that take most of a step's time in Newmark's family:
 /// two chains at once, and of a mixed line single ones as well; others do the rest.
 template <class Blocks, bool IsMixed>
 class QuickKernels final : public Kernels {

@@ -6,7 +6,7 @@
 
 namespace catenary {
 
-/// Where stations begin in vectors, and of which station type each is; both empty if all are alike.
+/// Begins of stations in vectors, and the station type of each; both empty if all are alike.
 struct Sections {
     std::span<const int64_t> starts;
     std::span<const uint8_t> station_type;

@@ -12,7 +12,7 @@ struct Numbered {
     int at = 0;
     bool is_off_diagonal = false;
 };
-/// Those of a block of N numbers, column by column, so that an unknown is read once.
+/// Numbers of a packed block of N, column by column, so that an unknown is read once.
 template <int N>
 struct Joints {
     std::array<Numbered, N> of{};

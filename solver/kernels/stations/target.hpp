@@ -1,12 +1,12 @@
 #pragma once
-// All kernels for one target. A target is what a processor is told to be: files that include this
-// set it by a pragma, after the headers of the standard library.
+// All kernels for one target. A target is an instruction set: files that include this set it by a
+// pragma, after the headers of the standard library.
 #include "stations/known_layouts.hpp"
 #include "stations/passes.hpp"
 
 namespace catenary::CATENARY_TARGET {
 
-/// Kernels of the lanes that rows take, whatever they join.
+/// General kernels for the lanes of these rows, with masks found at run time.
 template <int W = 2>
 std::unique_ptr<Kernels> make_general(const Layout& rows, const Layout& factors) {
     if (rows.pieces().lanes() == W)

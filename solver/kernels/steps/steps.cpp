@@ -75,7 +75,7 @@ int64_t Steps::find_forces(int64_t number) {
     }
 }
 
-/// Add what the forces do to line and heads.
+/// Move line and heads by the forces, and fill in the outputs.
 void Steps::finish(int64_t n_compensations) {
     const SmallProblem& problem = parts_.problem;
     const int64_t n = size(problem.found.depth);
@@ -91,7 +91,7 @@ void Steps::finish(int64_t n_compensations) {
     check();
 }
 
-/// Look whether the step has left numbers, in builds that look for faults.
+/// Check that the results of a step are finite, in builds that look for faults.
 void Steps::check() const {
     const auto& [x, y, z, shares, spacing] = parts_.shown.motion;
     for (auto numbers : {x, y, z}) check_numbers(numbers, "the line's motion");
@@ -100,7 +100,7 @@ void Steps::check() const {
     check_numbers(parts_.train_outputs.head_height, "heights of heads");
 }
 
-/// What pantographs show, the line, and further channels.
+/// Fill the row of a step: outputs of pantographs, of the line, and further channels.
 void Steps::show(int64_t number) {
     std::span<double> row = block_.rows[number];
     auto next = [&row](size_t n) {

@@ -1,6 +1,6 @@
 #pragma once
 // Steps of the scheme `one_solve` on one rank: a step of the line without contact, the small
-// problem of contact forces and switching links, and what both do to line and pantographs.
+// problem of contact forces and switching links, and the motion of line and pantographs by both.
 #include "contact/outputs.hpp"
 #include "contact/response.hpp"
 #include "contact_problem/forces.hpp"
@@ -11,34 +11,34 @@
 
 namespace catenary {
 
-/// What steps are made of.
+/// Arguments of steps: line, heads, contacts, loads, and their outputs.
 struct StepParts {
     double speed;              ///< of the train [m/s]
-    TrainPlaces train;         ///< where its contacts are
-    Contacts contacts;         ///< what they work on
+    TrainPlaces train;         ///< places of its contacts
+    Contacts contacts;         ///< arrays of these contacts
     TwoPasses* free;           ///< the line's step without contact
-    std::vector<Loads> loads;  ///< those that change with time, or none
+    std::vector<Loads> loads;  ///< that change with time, or none
     std::vector<Head*> heads;  ///< of the pantographs
     std::span<double> strips;  ///< all strips as functions of the forces, see `Head::predict`
     SmallProblem problem;      ///< of a step's forces
     StepLaw law;               ///< of the contacts
-    std::span<double> lateral_place;  ///< (n,) where wires are on the strips [m], or nothing
+    std::span<double> lateral_place;  ///< (n,) places of wires on the strips [m], or empty
     std::span<int64_t> switched;      ///< room for the numbers of links with a compensation
-    TrainOutputs train_outputs;       ///< what a step fills in of the following
-    std::span<const double> outputs;  ///< what pantographs show
-    Shown shown;                      ///< what the line shows
-    std::vector<std::span<const double>> channels;  ///< what further channels show
+    TrainOutputs train_outputs;       ///< part of `outputs` that a step fills in
+    std::span<const double> outputs;  ///< all outputs of pantographs
+    Shown shown;                      ///< outputs of the line
+    std::vector<std::span<const double>> channels;  ///< numbers of further channels
     CATENARY_RECORD(speed, train, contacts, free, loads, heads, strips, problem, law, lateral_place,
                     switched, train_outputs, outputs, shown, channels)
 };
 
-/// What a block of steps is told, and what it fills in.
+/// Inputs and outputs of a block of steps.
 struct Block {
     std::span<const double> times;  ///< (n,) at their ends [s]
     Array3<double> drives;          ///< (n, n_heads, width) a row for each head, see `Drive`
-    Array2<double> rows;            ///< (n, width) what each step shows; none if nobody looks
+    Array2<double> rows;            ///< (n, width) outputs of each step; none without observers
     std::span<int64_t> now;         ///< stations that move in this block, first and last + 1
-    Array2<const int64_t> behind;   ///< (n, 2) of each row those that moved since it was filled
+    Array2<const int64_t> behind;   ///< (n, 2) of each row, stations moved since it was filled
     KeptMotions kept;
     std::span<Counts> counts;  ///< (1,)
     CATENARY_RECORD(times, drives, rows, now, behind, kept, counts)
@@ -74,8 +74,8 @@ class Steps {
     /// Take the steps of the block from number `first` on up to before `end`.
     Taken take(int64_t first, int64_t end);
 
-    /// The parts of a step of which others take the free step: what comes before it, and after it;
-    /// whether forces were found.
+    /// The parts of a step before and after its free step, where others take the latter. `arrive`
+    /// returns whether forces were found.
     void set_off(int64_t number);
     bool arrive(int64_t number);
     /// Fill in the row of a step that has been taken.

@@ -12,7 +12,8 @@ namespace catenary {
 
 namespace {
 
-/// Second derivatives of the Hermite functions along the track [1/m2], of those of rotations [1/m].
+/// Second derivatives of the Hermite functions along the track: of deflections [1/m2], of rotations
+/// [1/m].
 std::array<double, 4> shape_curvatures(double xi, double length) {
     const double square = length * length;
     return {(12 * xi - 6) / square, (6 * xi - 4) / length, (6 - 12 * xi) / square,
@@ -27,7 +28,7 @@ Moved moved_at(int64_t unknown, const Motion& motion) {
     return {displacement_at(unknown, motion), velocity_at(unknown, motion)};
 }
 
-/// Make `result` what a term is multiplied with.
+/// Fill `result` with the operand of a term.
 CATENARY_FOR_TARGETS
 void add_up(const MatrixTerm& term, std::span<const double> displacement,
             std::span<const double> velocity, std::span<const double> acceleration,
@@ -37,7 +38,7 @@ void add_up(const MatrixTerm& term, std::span<const double> displacement,
         result[i] = by_d * displacement[i] + by_v * velocity[i] + by_a * acceleration[i];
 }
 
-/// The contact forces that a head's laws read, or nothing.
+/// Contact forces that a head's laws read; empty without laws.
 std::span<double> laws_of(const Head& head) {
     const auto* sprung = dynamic_cast<const SprungHead*>(&head);
     return sprung ? sprung->laws().pressed : std::span<double>{};
@@ -46,7 +47,8 @@ std::span<double> laws_of(const Head& head) {
 /// By how much a state is changed to differentiate a step: heights and their rates little beside
 /// the bends of tables, and much beside round-off.
 constexpr double kMoved[] = {1e-4, 1e-2, 1.0}, kDriven = 1.0;
-/// How much nearer it is moved if a law bends by more than such a part in between, and at least.
+/// Factor of a smaller change, for laws that bend by more than the part `kBent` in between; a
+/// change below `kNearest` is taken in any case.
 constexpr double kNearer = 1e-2, kBent = 1e-5, kNearest = 1e-3;
 /// Weights of a derivative of the fourth order, see set_up.py.
 constexpr double kStencil[] = {1.0 / 12.0, -8.0 / 12.0, 8.0 / 12.0, -1.0 / 12.0};
@@ -213,7 +215,7 @@ void TangentSteps::follow(int64_t number) {
     }
 }
 
-/// Put what a tangent's line is loaded with: what changes of its matrices, links and places.
+/// Put the loads of a tangent's line: by the changes of its matrices, links and places of contacts.
 void TangentSteps::load(const Tangent& tangent, double way) {
     const auto loads = tangent.loads;
     const auto acceleration = parts().contacts.motion.z;
@@ -242,7 +244,7 @@ void TangentSteps::load(const Tangent& tangent, double way) {
     }
 }
 
-/// Derivatives of heads without changes of contact forces, and what they add to those of gaps.
+/// Put the derivatives of heads without changes of contact forces, and add those of gaps by them.
 void TangentSteps::predict_heads(const Tangent& tangent, int64_t number) {
     for (size_t h = 0; h < chains_.size(); ++h) {
         const HeadChange& change = tangent.heads[h];
@@ -290,7 +292,7 @@ void TangentSteps::step_chain(const LinearChain& chain, const HeadChange& change
     add_places(chain, free, h, 1.0);
 }
 
-/// Add what a head's state, or a part of it, is worth at its strips.
+/// Add the heights and rates of the strips by a head's state, or by a part of it.
 void TangentSteps::add_places(const Head& head, std::span<const double> state, size_t h,
                               double weight) {
     const auto& touch = head.arrays().touch;
@@ -303,8 +305,8 @@ void TangentSteps::add_places(const Head& head, std::span<const double> state, s
         }
 }
 
-/// Differentiate the step of another head by steps of heads like it: by its state and what drives
-/// it, and by the parameter.
+/// Differentiate the step of another head by steps of heads like it: by its state, its drive and
+/// the parameter.
 void TangentSteps::step_beside(const HeadChange& change, std::span<const double> drive,
                                std::span<const double> changed, size_t h) {
     const int64_t n = parts().heads[h]->n();
@@ -373,7 +375,7 @@ void TangentSteps::add_end(const Head& head, size_t h, double weight) {
     add_places(head, state, h, weight);
 }
 
-/// Take off gaps what the wires' heights change by.
+/// Subtract the changes of the wires' heights from gaps.
 void TangentSteps::find_places(const Tangent& tangent, double way) {
     const Contacts& contacts = parts().contacts;
     const Motion& own = tangent.free->parts().arrays.motion;
@@ -441,7 +443,7 @@ double TangentSteps::of_reserve(const Tangent& tangent, int64_t link, int64_t nu
     return value;
 }
 
-/// Add what the changes of forces do to line and heads.
+/// Move line and heads by the changes of forces.
 void TangentSteps::move(const Tangent& tangent, const Contacts& contacts) {
     superpose(contacts, forces_);
     compensate(contacts, acting_.numbers,
@@ -458,7 +460,7 @@ void TangentSteps::move(const Tangent& tangent, const Contacts& contacts) {
     }
 }
 
-/// Keep what a Hertzian law remembers, see `remember` of the law.
+/// Keep the derivatives of a Hertzian law's memory, see `remember` of the law.
 void TangentSteps::remember(const Tangent& tangent) const {
     if (!parts().law.marched) return;
     const SmallProblem& problem = parts().problem;
@@ -500,7 +502,7 @@ void TangentSteps::show(const Tangent& tangent, int64_t number) const {
             head_height(*parts().heads[p], tangent.heads[p].state);
 }
 
-/// The mean of what a head's state, or a derivative of it, is worth at its strips.
+/// Mean height of the strips by a head's state, or by a derivative of it.
 double TangentSteps::head_height(const Head& head, std::span<const double> state) const {
     const auto& touch = head.arrays().touch;
     double sum = 0.0;

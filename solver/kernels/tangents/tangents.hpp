@@ -1,5 +1,5 @@
 #pragma once
-// Derivatives of a march by its parameters: tangents, which go beside the steps.
+// Derivatives of a march by its parameters: tangents, stepped beside the march.
 //
 // A step solves M a + C v + K d = sum_i b_i f_i - sum_l L_l s_l with forces of contacts and
 // compensations of links. Its derivative by a parameter p, written d., is a motion of the same
@@ -47,8 +47,8 @@ struct HeadChange {
     CATENARY_RECORD(matrix, by_drive, by_head, inverse, state, beside, step)
 };
 
-/// Derivatives of the contact law at n contacts: of own, offset, by_depth and by_rate (4, n), and
-/// of a Hertzian law those of K, n, chi and the least speed (4,); nothing if they do not change.
+/// Derivatives of the contact law at n contacts: of own, offset, by_depth and by_rate (4, n), and,
+/// of a Hertzian law, of K, n, chi and the least speed (4,); empty if they do not change.
 struct LawChange {
     Array2<const double> tangents;
     std::span<const double> hertz;
@@ -77,7 +77,7 @@ struct Tangent {
 /// Tangents of a march, the parts of it that they read, and the counts that they fill in.
 struct MarchTangents {
     std::vector<Tangent> all;
-    /// Of each head that is no linear chain two others like it, whose state is free to be changed.
+    /// Two copies of each head that is no linear chain, for changed states.
     std::vector<std::vector<Head*>> pairs;
     Links links;                     ///< of the line, by their numbers
     std::span<const int64_t> first;  ///< (1,) steps of the march before the block
@@ -89,13 +89,14 @@ struct MarchTangents {
 /// Steps with tangents.
 class TangentSteps : public Steps {
   public:
-    /// Throws std::invalid_argument if a head is no linear chain and has no others like it.
+    /// Throws std::invalid_argument if a head is no linear chain and has no copies.
     TangentSteps(StepParts parts, Block block, MarchTangents tangents);
-    /// Take steps as `Steps::take`; those that are left to others have no tangents.
+    /// Take steps as `Steps::take`; steps that are left to others have no tangents.
     Taken take(int64_t first, int64_t end);
 
   private:
-    /// Whose unknown stands where in the small problem: contacts, then links, that act.
+    /// Acting contacts and then acting links, in the order of unknowns of the tangents' small
+    /// problem.
     struct Acting {
         std::vector<int64_t> contacts, rows, numbers;
         int64_t n() const { return static_cast<int64_t>(contacts.size() + rows.size()); }
@@ -130,10 +131,10 @@ class TangentSteps : public Steps {
 
     MarchTangents tangents_;
     std::vector<Contacts> contacts_;            ///< of each tangent, with its motion
-    std::vector<const LinearChain*> chains_;    ///< of heads that are such
+    std::vector<const LinearChain*> chains_;    ///< of heads that are linear chains, else null
     std::vector<std::vector<double>> before_;   ///< states of the heads before the step
     std::vector<std::vector<double>> pressed_;  ///< contact forces that their laws read then
-    std::vector<double> row_;                   ///< room for what drives a head
+    std::vector<double> row_;                   ///< room for the drive of a head
     std::vector<std::vector<double>> free_;     ///< derivatives of heads without contact
     /// Displacements and velocities of the line, and sums of these and of accelerations.
     std::vector<double> displacement_, velocity_, sum_;
