@@ -56,7 +56,7 @@ void offer_contact(py::module_& module) {
     module.attr("FLAGS") = py::dtype::of<Flags>();
     module.attr("SLIP") = kSlip;
     offer(module, "locate", locate, "Make touches those at some places.");
-    offer(module, "place", place, "Look where contacts are and what answers to forces there.");
+    offer(module, "place", place, "Find places of contacts and the answers to forces there.");
     offer(module, "heights", heights,
           "Fill in wire heights [m] and total rates [m/s] at contacts.");
     offer(module, "find_across", find_across, "Fill in where wires are across the track.");
@@ -66,7 +66,8 @@ void offer_contact(py::module_& module) {
     offer(module, "begin_work", begin_work, "Keep velocities at contacts before a step.");
     offer(module, "add_work", add_work, "Add the work of contact forces in a step.");
     offer(module, "move_contacts", move_contacts, "Move contacts and pantographs along the track.");
-    offer(module, "write_outputs", write_outputs, "Fill in what a step shows of pantographs.");
+    offer(module, "write_outputs", write_outputs,
+          "Fill in outputs of pantographs at the end of a step.");
 
     module.attr("NOWHERE") = kNowhere;
     offer(module, "subtract", subtract, "Fill in the gap without forces.");

@@ -23,7 +23,7 @@ Layout layout_of(const Joined& own, const Joined& beside, bool damped, bool fact
     const py::ssize_t n = own.ndim() == 2 ? own.shape(0) : 0;
     for (const Joined& joined : {own, beside})
         if (joined.ndim() != 2 || joined.shape(0) != n || joined.shape(1) != n)
-            throw py::value_error("what is joined is a square of unknowns, the same twice");
+            throw py::value_error("own and beside must be square arrays of one size");
     if (n < 1 || n > kMostUnknowns)
         throw py::value_error("a station has 1 to " + std::to_string(kMostUnknowns) + " unknowns");
     const Pieces pieces{static_cast<int>(n)};

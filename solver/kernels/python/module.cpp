@@ -41,9 +41,9 @@ void offer_line(py::module_& module) {
           "Predictions of the generalized-alpha method in place.");
     offer(module, "displacements", displacements, "Fill in displacements.");
     offer(module, "velocities", velocities, "Fill in velocities.");
-    offer(module, "reserves", reserves, "Fill in what is left to each link until it switches [N].");
+    offer(module, "reserves", reserves, "Fill in the reserve of each link until it switches [N].");
     offer(module, "energy_of_switching", energy_of_switching,
-          "What elastic energy lacks where links have switched [J].");
+          "Elastic energy that links add where they have switched [J].");
     module.attr("LEAST_STATIONS") = kLeastStations;
     offer(module, "turn_to", turn_to, "Let steps of a window take on some stations.");
     offer(module, "take_in", take_in, "Let a range of stations take in another one.");
@@ -62,7 +62,7 @@ void offer_line(py::module_& module) {
           "Fourier transform in place, numbers in the order of reversed bits.");
 
     offer(module, "condense_spans", condense_spans,
-          "Fill in what spans take off the unknowns that they share, at frequencies.");
+          "Condense spans to the unknowns that they share, at frequencies.");
     offer(module, "cut_out", cut_out, "Short columns out of answers to unit forces.");
     offer(module, "bridge", bridge, "Fill in amplitudes of gusts between two posts.");
     offer(module, "add_waves", add_waves, "Add waves times amplitudes.");
