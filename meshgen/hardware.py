@@ -1,4 +1,4 @@
-"""What hangs between wires and stands under them: droppers, clamps, steady arms, supports."""
+"""Hardware of the wires: droppers, clamps, steady arms, supports, fittings."""
 
 from __future__ import annotations
 

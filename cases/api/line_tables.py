@@ -44,7 +44,7 @@ def check(scene: SceneLike) -> list[str]:
 
 
 class Plan:
-    """What a run will simulate, and what it will need: what ``plan`` gives.
+    """Plan of a run, from ``plan``: effects simulated and left out, sizes, and needs.
 
     As text it is what ``catenary plan`` prints.
 
@@ -127,7 +127,7 @@ class Plan:
 
 
 def plan(scene: SceneLike) -> Plan:
-    """What a run of a scene simulates, its sizes, and what it will need. Not collective.
+    """Plan a run of a scene: its effects, sizes, and needs. Not collective.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What a result file says of its run before the first step."""
+"""Header of a result file: facts of its run that are known before the first step."""
 
 from __future__ import annotations
 

@@ -174,7 +174,7 @@ class Marches:
         left, by_themselves = dict.fromkeys(problems), list[Marched]()
 
         def together() -> Iterator[tuple[int, LineAtRest]]:
-            """Those whose lines have the same matrices; others march when it is their turn."""
+            """Yield scenes whose lines have the same matrices; others march in their turn."""
             for number, problem in problems.items():
                 try:
                     at_rest = line.rest_of(problem)

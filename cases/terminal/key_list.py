@@ -166,7 +166,7 @@ def _details(key: Key) -> str:
 
 
 def _about_effect(name: str) -> list[str]:
-    """What an effect adds, requires, acts with and is taken from; nothing for other keys."""
+    """Sentences on an effect's additions, requirements, data and source; none for other keys."""
     effect = effects.registry().get(name.removeprefix("effects."))
     if effect is None or not name.startswith("effects."):
         return []

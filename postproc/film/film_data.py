@@ -1,4 +1,4 @@
-"""What a film shows of a run, read once: the line at rest, the train's course, the forces."""
+"""Data of a run for a film, read once: the line at rest, the train's course, the forces."""
 
 from __future__ import annotations
 

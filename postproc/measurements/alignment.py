@@ -387,7 +387,7 @@ class _Fit:
 
 
 def _likely(tried: Iterable[_Refined | None]) -> list[_Refined]:
-    """Those fits that are as likely as the best."""
+    """Fits that are as likely as the best."""
     found = [one for one in tried if one is not None]
     if not found:
         return []

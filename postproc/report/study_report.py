@@ -1,4 +1,4 @@
-"""What a study leaves: ``study.html`` with verdicts, tables and figures, the figures' data as CSV.
+"""Report of a study: ``study.html`` with verdicts, tables and figures, the figures' data as CSV.
 
 A study compares many runs with what a source states of its own; who made it fills a ``Study``.
 """

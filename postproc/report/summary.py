@@ -204,7 +204,7 @@ def _elasticity_of_wires(results: Results) -> dict[str, Any]:
 
 
 def _effects(attributes: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """What was simulated and what was left out, each with the reason."""
+    """Effects simulated and left out, each with the reason."""
     return [
         {"name": name, "title": title, "simulated": simulated, "reason": reason}
         for key, simulated in (("effects_on", True), ("effects_off", False))

@@ -160,8 +160,8 @@ def _begin(shared: SharedLine, lane: Lane, number: int, at_rest: LineAtRest) -> 
 def _steps(
     scheme: OneSolve, motion: Motion, n_steps: int, dt: float
 ) -> tuple[native.Steps, np.ndarray]:
-    """What takes the steps of a scheme, and the rows of outputs that they fill, the first one
-    before the first step."""
+    """Compiled steps of a scheme, and the rows (n_steps + 1, n_outputs) that they fill, the first
+    one before the first step."""
     pantographs, coupling = scheme.pantographs, scheme.coupling
     assert isinstance(coupling, Implicit)
     n = pantographs.n_contacts

@@ -33,9 +33,9 @@ _STRETCH = 8192
 
 
 class PassArrays(NamedTuple):
-    """What passes read and fill: what products with K read, and those with C; loads of all that is
-    solved for, or none; accelerations of these; the motion of the rank's own stations; known
-    accelerations and predicted velocities of these, or none."""
+    """Arrays that passes read and fill: inputs of the products with K and with C; loads of all
+    unknowns that are solved for, or none; accelerations of these; the motion of the rank's own
+    stations; known accelerations and predicted velocities of these, or none."""
 
     factor: np.ndarray
     velocity: np.ndarray

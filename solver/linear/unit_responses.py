@@ -326,8 +326,8 @@ class UnitResponses:
 
 
 class Cuts(NamedTuple):
-    """What is wanted of the answers of n places among unknowns of a stretch, (n,) each: it is to be
-    zero before ``low`` and from ``high`` on; ``at`` is where it goes."""
+    """Windows of the answers of n places among unknowns of a stretch, (n,) each: an answer should
+    vanish before ``low`` and from ``high`` on; ``width`` values from ``begin`` on go to ``at``."""
 
     low: np.ndarray
     high: np.ndarray

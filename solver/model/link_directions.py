@@ -67,8 +67,8 @@ def dropper_directions(model: Model) -> Direction:
 
 
 def across_droppers(model: Model) -> tuple[Direction, np.ndarray]:
-    """What a dropper's force at rest does across it, N / l of a pendulum of its length l, in the
-    plane along the track.
+    """Transverse stiffness of droppers in the plane along the track: N / l, as of a pendulum of the
+    dropper's length l with its force N at rest.
 
     Returns
     -------
@@ -86,9 +86,8 @@ def sideways_of_droppers(model: Model) -> tuple[Direction, np.ndarray]:
 
 
 def swings_of_droppers(model: Model) -> list[tuple[Direction, np.ndarray]]:
-    """What droppers' forces at rest do across them in the planes of the model beside the vertical
-    one: directions of all droppers, and N / l of each (n_droppers,) [N/m], of one plane after the
-    other."""
+    """Transverse stiffness of droppers in the planes of the model beside the vertical one, plane by
+    plane: directions of all droppers, and N / l of each (n_droppers,) [N/m]."""
     found = []
     if model.simulated.lateral:
         found.append(sideways_of_droppers(model))

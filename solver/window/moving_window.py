@@ -301,7 +301,7 @@ class MovingWindow:
 
 
 def wanted_pieces(problem: Problem, model: Model, contacts: np.ndarray) -> WantedPieces | None:
-    """What steps with a window need of a line at a time, None if that is not known beforehand.
+    """Part of a line that steps with a window need at a time, None if it is not known beforehand.
 
     ``contacts`` (n,) are where they are [m]. Not collective.
     """

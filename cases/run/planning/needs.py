@@ -1,4 +1,4 @@
-"""What a run needs, estimated before anything is made: time, memory and room for its files."""
+"""Needs of a run, estimated before anything is made: time, memory and room for its files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a scene will simulate and what not, with its size and what a run of it needs."""
+"""Plan of a run: effects simulated and left out, size, and needs."""
 
 from __future__ import annotations
 

@@ -117,7 +117,7 @@ class LengthsTable(Table):
 
 
 class IrregularitiesTable(Table):
-    """What is irregular about the line from the start; each entry is an effect of its name."""
+    """Irregularities of the line from the start; each entry is an effect of its name."""
 
     contact_wire_height: WireHeightTable | None = Field(
         None, description="heights that droppers are cut for"

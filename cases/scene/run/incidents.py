@@ -1,4 +1,4 @@
-"""What happens during a run: tables, and conversion to SI."""
+"""Incidents during a run: tables, and conversion to SI."""
 
 from __future__ import annotations
 

@@ -248,7 +248,7 @@ _WRONG_COURSE = 10.0
 def advice(
     rows: Sequence[Row], quantity: str, target: float, uncertainty: float = 0.0, without: str = ""
 ) -> str:
-    """What to take for an error of at most ``target`` [%], as a sentence.
+    """Recommend settings for an error of at most ``target`` [%], in a sentence.
 
     Parameters
     ----------

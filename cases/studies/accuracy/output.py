@@ -1,4 +1,4 @@
-"""What an accuracy study leaves: tables as CSV, JSON, text and page, the work-precision diagram."""
+"""Output of an accuracy study: tables as CSV, JSON, text and page, the work-precision diagram."""
 
 from __future__ import annotations
 

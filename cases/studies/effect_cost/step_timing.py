@@ -1,4 +1,4 @@
-"""What a step costs: marches over the same stretch again and again, several of them in turns.
+"""Time of a step: marches over the same stretch again and again, several of them in turns.
 
 Other programs slow all contenders alike, and the least of many rounds is what a step takes when
 none does.

@@ -1,4 +1,4 @@
-"""What each effect of a scene costs and changes: runs beside the scene as it is, and their steps.
+"""Cost of each effect of a scene, and the change by it: runs and steps beside the scene as it is.
 
 Figures are those of whole runs over a stretch, costs those of steps in turns on the same stretch.
 """

@@ -1,4 +1,4 @@
-"""What `catenary validate` found of an installation, as a section of a run's report."""
+"""Statement of ``catenary validate`` on an installation, as a section of a run's report."""
 
 from __future__ import annotations
 

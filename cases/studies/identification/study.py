@@ -47,7 +47,7 @@ _SEARCHES_IN_DOUBT = 3  # where the task names no number and the first leaves an
 
 
 class Unknown(NamedTuple):
-    """What is looked for, with its prior.
+    """Parameter that is identified, or a bias of the data, with its prior.
 
     Attributes
     ----------

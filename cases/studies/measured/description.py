@@ -143,7 +143,7 @@ class Tolerances(Table):
 
 
 class Description(Table):
-    """What a line test measured of a passage, for a comparison with a run."""
+    """Measured passage of a line test, for a comparison with a run."""
 
     measured: Measured
     others: Annotated[list[OtherPantograph], Field(max_length=20)] = []

@@ -193,7 +193,7 @@ def not_improved(rows: Sequence[Row]) -> list[str]:
 
 
 def trap(rows: Sequence[Row]) -> str:
-    """What becomes of the direction that no search has seen; empty if all were seen."""
+    """Sentence on ``std_N`` in the direction that no search has seen; empty if all were seen."""
     own = [row for row in rows if row.check == AS_IS and row.outcome == "done"]
     seen, unseen = ([row for row in own if row.searched is side] for side in (True, False))
     if not seen or not unseen:

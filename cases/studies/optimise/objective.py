@@ -113,7 +113,7 @@ class Problem:
         return self._best
 
     def points(self, changes: Sequence[np.ndarray]) -> list[Point]:
-        """What comes of changes, (n,) each, of which all runs are made together.
+        """Evaluate and record changes, (n,) each, with the runs of all of them made together.
 
         Raises
         ------

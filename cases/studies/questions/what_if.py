@@ -1,4 +1,4 @@
-"""What a change of a scene changes: a run as it is, one with the change, and tables of both."""
+"""Differences by a change of a scene: a run as it is, one with the change, and tables of both."""
 
 from __future__ import annotations
 

@@ -53,8 +53,8 @@ class PointModel:
 
     @property
     def mass(self) -> float:
-        """What forces there meet before anything else has moved [kg], at the least: of one wire
-        1 / b . M^-1 b."""
+        """Least apparent mass of the wires under sudden forces there [kg]: of one wire
+        1 / (b . M^-1 b)."""
         return 1.0 / _largest(self.load.T @ self.load)
 
 
@@ -199,13 +199,13 @@ def step_matrix(both: Coupled, step: Step, implicit: float, explicit: float) -> 
 
 
 def radius(both: Coupled, step: Step, stiffness: float, coupling: str) -> float:
-    """What a step multiplies a perturbation by, at most, with ``implicit`` or ``explicit``."""
+    """Spectral radius of a step with the ``implicit`` or ``explicit`` coupling."""
     parts = (stiffness, 0.0) if coupling == "implicit" else (0.0, stiffness)
     return float(np.abs(linalg.eigvals(step_matrix(both, step, *parts))).max())
 
 
 def exchange_ratio(both: Coupled, step: Step, stiffness: float) -> float:
-    """What an exchange of forces and motions multiplies errors of the forces by, at most."""
+    """Largest factor by which an exchange of forces and motions multiplies errors of the forces."""
     operator = both.mass + step.gamma * step.dt * both.damping
     operator = operator + step.beta * step.dt**2 * both.stiffness
     answer = linalg.solve(operator, both.depth, assume_a="sym")

@@ -1,4 +1,4 @@
-"""What a study of tolerances leaves: the table of an installer, and that of all criteria."""
+"""Output of a study of tolerances: the table of an installer, and that of all criteria."""
 
 from __future__ import annotations
 

@@ -138,7 +138,7 @@ class Transmitted(NamedTuple):
 
 
 def transmitted(theory: WaveTheory, seen: WavesSeen) -> Transmitted | None:
-    """What passes from one station to another; None without a blow, periodic line or room."""
+    """Spectra at two stations after a blow; None without a blow, periodic line or room."""
     columns = _stations(theory, seen)
     if columns is None:
         return None

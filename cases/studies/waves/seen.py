@@ -288,8 +288,8 @@ class EnergyMotion:
         return vector
 
     def _switched(self, d: np.ndarray) -> np.ndarray:
-        """What the energy of droppers differs by from k e^2 / 2 as they are slack, or on another
-        slope of their curve than at rest, by link and bend [J].
+        """Energy of droppers less k e^2 / 2, as they are slack or on another slope of their curve
+        than at rest, by link and bend [J].
 
         A dropper of tension N at rest and stretch e beyond it has (N + k e)^2 / 2 k - N^2 / 2 k -
         N e, the last term being the work of the weights: k e^2 / 2 if it pulls, -N^2 / 2 k - N e if

@@ -1,4 +1,4 @@
-"""What was simulated and what was not, and the run: sizes, times, versions, configuration."""
+"""Facts on a run: effects simulated and left out, sizes, times, versions, configuration."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ INPUT = "input.toml"
 
 
 def checks(run: EvaluatedRun) -> Section:
-    """What the march found of itself: energy, motion beyond linear theory, iterations."""
+    """Own checks of the march: energy, motion beyond linear theory, iterations."""
     return Section("The run's own checks", _checks(run))
 
 

@@ -1,4 +1,4 @@
-"""What a section of a report is made of: sentences, tables, pictures, and what is folded away."""
+"""Parts of a section of a report: sentences, tables, pictures, folded blocks."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ class Picture(NamedTuple):
 
 
 class Folded(NamedTuple):
-    """What a reader unfolds: a title, and a text or table."""
+    """Folded block: a title, and a text or table that a reader unfolds."""
 
     title: str
     block: Text | StudyTable

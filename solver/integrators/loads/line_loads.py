@@ -218,7 +218,8 @@ class _Sampled:
 def _changing_of(
     shapes: list[tuple[ShapeLoad, np.ndarray, np.ndarray]], others: np.ndarray
 ) -> Changing:
-    """What changes with ``shapes``, each with its places and forces there, and ``others``."""
+    """Sparse table of the forces of ``shapes``, each with its places and forces there; ``others``
+    are further places that change."""
     at = np.concatenate([np.zeros(0, np.int64), *(places for _, places, _ in shapes)])
     term = np.repeat(np.arange(len(shapes)), [places.size for _, places, _ in shapes])
     forces = np.concatenate([np.zeros(0), *(values for _, _, values in shapes)])

@@ -65,7 +65,7 @@ class Energies(NamedTuple):
 
 
 class TrainLayout(NamedTuple):
-    """What decides which channels a run has.
+    """Properties of train and line that determine the channels of a run.
 
     Attributes
     ----------
