@@ -61,7 +61,7 @@ class LoweredPantograph:
 
     Attributes
     ----------
-    stepped : what steps it, from Python and in the loop of kernels
+    stepped : the compiled head, for steps from Python and in the loop of kernels
 
     Parameters
     ----------

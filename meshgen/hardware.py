@@ -182,7 +182,7 @@ class Fittings:
 
     Attributes
     ----------
-    kind : what they are
+    kind : their name
     wire : its name
     x : their places, ascending [m]
     mass : of each [kg]

@@ -167,7 +167,7 @@ class Wire(Conductor):
     Attributes
     ----------
     name : of the wire, of its group in a mesh file and of its component in the damping
-    role : what it is there for
+    role : contact, messenger, auxiliary or stitch wire
     pieces : where it runs, one piece or several by ascending x that do not overlap
     profile : heights wanted at its droppers' lower ends; None if none hangs it
     taken : stretches (from, to, tension) over which wires that are clamped to it carry that much of

@@ -1,4 +1,4 @@
-"""Tables of a scene before any run: what is checked, what is planned, how the line hangs."""
+"""Tables of a scene before any run: its check, its plan, and its line at rest."""
 
 from __future__ import annotations
 
@@ -108,7 +108,7 @@ class Plan:
 
     @property
     def warnings(self) -> list[str]:
-        """Sentences on what disturbs the evaluated stretch, such as waves from a near end.
+        """Sentences on disturbances of the evaluated stretch, such as waves from a near end.
 
         Examples
         --------
@@ -155,7 +155,7 @@ def plan(scene: SceneLike) -> Plan:
 
 
 class AtRest:
-    """A line at rest as tables: what ``static`` gives. As text it is what the program prints.
+    """A line at rest as tables, from ``static``. As text it is what the program prints.
 
     Examples
     --------
@@ -236,7 +236,7 @@ class AtRest:
 
     @property
     def steady_arms(self) -> pd.DataFrame:
-        """A row for each steady arm: ``x_m`` and, of lines that move sideways, what holds the wire.
+        """A row for each steady arm: ``x_m`` and, of lines that move sideways, place and forces.
 
         Then ``stagger_m`` is the place of the wire to the left of the track, ``radial_N``,
         ``lift_N`` and ``along_N`` the force of the arm on it to the left, upward and along the

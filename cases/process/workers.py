@@ -51,7 +51,7 @@ class Outcome(NamedTuple):
     ----------
     number : place of the item among all, from 0 on
     value : result of the function, None if it raised an error
-    error : what it raised, or that its process was lost
+    error : the error that it raised, or the loss of its process; None without one
     """
 
     number: int

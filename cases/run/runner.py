@@ -171,7 +171,7 @@ def run_case(
     ready : called on all ranks when folder and size of the run have been judged
     only_summary : of the report write ``summary.json`` alone, which costs no time
     large : whether a run may pass the bounds on its size; as ``force`` if not given
-    excited : what sets the line into motion in place of the scene's train
+    excited : excitation that sets the line into motion in place of the scene's train
 
     Raises
     ------

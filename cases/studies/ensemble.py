@@ -246,7 +246,7 @@ class _Line:
     Parameters
     ----------
     scene, problem : of one of the scenes
-    range_of_run : what contact wires their trains touch [m], None if they march by themselves
+    range_of_run : stretch that their trains touch the wire in [m], None if they march by themselves
     """
 
     def __init__(

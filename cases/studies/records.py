@@ -201,7 +201,7 @@ def held_study(
     Parameters
     ----------
     out : the folder, None to keep and write nothing
-    command : what this process does, for others that want the folder
+    command : work of this process in words, for others that want the folder
     force : forget what is kept there
     """
     from catenary.cases.result_folder.folder_lock import held

@@ -143,7 +143,7 @@ class Work(NamedTuple):
     ----------
     unknowns, spans : of the line
     step : time of a step on one rank [s]
-    fixed : what of it does not go with the length of the line [s]
+    fixed : part of it that does not grow with the length of the line [s]
     sizes : of messages on several ranks
     """
 

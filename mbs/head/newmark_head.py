@@ -23,9 +23,9 @@ class SteppedHead(ABC):
 
     Attributes
     ----------
-    stepped : what steps it, from Python and in the loop of kernels
+    stepped : the compiled head, for steps from Python and in the loop of kernels
     head : HeadState, what it predicted last
-    row : what the coming step depends on, see `drives`
+    row : inputs of the coming step, see `drives`
 
     Parameters
     ----------

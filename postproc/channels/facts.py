@@ -47,7 +47,7 @@ class Fact(NamedTuple):
     Attributes
     ----------
     unit : SI unit, "-" if none
-    meaning : what it is, in words
+    meaning : description in words
     of : how it is derived: a number, or a sequence with one for each pantograph or contact wire
     per : ``RUN``, ``PANTOGRAPH`` or ``WIRE``
     low, high : bounds, inclusive

@@ -67,7 +67,7 @@ class Indicators:
     relative_error : (n_pantographs,) the same over the force's standard deviation
     resolved_frequency : highest frequency of a wave on the contact wire that the elements carry
         with less than 1 % error in frequency [Hz]
-    required_frequency : what the elements have to carry, ``required_frequency`` of 20 Hz [Hz];
+    required_frequency : that elements have to carry, ``required_frequency`` of 20 Hz [Hz];
         infinite where the train is as fast as the wave; both NaN in files of earlier formats
     warnings : sentences, empty if the settings are fine enough
     """

@@ -20,7 +20,7 @@ class Criterion:
 
     Attributes
     ----------
-    criterion : what is judged, in words; names the pantograph where there are several
+    criterion : the judged quantity in words; names the pantograph where there are several
     value, limit : in ``unit``; NaN where there is none
     unit : for readers: N, mm, %, km/h
     relation : how the value must stand to the limit: "<=", "<", ">=" or ">"

@@ -37,7 +37,7 @@ class FilmData:
     position, force, filtered, head_height : (n, p) [m], [N], [N] below 20 Hz, [m]; filtered is all
         NaN where the record is too coarse for it, and the force itself where that is given
     names : of the pantographs
-    excitation : what sets the line into motion in place of a train, whose place and force then
+    excitation : of the line in place of a train, whose place and force then
         stand in place of those of a pantograph; None with a train
     """
 

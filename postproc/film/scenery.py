@@ -134,7 +134,7 @@ class Scenery:
     ----------
     data : of the run
     line : parts of the line by name
-    parts : what stands beside it, by name; no train where an excitation stands for it
+    parts : parts beside it, by name; no train where an excitation stands for it
     shapes : of the pantographs
     roof : height of the roofs that they stand on [m]
     number : pantograph of each point of ``parts["pantographs"]``

@@ -68,7 +68,7 @@ class Passage:
     by_time : whether places come from a clock
     stretch : begin and end of what is compared [m]
     uplift : at supports, None if not measured
-    tolerances : those that replace the usual ones, by name of the quantity, SI units
+    tolerances : replacements of the usual ones, by name of the quantity, SI units
     """
 
     name: str

@@ -51,7 +51,7 @@ class ValidatedFile:
     Parameters
     ----------
     path : the result file
-    records : what ``scan`` found in it, None to scan it when records are first read
+    records : result of ``scan``, None to scan it when records are first read
     image : its bytes, if a run of this process wrote it; the file need not be there any more
 
     Attributes

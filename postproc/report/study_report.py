@@ -30,7 +30,7 @@ class Finding:
     Attributes
     ----------
     number : of the statement
-    statement : what the source says
+    statement : its text in the source
     criterion : when it counts as reproduced
     verdict : ``REPRODUCED``, ``NOT_REPRODUCED`` or ``UNDECIDED``
     found : our numbers

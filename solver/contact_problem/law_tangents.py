@@ -174,7 +174,7 @@ class HertzInSteps(_Tangents):
         return self.there
 
     def accept(self, time: float, depth: np.ndarray, rate: np.ndarray, force: np.ndarray) -> None:
-        """Remember how fast those come who do not touch yet."""
+        """Store the approach speed of open contacts."""
         self._remember(depth, rate)
 
     def in_loop(self) -> StepLaw:

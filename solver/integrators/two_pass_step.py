@@ -94,12 +94,12 @@ class StationPasses:
 
     Attributes
     ----------
-    native : what takes a step, for loops that take steps themselves
+    native : compiled step, for loops that take steps themselves
     are_compiled : whether kernels were compiled for what its stations join
     rows, columns : layouts of each station type, of rows and of factors, as kernels take them
     parts : PassParts
     factors : as given
-    known : what the motion keeps besides x, y and z, or nothing
+    known : accelerations that the motion keeps besides x, y and z, or none
     by_mass : whether right-hand sides are made by M, as where that is shorter than by K
 
     Parameters
@@ -109,7 +109,7 @@ class StationPasses:
         motion, or of what it predicts of the velocity; that of ``answer`` is the acceleration
     loads : of all that is solved for [N], or none, added in the pass forth; kept by reference
     motion : of the rank's own stations
-    steps : those that the motion is kept for
+    steps : scheme that the motion is kept for
     """
 
     def __init__(

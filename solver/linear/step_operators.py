@@ -74,7 +74,7 @@ class LineOperators:
     ownership : Ownership
     coefficients : of M, K and C in A
     windows : Windows, whose reach is that of A^-1
-    in_pieces : what makes products and factors of a part of the line, on one rank; if None all of
+    in_pieces : maker of products and factors of a part of the line, on one rank; if None all of
         it has some
 
     Attributes

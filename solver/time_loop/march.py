@@ -87,7 +87,7 @@ class March:
     Parameters
     ----------
     comm : mpi4py communicator
-    problem, model, form : what ``equilibrium.find_form`` was given and returned, on all ranks
+    problem, model, form : arguments and result of ``equilibrium.find_form``, on all ranks
     elasticity : of the contact wires in a running span, for the height at which static forces are
         defined
     """

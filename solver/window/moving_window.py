@@ -47,7 +47,7 @@ class WindowArrays(NamedTuple):
     ends, kinds, turning : of ``StationFactors``
     links : (2,) the first link that may switch and the one after the last
     ranges : (2, 2) the same for the pass back, see ``StationPasses.track_links``
-    known : what the motion keeps besides x, y and z, or nothing
+    known : accelerations that the motion keeps besides x, y and z, or none
     """
 
     state: np.ndarray
@@ -106,7 +106,7 @@ class MovingWindow:
     reach : how far a step reaches [m]
     links : (m, k) unknowns of each link, in the order along the track
     moving_links : (2,) int, filled with the first that may switch and the one after the last
-    known : what the motion keeps besides x, y and z, or nothing
+    known : accelerations that the motion keeps besides x, y and z, or none
     operators : of a line in pieces, None if it is whole
     """
 
@@ -296,7 +296,7 @@ class MovingWindow:
         arrays.peak[:] = state[4:6]
 
     def _open(self, begin: int, end: int) -> None:
-        """Make the window that from station ``begin`` to ``end``, and touch no motion."""
+        """Set the window to stations from ``begin`` to ``end``; the motion stays as it is."""
         native.turn_to(self.arrays, begin, end)
 
 

@@ -70,13 +70,13 @@ class Plan:
     scheme : way through a step
     slow_path : why steps take longer than they could, empty if they do not
     halved : sentence on steps that adapt, empty if none do
-    slack : what a slack dropper does, in words; empty if no dropper slackens
+    slack : law of a slack dropper, in words; empty if no dropper slackens
     window : which part of the line moves, in words; empty if all of it
     moving : how much that is, and what a step of it costs, in words
     memory : estimate of the resident memory on one rank [B]
     march : estimate of the wall time of the time loop on one rank [s]
     files : sizes of the files
-    recorded : what is recorded of line and snapshots, in sentences by what it is
+    recorded : sentences on the records of line and snapshots, by the kind of record
     """
 
     case: str

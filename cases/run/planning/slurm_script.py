@@ -67,7 +67,7 @@ def slurm_script(
     words : arguments of ``catenary run`` but the folder
     out : folder of the results
     march_s, memory : estimates of a plan on one rank [s], [B]
-    petsc_options : those after --, which a job that continues the run takes as well
+    petsc_options : options after --, which a job that continues the run takes as well
 
     Raises
     ------

@@ -62,7 +62,7 @@ class Row:
     ----------
     axis, level : names
     outcome : "done", or what broke or is not possible
-    sizes : what is refined, by name
+    sizes : refined sizes by name
     errors : quantity -> difference from the reference in its unit, of the pantograph where it is
         largest, signed (``HISTORY``: rms)
     percent : quantity -> its magnitude in percent of the reference's scale

@@ -123,7 +123,7 @@ def page(found: Measured, sentences: Sequence[str], picture: str) -> str:
 
     Parameters
     ----------
-    found : what was measured
+    found : result of the study
     sentences : the recommendations
     picture : file of the work-precision diagram, empty for none
     """

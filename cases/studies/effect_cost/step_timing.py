@@ -27,7 +27,7 @@ class RepeatedMarch:
     Parameters
     ----------
     comm : mpi4py communicator
-    at_rest : what is marched
+    at_rest : line that is marched
     first : step from which rounds start, which the march runs to once
     n_steps : of a round; those to the end of the run if there are fewer
 

@@ -63,7 +63,7 @@ class SwitchableEffects:
     ----------
     switches : effects that can be switched, those that are simulated first
     always : names of those that no scene leaves out
-    lacking : what a scene lacks for the others, by their names
+    lacking : data that a scene lacks for the others, by their names
     """
 
     switches: list[Switch]
@@ -156,7 +156,7 @@ class Measured:
 
     Attributes
     ----------
-    switch : what is switched
+    switch : the switched effect
     outcome : "done", or the sentence of what is not possible or broke
     size : of the line
     ratio : time of a step over that of the scene as it is
@@ -189,7 +189,7 @@ class Costs:
     Attributes
     ----------
     case : name of the case
-    wish, effects : what was asked for, and what the scene leaves to choose
+    wish, effects : the wanted effects, and those that can be switched
     stretch : evaluated, from and to [m]
     n_steps : of a timed round
     size, figures, remarks : of the scene as it is, as in ``Measured``

@@ -120,7 +120,7 @@ def check_cases(
     ----------
     comm : agreement of its ranks is measured if there are several
     short : the case's short form; steps are halved once only then
-    kept : what an earlier call has found, None to keep nothing
+    kept : results of earlier calls, None to keep nothing
     n_at_once : cases that are run at the same time, 1 on several ranks
     initialise : called first in each further process
     """

@@ -94,14 +94,14 @@ class Measurement:
     Attributes
     ----------
     place : (n,) of the samples that are compared [m]
-    signals : what was measured there
+    signals : that were measured there
     pantograph : its number on the train, from 0
 
     Parameters
     ----------
     table : of a CSV file, see ``table_file.read_table``
-    path : what sentences call it
-    task : what its columns are
+    path : its name in sentences
+    task : description of its columns
     speed : of the train [m/s]
     start : place of the pantograph at time zero [m]
     stretch : begin and end of the scene's evaluation [m]

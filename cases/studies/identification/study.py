@@ -72,7 +72,7 @@ class Identification:
     values : (m,) found
     posterior : their uncertainty, in deviations of the priors
     place : (n,) of the samples of each signal [m]
-    signals : what was measured
+    signals : that were measured
     modelled : of each signal the samples (n,) of the march that was found, without biases
     judged : the residuals of each signal and of "all"
     n_marches, n_jacobians : how many were made
@@ -175,7 +175,7 @@ def identify(
     ----------
     scene : checked
     measured : CSV file, or the table of one
-    task : what its columns are, and what is looked for
+    task : description of its columns, and the parameters to be identified
     comm : mpi4py communicator of this process alone
     progress : called with a line for each parameter and march
 

@@ -32,7 +32,7 @@ class Place(_Column):
 
     Attributes
     ----------
-    zero_m : what the file counts at the begin of the run's line [m]
+    zero_m : place by the file's count at the begin of the run's line [m]
     direction : whether it counts with the run's train, or against it
     """
 

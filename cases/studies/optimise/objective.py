@@ -69,7 +69,7 @@ class Problem:
 
     Attributes
     ----------
-    scenes, variables : what is varied
+    scenes, variables : set of scenes, and quantities that are varied
     objective, constraints : as the task has them
     least_dropper_force : that droppers keep at rest, if the line is varied [N]
     evaluation : makes the runs

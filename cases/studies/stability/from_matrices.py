@@ -227,7 +227,7 @@ def largest_step(
     newmark : beta and gamma
     coupling : "implicit", "explicit", or any other, which exchanges
     steps : least and greatest [s]
-    allowed : what a step or an exchange may multiply errors by
+    allowed : largest factor by which a step or an exchange may multiply errors
     """
 
     def excess(log_dt: float) -> float:

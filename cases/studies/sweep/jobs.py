@@ -109,7 +109,7 @@ class Ended:
     variant : which one
     outcome : "done", "interrupted" or the sentence of what broke
     summary : content of ``summary.json``, empty unless done
-    measured : what ``Measure`` took, empty unless done
+    measured : values that ``Measure`` took, empty unless done
     wall : time that the run took [s], the earlier run's if it was not run again
     skipped : whether it was done already
     """

@@ -176,7 +176,7 @@ class Watch(Observer):
     Parameters
     ----------
     every : steps from one time to the next
-    seen : what it is shown to
+    seen : receivers of the uplift
     """
 
     def __init__(self, every: int, seen: Sequence[NodeMotion]) -> None:

@@ -29,7 +29,7 @@ class FieldKind:
     ----------
     name : of the field in files
     unit : SI unit, "-" if none
-    meaning : what it is, and which sign it has
+    meaning : description with its sign, in words
     components : numbers of a value
     motions : unknowns that it takes at all nodes, each with whether their rate is meant
     of_wires : whether wires alone have it, and not other blocks that move

@@ -56,7 +56,7 @@ class Text(NamedTuple):
 
     Attributes
     ----------
-    text : what it says
+    text : sentence or sentences
     look : "good", "bad" or "open" for a verdict, "note" for a box, "remark" for a remark, "code"
         for what is shown to the letter; empty for plain text
     first : words before the text, in bold
@@ -93,7 +93,7 @@ class Section(NamedTuple):
     heading : empty for what stands below the title of the page
     blocks : texts and tables; made when the page is, such as by a generator
     pictures : those that the run has
-    folded : what few want to see
+    folded : blocks of details
     """
 
     heading: str

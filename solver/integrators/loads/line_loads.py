@@ -66,7 +66,7 @@ class LineLoads:
     Parameters
     ----------
     loads : of the model, the same on all ranks
-    domain : what the rank solves for
+    domain : range that the rank solves for
     held : numbers of held unknowns
     comm : mpi4py communicator of the ranks that the line is on
 
@@ -75,7 +75,7 @@ class LineLoads:
     memories : of ends that go on, None if there are none
     values : (domain.size,) their sum at the latest time [N], [N m]
     changes : whether they change with time
-    arguments : what the kernel that fills ``values`` is called with, once its clock is set and the
+    arguments : of the kernel that fills ``values``, once its clock is set and the
         time is ``cover``ed
     """
 

@@ -133,7 +133,7 @@ class StationFactors:
     low : first station of a rank's own
     ends : (5,) int, read at each step: first station that a step solves for and the one after the
         last, first own one that it takes on and the one after the last, and where elimination ends
-    turning : what may move the place where elimination ends, None if it stays
+    turning : arrays by which the place where elimination ends moves, None if it stays
     n_stations, n_kinds : in the matrix, and how many have different factors
     stations : Sections
     arrays : FactorArrays

@@ -205,7 +205,7 @@ class _HangingWires:
 
     Attributes
     ----------
-    moments : what exact elements add to all loads, None if they are Hermite's
+    moments : additions of exact elements to all loads, None if they are Hermite's
     """
 
     def __init__(self, model: Model, exact: bool = False) -> None:
