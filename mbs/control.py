@@ -120,7 +120,7 @@ class Controller(Protocol):
         """
 
     def state(self) -> np.ndarray:
-        """All that is remembered, as one array of a fixed shape."""
+        """Memory of the controller, as one array of a fixed shape."""
 
     def restore(self, state: np.ndarray) -> None:
         """Continue from what ``state`` returned."""

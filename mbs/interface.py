@@ -57,7 +57,7 @@ class Pantograph(Protocol):
         """Take the step predicted last with these contact forces (s,) [N]."""
 
     def state(self) -> np.ndarray:
-        """Everything needed to continue, as one array."""
+        """State to continue from, as one array."""
 
     def restore(self, state: np.ndarray) -> None:
         """Continue from what ``state`` returned."""

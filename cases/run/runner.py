@@ -347,7 +347,7 @@ def _observers(
     progress: Progress,
     n_steps: int,
 ) -> tuple[list[Observer], Recorder, RunWatch]:
-    """All that watches the march, the recorder last, and the one that judges it. Not collective.
+    """Observers of the march, the recorder last, and the one that judges it. Not collective.
 
     The state to continue from, which the recorder writes, stands for all before it. ``n_steps`` are
     those of the whole run, ``header`` is needed on rank 0.

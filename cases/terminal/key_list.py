@@ -111,7 +111,7 @@ def key_table() -> str:
 
 
 def key_details(wanted: str) -> str:
-    """All that is known of the keys that a filter leaves, several lines each.
+    """Details of the keys that a filter leaves, several lines each.
 
     ``wanted`` is a part of a key, or a pattern for all of it with ``*``, ``?`` and ``[...]``; if no
     key has that part, a part of a meaning.

@@ -77,7 +77,7 @@ class Strips:
 
     @property
     def contact_offsets(self) -> tuple[float, ...]:
-        """The same for each contact that may be: strip by strip, those of all wires together."""
+        """Offset of the strip of each possible contact [m]: strip by strip, all wires together."""
         return tuple(x for x in self.offsets for _ in range(self.wires))
 
     def compression(self, force: float) -> float:

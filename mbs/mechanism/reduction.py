@@ -297,7 +297,7 @@ class _Raised:
 
 
 def _refined(raised: _Raised, more: float, places: list[_Place], tolerance: float) -> list[_Place]:
-    """The same with further heights in between where splines miss the lift, such as at stops.
+    """Add places at heights in between where splines miss the lift, such as at stops.
 
     Splines through every second place are compared at the others, which costs no further place; one
     through all of them misses less. Where that is too much, places are put in between.

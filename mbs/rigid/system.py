@@ -76,11 +76,11 @@ class System:
         return initial_motion(self.bodies)
 
     def with_joints(self, *joints: Joint) -> System:
-        """The same with further joints."""
+        """Return this system with further joints."""
         return replace(self, joints=(*self.joints, *joints))
 
     def with_forces(self, *forces: Force) -> System:
-        """The same with further forces."""
+        """Return this system with further forces."""
         return replace(self, forces=(*self.forces, *forces))
 
     def force(self, name: str) -> Force:
@@ -91,7 +91,7 @@ class System:
         raise InputError(f"There is no force {name!r} among {[f.name for f in self.forces]}.")
 
     def with_force_changed(self, name: str, **changes: Any) -> System:
-        """The same with other values in the force of this name."""
+        """Return this system with other values in the force of this name."""
         self.force(name)
         return replace(
             self,

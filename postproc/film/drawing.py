@@ -146,7 +146,7 @@ class Drawing:
             write(0.985, 0.965, "- - -  slack", fontsize=14, color=drawn.SLACK, ha="right")
 
     def _add_lines(self, strongest: float | None) -> None:
-        """All that moves, empty, from behind to the front."""
+        """Add the moving artists, empty, from behind to the front."""
         axes = self._axes
 
         def lines(**how: Any) -> LineCollection:

@@ -149,7 +149,7 @@ def film_data(results: Results) -> FilmData:
 
 
 def _excited(data: FilmData, excitation: Excitation) -> FilmData:
-    """The same of a line that an excitation sets into motion."""
+    """Data of a film of a line that an excitation sets into motion."""
     position, force = (of(data.time)[:, None] for of in (excitation.place, excitation.value))
     return replace(
         data,

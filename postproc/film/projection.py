@@ -108,7 +108,7 @@ class Picture:
 
     @classmethod
     def of(cls, view: View, data: FilmData, roof: float, width: float, aspect: float) -> Picture:
-        """That of a run, from the train's roof to above the wires; from above, from side to side.
+        """Frame of a run, from the train's roof to above the wires; from above, from side to side.
 
         From behind lengths are not seen: one metre of height is one metre of the picture.
         """

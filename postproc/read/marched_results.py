@@ -86,4 +86,4 @@ class MarchedFile:
         return None, []
 
     def close(self) -> None:
-        """Nothing is open."""
+        """Do nothing: no file is open."""

@@ -210,7 +210,7 @@ def _in_order(table: h5py.Dataset, n: int, dt: float | None) -> int:
 
 
 def _missing_end(about: dict[str, Any], n: int) -> list[str]:
-    """That the file says it holds more steps than it does."""
+    """Fault of a file that holds fewer steps than it says; none otherwise."""
     wanted = about.get("n_steps")
     if wanted is None or about["outcome"] == RUNNING or n == wanted + 1:
         return []

@@ -72,7 +72,7 @@ class StudyFigure:
 
 @dataclass(frozen=True)
 class Study:
-    """All that a study found. The first reading is the case as it stands."""
+    """Results of a study. The first reading is the case as it stands."""
 
     title: str
     lead: str

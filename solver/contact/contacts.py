@@ -1,4 +1,4 @@
-"""All that the contacts of a rank work on, as kernels take it; see ``kernels/contact``."""
+"""Arrays of the contacts of a rank, as kernels take them; see ``kernels/contact``."""
 
 from __future__ import annotations
 

@@ -81,7 +81,7 @@ class FollowedLinks:
 
     @property
     def followed(self) -> Followed:
-        """The same as kernels take it."""
+        """Followed links as kernels take them."""
         links = self.numbers, self.links, self.reserve, self.moving
         return Followed(*links, self.dependents, self.dependent_numbers)
 

@@ -272,7 +272,7 @@ def _columns_of_nodes(
     dofs, nodes = wires.dofs[chosen][:, :, None], wires.nodes
 
     def put(found: ShortColumns, which: np.ndarray) -> None:
-        """Let nodes know of the columns of some."""
+        """Enter the columns of some nodes in the table of nodes."""
         mine = chosen[which]
         nodes["begin"][mine], nodes["at"][mine] = found.start[which], found.at[which]
         nodes["width"][mine] = found.width[which]

@@ -116,7 +116,7 @@ def march_side_by_side(
 
 
 def _begin(shared: SharedLine, lane: Lane, number: int, at_rest: LineAtRest) -> _OnItsWay:
-    """Let a scene begin in a lane."""
+    """Begin the march of a scene in a lane."""
     problem, model, form, lift = at_rest
     model = replace(model, problem=problem, simulated=simulated(problem))
     laws, train = model.simulated, problem.train

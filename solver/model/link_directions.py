@@ -80,7 +80,7 @@ def across_droppers(model: Model) -> tuple[Direction, np.ndarray]:
 
 
 def sideways_of_droppers(model: Model) -> tuple[Direction, np.ndarray]:
-    """The same in the plane across the track, at right angles to ``across_droppers``."""
+    """Transverse stiffness across the track, at right angles to that of ``across_droppers``."""
     unit, pull = _unit_vectors(model)
     return _along(model, np.cross(unit, _across(unit)), (_SIDEWAYS,)), pull
 

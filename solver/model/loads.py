@@ -33,7 +33,7 @@ class TimeFunction(NamedTuple):
 
 
 def constant(value: float = 1.0) -> TimeFunction:
-    """The same at all times."""
+    """A constant ``value`` at all times."""
     return TimeFunction(CONSTANT, np.array([value], dtype=float))
 
 

@@ -111,7 +111,7 @@ class Wind:
         return math.sqrt(_DAVENPORT) * self.gusts.friction_velocity / self.mean
 
     def with_gusts(self, gusts: Gusts | None) -> Wind:
-        """The same mean wind with other gusts."""
+        """Return this mean wind with other gusts."""
         return replace(self, gusts=gusts)
 
     @property

@@ -93,7 +93,7 @@ class StepError:
         self._known = min(self._known + 1, _PAST)
 
     def state(self) -> np.ndarray:
-        """All that is remembered, as one array of fixed length."""
+        """Memory of the estimate, as one array of fixed length."""
         times, depths, forces = self._past
         return np.concatenate([[self._known], forces, times, depths.ravel()], dtype=float)
 

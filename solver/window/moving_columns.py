@@ -57,7 +57,7 @@ def columns_of(
 
 
 def widen(stations: np.ndarray, begin: int, end: int) -> None:
-    """Let a range (2,) of stations take in those from ``begin`` to ``end``."""
+    """Extend a range (2,) of stations, in place, to those from ``begin`` to ``end``."""
     stations[0] = min(int(stations[0]), begin)
     stations[1] = max(int(stations[1]), end)
 

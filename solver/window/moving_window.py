@@ -282,7 +282,7 @@ class MovingWindow:
         return np.array([*arrays.state, *arrays.ends[2:4], *arrays.peak], dtype=float)
 
     def wake(self) -> None:
-        """Let all stations move until the next look, as after a change of the line's motion."""
+        """Open the window to all stations until the next look, as after a change of the motion."""
         arrays = self.arrays
         arrays.state[:] = 0, 1
         self._open(0, arrays.low.size)

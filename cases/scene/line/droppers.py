@@ -170,7 +170,7 @@ class DropperTable(HangingTable):
 
 
 def one_pre_sag_each(pre_sag: list[float] | None, n_droppers: int) -> None:
-    """That a list of pre-sags has one per dropper; ValueError if not, with a predicate."""
+    """Raise ValueError, with a predicate, unless a list of pre-sags has one per dropper."""
     if pre_sag is not None and len(pre_sag) != n_droppers:
         raise ValueError(
             f"must give one pre_sag_mm per dropper, but there are {len(pre_sag)} values "

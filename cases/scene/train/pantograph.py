@@ -262,7 +262,7 @@ class MultibodyTable(_Pressing):
         return {key: value for key, value in plain.items() if key not in idle}
 
     def in_force(self) -> MultibodyTable:
-        """The same with the published numbers in place, if ``as_published``.
+        """Return this table with the published numbers in place, if ``as_published``.
 
         Raises
         ------

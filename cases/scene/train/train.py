@@ -211,7 +211,7 @@ class VehicleTable(Table):
 
 
 def vehicle_of(table: VehicleTable) -> VehicleMotion:
-    """All that moves the bases, in both directions."""
+    """Sources of motion of the pantographs' bases, in both directions."""
     track = table.irregularity
     both: tuple[Source, ...] = ()
     if track is not None:

@@ -100,7 +100,7 @@ def switchable_effects(scene: Scene) -> SwitchableEffects:
 
 
 def _taken_along(name: str, among: Iterable[str], takes: Callable[[str, str], bool]) -> list[str]:
-    """All that an effect takes along, directly and through others, in the registry's order."""
+    """Effects that one takes along, directly and through others, in the registry's order."""
     found, ahead, left = set(), [name], [other for other in among if other != name]
     while ahead:
         one = ahead.pop()

@@ -377,7 +377,7 @@ _PLAIN = ("runs to its end", "everything is finite", "the fixed-point correction
 
 
 def criteria(found: Sequence[Criterion], told: Told) -> StudyTable:
-    """All that was measured, a row each, and a row with the remarks on each case that has any."""
+    """Table of criteria, a row each, and a row with the remarks on each case that has any."""
     names = ("case", "criterion", "value", "limit", "kept", "note")
     rows: list[tuple[str, ...]] = [
         (row.case, row.name, f"{row.value:.3g}", f"{row.limit:.3g}", "yes" if row.passed else "no",

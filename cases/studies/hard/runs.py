@@ -152,7 +152,7 @@ class Watcher(Observer):
                 self._add_work()
 
     def watched(self, outcome: str, counters: dict[str, int]) -> Watched:
-        """All that was seen."""
+        """Return the record of the march."""
         if self._states:
             self._add_work()
         return Watched(

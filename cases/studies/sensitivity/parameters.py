@@ -88,7 +88,7 @@ class Parameter:
 
     @property
     def unit(self) -> str:
-        """That the key names."""
+        """Unit that the key names, mm for the length of a dropper."""
         return "mm" if _OF_DROPPER.fullmatch(self.key) else unit_of(self.key)
 
     @property
@@ -292,7 +292,7 @@ def _change(raw: dict[str, Any], parameter: Parameter, by: float) -> None:
 
 
 def _lengthen(raw: dict[str, Any], span: int, number: int, error: float) -> None:
-    """Let a dropper have an error of its length [mm]."""
+    """Give a dropper an error of its length [mm]."""
     lengths = raw.setdefault("irregularities", {}).setdefault("dropper_lengths", {})
     others = [own for own in lengths.get("by_dropper", []) if own[:2] != [span, number]]
     lengths["by_dropper"] = [*others, [span, number, error]]

@@ -117,7 +117,7 @@ class WireMotion:
     def seen(
         self, position: Callable[[np.ndarray], np.ndarray], struck: float = np.nan
     ) -> WavesSeen:
-        """All that was added; ``position`` gives (t, p) of what moves at times (t,).
+        """Return all that was added; ``position`` gives the places (t, p) that move at times (t,).
 
         Raises
         ------
@@ -267,7 +267,7 @@ class EnergyMotion:
         self._before = time, now
 
     def seen(self) -> EnergySeen:
-        """All that was added."""
+        """Return all that was added."""
         return EnergySeen(np.array(self._times), self._middles, np.array(self._rows))
 
     def _density(self, uplift: np.ndarray, velocity: np.ndarray) -> np.ndarray:

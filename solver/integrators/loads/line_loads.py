@@ -119,7 +119,7 @@ class LineLoads:
         self.read(None)
 
     def read(self, motion: LineState | None) -> None:
-        """Let forces that remember a motion take it from here. Not collective."""
+        """Set the motion that forces with memory read. Not collective."""
         if self.memories is not None:
             self.memories.read(motion)
             self.arguments = self.arguments._replace(memories=self.memories.arguments)

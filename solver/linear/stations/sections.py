@@ -84,7 +84,7 @@ class Sections:
         return Places(self.starts[:-1].astype(np.int64), self.station_type.astype(np.uint8))
 
     def padded(self) -> Sections:
-        """The same with a station of all places more at both ends."""
+        """Return these sections with a further station of all places at both ends."""
         whole = tuple(range(self.width))
         station_types = (
             self.station_types if whole in self.station_types else (*self.station_types, whole)

@@ -70,13 +70,13 @@ class Layout:
 
     @property
     def key(self) -> tuple[object, ...]:
-        """All that makes a layout."""
+        """Parameters of the layout, hashable."""
         own = self.widths, self.own.tobytes(), self.beside.tobytes()
         more = self.damped, self.station_types, self.factors, self.number
         return (*own, *more, None if self.whole is None else self.whole.key)
 
     def changed(self, **settings: Any) -> Layout:
-        """The same with some other parameters, by their names."""
+        """Return this layout with some other parameters, by their names."""
         return Layout(**{**{name: getattr(self, name) for name in _SETTINGS}, **settings})
 
     @property
