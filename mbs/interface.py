@@ -63,7 +63,7 @@ class Pantograph(Protocol):
         """Continue from what ``state`` returned."""
 
     def places(self) -> np.ndarray:
-        """Numbers that say where its masses or bodies are, (k,); a view or a copy.
+        """Coordinates of its masses or bodies, (k,); a view or a copy.
 
         Heights of lumped masses and of an arm, and angles of a head; of a mechanism that is moved
         body by body its positions and Euler parameters.

@@ -150,7 +150,7 @@ class SteadyArms:
     x: tuple[float, ...]
 
     def vertical_stiffness(self, wire: Wire) -> np.ndarray:
-        """Of each at ``wire``, which they hold, where nothing moves sideways, (n,) [N/m]."""
+        """Stiffness (n,) of each at ``wire``, which they hold, if nothing moves sideways [N/m]."""
         if not self.kind.by_radial_force:
             return np.full(len(self.x), self.kind.stiffness)
         return np.abs(wire.radial_force(np.array(self.x))) / self.kind.length

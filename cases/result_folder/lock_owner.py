@@ -37,7 +37,7 @@ class Owner:
     since: str
 
     def text(self) -> str:
-        """As the lock file holds it."""
+        """Text of the lock file: the owner as JSON."""
         return json.dumps(asdict(self), indent=1) + "\n"
 
     @property

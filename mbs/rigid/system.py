@@ -34,7 +34,7 @@ _MOST_ITERATIONS = 30
 
 
 class Miss(NamedTuple):
-    """By how much a joint is open: ``gap`` [m], and ``tilt``, cosines off right angles."""
+    """Error of an open joint: ``gap`` [m], and ``tilt``, cosines off right angles."""
 
     joint: str
     gap: float
@@ -198,7 +198,7 @@ class System:
         return 6 * motion.n_bodies - len(independent_rows(self.constraints(motion, 0.0).jacobian))
 
     def misses(self, motion: Motion, time: float = 0.0) -> tuple[Miss, ...]:
-        """By how much each joint is open."""
+        """Errors of all joints."""
         found, result = self.constraints(motion, time).value, []
         for joint in self.joints:
             error = found[self.row_ranges[joint.name]]

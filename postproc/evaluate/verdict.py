@@ -105,7 +105,7 @@ def verdict(criteria: Sequence[Criterion]) -> bool | None:
 
 
 def verdict_sentence(criteria: Sequence[Criterion], supply: str) -> str:
-    """By which books a run is judged, and how many criteria each verdict has.
+    """Sentence on the books that judge a run, and the number of criteria with each verdict.
 
     Parameters
     ----------

@@ -82,7 +82,7 @@ class MarchedFile:
         return self._extremes
 
     def state(self) -> tuple[None, list[str]]:
-        """There is nothing to continue from."""
+        """Return no state to continue from."""
         return None, []
 
     def close(self) -> None:

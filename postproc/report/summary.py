@@ -187,7 +187,7 @@ def _static(results: Results) -> dict[str, Any]:
 
 
 def _elasticity_of_wires(results: Results) -> dict[str, Any]:
-    """Of each of several contact wires pressed alone, by its name."""
+    """Elasticity of each of several contact wires pressed alone, by its name."""
     names = results.wires_of(Role.CONTACT)
     if len(names) == 1:
         return {}

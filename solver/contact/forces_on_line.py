@@ -33,7 +33,7 @@ from catenary.solver.statics.form_finding.equilibrium import Equilibrium
 def sideways_of(
     model: Model, form: Equilibrium, wires: ContactWires, ownership: Ownership
 ) -> Sideways:
-    """Of a line with lateral motion, which is at rest in ``form``."""
+    """Lateral data of a line with lateral motion, which is at rest in ``form``."""
     dofs = np.stack([model.dofs(wires.mesh_nodes, name) for name in ("v", "theta_z")], axis=1)
     mine = ownership.owned(dofs)
     local = np.where(mine, dofs - ownership.first, 0).astype(np.int64)

@@ -47,7 +47,7 @@ class PassArrays(NamedTuple):
 
 
 class Changes(NamedTuple):
-    """Numbers that take a state from one prediction to the next.
+    """Coefficients that take a state from one prediction to the next.
 
     Attributes
     ----------
@@ -169,7 +169,7 @@ class StationPasses:
 
 
 def changes_of(motion: PredictedLineState, steps: Steps | AlphaSteps, by_mass: float) -> Changes:
-    """Numbers that take a state from one prediction to the next."""
+    """Coefficients that take a state from one prediction to the next."""
     by_position, by_velocity, _ = map(float, motion.gains)
     nothing = 0.0, 0.0
     if isinstance(steps, Steps):

@@ -262,7 +262,7 @@ class UnitResponses:
         return min(self.windows.reach, _MARGIN * furthest)
 
     def _bands(self, end: float) -> OperatorBands:
-        """Of A up to a place [m]."""
+        """Bands of A up to a place [m]."""
         _, last = self.windows.numbering.within(-np.inf, end)
         return OperatorBands(self._model, self._coefficients, last)
 

@@ -137,7 +137,7 @@ class StepLevels:
 
     @property
     def counters(self) -> Counters:
-        """Of all levels together."""
+        """Counters of all levels together."""
         return self._counters
 
     @counters.setter

@@ -128,7 +128,7 @@ class StripsTable(Table):
 
     @property
     def mass(self) -> float:
-        """Of all strips that have springs of their own [kg]."""
+        """Mass of all strips that have springs of their own [kg]."""
         return 0.0 if self.mass_kg is None else self.number * self.mass_kg
 
     @property

@@ -145,7 +145,7 @@ def _pairs(
 def uncertainties(
     reference: Found | None, chains: Sequence[Sequence[Found | None]]
 ) -> dict[str, float]:
-    """By how much a reference may be wrong itself, by quantity [%]; infinite if it is not known.
+    """Uncertainty of a reference itself, by quantity [%]; infinite if it is not known.
 
     Each of ``chains`` holds three runs, of which each has half the fineness of the one before it in
     one size. With d and D, by what the first two and the last two differ, the observed order is

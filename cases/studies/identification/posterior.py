@@ -50,7 +50,7 @@ class Posterior:
 
     @property
     def correlation(self) -> np.ndarray:
-        """Of the parameters (m, m)."""
+        """Correlation of the parameters (m, m)."""
         return self.covariance / np.outer(self.widths, self.widths)
 
     @property
@@ -65,8 +65,8 @@ class Posterior:
 
     @property
     def condition(self) -> float:
-        """Of J: root of the largest information over the least; infinite if data do not depend on a
-        direction."""
+        """Condition of J: root of the largest information over the least; infinite if data do not
+        depend on a direction."""
         least = self.information[-1]
         return float(np.sqrt(self.information[0] / least)) if least > 0.0 else float("inf")
 

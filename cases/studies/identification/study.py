@@ -158,7 +158,7 @@ class _Compared:
         return np.concatenate(rows)
 
     def _by(self, at: np.ndarray) -> list[float]:
-        """By how much the parameters of the scene are changed, in their units."""
+        """Changes of the parameters of the scene, in their units."""
         return list(self._offsets + self._deviations * at[: self._offsets.size])
 
 

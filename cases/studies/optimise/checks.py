@@ -158,7 +158,7 @@ def _figures(summary: Mapping[str, Any], pantograph: Mapping[str, Any]) -> dict[
 
 
 def change(row: Row, statistic: str) -> float:
-    """By how much a statistic changes, over its value as shipped; that of shares as they are.
+    """Relative change of a statistic over its value as shipped; of shares the change itself.
 
     Zero where a run does not give it.
     """

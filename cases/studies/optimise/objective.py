@@ -223,7 +223,7 @@ class Problem:
 
     @property
     def _counts(self) -> list[bool]:
-        """Of which scenes the objective is."""
+        """Whether each scene counts in the objective."""
         speeds = self.objective.speeds_km_h
         return [speeds is None or member.speed in speeds for member in self.scenes.members]
 

@@ -54,7 +54,7 @@ class BoundTable(Table):
         return f"{self.statistic} <= {self.at_most:g}"
 
     def margin(self, value: float) -> float:
-        """By how much a value is within the bound, in its unit; negative beyond."""
+        """Distance of a value from the bound, in its unit; negative beyond."""
         if self.at_least is not None:
             return value - self.at_least
         assert self.at_most is not None

@@ -108,14 +108,14 @@ class Parameter:
 
     @property
     def step(self) -> float:
-        """By how much it is changed to differentiate set-ups."""
+        """Step by which it is changed to differentiate set-ups, in its unit."""
         if self.size > 0.0:
             return _STEP * self.size
         return _STEP_OF_ZERO.get(self.unit, _USUAL_STEP_OF_ZERO)
 
     @property
     def change(self) -> float:
-        """By how much a table lets it change: a millimetre, kilogram or newton, a kilonewton of
+        """Change of it that a table shows: a millimetre, kilogram or newton, a kilonewton of
         tension, or a hundredth of itself."""
         for end, by in _CHANGES_OF_FORCES.items():
             if self.key.endswith(end) and by < self.size:

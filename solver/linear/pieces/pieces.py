@@ -78,7 +78,7 @@ class Pieces:
 
     @property
     def n_stations(self) -> int:
-        """Of the line."""
+        """Number of stations of the line."""
         return int(self.edges[-1])
 
     @property
