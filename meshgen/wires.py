@@ -88,7 +88,7 @@ class Piece:
 
 @dataclass(frozen=True)
 class Section:
-    """Where a wire runs level in a tension section, and how far it rises to either end of it.
+    """Level part of a wire in a tension section, and its rise to either end of it.
 
     ends, running : from and to of the section, and of where the wire is level [m]
     rise : height gained from there to the start, and to the end [m]

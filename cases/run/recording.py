@@ -223,7 +223,7 @@ def _field_every(
 
 
 def _field_record(output: OutputTable, problem: Problem, reach: Reach | None) -> FieldRecord:
-    """Which part of the fields is recorded: what moves, unless the scene says how far."""
+    """Recorded part of the fields: the moving one, unless the scene says how far."""
     masts, train = problem.line.support_positions, problem.train
     spans, window = output.field_spans, output.field_window_m
     follows = spans is None and window is None and reach is not None

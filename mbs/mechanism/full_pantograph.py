@@ -185,7 +185,7 @@ class FullPantograph:
 
     @property
     def motion(self) -> Motion:
-        """Where all bodies are, from the base."""
+        """Positions of all bodies, from the base."""
         return self._stepper.motion
 
     def follow(self, part: Callable[[float], float]) -> None:

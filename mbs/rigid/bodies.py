@@ -86,7 +86,7 @@ class Body:
 
 @dataclass(frozen=True)
 class Motion:
-    """Where n bodies are and how they move; the last row of each array is the frame at rest.
+    """Positions and velocities of n bodies; the last row of each array is the frame at rest.
 
     ``position`` (n + 1, 3) [m], ``parameters`` (n + 1, 4), ``velocity`` (n + 1, 3) [m/s] in space
     axes, ``spin`` (n + 1, 3) [rad/s], the angular velocities in body axes. Displacements and

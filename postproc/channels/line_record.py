@@ -1,4 +1,4 @@
-"""Which part of the line's channels is recorded: cadence, window, stretch, names, compression."""
+"""Recorded part of the line's channels: cadence, window, stretch, names, compression."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where contact wires were on the strips of pantographs, beside how long these are."""
+"""Lateral places of contact wires on the strips of pantographs, beside the strips' length."""
 
 from __future__ import annotations
 

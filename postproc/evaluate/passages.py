@@ -88,6 +88,6 @@ def uplift_onset(results: Results) -> float | None:
 
 
 def leading_position(results: Results) -> np.ndarray:
-    """Where the foremost pantograph is at each record, (n,) [m]."""
+    """Place of the foremost pantograph at each record, (n,) [m]."""
     foremost = int(np.argmax(results.first_position))
     return results.column("contact_position", foremost)

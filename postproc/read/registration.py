@@ -58,7 +58,7 @@ class Registration(NamedTuple):
 
     @property
     def pushed(self) -> np.ndarray:
-        """Which arms their wires push, (n,) bool."""
+        """Mask of the arms that their wires push, (n,) bool."""
         return self.tension < 0.0
 
     def warnings(self) -> list[str]:

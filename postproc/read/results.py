@@ -141,7 +141,7 @@ class Results(TrainOfRun):
 
     @property
     def line_record(self) -> LineRecord:
-        """Which part of the line's channels is recorded."""
+        """Recorded part of the line's channels."""
         return self._file.record
 
     @property

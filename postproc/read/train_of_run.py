@@ -82,5 +82,5 @@ class TrainOfRun(LineOfRun):
 
     @property
     def first_position(self) -> np.ndarray:
-        """Where the pantographs are in the first record, (n_pantographs,) [m]."""
+        """Places of the pantographs in the first record, (n_pantographs,) [m]."""
         return np.asarray(self._file["channels/contact_position"][0])

@@ -249,7 +249,7 @@ class ValidatedFile:
 
     @cached_property
     def records(self) -> Records:
-        """Which records are valid."""
+        """Valid records of the file."""
         dt = float(self.facts["time_step"])
         return scan(self._file, self.attrs, self.record, dt, self._faults, self._complete)
 

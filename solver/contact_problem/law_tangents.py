@@ -28,7 +28,7 @@ class Tangents(NamedTuple):
 
 
 class ReportedForces(NamedTuple):
-    """Which forces of n contacts are reported at the end of a step.
+    """Reported forces of n contacts at the end of a step.
 
     Attributes
     ----------

@@ -95,7 +95,7 @@ class FeltFurther(RunBroken):
 
 
 class Windows(NamedTuple):
-    """Where along the line unknowns stand, and which of them a force at x can move.
+    """Windows of unknowns that a force at x can move.
 
     Attributes
     ----------
@@ -337,7 +337,7 @@ class Cuts(NamedTuple):
 
 
 class Places(NamedTuple):
-    """Where columns are wanted, and their windows.
+    """Places at which columns are wanted, and their windows.
 
     ``first`` and ``last`` (n,) are stations of the windows; ``begin`` and ``width`` (n,) the local
     unknowns in them that this rank owns.

@@ -27,7 +27,7 @@ from catenary.solver.problem.watched_links import (
 
 
 class GaugePlace(NamedTuple):
-    """Where a gauge is: number of its wire in the line, place [m], and on which side of the wire:
+    """Place of a gauge: number of its wire in the line, place [m], and on which side of the wire:
     -1 where the wire begins there, 1 where it ends there."""
 
     wire: int

@@ -56,7 +56,7 @@ class Reach(NamedTuple):
 
 
 def window_sentence(problem: Problem) -> str:
-    """Which part of the line moves, in words; empty if all of it does. Not collective."""
+    """Moving part of the line, in words; empty if all of it moves. Not collective."""
     window = problem.window
     if not window.moves:
         return ""

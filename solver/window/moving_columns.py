@@ -1,4 +1,4 @@
-"""Which columns of what a step shows change with which stations of a line."""
+"""Columns of the rows that steps show, which change with the moving stations of a line."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def widen(stations: np.ndarray, begin: int, end: int) -> None:
 
 
 class MovingColumns:
-    """Which columns of what steps show have changed since the rows shown before them.
+    """Columns of the rows that steps show, with those that changed since the rows before.
 
     Those who step the line keep it up to date. Not collective.
     """

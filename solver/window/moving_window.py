@@ -89,7 +89,7 @@ _AROUND = 192
 
 
 class MovingWindow:
-    """Which stations move. Not collective.
+    """Window of the stations that move. Not collective.
 
     Attributes
     ----------

@@ -41,7 +41,7 @@ Curve = Annotated[list[PAIR], Field(min_length=2, max_length=20), AfterValidator
 
 
 class DropperPattern(Table):
-    """Where the droppers of all spans of one length hang, or of spans by their numbers."""
+    """Places of the droppers in all spans of one length, or in spans by their numbers."""
 
     span_m: Span | None = Field(None, description="length of the spans that have this pattern")
     spans: list[Annotated[int, Field(ge=1, le=20_000)]] | None = Field(

@@ -140,7 +140,7 @@ _WIRE = "name of a wire of the line, such as contact_wire, messenger_wire"
 
 
 class DropperDefectTable(Table):
-    """Which dropper it is."""
+    """Defect of a dropper, with its place."""
 
     span: int = Field(ge=1, le=20_000, description="number of its span, from 1")
     dropper: int = Field(ge=1, le=200, description="its number in the span, from 1")

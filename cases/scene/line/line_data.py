@@ -317,7 +317,7 @@ def _droppers(
 
 
 def overlaps_of(table: LineTable) -> Overlaps | None:
-    """Where a line's tension sections overlap; None if it has one section.
+    """Overlaps of a line's tension sections; None if it has one section.
 
     Overlaps are repeated as long as a running span is left behind them.
     """

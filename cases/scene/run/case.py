@@ -130,7 +130,7 @@ _AroundTrain = Annotated[
 
 
 class OutputTable(Table):
-    """Which files are written, and how much into them."""
+    """Files that are written, and how much into them."""
 
     field_every_s: float | None = Field(
         None,

@@ -1,4 +1,4 @@
-"""Which runs ``catenary accuracy`` needs: each setting once, whichever axes need it."""
+"""Runs that ``catenary accuracy`` needs: each setting once, whichever axes need it."""
 
 from __future__ import annotations
 

@@ -57,7 +57,7 @@ class Switch:
 
 @dataclass(frozen=True)
 class SwitchableEffects:
-    """Which effects of a scene can be switched, and why others cannot.
+    """Effects of a scene that can be switched, and why others cannot.
 
     Attributes
     ----------
@@ -72,7 +72,7 @@ class SwitchableEffects:
 
 
 def switchable_effects(scene: Scene) -> SwitchableEffects:
-    """Which effects of a scene can be switched. Not collective."""
+    """Find the effects of a scene that can be switched. Not collective."""
     problem, known = problem_of(scene), effects.registry()
     active = {effect.name for effect in effects.active(problem)}
     is_on = scene.switches()

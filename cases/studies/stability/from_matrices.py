@@ -104,7 +104,7 @@ def loads_at(wires: ContactWires, x: float, n_dofs: int) -> np.ndarray:
 def lightest_place(
     model: Model, wires: ContactWires, low: float, high: float, every: bool = False
 ) -> float | None:
-    """Where in [low, high] [m] the contact wires meet forces with the least mass.
+    """Place in [low, high] [m] where the apparent mass of the contact wires is least.
 
     Ends of elements and eight places in between are tried, of those where a head meets the most
     wires; None where wires are too far apart in height for that, or if ``every`` one is wanted and

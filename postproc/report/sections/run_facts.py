@@ -184,7 +184,7 @@ def _facts(results: Results) -> list[tuple[str, str]]:
 
 
 def _of_program(results: Results) -> list[tuple[str, str]]:
-    """When and how fast the program ran, and its versions."""
+    """Time and speed of the program's run, and its versions."""
     about = results.attributes
     phases = about.get("phase_wall_s", {}).items()
     factors = [

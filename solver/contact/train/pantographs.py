@@ -82,7 +82,7 @@ def leads_of(wires: ContactWires, wire: np.ndarray, rake: np.ndarray) -> Leads:
 
 
 class StripEnds(NamedTuple):
-    """Which contacts a strip has, and which strips a pantograph: numbers of the first ones, and of
+    """Contacts of each strip, and strips of each pantograph: numbers of the first ones, and of
     all; ``of_strip`` (n_strips + 1,), ``of_pantograph`` (n_pantographs + 1,)."""
 
     of_strip: np.ndarray

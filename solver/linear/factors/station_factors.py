@@ -60,7 +60,7 @@ def softened(whole: np.ndarray, eliminated: np.ndarray) -> np.ndarray:
 
 
 def edges(towards_end: np.ndarray, towards_start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Where steps of a part of the line may begin and end, from each station outwards, (n + 1,).
+    """Stations where steps of a part of the line may begin and end, from each outwards, (n + 1,).
 
     ``towards_end`` and ``towards_start`` (n,) are what ``softened`` says of each station after
     elimination to either side.

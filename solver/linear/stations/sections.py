@@ -16,7 +16,7 @@ from catenary.solver.model.unknowns.registry import Unknowns
 
 
 class Places(NamedTuple):
-    """Where stations stand in vectors, as kernels read it: arrays without entries if all are alike.
+    """Places of stations in vectors, for kernels: arrays without entries if all are alike.
 
     Attributes
     ----------
