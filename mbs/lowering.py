@@ -24,7 +24,7 @@ from catenary.solver.kernels import native
 
 @dataclass(frozen=True)
 class Lowering:
-    """How a pantograph is lowered from ``time`` [s] on.
+    """Lowering of a pantograph from ``time`` [s] on.
 
     The static force goes over to ``force`` [N] over ``within`` [s]; the head is caught ``drop``
     [m] below where it was at ``time``.

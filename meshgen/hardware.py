@@ -30,7 +30,7 @@ class DropperKind:
 
     @property
     def n_pieces(self) -> int:
-        """How many slopes their tension has."""
+        """Number of slopes of their tension."""
         return 1 if self.curve is None else len(self.curve) - 1
 
     def slopes_at(self, length: np.ndarray) -> Slopes:

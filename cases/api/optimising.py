@@ -164,7 +164,7 @@ def tolerance(
     force: bool = False,
     progress: bool = False,
 ) -> pd.DataFrame:
-    """How far an installation may be off for each criterion to hold. Not collective.
+    """Find the tolerances of an installation for each criterion to hold. Not collective.
 
     Parameters
     ----------

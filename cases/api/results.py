@@ -79,7 +79,7 @@ class Run:
 
     @property
     def outcome(self) -> str:
-        """How the run ended: "done", "interrupted", "running", or a sentence on the failure.
+        """End of the run: "done", "interrupted", "running", or a sentence on the failure.
 
         Examples
         --------

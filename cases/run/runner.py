@@ -133,7 +133,7 @@ def on_as_many(scene: Scene, comm: Any, run: Callable[[Any], T]) -> T:
 
 @dataclass
 class RunOutcome:
-    """How a run ended.
+    """Result of a run.
 
     ``outcome`` is "done", "interrupted" or the sentence of what broke; ``accepted`` the verdict
     of the standard, None if not judged; ``summary`` the content of ``summary.json``;

@@ -99,7 +99,7 @@ _BEYOND = 60.0
 
 
 class Marched(NamedTuple):
-    """How a scene ended.
+    """Result of a scene.
 
     Attributes
     ----------

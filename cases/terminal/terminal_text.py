@@ -121,7 +121,7 @@ def _waited(phase_wall: Mapping[str, float], waited: float | None) -> list[str]:
 
 
 def _sizes_of_steps(counted: Mapping[str, Any]) -> list[str]:
-    """How many steps of which size were taken, where steps adapt."""
+    """Numbers of steps of each size, where steps adapt."""
     if "rejected_steps" not in counted:
         return []
     sizes = [

@@ -34,7 +34,7 @@ class Bending(NamedTuple):
 
 @dataclass(frozen=True)
 class Flexure:
-    """How a strip bends.
+    """Bending of a strip.
 
     ``stiffness`` EI [N m2]; ``spring_distance`` [m] across the track between the two springs below;
     ``n_modes`` that are followed; ``damping_ratio`` of each as a free beam.

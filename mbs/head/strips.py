@@ -81,7 +81,7 @@ class Strips:
         return tuple(x for x in self.offsets for _ in range(self.wires))
 
     def compression(self, force: float) -> float:
-        """How far a force shared by all strips presses them into the head [m]."""
+        """Compression of the strips' springs under a force shared by all strips [m]."""
         if self.suspension is None:
             return 0.0
         return force / (self.number * self.suspension.stiffness)

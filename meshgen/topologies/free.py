@@ -225,7 +225,7 @@ class Loads:
 
 
 def sag_between(x: np.ndarray, held: np.ndarray, loads: Loads, wire: Conductor) -> np.ndarray:
-    """How far a string hangs below the straight line between neighbouring places ``held`` (m,).
+    """Sag of a string below the straight line between neighbouring places ``held`` (m,).
 
     Parameters
     ----------

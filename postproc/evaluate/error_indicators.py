@@ -163,7 +163,7 @@ def _spectrum(values: np.ndarray, dt: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def memory(omega: np.ndarray, alpha: float, beta: float) -> np.ndarray:
-    """How long a component of the contact force is remembered, shape (n,) [s].
+    """Memory time of each component of the contact force, shape (n,) [s].
 
     A wave exp(i (w t - k x)) on a string with C = alpha K + beta M has
     k = (w / c) sqrt((1 - i beta / w) / (1 + i alpha w)). Over the length 1 / |Im k| on which it

@@ -70,7 +70,7 @@ def mid_span(results: Results) -> np.ndarray:
 
 
 def uplift_onset(results: Results) -> float | None:
-    """How far before an evaluated arm the leading head is when its uplift has begun [m].
+    """Distance of the leading head before an evaluated arm when the arm's uplift has begun [m].
 
     The smallest value of all arms; negative if an arm moves only after the head has passed. None
     without arms in the stretch.

@@ -1,4 +1,4 @@
-"""How places and motions of a line become points of a picture, by where it is looked at from.
+"""Projection of places and motions of a line to points of a picture, by the view.
 
 A line is a thousand times longer than it moves: heights and widths are drawn larger than lengths,
 and motions from rest larger still. All factors stand in the picture.

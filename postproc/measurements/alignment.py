@@ -56,7 +56,7 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Alignment:
-    """How a measured force lies on that of a run.
+    """Alignment of a measured force with that of a run.
 
     Attributes
     ----------

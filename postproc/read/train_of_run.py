@@ -69,7 +69,7 @@ class TrainOfRun(LineOfRun):
         return told or [{} for _ in range(self.n_pantographs)]
 
     def pantograph_names(self) -> list[str]:
-        """How the pantographs are called, by their order on the train."""
+        """Names of the pantographs, by their order on the train."""
         n = self.n_pantographs
         if n == 1:
             return ["pantograph"]

@@ -56,7 +56,7 @@ class Reading:
 
     @property
     def n_reproduced(self) -> int:
-        """How many statements are reproduced."""
+        """Number of reproduced statements."""
         return sum(one.verdict == REPRODUCED for one in self.findings)
 
 

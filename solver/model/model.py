@@ -176,7 +176,7 @@ class Model:
 
     @property
     def n_unknowns(self) -> int:
-        """How many unknowns all nodes have."""
+        """Number of unknowns of all nodes."""
         return self.numbering.n_unknowns
 
     @property

@@ -15,7 +15,7 @@ _DAVENPORT = 6.0
 
 @dataclass(frozen=True)
 class Profile:
-    """How the mean speed grows with the height above ground.
+    """Profile of the mean speed over the height above ground.
 
     ln(z / ``roughness``) [m], or with an ``exponent`` z to the power of it.
     """

@@ -1,4 +1,4 @@
-"""How much of a line a step takes on: all of it, or a window that moves with the train."""
+"""Part of a line that a step computes: all of it, or a window that moves with the train."""
 
 from __future__ import annotations
 

@@ -56,7 +56,7 @@ from catenary.solver.window.moving_columns import MovingColumns
 
 @dataclass
 class Outcome:
-    """How a march ended.
+    """Result of a march.
 
     ``outcome`` is "done", "interrupted" or the sentence of what broke; ``wall`` [s] the time of the
     time loop alone, changes of the line on the way included, and ``cpu`` [s] what of it this

@@ -273,7 +273,7 @@ class MovingWindow:
 
     @property
     def n_stations(self) -> int:
-        """How many stations move."""
+        """Number of moving stations."""
         return int(self.arrays.ends[3] - self.arrays.ends[2])
 
     def state(self) -> np.ndarray:

@@ -30,7 +30,7 @@ SIDES = ("start", "end")
 
 
 def end_sentences(problem: Problem) -> tuple[str, str]:
-    """How the line begins and how it ends, in words."""
+    """Begin and end of the line, in words."""
     start, end = (f"{side} {_of_end(kind)}" for side, kind in zip(SIDES, problem.ends, strict=True))
     return start, end
 

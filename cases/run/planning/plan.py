@@ -201,7 +201,7 @@ def make_plan(scene: Scene, mesh: LineMesh | None = None) -> Plan:
 
 
 def _moving(problem: Problem, needs: Needs, n_dofs: int) -> str:
-    """How much of the line moves with a window, and what that is worth."""
+    """Sentence on the part of the line that moves with a window, and its benefit."""
     window = problem.window
     if not window.moves:
         return ""

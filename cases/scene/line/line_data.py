@@ -332,7 +332,7 @@ def overlaps_of(table: LineTable) -> Overlaps | None:
 
 
 def along_of(table: LineTable) -> AlongTrack:
-    """How the wires of a line end along the track, and what else holds them."""
+    """Ends of a line's wires along the track, and their other fixings."""
     given = table.tensioner
     return AlongTrack(
         tensioner=Tensioner(

@@ -39,7 +39,7 @@ SomeInertia = _no_less(LEAST_INERTIA, "kg m2")
 
 
 class FlexureTable(Table):
-    """How strips on springs of their own bend, as beams whose ends are free."""
+    """Bending of strips on springs of their own, as beams whose ends are free."""
 
     bending_stiffness_N_m2: float = Field(gt=0, le=1e9, description="EI of a strip")
     spring_distance_m: float = Field(

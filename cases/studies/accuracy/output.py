@@ -187,7 +187,7 @@ def runs_with_remarks(found: Measured) -> list[tuple[str, Sequence[str]]]:
 
 
 def uncertainty_text(planned: PlannedAxis, percent: Mapping[str, float]) -> str:
-    """How far the reference itself may be wrong, and from which runs that is known."""
+    """Sentence on the uncertainty of the reference, and the runs that it is known from."""
     chains = [", ".join(map(run_in_words, chain)) for chain in planned.chains]
     from_runs = " and from ".join(chains)
     known = {what: value for what, value in percent.items() if math.isfinite(value)}

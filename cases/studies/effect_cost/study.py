@@ -178,7 +178,7 @@ class Measured:
 
     @property
     def cost(self) -> float:
-        """How many times as long a step takes with the effect as without."""
+        """Ratio of the times of a step with the effect and without."""
         return 1.0 / self.ratio if self.switch.on else self.ratio
 
 

@@ -50,7 +50,7 @@ def statement_in(folder: Path) -> dict[str, Any]:
 
 
 def section(statement: Mapping[str, Any] | None, run: EvaluatedRun) -> Section:
-    """How the program that made a run was validated.
+    """Validation of the program that made a run.
 
     Parameters
     ----------

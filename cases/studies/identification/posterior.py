@@ -55,7 +55,7 @@ class Posterior:
 
     @property
     def n_found(self) -> float:
-        """How many parameters the data determine: degrees of freedom for signal."""
+        """Number of parameters that the data determine: degrees of freedom for signal."""
         return float((self.information / (1.0 + self.information)).sum())
 
     @property

@@ -132,7 +132,7 @@ class Uplift(Table):
 
 
 class Tolerances(Table):
-    """How far a run may be from the measurement, in place of the usual ones."""
+    """Tolerances of a run against the measurement, in place of the usual ones."""
 
     mean_N: POSITIVE | None = None
     std_percent: POSITIVE | None = None

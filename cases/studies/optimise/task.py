@@ -73,7 +73,7 @@ class ConstraintTable(BoundTable):
 
 
 class SearchTable(Table):
-    """How the optimum is searched."""
+    """Search for the optimum."""
 
     methods: list[Literal["gradient", "cma"]] = Field(
         ["gradient"],

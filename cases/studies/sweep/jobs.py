@@ -81,7 +81,7 @@ class Job:
 
 
 class RunOptions(NamedTuple):
-    """How the runs of a sweep or study are made.
+    """Options for the runs of a sweep or study.
 
     Attributes
     ----------
@@ -102,7 +102,7 @@ AS_USUAL = RunOptions()
 
 @dataclass(frozen=True)
 class Ended:
-    """How a variant ended.
+    """Result of a variant.
 
     Attributes
     ----------

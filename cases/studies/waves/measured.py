@@ -48,7 +48,7 @@ def arrived(
     time: np.ndarray, first: np.ndarray, second: np.ndarray, distance: float, frequency: float,
     width: float,
 ) -> Arrived:  # fmt: skip
-    """How fast the energy of a band of frequencies travels from one station to another.
+    """Speed of the energy in a band of frequencies from one station to another.
 
     The centre of energy of a signal in time is the mean of its group delays, each frequency by its
     share of the energy: whatever the phases are.

@@ -66,7 +66,7 @@ class FieldKind:
         return block.is_wire if self.of_wires else block.moves
 
     def values_of(self, n_points: _Count) -> _Count:
-        """How many values blocks with so many points have."""
+        """Number of values of blocks with so many points."""
         return n_points // 2 if self.of_droppers else n_points
 
 

@@ -92,7 +92,7 @@ def effects(run: EvaluatedRun, costs: tuple[Mapping[str, str], str] = ({}, "")) 
 
 
 def signatures(text: str | None, run: EvaluatedRun) -> Section:
-    """How to make the run again, and room for those who answer for it.
+    """Commands to make the run again, and room for signatures.
 
     Parameters
     ----------

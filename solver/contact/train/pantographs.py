@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 
 class Leads(NamedTuple):
-    """How far contacts are ahead of the middle of their raked strips, as kernels take it.
+    """Advance of contacts before the middle of their raked strips, for kernels.
 
     Attributes
     ----------
@@ -396,7 +396,7 @@ def _make(
 
 
 def _base(problem: Problem, simulated: Simulated, placement: Placement) -> BaseMotion | None:
-    """How the vehicle moves a pantograph, None if it does not."""
+    """Motion of a pantograph's base by the vehicle, None without any."""
     if simulated.vehicle is None:
         return None
     vehicle = replace(simulated.vehicle, suspension=simulated.suspension)
