@@ -178,7 +178,7 @@ def array_script(
     job : ``ranks`` of a task, a run on each at the same time; ``chain``, how often a task may be
         started again
     n_tasks : tasks that make runs
-    petsc_options : those after --
+    petsc_options : options after --
 
     Raises
     ------

@@ -92,7 +92,7 @@ class Section(NamedTuple):
     ----------
     heading : empty for what stands below the title of the page
     blocks : texts and tables; made when the page is, such as by a generator
-    pictures : those that the run has
+    pictures : of the section, as far as the run has them
     folded : blocks of details
     """
 
