@@ -168,7 +168,7 @@ class AirForces:
         return np.asarray(parts * self._acting(np.asarray(times, dtype=float)))
 
     def now(self, time: float) -> np.ndarray:
-        """The same at one ``time`` [s], (3,)."""
+        """Forces at one ``time`` [s], (3,), as ``at`` returns them."""
         if self._latest[0] != time:
             self._latest = time, self.at([time])[0]
         return self._latest[1]

@@ -31,7 +31,7 @@ PantographData: TypeAlias = "LumpedData | MultibodyData"
 
 
 class Operation(NamedTuple):
-    """How a pantograph is operated, whatever its model.
+    """Operation of a pantograph, whatever its model.
 
     ``static_force`` [N] on a wire at rest at ``nominal_height`` [m] of the head, raised from zero
     over ``raise_time`` [s]; ``dt`` [s], ``beta`` and ``gamma`` of the line's Newmark step.

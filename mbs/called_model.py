@@ -15,7 +15,7 @@ class CalledModel:
 
     Attributes
     ----------
-    head : what it predicted last
+    head : its latest prediction
     places : ``Pantograph.places`` at the end of the latest step, kept in one array
 
     Parameters

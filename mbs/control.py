@@ -92,7 +92,7 @@ class Regulation:
         return round(self.delay / self.sample_time)
 
     def arrays(self, dt: float) -> ControlArrays:
-        """As kernels take it, for steps of ``dt`` [s] from time 0 on."""
+        """Arrays of the controller for kernels, for steps of ``dt`` [s] from time 0 on."""
         slow = self.filter_time > 0.0
         settings = {
             "of_height": float(self.of_height),
@@ -120,7 +120,7 @@ class Controller(Protocol):
         """
 
     def state(self) -> np.ndarray:
-        """All that is remembered, as one array of a fixed shape."""
+        """Memory of the controller, as one array of a fixed shape."""
 
     def restore(self, state: np.ndarray) -> None:
         """Continue from what ``state`` returned."""

@@ -57,13 +57,13 @@ class Pantograph(Protocol):
         """Take the step predicted last with these contact forces (s,) [N]."""
 
     def state(self) -> np.ndarray:
-        """Everything needed to continue, as one array."""
+        """State to continue from, as one array."""
 
     def restore(self, state: np.ndarray) -> None:
         """Continue from what ``state`` returned."""
 
     def places(self) -> np.ndarray:
-        """Numbers that say where its masses or bodies are, (k,); a view or a copy.
+        """Coordinates of its masses or bodies, (k,); a view or a copy.
 
         Heights of lumped masses and of an arm, and angles of a head; of a mechanism that is moved
         body by body its positions and Euler parameters.

@@ -18,7 +18,7 @@ class ReadyPantograph:
     chain : masses, springs and dampers, head first
     source : where they are from
     static_force : on a wire at standstill [N], None if the source has none
-    uplift : what the air adds to it [N], as coefficients (a, b, c) of a v^2 + b v + c over the
+    uplift : aerodynamic addition to it [N], as coefficients (a, b, c) of a v^2 + b v + c over the
         speed v in km/h, as sources have it
     """
 

@@ -24,7 +24,7 @@ from catenary.solver.kernels import native
 
 @dataclass(frozen=True)
 class Lowering:
-    """How a pantograph is lowered from ``time`` [s] on.
+    """Lowering of a pantograph from ``time`` [s] on.
 
     The static force goes over to ``force`` [N] over ``within`` [s]; the head is caught ``drop``
     [m] below where it was at ``time``.
@@ -61,7 +61,7 @@ class LoweredPantograph:
 
     Attributes
     ----------
-    stepped : what steps it, from Python and in the loop of kernels
+    stepped : the compiled head, for steps from Python and in the loop of kernels
 
     Parameters
     ----------

@@ -180,7 +180,7 @@ class LumpedPantograph(SteppedHead):
         self._fill_lateral(times, drives)
 
     def base(self, time: float) -> float:
-        """How far the vehicle has lifted the base [m]."""
+        """Lift of the base by the vehicle [m]."""
         return 0.0 if self._base is None else float(self._base.vertical(time).place)
 
     def energy(self) -> float:
@@ -212,7 +212,7 @@ class LumpedPantograph(SteppedHead):
         return way * (1.0 - now), way * (before - after) / (2.0 * _MOMENT)
 
     def _base_motion(self, time: float) -> tuple[float, float]:
-        """How far and how fast vehicle and raising have lifted the base [m], [m/s]."""
+        """Lift of the base by vehicle and raising, and its speed [m], [m/s]."""
         place = velocity = 0.0
         if self._base is not None:
             moved = self._base.vertical(time)

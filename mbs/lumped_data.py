@@ -51,7 +51,7 @@ class LumpedData:
 
     @property
     def compliance(self) -> float:
-        """Of the springs between head and last mass, the strips' included [m/N]."""
+        """Compliance of the springs between head and last mass, the strips' included [m/N]."""
         return sum(1.0 / k for k in self.stiffnesses[:-1]) + self.strips.compression(1.0)
 
     @property
@@ -61,7 +61,7 @@ class LumpedData:
 
     @property
     def height_stiffness(self) -> float:
-        """By how much its force falls as its head rises [N/m]."""
+        """Fall of its force by the rise of its head [N/m]."""
         base = self.stiffnesses[-1]
         return base / (1.0 + base * self.compliance)
 

@@ -57,7 +57,7 @@ class Shape(Protocol):
     schematic: bool
 
     def pose(self, places: np.ndarray, base: float, head: float, wire: float) -> Pose:
-        """Where the points are.
+        """Positions of the points.
 
         Parameters
         ----------
@@ -129,7 +129,7 @@ class _Points:
     local: np.ndarray
 
     def at(self, position: np.ndarray, rotation: np.ndarray) -> np.ndarray:
-        """Where they are, (n, 3)."""
+        """Positions (n, 3) of the points."""
         turned = np.einsum("nij,nj->ni", rotation[self.bodies], self.local)
         return np.asarray(position[self.bodies] + turned)
 

@@ -363,7 +363,7 @@ def _renumber(
 
 
 def _nearest(points: np.ndarray, nodes: np.ndarray, x: tuple[float, ...]) -> np.ndarray:
-    """Of a wire's ``nodes`` in order of x those nearest to places ``x`` [m]."""
+    """Nodes of a wire that are nearest to places ``x`` [m]; ``nodes`` are all, in order of x."""
     places = points[nodes, 0]
     between = 0.5 * (places[1:] + places[:-1])
     return np.asarray(nodes[np.searchsorted(between, np.array(x))])

@@ -1,4 +1,4 @@
-"""Where the wires of a line are cut, and how they are divided between their cuts, as arrays."""
+"""Cuts of the wires of a line, and their division between cuts, as arrays."""
 
 from __future__ import annotations
 

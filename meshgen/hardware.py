@@ -1,4 +1,4 @@
-"""What hangs between wires and stands under them: droppers, clamps, steady arms, supports."""
+"""Hardware of the wires: droppers, clamps, steady arms, supports, fittings."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class DropperKind:
 
     @property
     def n_pieces(self) -> int:
-        """How many slopes their tension has."""
+        """Number of slopes of their tension."""
         return 1 if self.curve is None else len(self.curve) - 1
 
     def slopes_at(self, length: np.ndarray) -> Slopes:
@@ -150,7 +150,7 @@ class SteadyArms:
     x: tuple[float, ...]
 
     def vertical_stiffness(self, wire: Wire) -> np.ndarray:
-        """Of each at ``wire``, which they hold, where nothing moves sideways, (n,) [N/m]."""
+        """Stiffness (n,) of each at ``wire``, which they hold, if nothing moves sideways [N/m]."""
         if not self.kind.by_radial_force:
             return np.full(len(self.x), self.kind.stiffness)
         return np.abs(wire.radial_force(np.array(self.x))) / self.kind.length
@@ -182,7 +182,7 @@ class Fittings:
 
     Attributes
     ----------
-    kind : what they are
+    kind : their name
     wire : its name
     x : their places, ascending [m]
     mass : of each [kg]

@@ -88,7 +88,7 @@ class Piece:
 
 @dataclass(frozen=True)
 class Section:
-    """Where a wire runs level in a tension section, and how far it rises to either end of it.
+    """Level part of a wire in a tension section, and its rise to either end of it.
 
     ends, running : from and to of the section, and of where the wire is level [m]
     rise : height gained from there to the start, and to the end [m]
@@ -167,7 +167,7 @@ class Wire(Conductor):
     Attributes
     ----------
     name : of the wire, of its group in a mesh file and of its component in the damping
-    role : what it is there for
+    role : contact, messenger, auxiliary or stitch wire
     pieces : where it runs, one piece or several by ascending x that do not overlap
     profile : heights wanted at its droppers' lower ends; None if none hangs it
     taken : stretches (from, to, tension) over which wires that are clamped to it carry that much of

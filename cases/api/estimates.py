@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, repr=False)
 class Uncertainty:
-    """Estimates from a table of runs, with bounds of 95 % confidence: what ``uncertainty`` gives.
+    """Estimates from a table of runs, with bounds of 95 % confidence, from ``uncertainty``.
 
     Bounds are columns with the end ``_low`` and ``_high``, NaN where too few runs leave them open.
     ``pantograph`` is empty for statistics of the line.

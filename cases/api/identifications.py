@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Identified:
-    """What ``identify`` finds. As text it is what the program prints.
+    """Result of ``identify``. As text it is what the program prints.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""Tables of a scene before any run: what is checked, what is planned, how the line hangs."""
+"""Tables of a scene before any run: its check, its plan, and its line at rest."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def check(scene: SceneLike) -> list[str]:
 
 
 class Plan:
-    """What a run will simulate, and what it will need: what ``plan`` gives.
+    """Plan of a run, from ``plan``: effects simulated and left out, sizes, and needs.
 
     As text it is what ``catenary plan`` prints.
 
@@ -108,7 +108,7 @@ class Plan:
 
     @property
     def warnings(self) -> list[str]:
-        """Sentences on what disturbs the evaluated stretch, such as waves from a near end.
+        """Sentences on disturbances of the evaluated stretch, such as waves from a near end.
 
         Examples
         --------
@@ -127,7 +127,7 @@ class Plan:
 
 
 def plan(scene: SceneLike) -> Plan:
-    """What a run of a scene simulates, its sizes, and what it will need. Not collective.
+    """Plan a run of a scene: its effects, sizes, and needs. Not collective.
 
     Parameters
     ----------
@@ -155,7 +155,7 @@ def plan(scene: SceneLike) -> Plan:
 
 
 class AtRest:
-    """A line at rest as tables: what ``static`` gives. As text it is what the program prints.
+    """A line at rest as tables, from ``static``. As text it is what the program prints.
 
     Examples
     --------
@@ -236,7 +236,7 @@ class AtRest:
 
     @property
     def steady_arms(self) -> pd.DataFrame:
-        """A row for each steady arm: ``x_m`` and, of lines that move sideways, what holds the wire.
+        """A row for each steady arm: ``x_m`` and, of lines that move sideways, place and forces.
 
         Then ``stagger_m`` is the place of the wire to the left of the track, ``radial_N``,
         ``lift_N`` and ``along_N`` the force of the arm on it to the left, upward and along the

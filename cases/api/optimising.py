@@ -25,7 +25,7 @@ Task = str | Path | Mapping[str, Any]
 
 @dataclass(frozen=True)
 class Optimum:
-    """What a method of ``optimise`` found: the better scene, and how it compares.
+    """Result of a method of ``optimise``: the better scene, and its comparison with the given one.
 
     As text it is what ``catenary optimise`` prints of it.
 
@@ -164,7 +164,7 @@ def tolerance(
     force: bool = False,
     progress: bool = False,
 ) -> pd.DataFrame:
-    """How far an installation may be off for each criterion to hold. Not collective.
+    """Find the tolerances of an installation for each criterion to hold. Not collective.
 
     Parameters
     ----------
@@ -220,7 +220,13 @@ def _found(
     force: bool,
     progress: bool,
 ) -> Any:
-    """What a planned study finds, which its ``output`` writes; a signal is one to this process."""
+    """Run a planned study, write its result with ``output``, and return it.
+
+    Raises
+    ------
+    KeyboardInterrupt
+        If a signal ends the study.
+    """
     from catenary.cases.process.interrupts import Interrupted
     from catenary.cases.studies.scene_sets.evaluation import workers
 

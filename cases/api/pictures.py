@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class Pictures:
-    """Draws what a run has to show: ``run.plot``. Not collective.
+    """Pictures of a run: ``run.plot``. Not collective.
 
     A figure is Matplotlib's: ``savefig`` writes it, a notebook shows it. Nothing opens a window.
 

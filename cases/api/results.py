@@ -42,7 +42,7 @@ _TRUE_OR_FALSE = ("passed", "evaluated", "compared")
 
 
 class Run:
-    """The results of a run: what ``run`` and ``open`` give.
+    """Results of a run, from ``run`` or ``open``.
 
     Arrays are of xarray, with names, places along the track [m], times [s] and units; tables are of
     pandas, with the columns of ``summary.json``. An array is read when it is asked for.
@@ -79,7 +79,7 @@ class Run:
 
     @property
     def outcome(self) -> str:
-        """How the run ended: "done", "interrupted", "running", or the sentence of what broke.
+        """End of the run: "done", "interrupted", "running", or a sentence on the failure.
 
         Examples
         --------

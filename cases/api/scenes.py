@@ -18,7 +18,7 @@ from catenary.cases.scene.scene import Scene as CheckedScene
 
 
 class Scene:
-    """A line, a train and a run of it, checked: what ``load`` gives. Nothing changes a scene.
+    """A checked line with a train and a run, from ``load``. A scene does not change.
 
     Keys are those of ``case.toml``, dotted: ``catenary list --keys`` lists them with unit, bounds
     and meaning. A unit stands at the end of a key; a key without one has no unit.
@@ -49,7 +49,7 @@ class Scene:
 
     @property
     def title(self) -> str:
-        """One line that says what the case is.
+        """Title of the case, one line.
 
         Examples
         --------

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 def sensitivity(
     scene: SceneLike, parameters: Sequence[str] = (), *, droppers: bool = False
 ) -> pd.DataFrame:
-    """What the statistics of a scene change by with its parameters, from one march.
+    """Sensitivities of the statistics of a scene to its parameters, from one march.
 
     The march is differentiated step by step: these are no differences of runs. Derivatives hold
     while a change moves no loss of contact and no slackening of a dropper to another step. One

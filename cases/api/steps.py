@@ -99,7 +99,7 @@ class Simulation:
         return done
 
     def save(self) -> bytes:
-        """The whole state, with what was added to forces and bases, to come back to.
+        """Return the whole state, with additions to forces and bases, for ``restore``.
 
         Examples
         --------
@@ -201,7 +201,7 @@ class Simulation:
 
     @property
     def steps_left(self) -> int:
-        """Steps to the end of what is prepared, at the scene's speed.
+        """Steps to the end of the prepared run, at the scene's speed.
 
         Examples
         --------

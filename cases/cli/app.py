@@ -217,7 +217,7 @@ Verbose = Annotated[bool, typer.Option("-v", "--verbose", help="Print the time o
 
 @dataclass
 class StudyRuns:
-    """How the runs of a study are made.
+    """Options for the runs of a study.
 
     Attributes
     ----------

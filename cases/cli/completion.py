@@ -1,4 +1,4 @@
-"""What the shell completes: names of shipped cases, keys after ``--set``, words that a key takes.
+"""Completion in a shell: names of shipped cases, keys after ``--set``, words that a key takes.
 
 Called at every press of the tabulator key: nothing here imports more than a
 list does, and an error only means that nothing is completed.

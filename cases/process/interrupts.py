@@ -116,8 +116,8 @@ class Phase:
     Parameters
     ----------
     comm : mpi4py communicator
-    doing : what is done first, as in "the mesh was made"
-    left : what an interruption leaves
+    doing : sentence on the first work, as in "the mesh was made"
+    left : sentence on the remains of an interruption
     """
 
     def __init__(self, comm: Any, doing: str, left: str) -> None:

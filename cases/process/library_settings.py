@@ -1,4 +1,4 @@
-"""What libraries are told before they are loaded, and whether they have memory to be loaded.
+"""Settings of libraries before they are loaded, and the check that memory suffices to load them.
 
 Not for other people's Python programs.
 """

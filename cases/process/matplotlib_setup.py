@@ -1,4 +1,4 @@
-"""What Matplotlib finds when it is imported: a folder for its cache, and no settings of the user's.
+"""Set-up of Matplotlib before its import: a folder for its cache, and no settings of the user's.
 
 Pictures have the program's own style. Matplotlib reads a ``matplotlibrc`` at import: that in the
 working directory, else that of ``MATPLOTLIBRC``, else that of the user. One that is no text ends

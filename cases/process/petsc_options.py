@@ -125,7 +125,7 @@ def idle_names() -> set[str]:
 
 
 def look_up_all_but(idle: Collection[str]) -> None:
-    """Let PETSc know as used what another process has used. Not collective."""
+    """Mark options that another process has used as used in PETSc. Not collective."""
     from catenary.base.petsc import PETSc
 
     for name in PETSc.Options().getAll().keys() - set(idle):

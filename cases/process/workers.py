@@ -51,7 +51,7 @@ class Outcome(NamedTuple):
     ----------
     number : place of the item among all, from 0 on
     value : result of the function, None if it raised an error
-    error : what it raised, or that its process was lost
+    error : the error that it raised, or the loss of its process; None without one
     """
 
     number: int
@@ -268,7 +268,7 @@ class Pool(Generic[T]):
             _end((*busy, *gone), stopped_at)
 
     def _process(self) -> _Process:
-        """One that has nothing to do, or a new one."""
+        """Return an idle process, or a new one."""
         self._idle = [one for one in self._idle if one.is_there()]
         return self._idle.pop() if self._idle else _Process(self._initialise, self._function)
 
@@ -354,7 +354,7 @@ class _Process:
         return f"its process was ended by {signal.Signals(-code).name}{memory}"
 
     def stop(self) -> None:
-        """Let it end what it works on in good order."""
+        """Ask it to end its work in good order."""
         if self._life >= 0:
             os.close(self._life)
             self._life = -1

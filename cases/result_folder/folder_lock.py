@@ -41,7 +41,7 @@ class FolderLock:
     Parameters
     ----------
     folder : made if it is not there, with its parents
-    command : what this process does, for the message to others
+    command : work of this process in words, for the message to others
 
     Raises
     ------

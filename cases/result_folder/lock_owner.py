@@ -23,7 +23,7 @@ class Owner:
     boot : number of the machine's last start
     space : the namespace of process numbers, which containers have of their own
     pid, started : process, and its start by the kernel's clock
-    command : what the process does, for the user
+    command : work of the process in words, for the user
     since : when the lock was taken, in the machine's local time
     """
 
@@ -37,7 +37,7 @@ class Owner:
     since: str
 
     def text(self) -> str:
-        """As the lock file holds it."""
+        """Text of the lock file: the owner as JSON."""
         return json.dumps(asdict(self), indent=1) + "\n"
 
     @property

@@ -23,7 +23,7 @@ class ExcitedRun:
     problem : of the scene, with what stands aside in place of its train
     excitation : of the contact wire
     snapshot_every : from one snapshot to the next where the scene does not say so [s]
-    watching : what watches the march beside the recorder, of a line at rest
+    watching : makes the observers beside the recorder, for a line at rest
     """
 
     problem: Problem

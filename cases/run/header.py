@@ -1,4 +1,4 @@
-"""What a result file says of its run before the first step."""
+"""Header of a result file: facts of its run that are known before the first step."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def header_of(
     problem : of the scene
     at_rest : its line in equilibrium
     petsc_options : the options that PETSc was started with, for the record
-    excited : what sets the line into motion in place of the scene's train
+    excited : excitation that sets the line into motion in place of the scene's train
     """
     on, off = effect_rows(scene, problem)
     line, lengths = problem.line, lengths_to_cut(problem, at_rest.mesh)

@@ -55,7 +55,7 @@ def extent_of(mesh: LineMesh) -> Extent:
 
 
 def extent_before_meshing(line: Line, n_nodes: int) -> Extent:
-    """The same of a line that is to be meshed, of which only the nodes are counted."""
+    """Recorded parts of a line before it is meshed, with the number of its nodes alone."""
     arm_x = np.sort(np.concatenate([[], *(group.x for group in line.steady_arms)]))
     n_pieces = sum(len(wire.pieces) for wire in line.wires)
     n_cells = n_nodes - n_pieces + line.dropper_x.size
@@ -223,7 +223,7 @@ def _field_every(
 
 
 def _field_record(output: OutputTable, problem: Problem, reach: Reach | None) -> FieldRecord:
-    """Which part of the fields is recorded: what moves, unless the scene says how far."""
+    """Recorded part of the fields: the moving one, unless the scene says how far."""
     masts, train = problem.line.support_positions, problem.train
     spans, window = output.field_spans, output.field_window_m
     follows = spans is None and window is None and reach is not None

@@ -133,7 +133,7 @@ def on_as_many(scene: Scene, comm: Any, run: Callable[[Any], T]) -> T:
 
 @dataclass
 class RunOutcome:
-    """How a run ended.
+    """Result of a run.
 
     ``outcome`` is "done", "interrupted" or the sentence of what broke; ``accepted`` the verdict
     of the standard, None if not judged; ``summary`` the content of ``summary.json``;
@@ -171,7 +171,7 @@ def run_case(
     ready : called on all ranks when folder and size of the run have been judged
     only_summary : of the report write ``summary.json`` alone, which costs no time
     large : whether a run may pass the bounds on its size; as ``force`` if not given
-    excited : what sets the line into motion in place of the scene's train
+    excited : excitation that sets the line into motion in place of the scene's train
 
     Raises
     ------
@@ -347,7 +347,7 @@ def _observers(
     progress: Progress,
     n_steps: int,
 ) -> tuple[list[Observer], Recorder, RunWatch]:
-    """All that watches the march, the recorder last, and the one that judges it. Not collective.
+    """Observers of the march, the recorder last, and the one that judges it. Not collective.
 
     The state to continue from, which the recorder writes, stands for all before it. ``n_steps`` are
     those of the whole run, ``header`` is needed on rank 0.

@@ -63,7 +63,7 @@ class Draft:
         return replace(self, raw=raw, given=tuple(given))
 
     def shortened(self) -> Draft:
-        """With the values of its ``[test]`` table."""
+        """Return the draft with the values of its ``[test]`` table."""
         raw = self._copy()
         if isinstance(raw.get("test"), dict):
             for key, value in raw["test"].items():

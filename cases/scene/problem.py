@@ -57,7 +57,7 @@ def line_data_of(scene: Scene) -> LineData:
 
 
 def end_of(scene: Scene) -> float:
-    """Where the leading pantograph stops [m]: ``train.end_m`` or its default."""
+    """Place where the leading pantograph stops [m]: ``train.end_m`` or its default."""
     if scene.train.end_m is not None:
         return scene.train.end_m
     line = line_data_of(scene)

@@ -25,7 +25,7 @@ class Beginning:
     Attributes
     ----------
     case : name of the shipped case
-    meaning : what the line is, for questions and help
+    meaning : description of the line, for questions and help
     changes : pairs of a text in the case file and what stands there instead
     """
 

@@ -99,7 +99,7 @@ _BEYOND = 60.0
 
 
 class Marched(NamedTuple):
-    """How a scene ended.
+    """Result of a scene.
 
     Attributes
     ----------
@@ -174,7 +174,7 @@ class Marches:
         left, by_themselves = dict.fromkeys(problems), list[Marched]()
 
         def together() -> Iterator[tuple[int, LineAtRest]]:
-            """Those whose lines have the same matrices; others march when it is their turn."""
+            """Yield scenes whose lines have the same matrices; others march in their turn."""
             for number, problem in problems.items():
                 try:
                     at_rest = line.rest_of(problem)
@@ -246,7 +246,7 @@ class _Line:
     Parameters
     ----------
     scene, problem : of one of the scenes
-    range_of_run : what contact wires their trains touch [m], None if they march by themselves
+    range_of_run : stretch that their trains touch the wire in [m], None if they march by themselves
     """
 
     def __init__(

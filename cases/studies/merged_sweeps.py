@@ -95,8 +95,8 @@ def merge(folders: Sequence[Path]) -> Merged:
 
 
 class Written(NamedTuple):
-    """What was written of merged sweeps: files, the evaluation of samples, and why there are no
-    histories, empty if there are or nobody has some."""
+    """Output of merged sweeps: files, the evaluation of samples, and the reason why histories are
+    left out; empty if they are not."""
 
     files: list[Path]
     found: Uncertainty | None
@@ -123,7 +123,7 @@ class _Variant(BaseModel):
 
 
 class _Record(BaseModel):
-    """What is read of a sweep's record."""
+    """Record of a sweep, as far as it is read."""
 
     case: str
     varied: list[Any]

@@ -1,4 +1,4 @@
-"""What a study has done already, as files: the same command continues one that was stopped.
+"""Records of a study's finished work, as files: the same command continues a stopped study.
 
 A record is a JSON table with a checksum. It is left by whoever did the work, whichever process that
 is, and appears whole. Runs have theirs in their folders (``sweep/run_jobs.py``); what is no run has
@@ -201,7 +201,7 @@ def held_study(
     Parameters
     ----------
     out : the folder, None to keep and write nothing
-    command : what this process does, for others that want the folder
+    command : work of this process in words, for others that want the folder
     force : forget what is kept there
     """
     from catenary.cases.result_folder.folder_lock import held

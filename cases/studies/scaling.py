@@ -143,7 +143,7 @@ class Work(NamedTuple):
     ----------
     unknowns, spans : of the line
     step : time of a step on one rank [s]
-    fixed : what of it does not go with the length of the line [s]
+    fixed : part of it that does not grow with the length of the line [s]
     sizes : of messages on several ranks
     """
 
@@ -180,8 +180,8 @@ class Predicted(NamedTuple):
 
 
 def work_of(scene: Scene) -> Work:
-    """What a step of a scene takes on one rank, by the estimate of ``catenary plan``, and its
-    messages on several. Not collective."""
+    """Work of a step of a scene: its time on one rank, by the estimate of ``catenary plan``, and
+    its messages on several. Not collective."""
     problem, mesh = problem_of(scene), mesh_of(scene)
     needs = needs_with_mesh(scene, mesh)
     n_unknowns, n_spans = numbering_of(problem, mesh).n_unknowns, problem.line.n_spans

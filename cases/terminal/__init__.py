@@ -1,1 +1,1 @@
-"""What verbs share on a terminal: messages, tables, completion."""
+"""Tables, messages and completion that the verbs share."""

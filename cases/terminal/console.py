@@ -34,7 +34,7 @@ _last_words: list[Callable[[], None]] = []
 
 
 def at_end(tell: Callable[[], None]) -> None:
-    """Let ``tell`` be called when the present verb has come to its end without an error.
+    """Call ``tell`` when the present verb has come to its end without an error.
 
     Not collective.
     """
@@ -114,14 +114,14 @@ def _tell(head: str, sentence: str) -> None:
 
 
 def _discard(stream: TextIO) -> None:
-    """Let a stream that cannot be written to lead nowhere: Python tries again at its end."""
+    """Redirect a stream that fails to the null device: Python tries again at its end."""
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, stream.fileno())
     os.close(nowhere)
 
 
 def open_closed_streams() -> None:
-    """Let standard streams that are closed lead nowhere. Not collective.
+    """Redirect closed standard streams to the null device. Not collective.
 
     The next file that is opened, such as a result file, would get the number of a closed one, and
     what libraries print would be written into it.

@@ -111,7 +111,7 @@ def key_table() -> str:
 
 
 def key_details(wanted: str) -> str:
-    """All that is known of the keys that a filter leaves, several lines each.
+    """Details of the keys that a filter leaves, several lines each.
 
     ``wanted`` is a part of a key, or a pattern for all of it with ``*``, ``?`` and ``[...]``; if no
     key has that part, a part of a meaning.
@@ -166,7 +166,7 @@ def _details(key: Key) -> str:
 
 
 def _about_effect(name: str) -> list[str]:
-    """What an effect adds, requires, acts with and is taken from; nothing for other keys."""
+    """Sentences on an effect's additions, requirements, data and source; none for other keys."""
     effect = effects.registry().get(name.removeprefix("effects."))
     if effect is None or not name.startswith("effects."):
         return []

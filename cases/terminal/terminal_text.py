@@ -1,4 +1,4 @@
-"""What the verbs print: tables for a terminal, no measurement and no decision."""
+"""Text of the verbs for the terminal: tables and sentences, no measurement and no decision."""
 
 from __future__ import annotations
 
@@ -113,7 +113,7 @@ def labelled(row: Mapping[str, Any], several: bool) -> str:
 
 
 def _waited(phase_wall: Mapping[str, float], waited: float | None) -> list[str]:
-    """What a user waited for: the whole command, and the phases of the run in it."""
+    """Line on the time of the whole command and of the run's phases; none without ``waited``."""
     if waited is None:
         return []
     parts = ", ".join(f"{name} {wall:.1f}" for name, wall in phase_wall.items())
@@ -121,7 +121,7 @@ def _waited(phase_wall: Mapping[str, float], waited: float | None) -> list[str]:
 
 
 def _sizes_of_steps(counted: Mapping[str, Any]) -> list[str]:
-    """How many steps of which size were taken, where steps adapt."""
+    """Numbers of steps of each size, where steps adapt."""
     if "rejected_steps" not in counted:
         return []
     sizes = [

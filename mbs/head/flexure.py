@@ -34,7 +34,7 @@ class Bending(NamedTuple):
 
 @dataclass(frozen=True)
 class Flexure:
-    """How a strip bends.
+    """Bending of a strip.
 
     ``stiffness`` EI [N m2]; ``spring_distance`` [m] across the track between the two springs below;
     ``n_modes`` that are followed; ``damping_ratio`` of each as a free beam.
@@ -76,7 +76,7 @@ def mode_tables(n_modes: int, length: float) -> SplineTables:
 
 @lru_cache(maxsize=32)
 def _root(number: int) -> float:
-    """Of cosh(b) cos(b) = 1, the first being 4.73."""
+    """Root of cosh(b) cos(b) = 1, the first being 4.73."""
     from scipy.optimize import brentq  # not loaded for strips that are rigid
 
     near = (number + 1.5) * np.pi

@@ -87,7 +87,7 @@ class LawsInPlace:
     zero: np.ndarray
 
     def arrays(self, n_contacts: int) -> LawArrays:
-        """As kernels take them, with room for the forces of so many contacts."""
+        """Arrays of the laws for kernels, with room for the forces of so many contacts."""
         law = np.zeros(len(self.laws), dtype=native.HEAD_LAW)
         counts = np.array([len(one.points) for one in self.laws], dtype=np.int64)
         law["by_base"], law["zero"] = self.by_base, self.zero

@@ -23,9 +23,9 @@ class SteppedHead(ABC):
 
     Attributes
     ----------
-    stepped : what steps it, from Python and in the loop of kernels
+    stepped : the compiled head, for steps from Python and in the loop of kernels
     head : HeadState, what it predicted last
-    row : what the coming step depends on, see `drives`
+    row : inputs of the coming step, see `drives`
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ class SteppedHead(ABC):
         self._time = 0.0
 
     def _step_by(self, stepped: native.Head) -> None:
-        """Let this step it, which was made of its arrays."""
+        """Set the compiled head that steps this one, made of its arrays."""
         self.stepped = stepped
         if self._bending is not None:
             stepped.bend(self._bending)
@@ -101,7 +101,7 @@ class SteppedHead(ABC):
         return self._control is not None or self.by_hand
 
     def regulate(self, regulator: Regulator | None) -> None:
-        """Let the lift be regulated from the start on; None leaves it as it is."""
+        """Regulate the lift from the start on; None leaves it as it is."""
         if isinstance(regulator, Regulation):
             self._control = regulator.arrays(self._newmark.dt)
             self.stepped.regulate(self._control)
@@ -109,7 +109,7 @@ class SteppedHead(ABC):
             self._controller = regulator()
 
     def follow(self, part: Callable[[float], float]) -> None:
-        """Let the part ``part(time)`` of the lift act."""
+        """Scale the lift by ``part(time)``."""
         self._part = part
 
     @property
@@ -124,7 +124,7 @@ class SteppedHead(ABC):
         return self.stepped.added_force
 
     def _put_laws(self, laws: LawsInPlace) -> None:
-        """Let laws act that are not linear, on the coordinates of the head and what is below."""
+        """Add nonlinear laws on the coordinates of the head and of the masses below."""
         self._laws, self._law_arrays = laws, laws.arrays(len(self.strip_offsets))
 
     @property
@@ -212,7 +212,7 @@ class SteppedHead(ABC):
             self._controller.restore(np.array(state[begin + 1 :]))
 
     def _aim(self, time: float) -> None:
-        """Let the strips touch where the wire is at ``time`` [s], the end of the coming step."""
+        """Set the place of the wire on the strips at ``time`` [s], the end of the coming step."""
         self._time = time
         if self._lateral is not None:
             self._lateral.move_to(time)

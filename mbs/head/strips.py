@@ -77,11 +77,11 @@ class Strips:
 
     @property
     def contact_offsets(self) -> tuple[float, ...]:
-        """The same for each contact that may be: strip by strip, those of all wires together."""
+        """Offset of the strip of each possible contact [m]: strip by strip, all wires together."""
         return tuple(x for x in self.offsets for _ in range(self.wires))
 
     def compression(self, force: float) -> float:
-        """How far a force shared by all strips presses them into the head [m]."""
+        """Compression of the strips' springs under a force shared by all strips [m]."""
         if self.suspension is None:
             return 0.0
         return force / (self.number * self.suspension.stiffness)

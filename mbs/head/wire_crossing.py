@@ -1,4 +1,4 @@
-"""Where the wire crosses a pantograph's strips under way: where it is less the vehicle's sway."""
+"""Lateral place of the wire on a pantograph's strips under way: its own less the vehicle's sway."""
 
 from __future__ import annotations
 

@@ -185,11 +185,11 @@ class FullPantograph:
 
     @property
     def motion(self) -> Motion:
-        """Where all bodies are, from the base."""
+        """Positions of all bodies, from the base."""
         return self._stepper.motion
 
     def follow(self, part: Callable[[float], float]) -> None:
-        """Let the part ``part(time)`` of the lift act."""
+        """Scale the lift by ``part(time)``."""
         self._hold_down.part = part
 
     def constraint_violation(self) -> float:
@@ -327,7 +327,7 @@ class FullPantograph:
         )
 
     def _aim(self, time: float) -> None:
-        """Let the strips touch where the wire is at ``time`` [s]."""
+        """Set the place of the wire on the strips at ``time`` [s]."""
         if self._lateral is not None:
             self._lateral.move_to(time)
             self._points[:, 1] = self._lateral.place

@@ -329,7 +329,7 @@ def describe(data: MultibodyData) -> str:
 
 
 def describe_assembly(missed: tuple[Miss, ...]) -> str:
-    """By how much joints missed in the given positions, for people."""
+    """Sentence on the gaps of joints in the given positions [mm]."""
     listed = ", ".join(f"{miss.joint} {1e3 * miss.gap:.1f} mm" for miss in missed)
     return f"joints missed before assembly by: {listed}"
 

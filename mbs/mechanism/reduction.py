@@ -297,7 +297,7 @@ class _Raised:
 
 
 def _refined(raised: _Raised, more: float, places: list[_Place], tolerance: float) -> list[_Place]:
-    """The same with further heights in between where splines miss the lift, such as at stops.
+    """Add places at heights in between where splines miss the lift, such as at stops.
 
     Splines through every second place are compared at the others, which costs no further place; one
     through all of them misses less. Where that is too much, places are put in between.
@@ -315,7 +315,7 @@ def _refined(raised: _Raised, more: float, places: list[_Place], tolerance: floa
 def _missed(
     raised: _Raised, more: float, places: list[_Place], others: list[_Place], tolerance: float
 ) -> list[_Place]:
-    """Those of ``others`` whose lift a spline through ``places`` misses by more than tolerated."""
+    """Places of ``others`` whose lift differs by over ``tolerance`` from a spline of ``places``."""
     lift = CubicSpline([p.height for p in places], [raised.lift(p, more) for p in places])
     expected = lift([place.height for place in others])
     return [

@@ -132,7 +132,7 @@ def of_chain(data: LumpedData) -> LinearModel:
 
 
 def with_strips(model: LinearModel, strips: Strips) -> LinearModel:
-    """The same head with its strips on their own springs, loaded on all of them alike.
+    """Return a model with its strips on their own springs, loaded on all of them alike.
 
     The strips' masses are part of what the model's loaded point carries; they move as one.
     """

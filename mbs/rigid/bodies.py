@@ -86,7 +86,7 @@ class Body:
 
 @dataclass(frozen=True)
 class Motion:
-    """Where n bodies are and how they move; the last row of each array is the frame at rest.
+    """Positions and velocities of n bodies; the last row of each array is the frame at rest.
 
     ``position`` (n + 1, 3) [m], ``parameters`` (n + 1, 4), ``velocity`` (n + 1, 3) [m/s] in space
     axes, ``spin`` (n + 1, 3) [rad/s], the angular velocities in body axes. Displacements and
@@ -114,13 +114,13 @@ class Motion:
         return np.hstack([self.velocity, self.spin])[:-1].ravel()
 
     def moved(self, displacement: np.ndarray) -> Motion:
-        """The same velocities after a displacement (6 n,) [m, rad]."""
+        """Return this motion after a displacement (6 n,) [m, rad], with the same velocities."""
         position, parameters = self.position.copy(), self.parameters.copy()
         native.move_bodies(position, parameters, np.ascontiguousarray(displacement))
         return Motion(self.numbers, position, parameters, self.velocity, self.spin)
 
     def with_velocities(self, velocities: np.ndarray) -> Motion:
-        """The same place with velocities (6 n,) [m/s, rad/s]."""
+        """Return this place with other velocities (6 n,) [m/s, rad/s]."""
         return Motion(self.numbers, self.position, self.parameters, *_split(velocities))
 
     def to_vector(self) -> np.ndarray:

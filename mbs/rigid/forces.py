@@ -44,7 +44,7 @@ class Table:
     Parameters
     ----------
     x, y : arrays, shape (n,), n >= 2, x growing
-    what : what the table is of, for messages
+    what : name of the table in messages
     """
 
     def __init__(self, x: Vector, y: Vector, what: str = "table") -> None:

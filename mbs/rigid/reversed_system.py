@@ -23,7 +23,7 @@ _HALF_TURN = np.array([0.0, 0.0, 0.0, 1.0])
 
 
 def turned_round(system: System) -> System:
-    """The same system after half a turn about the z axis of space. Not collective."""
+    """Return a system after half a turn about the z axis of space. Not collective."""
     return System(
         tuple(_body(body) for body in system.bodies),
         tuple(_joint(joint) for joint in system.joints),

@@ -34,7 +34,7 @@ _MOST_ITERATIONS = 30
 
 
 class Miss(NamedTuple):
-    """By how much a joint is open: ``gap`` [m], and ``tilt``, cosines off right angles."""
+    """Error of an open joint: ``gap`` [m], and ``tilt``, cosines off right angles."""
 
     joint: str
     gap: float
@@ -76,11 +76,11 @@ class System:
         return initial_motion(self.bodies)
 
     def with_joints(self, *joints: Joint) -> System:
-        """The same with further joints."""
+        """Return this system with further joints."""
         return replace(self, joints=(*self.joints, *joints))
 
     def with_forces(self, *forces: Force) -> System:
-        """The same with further forces."""
+        """Return this system with further forces."""
         return replace(self, forces=(*self.forces, *forces))
 
     def force(self, name: str) -> Force:
@@ -91,7 +91,7 @@ class System:
         raise InputError(f"There is no force {name!r} among {[f.name for f in self.forces]}.")
 
     def with_force_changed(self, name: str, **changes: Any) -> System:
-        """The same with other values in the force of this name."""
+        """Return this system with other values in the force of this name."""
         self.force(name)
         return replace(
             self,
@@ -198,7 +198,7 @@ class System:
         return 6 * motion.n_bodies - len(independent_rows(self.constraints(motion, 0.0).jacobian))
 
     def misses(self, motion: Motion, time: float = 0.0) -> tuple[Miss, ...]:
-        """By how much each joint is open."""
+        """Errors of all joints."""
         found, result = self.constraints(motion, time).value, []
         for joint in self.joints:
             error = found[self.row_ranges[joint.name]]

@@ -84,7 +84,7 @@ class Partitioned:
         return result + self._basis @ linalg.cho_solve(self._small, left, check_finite=False)
 
     def removal(self, errors: np.ndarray) -> np.ndarray:
-        """By dependent coordinates only."""
+        """Changes of dependent coordinates that remove errors of the rows."""
         result = np.zeros(len(self._operator))
         result[self._dependent] = self._from_rows(-errors[self._kept])
         return result

@@ -1,1 +1,1 @@
-"""How the vehicle moves the pantographs' bases."""
+"""Motion of the pantographs' bases by the vehicle."""

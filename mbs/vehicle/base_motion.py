@@ -1,4 +1,4 @@
-"""How the vehicle moves the base of its pantographs: tables, harmonics, track irregularities.
+"""Motion of the pantographs' bases by the vehicle: tables, harmonics, track irregularities.
 
 Up and to the left are positive. What is a function of the place along the track, such as the track
 itself, reaches every pantograph of the train when it gets there; what is a function of time reaches

@@ -39,7 +39,7 @@ _STEPS_PER_WAVE, _SHORTEST = 40, 0.01
 
 @dataclass(frozen=True)
 class Sideways:
-    """What lateral motion needs besides: ``roll_inertia`` [kg m2]; ``stiffness`` [N/m] and
+    """Further data for lateral motion: ``roll_inertia`` [kg m2]; ``stiffness`` [N/m] and
     ``damping`` [N s/m] of one bogie; ``spring_distance`` [m] across the track; ``centre_above``
     [m] of the body's centre of mass over the springs, ``roof_above`` [m] of the roof over it."""
 

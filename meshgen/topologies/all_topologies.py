@@ -245,7 +245,7 @@ def _inner(data: LineData) -> tuple[float, ...]:
 
 
 def _sides(data: LineData) -> tuple[float, float]:
-    """How far to the left each of two wires is [m]."""
+    """Lateral place of each of two wires [m], positive to the left."""
     assert data.twin is not None
     return 0.5 * data.twin.spacing, -0.5 * data.twin.spacing
 

@@ -160,7 +160,7 @@ def _taken(name: str, wires: tuple[FreeWire, ...]) -> tuple[tuple[float, float, 
 def _loads(
     data: LineData, wires: tuple[FreeWire, ...], droppers: tuple[FreeDroppers, ...]
 ) -> dict[str, Loads]:
-    """What is expected to hang from each wire: of wires below by their droppers, of clamped ones at
+    """Expected loads that hang from each wire: of wires below by their droppers, of clamped ones at
     their ends. For first guesses only."""
     by_name = {wire.name: wire for wire in wires}
     loads = {wire.name: Loads() for wire in wires}
@@ -225,7 +225,7 @@ class Loads:
 
 
 def sag_between(x: np.ndarray, held: np.ndarray, loads: Loads, wire: Conductor) -> np.ndarray:
-    """How far a string hangs below the straight line between neighbouring places ``held`` (m,).
+    """Sag of a string below the straight line between neighbouring places ``held`` (m,).
 
     Parameters
     ----------

@@ -153,7 +153,7 @@ class LineData(Spans):
     contact_height : height of the contact wire at the supports of the running spans [m]
     encumbrance : height of the messenger wire above ``contact_height`` at the supports [m]
     contact_wire, messenger_wire : conductors, None for the latter if there is none
-    dropper : what the contact wire hangs by
+    dropper : kind of the contact wire's droppers
     support_stiffness : vertical stiffness of what carries the topmost wire at a mast [N/m]
     steady_arm : the arms at the inner supports
     transition_rise : height gained by the contact wire over all transition spans of one end [m]

@@ -1,1 +1,1 @@
-"""What is recorded of a run: facts, choice of line channels, and the head of the result file."""
+"""Recorded data of a run: facts, choice of line channels, and the head of the result file."""

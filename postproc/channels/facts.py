@@ -47,7 +47,7 @@ class Fact(NamedTuple):
     Attributes
     ----------
     unit : SI unit, "-" if none
-    meaning : what it is, in words
+    meaning : description in words
     of : how it is derived: a number, or a sequence with one for each pantograph or contact wire
     per : ``RUN``, ``PANTOGRAPH`` or ``WIRE``
     low, high : bounds, inclusive
@@ -111,7 +111,7 @@ def _damping(source: Derivation, component: str) -> tuple[float, float]:
 
 
 def _longest_element(source: Derivation, wire: Wire) -> float:
-    """Of a wire, where it is evaluated; its shortest one if it is not there."""
+    """Longest element of a wire [m] where it is evaluated; its shortest one if it is not there."""
     first, second = (source.mesh.x(ends) for ends in source.mesh.elements(wire.name).T)
     start, end = source.problem.evaluation
     lengths = (second - first)[(second > start) & (first < end)]
@@ -143,7 +143,7 @@ def _slowest_wave(source: Derivation) -> float:
 
 
 def _strongest_gust(source: Derivation) -> float:
-    """Of gusts whose drag is linearised, over the mean wind."""
+    """Strongest gust over the mean wind, if drag of gusts is linearised; else none."""
     from catenary.solver.wind.spectra import PEAK
 
     wind = source.laws.wind

@@ -1,4 +1,4 @@
-"""Which part of the line's channels is recorded: cadence, window, stretch, names, compression."""
+"""Recorded part of the line's channels: cadence, window, stretch, names, compression."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class LineRecord:
         )
 
     def of(self, train: channels.TrainLayout) -> LineRecord:
-        """The same of a run with this train, which may lack some of the channels."""
+        """Return this record for a run with this train, which may lack some of the channels."""
         there = channels.line_channels(train)
         return replace(self, names=tuple(name for name in self.names if name in there))
 

@@ -41,5 +41,5 @@ def criteria_of(results: Results, statistics: RunStatistics) -> list[Criterion]:
 
 
 def judged_by(results: Results, criteria: list[Criterion]) -> str:
-    """By which books, editions and supply a run is judged, and how many criteria passed."""
+    """Sentence on books, editions and supply that judge a run, with counts of verdicts."""
     return verdict_sentence(criteria, results.attributes["system"])

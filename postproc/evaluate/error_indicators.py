@@ -67,7 +67,7 @@ class Indicators:
     relative_error : (n_pantographs,) the same over the force's standard deviation
     resolved_frequency : highest frequency of a wave on the contact wire that the elements carry
         with less than 1 % error in frequency [Hz]
-    required_frequency : what the elements have to carry, ``required_frequency`` of 20 Hz [Hz];
+    required_frequency : that elements have to carry, ``required_frequency`` of 20 Hz [Hz];
         infinite where the train is as fast as the wave; both NaN in files of earlier formats
     warnings : sentences, empty if the settings are fine enough
     """
@@ -163,7 +163,7 @@ def _spectrum(values: np.ndarray, dt: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def memory(omega: np.ndarray, alpha: float, beta: float) -> np.ndarray:
-    """How long a component of the contact force is remembered, shape (n,) [s].
+    """Memory time of each component of the contact force, shape (n,) [s].
 
     A wave exp(i (w t - k x)) on a string with C = alpha K + beta M has
     k = (w / c) sqrt((1 - i beta / w) / (1 + i alpha w)). Over the length 1 / |Im k| on which it

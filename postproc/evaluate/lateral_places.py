@@ -1,4 +1,4 @@
-"""Where contact wires were on the strips of pantographs, beside how long these are."""
+"""Lateral places of contact wires on the strips of pantographs, beside the strips' length."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def lateral_ranges(results: Results) -> list[LateralRange]:
 
 
 def sentence(p: LateralRange) -> str:
-    """That a wire left a strip, and when and where."""
+    """Sentence on a wire that left a strip, with time and place."""
     who = "the pantograph" if p.name == "pantograph" else f"the {p.name} pantograph"
     return (
         f"At {p.left_time:.4g} s, {p.left_x:.4g} m, a contact wire leaves the strips of {who}, "

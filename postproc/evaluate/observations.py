@@ -34,7 +34,7 @@ class Observation:
     values : by the name of a pantograph, or under "" for the run; NaN where its record gives none
     unjudged : why values are NaN, or judge nothing, by the same names
     absent : why runs of this scene have no such quantity, empty if they have
-    note : what is to be known where the quantity is a limit
+    note : remark on the quantity where it is a limit
     """
 
     values: Mapping[str, float] = field(default_factory=dict)

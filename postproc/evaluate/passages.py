@@ -70,7 +70,7 @@ def mid_span(results: Results) -> np.ndarray:
 
 
 def uplift_onset(results: Results) -> float | None:
-    """How far before an evaluated arm the leading head is when its uplift has begun [m].
+    """Distance of the leading head before an evaluated arm when the arm's uplift has begun [m].
 
     The smallest value of all arms; negative if an arm moves only after the head has passed. None
     without arms in the stretch.
@@ -88,6 +88,6 @@ def uplift_onset(results: Results) -> float | None:
 
 
 def leading_position(results: Results) -> np.ndarray:
-    """Where the foremost pantograph is at each record, (n,) [m]."""
+    """Place of the foremost pantograph at each record, (n,) [m]."""
     foremost = int(np.argmax(results.first_position))
     return results.column("contact_position", foremost)

@@ -77,7 +77,7 @@ def remarks(results: Results) -> list[str]:
 
 
 def _about_excitation(results: Results) -> list[str]:
-    """That there is no train, of which forces could be judged."""
+    """Remark on a run without a train, of which nothing is judged."""
     facts = results.attributes.get("excitation")
     if not facts:
         return []
@@ -88,7 +88,7 @@ def _about_excitation(results: Results) -> list[str]:
 
 
 def _about_iterations(results: Results) -> list[str]:
-    """That steps went on above the tolerances, where the scene has a fixed number of iterations."""
+    """Remark on steps above the tolerances, where the scene has a fixed number of iterations."""
     counted = results.attributes.get("inner_iterations", {})
     above, fixed = counted.get("unconverged_steps", 0), results.fact("fixed_iterations")
     if not above or math.isnan(fixed):
@@ -101,7 +101,7 @@ def _about_iterations(results: Results) -> list[str]:
 
 
 def _about_sizes(results: Results) -> list[str]:
-    """That the shortest step was too long for the tolerance."""
+    """Remark on steps above the tolerance though they were the shortest."""
     counted = results.attributes.get("inner_iterations", {})
     above = counted.get("steps_above_tolerance", 0)
     if not above:
@@ -114,7 +114,7 @@ def _about_sizes(results: Results) -> list[str]:
 
 
 def _about_gusts(results: Results) -> list[str]:
-    """That linear drag leaves out much of the load of strong gusts."""
+    """Remark on strong gusts, much of whose load linear drag leaves out."""
     gust = results.fact("strongest_gust")
     # Not of NaN either.
     if not gust > 0.0:
@@ -148,7 +148,7 @@ def _about_incidents(results: Results) -> list[str]:
 
 
 def _about_droppers(results: Results) -> list[str]:
-    """That droppers are stiff for the step, and what is done about it."""
+    """Remark on droppers that are stiff for the step, and the remedy."""
     stiffness, dt = results.fact("stiffest_dropper"), results.dt
     # Not of NaN either.
     if not stiffness * dt**2 > STIFF:
@@ -171,7 +171,7 @@ def _about_droppers(results: Results) -> list[str]:
 
 
 def _about_ends(results: Results) -> list[str]:
-    """That droppers beyond a periodic end would have slackened, by those of the span before it."""
+    """Remark on slack droppers in the span before a periodic end, beyond which none slacken."""
     periodic = [side for side in _SIDES if results.fact(f"periodic_{side}") == 1.0]
     if not periodic or not slackens_at_all(results):
         return []

@@ -19,7 +19,7 @@ STATISTICS = ("mean", "standard deviation")
 
 
 class SpanSums(NamedTuple):
-    """Of each span (n,) the number of samples, their sum and the sum of their squares."""
+    """Number of samples of each span (n,), their sum and the sum of their squares."""
 
     samples: np.ndarray
     total: np.ndarray

@@ -20,7 +20,7 @@ class Criterion:
 
     Attributes
     ----------
-    criterion : what is judged, in words; names the pantograph where there are several
+    criterion : the judged quantity in words; names the pantograph where there are several
     value, limit : in ``unit``; NaN where there is none
     unit : for readers: N, mm, %, km/h
     relation : how the value must stand to the limit: "<=", "<", ">=" or ">"
@@ -105,7 +105,7 @@ def verdict(criteria: Sequence[Criterion]) -> bool | None:
 
 
 def verdict_sentence(criteria: Sequence[Criterion], supply: str) -> str:
-    """By which books a run is judged, and how many criteria each verdict has.
+    """Sentence on the books that judge a run, and the number of criteria with each verdict.
 
     Parameters
     ----------

@@ -95,7 +95,7 @@ def describe_filtered(dataset: h5py.Dataset) -> None:
 
 
 def hide(group: h5py.Group) -> None:
-    """Let readers of netCDF-4 take tables of a state to continue from for dimensions alone.
+    """Mark tables of a state to continue from as mere dimensions for readers of netCDF-4.
 
     They need a name for each dimension of each table; whatever else a state holds is not for them.
     """

@@ -37,7 +37,7 @@ CHANGED = ("line/evaluation_range",)
 
 
 def let_go_on(path: Path, header: Header, n_steps: int) -> None:
-    """Let a result file be one of a run of ``n_steps`` that was interrupted where it has ended.
+    """Turn a result file into that of a run of ``n_steps`` interrupted where it has ended.
 
     Parameters
     ----------

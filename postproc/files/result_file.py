@@ -102,7 +102,7 @@ class ResultFile:
     ----------
     path : the file, replaced at the end of the first ``append`` unless ``resume``
     stage : of the run
-    header : what the runner knows before the first step
+    header : facts of the run that are known before the first step
     n_ranks : size of the run's communicator
     rows_per_append : largest number of rows of an append
     with_energies : whether energies will be appended

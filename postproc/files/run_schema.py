@@ -1,4 +1,4 @@
-"""All that ``run.h5`` holds, declared once: attributes, tables, their dimensions, units and bounds.
+"""Schema of ``run.h5``, declared once: attributes, tables, their dimensions, units and bounds.
 
 ``result_file`` and ``dimensions`` write by these declarations, ``read.validated_file`` reads
 against them.

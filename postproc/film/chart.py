@@ -23,7 +23,7 @@ class ForceChart:
     Attributes
     ----------
     curves : the force as it is and below 20 Hz, of each pantograph
-    moving : what is drawn anew in each picture
+    moving : artists drawn anew in each picture
 
     Parameters
     ----------
@@ -77,14 +77,14 @@ class RingingChart:
     Attributes
     ----------
     curve : over the time until now
-    moving : what is drawn anew in each picture
+    moving : artists drawn anew in each picture
 
     Parameters
     ----------
     axes : where it is drawn
     data : of a line that a blow struck
     blow : which
-    snapshots, numbers : those that the film shows
+    snapshots, numbers : snapshots, and which of them the film shows
     """
 
     def __init__(

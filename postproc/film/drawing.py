@@ -68,16 +68,16 @@ class Drawing:
     Attributes
     ----------
     chart : axes of the chart, filled by whoever adds its curves to ``moving``
-    moving : what is drawn anew in each picture, from behind to the front
+    moving : artists drawn anew in each picture, from behind to the front
     wires, droppers, slack, bodies : lines of the picture
     values : texts of the forces, and ``words``, those of the time
 
     Parameters
     ----------
     scenery : of the run
-    picture : what the drawing holds
+    picture : frame of the drawing
     projection : of the drawing
-    colours : what colours of wires show
+    colours : colour scale of the wires
     strongest : largest force of a dropper [N], None if it is not known
     """
 
@@ -146,7 +146,7 @@ class Drawing:
             write(0.985, 0.965, "- - -  slack", fontsize=14, color=drawn.SLACK, ha="right")
 
     def _add_lines(self, strongest: float | None) -> None:
-        """All that moves, empty, from behind to the front."""
+        """Add the moving artists, empty, from behind to the front."""
         axes = self._axes
 
         def lines(**how: Any) -> LineCollection:

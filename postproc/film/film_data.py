@@ -1,4 +1,4 @@
-"""What a film shows of a run, read once: the line at rest, the train's course, the forces."""
+"""Data of a run for a film, read once: the line at rest, the train's course, the forces."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class FilmData:
     position, force, filtered, head_height : (n, p) [m], [N], [N] below 20 Hz, [m]; filtered is all
         NaN where the record is too coarse for it, and the force itself where that is given
     names : of the pantographs
-    excitation : what sets the line into motion in place of a train, whose place and force then
+    excitation : of the line in place of a train, whose place and force then
         stand in place of those of a pantograph; None with a train
     """
 
@@ -149,7 +149,7 @@ def film_data(results: Results) -> FilmData:
 
 
 def _excited(data: FilmData, excitation: Excitation) -> FilmData:
-    """The same of a line that an excitation sets into motion."""
+    """Data of a film of a line that an excitation sets into motion."""
     position, force = (of(data.time)[:, None] for of in (excitation.place, excitation.value))
     return replace(
         data,

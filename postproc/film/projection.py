@@ -1,4 +1,4 @@
-"""How places and motions of a line become points of a picture, by where it is looked at from.
+"""Projection of places and motions of a line to points of a picture, by the view.
 
 A line is a thousand times longer than it moves: heights and widths are drawn larger than lengths,
 and motions from rest larger still. All factors stand in the picture.
@@ -79,8 +79,8 @@ class Projection:
 
 
 class Colours(NamedTuple):
-    """What colours of wires show: the motion along an ``axis`` (1 to the left, 2 upward), what it
-    is called, and the ends of its scale [m]."""
+    """Colour scale of the wires: motion along an ``axis`` (1 to the left, 2 upward), its name, and
+    the ends of the scale [m]."""
 
     axis: int
     title: str
@@ -90,7 +90,7 @@ class Colours(NamedTuple):
 
 @dataclass(frozen=True)
 class Picture:
-    """What a drawing of a run has to hold.
+    """Frame of a drawing of a run.
 
     Attributes
     ----------
@@ -108,7 +108,7 @@ class Picture:
 
     @classmethod
     def of(cls, view: View, data: FilmData, roof: float, width: float, aspect: float) -> Picture:
-        """That of a run, from the train's roof to above the wires; from above, from side to side.
+        """Frame of a run, from the train's roof to above the wires; from above, from side to side.
 
         From behind lengths are not seen: one metre of height is one metre of the picture.
         """
@@ -145,7 +145,7 @@ class Picture:
         return Scale(size, motion, max(1.0, round_down(np.sqrt(size))))
 
     def colours(self, extremes: np.ndarray) -> Colours:
-        """What colours show: uplift, from above the motion sideways if there is one."""
+        """Scale of the colours: of uplift, or from above of the motion sideways if there is one."""
         axis, title = 2, "uplift"
         if self.view is View.PLAN and np.abs(extremes[:, 1]).max() >= _SMALLEST:
             axis, title = 1, "to the left"

@@ -1,4 +1,4 @@
-"""What films and ParaView draw of a run, and how it looks: the one description that feeds both.
+"""Drawn parts of a run and their looks: the one description that feeds films and ParaView.
 
 The line comes from the snapshots part by part. Beside it stand the pantographs, the forces at their
 heads, the train and the track. Points are places at rest, with how far they have moved from there,
@@ -66,7 +66,7 @@ SLACK, UNKNOWN = "#d6006c", "#8c9198"
 
 
 class Stroke:
-    """What is drawn where an excitation acts: a stem up to the wire, with a plate on it."""
+    """Mark where an excitation acts: a stem up to the wire, with a plate on it."""
 
     cells = np.array([[0, 1], [2, 3], [4, 5]])
     kinds = np.array([BODY, HEAD, HEAD])
@@ -134,7 +134,7 @@ class Scenery:
     ----------
     data : of the run
     line : parts of the line by name
-    parts : what stands beside it, by name; no train where an excitation stands for it
+    parts : parts beside it, by name; no train where an excitation stands for it
     shapes : of the pantographs
     roof : height of the roofs that they stand on [m]
     number : pantograph of each point of ``parts["pantographs"]``

@@ -48,7 +48,7 @@ class _Wire:
 
     @classmethod
     def of(cls, block: BlockTables, group: h5py.Group, rests: bool) -> _Wire:
-        """That of a group of the file."""
+        """Wire of a group of the file."""
         values = group["displacement" if "displacement" in group else "uplift"]
         return cls(block, np.cumsum(block.count) - block.count, values, rests)
 

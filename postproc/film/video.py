@@ -104,7 +104,7 @@ def _encode(
 
 
 def _command(size: tuple[int, int], rate: float, palette: Path, parts: Sequence[Path]) -> list[str]:
-    """How ffmpeg is called: pictures come from standard input, and go both ways."""
+    """Command of ffmpeg: pictures from standard input into a film and an animated picture."""
     small = f"fps={min(rate, _GIF_RATE):g},scale={_GIF_WIDTH}:-1:flags=area"
     ways = f"[0:v]split[a][b];[b]{small}[s];[s][1:v]paletteuse=dither=none[g]"
     return [

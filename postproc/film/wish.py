@@ -1,4 +1,4 @@
-"""What is wanted of a film, and where a line is looked at from in films and ParaView."""
+"""Choices for a film, and views of a line in films and ParaView."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class View(StrEnum):
 
 @dataclass(frozen=True)
 class Wish:
-    """What is wanted of a film; None leaves it to the run.
+    """Choices for a film; None leaves one to the run.
 
     Attributes
     ----------

@@ -56,7 +56,7 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Alignment:
-    """How a measured force lies on that of a run.
+    """Alignment of a measured force with that of a run.
 
     Attributes
     ----------
@@ -387,7 +387,7 @@ class _Fit:
 
 
 def _likely(tried: Iterable[_Refined | None]) -> list[_Refined]:
-    """Those fits that are as likely as the best."""
+    """Fits that are as likely as the best."""
     found = [one for one in tried if one is not None]
     if not found:
         return []

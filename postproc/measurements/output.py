@@ -67,7 +67,7 @@ def figures_table(found: Comparison) -> StudyTable:
 
 
 def as_text(found: Comparison) -> str:
-    """What is printed."""
+    """Text for the terminal: errors found, remarks, and the table of figures."""
     lines = [found.lead, ""]
     lines += [f"ERROR       {one.text}" for one in found.findings] or [NO_ERRORS]
     lines += [WHOSE] if found.findings else []

@@ -16,7 +16,7 @@ SETTLED = 6.0
 
 @dataclass(frozen=True)
 class MeasuredForce:
-    """What was measured at a pantograph, at even steps of place.
+    """Contact force and head height measured at a pantograph, at even steps of place.
 
     Attributes
     ----------
@@ -68,7 +68,7 @@ class Passage:
     by_time : whether places come from a clock
     stretch : begin and end of what is compared [m]
     uplift : at supports, None if not measured
-    tolerances : those that replace the usual ones, by name of the quantity, SI units
+    tolerances : replacements of the usual ones, by name of the quantity, SI units
     """
 
     name: str
@@ -98,7 +98,8 @@ class Passage:
         return filters.low_pass(values, dt, self.cut_off)
 
     def noise_in_band(self, noise: float, dt: float) -> float:
-        """What the filter leaves of the stated noise of samples ``dt`` [s] apart."""
+        """Standard deviation of the noise after the filter, in the unit of ``noise``, which is the
+        stated one of samples ``dt`` [s] apart."""
         share = 1.0 if self.is_filtered else filters.kept_variance(self.cut_off, dt)
         return noise * float(np.sqrt(share))
 

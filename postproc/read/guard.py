@@ -38,7 +38,7 @@ with file:
 
 
 def examined(path: Path) -> Records | None:
-    """Which records of a result file are valid; None if there is no file.
+    """Valid records of a result file; None if there is no file.
 
     Parameters
     ----------

@@ -173,7 +173,7 @@ class LineOfRun:
         return int(np.searchsorted(masts, 0.5 * (at[0] + at[-1]), side="right")) - 1
 
     def _contact_wires_in(self, masts: np.ndarray) -> np.ndarray:
-        """How many contact wires run in each span, (n_spans,)."""
+        """Number of contact wires in each span, (n_spans,)."""
         x, elements = self.line("node_points")[:, 0], self.elements()
         middles = 0.5 * (masts[:-1] + masts[1:])
         count = np.zeros(middles.size)

@@ -82,8 +82,8 @@ class MarchedFile:
         return self._extremes
 
     def state(self) -> tuple[None, list[str]]:
-        """There is nothing to continue from."""
+        """Return no state to continue from."""
         return None, []
 
     def close(self) -> None:
-        """Nothing is open."""
+        """Do nothing: no file is open."""

@@ -29,7 +29,7 @@ _COLUMNS = 256
 
 
 class Records(NamedTuple):
-    """Which records are valid.
+    """Valid records of a file.
 
     Attributes
     ----------
@@ -180,7 +180,7 @@ def valid_rows(table: h5py.Dataset, n_rows: int, most: float, may_be_nan: bool) 
 def _invalid(
     table: h5py.Dataset, part: slice, n_columns: int, most: float, may_be_nan: bool
 ) -> np.ndarray:
-    """Which rows hold something that cannot be, (rows,) bool."""
+    """Mask of rows with impossible values, (rows,) bool."""
     bad = np.zeros(part.stop - part.start, dtype=bool)
     for first in range(0, n_columns, _COLUMNS):
         columns = (slice(first, first + _COLUMNS),) if table.ndim == 2 else ()
@@ -210,7 +210,7 @@ def _in_order(table: h5py.Dataset, n: int, dt: float | None) -> int:
 
 
 def _missing_end(about: dict[str, Any], n: int) -> list[str]:
-    """That the file says it holds more steps than it does."""
+    """Fault of a file that holds fewer steps than it says; none otherwise."""
     wanted = about.get("n_steps")
     if wanted is None or about["outcome"] == RUNNING or n == wanted + 1:
         return []

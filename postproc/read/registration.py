@@ -41,7 +41,7 @@ class Registration(NamedTuple):
 
     @classmethod
     def of(cls, table: Mapping[str, np.ndarray], wires: Sequence[str] = ()) -> Registration | None:
-        """Of datasets ``arm_x``, ``arm_stagger`` and so on; None if one is missing.
+        """Registration from datasets ``arm_x``, ``arm_stagger`` and so on; None if one is missing.
 
         ``wires`` are the names of all wires of the line, to which ``arm_wire`` refers.
         """
@@ -58,7 +58,7 @@ class Registration(NamedTuple):
 
     @property
     def pushed(self) -> np.ndarray:
-        """Which arms their wires push, (n,) bool."""
+        """Mask of the arms that their wires push, (n,) bool."""
         return self.tension < 0.0
 
     def warnings(self) -> list[str]:
@@ -80,13 +80,13 @@ class Registration(NamedTuple):
 
     @property
     def slope(self) -> np.ndarray:
-        """By how much arms rise from their wire to their hinge, (n,) [rad]; zero without force."""
+        """Slope of arms, rising from their wire to their hinge, (n,) [rad]; zero without force."""
         sideways, up, along = self._towards_hinge.T
         return np.arctan2(up, np.hypot(sideways, along))
 
     @property
     def slew(self) -> np.ndarray:
-        """By how much hinges are ahead of wires along the track, seen from above, (n,) [rad]."""
+        """Angle by which hinges are ahead of wires along the track, from above, (n,) [rad]."""
         sideways, _, along = self._towards_hinge.T
         return np.arctan2(along, np.abs(sideways))
 

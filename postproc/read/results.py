@@ -37,7 +37,7 @@ class Results(TrainOfRun):
     Parameters
     ----------
     path : the result file or the folder that holds it as ``run.h5``
-    records : what ``guard.examined`` found in it, None to check it here
+    records : result of ``guard.examined``, None to check it here
     image : the bytes of the file, if a run of this process wrote it; it need not be there any more
 
     Raises
@@ -141,7 +141,7 @@ class Results(TrainOfRun):
 
     @property
     def line_record(self) -> LineRecord:
-        """Which part of the line's channels is recorded."""
+        """Recorded part of the line's channels."""
         return self._file.record
 
     @property

@@ -34,7 +34,7 @@ def opened(path: Path) -> tuple[h5py.File, Complete | None]:
     Returns
     -------
     file : with all indices read if its run goes on or was killed
-    complete : what ``committed_rows`` found before that, so that no later record counts; None if
+    complete : result of ``committed_rows`` before that, so that no later record counts; None if
         the run has ended
 
     Raises

@@ -69,7 +69,7 @@ class TrainOfRun(LineOfRun):
         return told or [{} for _ in range(self.n_pantographs)]
 
     def pantograph_names(self) -> list[str]:
-        """How the pantographs are called, by their order on the train."""
+        """Names of the pantographs, by their order on the train."""
         n = self.n_pantographs
         if n == 1:
             return ["pantograph"]
@@ -82,5 +82,5 @@ class TrainOfRun(LineOfRun):
 
     @property
     def first_position(self) -> np.ndarray:
-        """Where the pantographs are in the first record, (n_pantographs,) [m]."""
+        """Places of the pantographs in the first record, (n_pantographs,) [m]."""
         return np.asarray(self._file["channels/contact_position"][0])

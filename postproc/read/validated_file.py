@@ -51,7 +51,7 @@ class ValidatedFile:
     Parameters
     ----------
     path : the result file
-    records : what ``scan`` found in it, None to scan it when records are first read
+    records : result of ``scan``, None to scan it when records are first read
     image : its bytes, if a run of this process wrote it; the file need not be there any more
 
     Attributes
@@ -249,7 +249,7 @@ class ValidatedFile:
 
     @cached_property
     def records(self) -> Records:
-        """Which records are valid."""
+        """Valid records of the file."""
         dt = float(self.facts["time_step"])
         return scan(self._file, self.attrs, self.record, dt, self._faults, self._complete)
 

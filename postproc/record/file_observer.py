@@ -1,4 +1,4 @@
-"""What observers that write a file have in common: rank 0 writes at flushes, and failures end runs.
+"""Base of observers that write a file: rank 0 writes at flushes, and failures end runs.
 
 Between flushes ranks keep rows in memory.
 """

@@ -95,7 +95,7 @@ class LineGather:
     ----------
     comm : mpi4py communicator
     stage : of the run
-    record : what is recorded
+    record : recorded part of the channels
     max_rows : steps between two calls at most
     """
 

@@ -60,13 +60,13 @@ SECTIONS: list[SectionEntry] = [
 
 
 def quick_sections() -> list[SectionEntry]:
-    """Those that a run writes when it ends."""
+    """Sections that a run writes when it ends."""
     return [entry for entry in SECTIONS if not entry.full]
 
 
 @dataclass(frozen=True)
 class Report:
-    """What was written and found: the files, the criteria, and ``verdict`` (None: not judged)."""
+    """Written files of a report, its criteria, and ``verdict`` (None: not judged)."""
 
     files: list[Path]
     criteria: list[Criterion]
@@ -187,7 +187,7 @@ def write_summary(result_path: Path | str, out_dir: Path | str) -> bool | None:
 
 
 def drawings(results: Results, statistics: RunStatistics) -> Iterator[Picture]:
-    """What makes each picture of a run, in their order. Not collective.
+    """Pictures of a run in their order, each with the function that draws it. Not collective.
 
     Parameters
     ----------

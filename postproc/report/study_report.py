@@ -1,4 +1,4 @@
-"""What a study leaves: ``study.html`` with verdicts, tables and figures, the figures' data as CSV.
+"""Report of a study: ``study.html`` with verdicts, tables and figures, the figures' data as CSV.
 
 A study compares many runs with what a source states of its own; who made it fills a ``Study``.
 """
@@ -30,7 +30,7 @@ class Finding:
     Attributes
     ----------
     number : of the statement
-    statement : what the source says
+    statement : its text in the source
     criterion : when it counts as reproduced
     verdict : ``REPRODUCED``, ``NOT_REPRODUCED`` or ``UNDECIDED``
     found : our numbers
@@ -56,7 +56,7 @@ class Reading:
 
     @property
     def n_reproduced(self) -> int:
-        """How many statements are reproduced."""
+        """Number of reproduced statements."""
         return sum(one.verdict == REPRODUCED for one in self.findings)
 
 
@@ -72,7 +72,7 @@ class StudyFigure:
 
 @dataclass(frozen=True)
 class Study:
-    """All that a study found. The first reading is the case as it stands."""
+    """Results of a study. The first reading is the case as it stands."""
 
     title: str
     lead: str

@@ -187,7 +187,7 @@ def _static(results: Results) -> dict[str, Any]:
 
 
 def _elasticity_of_wires(results: Results) -> dict[str, Any]:
-    """Of each of several contact wires pressed alone, by its name."""
+    """Elasticity of each of several contact wires pressed alone, by its name."""
     names = results.wires_of(Role.CONTACT)
     if len(names) == 1:
         return {}
@@ -204,7 +204,7 @@ def _elasticity_of_wires(results: Results) -> dict[str, Any]:
 
 
 def _effects(attributes: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """What was simulated and what was left out, each with the reason."""
+    """Effects simulated and left out, each with the reason."""
     return [
         {"name": name, "title": title, "simulated": simulated, "reason": reason}
         for key, simulated in (("effects_on", True), ("effects_off", False))

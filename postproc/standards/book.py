@@ -154,7 +154,7 @@ class Rule(_Part):
     limit : rows, of which the first that holds is the limit
     clause : where the limit stands
     compared : whether the limit was compared with the text of the standard; None as the book says
-    note : what is to be known of it
+    note : remark on the criterion
     """
 
     id: Annotated[str, Field(max_length=60, pattern=_NAME)]

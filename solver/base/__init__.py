@@ -1,4 +1,4 @@
-"""What all parts may import: errors, ranks, MPI, PETSc, signals. Installed as ``catenary.base``."""
+"""Base of all parts: errors, ranks, MPI, PETSc, signals. Installed as ``catenary.base``."""
 
 if __name__ != "catenary.base":
     raise ImportError(

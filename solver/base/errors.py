@@ -33,7 +33,7 @@ class InputError(CatenaryError):
 
     @property
     def faults(self) -> tuple[Fault, ...]:
-        """All that is wrong, each with its key."""
+        """All faults, each with its key."""
         return self._of_scene or (Fault("", str(self)),)
 
 

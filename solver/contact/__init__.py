@@ -1,1 +1,1 @@
-"""Where heads touch the wire, what droppers pull, and what the line answers to both."""
+"""Contacts and links in steps: places of heads on wires, dropper forces, response of the line."""

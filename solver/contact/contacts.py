@@ -1,4 +1,4 @@
-"""All that the contacts of a rank work on, as kernels take it; see ``kernels/contact``."""
+"""Arrays of the contacts of a rank, as kernels take them; see ``kernels/contact``."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ class Sideways(NamedTuple):
 
 
 class Across(NamedTuple):
-    """Of the wires at n contacts: lateral ``place`` [m], its total ``rate`` [m/s], and displacement
-    ``moved`` [m]; empty where no lateral motion is simulated."""
+    """Lateral motion of wires at n contacts: ``place`` [m], its total ``rate`` [m/s], and
+    displacement ``moved`` [m]; empty where no lateral motion is simulated."""
 
     place: np.ndarray
     rate: np.ndarray
@@ -33,7 +33,7 @@ class Across(NamedTuple):
 
 
 def no_sideways() -> Sideways:
-    """Of a line without lateral motion."""
+    """Lateral data of a line without lateral motion, empty."""
     nothing = np.zeros((0, 2))
     return Sideways(nothing.astype(np.int64), nothing.astype(bool), nothing)
 
@@ -87,7 +87,7 @@ def no_work(n_contacts: int, share_after: float, dt: float) -> ContactWork:
 
 
 class Contacts(NamedTuple):
-    """Of n contacts.
+    """Arrays of n contacts.
 
     Attributes
     ----------

@@ -81,7 +81,7 @@ class FollowedLinks:
 
     @property
     def followed(self) -> Followed:
-        """The same as kernels take it."""
+        """Followed links as kernels take them."""
         links = self.numbers, self.links, self.reserve, self.moving
         return Followed(*links, self.dependents, self.dependent_numbers)
 
@@ -157,7 +157,7 @@ def no_links() -> Coupled:
 
 
 class LinkCoupling:
-    """How the compensation of one link changes the reserve of another, on rank 0.
+    """Change of the reserve of one link by the compensation of another, on rank 0.
 
     Collective to make. G_de = (k sigma + c tau)_d L_d^T A^-1 L_e [-], k and c being those of the
     reserve.
@@ -199,7 +199,7 @@ class LinkCoupling:
         return self._band
 
     def _distance(self, columns: ShortColumns) -> float:
-        """How far from a link others are coupled with it [m]."""
+        """Distance up to which links are coupled [m]."""
         return float(columns.reach + 2.0 * self._followed.table.half_length.max(initial=0.0))
 
     def _couple(self, columns: ShortColumns, which: np.ndarray) -> None:

@@ -33,7 +33,7 @@ from catenary.solver.statics.form_finding.equilibrium import Equilibrium
 def sideways_of(
     model: Model, form: Equilibrium, wires: ContactWires, ownership: Ownership
 ) -> Sideways:
-    """Of a line with lateral motion, which is at rest in ``form``."""
+    """Lateral data of a line with lateral motion, which is at rest in ``form``."""
     dofs = np.stack([model.dofs(wires.mesh_nodes, name) for name in ("v", "theta_z")], axis=1)
     mine = ownership.owned(dofs)
     local = np.where(mine, dofs - ownership.first, 0).astype(np.int64)
@@ -272,7 +272,7 @@ def _columns_of_nodes(
     dofs, nodes = wires.dofs[chosen][:, :, None], wires.nodes
 
     def put(found: ShortColumns, which: np.ndarray) -> None:
-        """Let nodes know of the columns of some."""
+        """Enter the columns of some nodes in the table of nodes."""
         mine = chosen[which]
         nodes["begin"][mine], nodes["at"][mine] = found.start[which], found.at[which]
         nodes["width"][mine] = found.width[which]

@@ -1,4 +1,4 @@
-"""How line and pantographs agree on the contact forces of a step: three coupling schemes.
+"""Coupling of line and pantographs by the contact forces of a step: three schemes.
 
 ``implicit`` (the default) solves for the forces through both compliances; see `complementarity`.
 The two of this module are the ways of programs that exchange forces and motions only, kept to be

@@ -59,7 +59,7 @@ class Exchange:
     Parameters
     ----------
     early : whether shares hold what the line extrapolates to
-    bounds : those of all shares, see ``LineResponse``
+    bounds : of all shares, see ``LineResponse``
     """
 
     def __init__(self, comm: Any, n_contacts: int, early: bool, bounds: Bounds) -> None:

@@ -28,7 +28,7 @@ class Tangents(NamedTuple):
 
 
 class ReportedForces(NamedTuple):
-    """Which forces of n contacts are reported at the end of a step.
+    """Reported forces of n contacts at the end of a step.
 
     Attributes
     ----------
@@ -88,10 +88,10 @@ class LawInSteps(Protocol):
         """Recorded part of the forces (n,) of the latest step [N]."""
 
     def in_loop(self) -> StepLaw:
-        """The same for a loop of kernels."""
+        """The law for a loop of kernels."""
 
     def state(self) -> np.ndarray:
-        """All that is remembered, as one array."""
+        """Memory of the law, as one array."""
 
     def restore(self, state: np.ndarray) -> None:
         """Continue from what ``state`` returned."""
@@ -110,14 +110,14 @@ class _Tangents:
         self.pulls = pulls
 
     def linearise(self, depth: np.ndarray, rate: np.ndarray) -> None:
-        """It is linear already."""
+        """Do nothing: the law is linear."""
 
     def force(self, depth: np.ndarray, rate: np.ndarray) -> np.ndarray:
         """Spring and damper (n,) [N]."""
         return np.asarray(self.tangents.by_depth * depth + self.tangents.by_rate * rate)
 
     def accept(self, time: float, depth: np.ndarray, rate: np.ndarray, force: np.ndarray) -> None:
-        """Nothing is remembered."""
+        """Do nothing: the law has no memory."""
 
     def reported(self, force: np.ndarray) -> np.ndarray:
         """The forces themselves."""
@@ -174,7 +174,7 @@ class HertzInSteps(_Tangents):
         return self.there
 
     def accept(self, time: float, depth: np.ndarray, rate: np.ndarray, force: np.ndarray) -> None:
-        """Remember how fast those come who do not touch yet."""
+        """Store the approach speed of open contacts."""
         self._remember(depth, rate)
 
     def in_loop(self) -> StepLaw:

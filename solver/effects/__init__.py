@@ -1,1 +1,1 @@
-"""What a scene may simulate, each effect with what it adds to the model."""
+"""Effects that a scene may simulate, each with its additions to the model."""

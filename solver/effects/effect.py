@@ -45,7 +45,7 @@ class Effect:
     Attributes
     ----------
     name : key in the scene's ``[effects]`` table
-    title : what is simulated, for the plan and the report
+    title : the simulated effect in words, for the plan and the report
     adds : the terms that it adds, in words
     source : paper, standard or equation number
     default : whether scenes simulate it by default
@@ -62,7 +62,7 @@ class Effect:
         order, so that an effect may change what one that it requires has set
     of_form : whether ``build`` reads the shape at rest, ``Model.form``
     lifts : limits of a scene that do not hold with the effect
-    data : what a scene has to hold for it to act on, by its keys; empty if any scene does
+    data : keys of the scene's data that it acts on; empty if it acts on any scene
     after_cutting : True for what befalls a line whose droppers are cut: form finding leaves it out,
         and the line then hangs with it (`statics.with_defects`)
     cut_for : of an effect after cutting, True where droppers are cut for it

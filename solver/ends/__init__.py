@@ -1,1 +1,1 @@
-"""How a line goes on beyond an end: half lines of a periodic line, and what they do in steps."""
+"""Line beyond an end: half lines of a periodic line, and their forces in steps."""

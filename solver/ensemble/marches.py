@@ -116,7 +116,7 @@ def march_side_by_side(
 
 
 def _begin(shared: SharedLine, lane: Lane, number: int, at_rest: LineAtRest) -> _OnItsWay:
-    """Let a scene begin in a lane."""
+    """Begin the march of a scene in a lane."""
     problem, model, form, lift = at_rest
     model = replace(model, problem=problem, simulated=simulated(problem))
     laws, train = model.simulated, problem.train
@@ -160,8 +160,8 @@ def _begin(shared: SharedLine, lane: Lane, number: int, at_rest: LineAtRest) -> 
 def _steps(
     scheme: OneSolve, motion: Motion, n_steps: int, dt: float
 ) -> tuple[native.Steps, np.ndarray]:
-    """What takes the steps of a scheme, and the rows of outputs that they fill, the first one
-    before the first step."""
+    """Compiled steps of a scheme, and the rows (n_steps + 1, n_outputs) that they fill, the first
+    one before the first step."""
     pantographs, coupling = scheme.pantographs, scheme.coupling
     assert isinstance(coupling, Implicit)
     n = pantographs.n_contacts

@@ -60,7 +60,7 @@ class Lane:
     ----------
     number : of the lane
     motion : of the line in this scene
-    links : those that are followed in it
+    links : its links whose state is followed
     taut : the line in the scene that is there
     wires, wires_at_rest : its contact wires where displacements are zero, and at rest
     """
@@ -82,7 +82,7 @@ class SharedLine:
     columns, line : as a ``March`` has them
     lanes : one for each scene
     extremes : LineExtremes
-    native : what takes steps, ``native.Ensemble``
+    native : compiled steps, ``native.Ensemble``
 
     Parameters
     ----------

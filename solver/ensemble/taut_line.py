@@ -29,7 +29,7 @@ class TautLine(NamedTuple):
     rest : the model of the line at rest, whose droppers may be slack
     model, form : with all droppers taut, in the shape from which displacements count
     moved : (n_dofs,) of the line at rest from there [m], [rad]
-    links : what is followed of it
+    links : its links whose state is followed
     """
 
     rest: Model

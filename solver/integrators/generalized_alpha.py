@@ -44,8 +44,8 @@ class AlphaFactors(NamedTuple):
     dt : step [s]
     ratio : r
     known_of_balanced, known_of_own : shares of b and a of the step before in p
-    position_of_own, position_of_known : what the displacement takes from a before and from p [s2]
-    velocity_of_own, velocity_of_known : what the velocity takes from both [s]
+    position_of_own, position_of_known : factors of a before and of p in the displacement [s2]
+    velocity_of_own, velocity_of_known : factors of both in the velocity [s]
     damping_on_stiffness : c, so that a product with K of d + c v gives elastic and damping forces
     """
 

@@ -226,7 +226,7 @@ class LineIntegrator(ABC):
             self.window.wake()
 
     def state(self) -> Mapping[str, np.ndarray]:
-        """All that the next step starts from, by name; to be read before that."""
+        """State that the next step starts from, by name; to be read before that."""
         return {name: part() for name, part in self._parts_of_state().items()}
 
     def _parts_of_state(self) -> Mapping[str, Callable[[], np.ndarray]]:

@@ -108,7 +108,7 @@ class LineState:
 
 
 class PredictedLineState(LineState):
-    """The same kept one prediction ahead, for Newmark's method.
+    """State of the line kept one prediction ahead, for Newmark's method.
 
     Kept are what the coming step's product with K reads, x = -(d* + c v*) with the predictions d*
     and v* of eq. (2.5), then y = v*, and the acceleration z. A step that starts from d and v reads
@@ -191,7 +191,7 @@ class AlphaSteps(NamedTuple):
 
 
 class AlphaAhead(PredictedLineState):
-    """The same for the generalized-alpha method, whose steps need an acceleration p known before.
+    """State for the generalized-alpha method, whose steps need an acceleration p known before.
 
     Kept are x = -(d* + c v*) of the coming step, y = v, and z = k b + l p, which is what d* + c v*
     takes from accelerations: d = -(x + (dt + c) y + z).

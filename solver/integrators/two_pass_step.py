@@ -33,9 +33,9 @@ _STRETCH = 8192
 
 
 class PassArrays(NamedTuple):
-    """What passes read and fill: what products with K read, and those with C; loads of all that is
-    solved for, or none; accelerations of these; the motion of the rank's own stations; known
-    accelerations and predicted velocities of these, or none."""
+    """Arrays that passes read and fill: inputs of the products with K and with C; loads of all
+    unknowns that are solved for, or none; accelerations of these; the motion of the rank's own
+    stations; known accelerations and predicted velocities of these, or none."""
 
     factor: np.ndarray
     velocity: np.ndarray
@@ -47,7 +47,7 @@ class PassArrays(NamedTuple):
 
 
 class Changes(NamedTuple):
-    """Numbers that take a state from one prediction to the next.
+    """Coefficients that take a state from one prediction to the next.
 
     Attributes
     ----------
@@ -94,12 +94,12 @@ class StationPasses:
 
     Attributes
     ----------
-    native : what takes a step, for loops that take steps themselves
+    native : compiled step, for loops that take steps themselves
     are_compiled : whether kernels were compiled for what its stations join
     rows, columns : layouts of each station type, of rows and of factors, as kernels take them
     parts : PassParts
     factors : as given
-    known : what the motion keeps besides x, y and z, or nothing
+    known : accelerations that the motion keeps besides x, y and z, or none
     by_mass : whether right-hand sides are made by M, as where that is shorter than by K
 
     Parameters
@@ -109,7 +109,7 @@ class StationPasses:
         motion, or of what it predicts of the velocity; that of ``answer`` is the acceleration
     loads : of all that is solved for [N], or none, added in the pass forth; kept by reference
     motion : of the rank's own stations
-    steps : those that the motion is kept for
+    steps : scheme that the motion is kept for
     """
 
     def __init__(
@@ -169,7 +169,7 @@ class StationPasses:
 
 
 def changes_of(motion: PredictedLineState, steps: Steps | AlphaSteps, by_mass: float) -> Changes:
-    """Numbers that take a state from one prediction to the next."""
+    """Coefficients that take a state from one prediction to the next."""
     by_position, by_velocity, _ = map(float, motion.gains)
     nothing = 0.0, 0.0
     if isinstance(steps, Steps):

@@ -25,7 +25,7 @@ def zeros(size: int, place: int = 0) -> np.ndarray:
 
 
 def copy(numbers: np.ndarray) -> np.ndarray:
-    """The same numbers one after the other in an array that begins at a cache line."""
+    """Copy numbers, one after the other, into an array that begins at a cache line."""
     result = zeros(numbers.size)
     result[:] = numbers.ravel()
     return result

@@ -1,4 +1,4 @@
-"""How far the response to a point load reaches within one time step.
+"""Reach of the response to a point load within one time step.
 
 The step operator A = M + gamma dt C + beta dt^2 K is nearly a mass matrix: the columns of its
 inverse decay exponentially along the track and vanish to round-off within about a span. The

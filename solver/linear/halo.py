@@ -17,9 +17,9 @@ class Subdomain:
 
     Attributes
     ----------
-    first, last : what the rank owns
-    low, high : what it solves for: its own, and the overlap with its neighbours
-    read_low, read_high : what products over [low, high) read
+    first, last : range that the rank owns
+    low, high : range that it solves for: its own, and the overlap with its neighbours
+    read_low, read_high : range that products over [low, high) read
     """
 
     first: int

@@ -41,9 +41,9 @@ class LineProducts:
     model : Model
     domain : Subdomain, whose rows are multiplied
     like : marks of the line's stations, None if ``in_pieces`` has some
-    padded : what products by stations read, with one station more at both ends
+    padded : vector that products by stations read, with one station more at both ends
     read : a vector around the same without these
-    in_pieces : what makes products of a part of the line only, None if they are of all of it
+    in_pieces : maker of products of a part of the line only, None if they are of all of it
 
     Attributes
     ----------

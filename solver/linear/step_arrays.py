@@ -21,20 +21,20 @@ class StepArrays:
 
     Parameters
     ----------
-    domain : what the rank solves for, and what products over it read
+    domain : ranges that the rank solves for, and that products over it read
     pad : further numbers at both ends that products by stations read, zero where the line ends
     comm : communicator of PETSc's solver
 
     Attributes
     ----------
-    padded, read : what products multiply, with and without ``pad``
+    padded, read : vector that products multiply, with and without ``pad``
     factor : (n_local,) the rank's own part of ``read``
     force, loaded : (domain.size,) right-hand sides of a solve: internal force [N], and room for
         that with loads
     solution : (domain.size,) of a solve; ``answer`` (n_local,) is the rank's own part of it
     read_domain : vector of ``read`` as far as the rank solves for it
-    padded_rates, rates : what products with C multiply in two passes, as ``padded`` and ``read``;
-        made when they are first asked for
+    padded_rates, rates : vector that products with C multiply in two passes, as ``padded`` and
+        ``read``; made when they are first asked for
     read_here, force_here, loaded_here : vectors of this rank alone. What products fill is the
         rank's, what is solved for perhaps the line's: two views of one array.
     """

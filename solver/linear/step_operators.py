@@ -74,7 +74,7 @@ class LineOperators:
     ownership : Ownership
     coefficients : of M, K and C in A
     windows : Windows, whose reach is that of A^-1
-    in_pieces : what makes products and factors of a part of the line, on one rank; if None all of
+    in_pieces : maker of products and factors of a part of the line, on one rank; if None all of
         it has some
 
     Attributes
@@ -317,7 +317,7 @@ class LineOperators:
                 held.destroy()
 
     def _solve_apart(self, windows: Windows) -> None:
-        """Let each rank solve by itself, for its own part and as much as can influence it."""
+        """Set up a solver on each rank, for its own part and as much as can influence it."""
         low, high = self._overlap(windows)
         self._make_arrays(low, high, PETSc.COMM_SELF)
         is_direct = True
@@ -345,7 +345,7 @@ class LineOperators:
         self._is_direct = bool(self._comm.allreduce(int(is_direct), op=MPI.MIN))
 
     def _solve_together(self, windows: Windows) -> None:
-        """Let PETSc solve for the whole line on all ranks."""
+        """Set up PETSc's solver for the whole line on all ranks."""
         first, last = self._ownership.first, self._ownership.last
         self._make_arrays(first, last, self._comm)
         rows, whole = (first, last), (0, self._model.n_dofs)

@@ -95,7 +95,7 @@ class FeltFurther(RunBroken):
 
 
 class Windows(NamedTuple):
-    """Where along the line unknowns stand, and which of them a force at x can move.
+    """Windows of unknowns that a force at x can move.
 
     Attributes
     ----------
@@ -262,7 +262,7 @@ class UnitResponses:
         return min(self.windows.reach, _MARGIN * furthest)
 
     def _bands(self, end: float) -> OperatorBands:
-        """Of A up to a place [m]."""
+        """Bands of A up to a place [m]."""
         _, last = self.windows.numbering.within(-np.inf, end)
         return OperatorBands(self._model, self._coefficients, last)
 
@@ -326,8 +326,8 @@ class UnitResponses:
 
 
 class Cuts(NamedTuple):
-    """What is wanted of the answers of n places among unknowns of a stretch, (n,) each: it is to be
-    zero before ``low`` and from ``high`` on; ``at`` is where it goes."""
+    """Windows of the answers of n places among unknowns of a stretch, (n,) each: an answer should
+    vanish before ``low`` and from ``high`` on; ``width`` values from ``begin`` on go to ``at``."""
 
     low: np.ndarray
     high: np.ndarray
@@ -337,7 +337,7 @@ class Cuts(NamedTuple):
 
 
 class Places(NamedTuple):
-    """Where columns are wanted, and their windows.
+    """Places at which columns are wanted, and their windows.
 
     ``first`` and ``last`` (n,) are stations of the windows; ``begin`` and ``width`` (n,) the local
     unknowns in them that this rank owns.

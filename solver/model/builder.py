@@ -60,7 +60,7 @@ class ModelBuilder:
             self._hang(len(self.model.blocks) - 1, load)
 
     def _hang(self, number: int, load: np.ndarray) -> None:
-        """Let a wire of block ``number`` weigh on its unknowns, with masses (k, m) of each kind."""
+        """Add the weight of the wire of block ``number``, with masses (k, m) of each kind."""
         block = self.model.blocks[number]
         self.model.hanging_wires[number] = load
         self.model.hanging.append(Hanging(block.dofs, load, block.kind))
@@ -187,7 +187,7 @@ class ModelBuilder:
         self.hold_unknowns(self.model.dofs(nodes, unknown))
 
     def hold_unknowns(self, unknowns: np.ndarray) -> None:
-        """The same by their numbers."""
+        """Hold unknowns by their numbers."""
         self._constrained.append(unknowns)
 
     @property

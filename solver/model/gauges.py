@@ -27,7 +27,7 @@ from catenary.solver.problem.watched_links import (
 
 
 class GaugePlace(NamedTuple):
-    """Where a gauge is: number of its wire in the line, place [m], and on which side of the wire:
+    """Place of a gauge: number of its wire in the line, place [m], and on which side of the wire:
     -1 where the wire begins there, 1 where it ends there."""
 
     wire: int
@@ -174,6 +174,6 @@ def _tension_at_rest(model: Model, place: GaugePlace, element: int) -> float:
 
 
 def _moved(model: Model, node: int) -> float:
-    """How far a node has moved along the track since the installation, at rest [m]."""
+    """Displacement of a node at rest along the track since the installation [m]."""
     form = model.form
     return float(form.along[node]) if form is not None and form.along.size else 0.0

@@ -67,8 +67,8 @@ def dropper_directions(model: Model) -> Direction:
 
 
 def across_droppers(model: Model) -> tuple[Direction, np.ndarray]:
-    """What a dropper's force at rest does across it, N / l of a pendulum of its length l, in the
-    plane along the track.
+    """Transverse stiffness of droppers in the plane along the track: N / l, as of a pendulum of the
+    dropper's length l with its force N at rest.
 
     Returns
     -------
@@ -80,15 +80,14 @@ def across_droppers(model: Model) -> tuple[Direction, np.ndarray]:
 
 
 def sideways_of_droppers(model: Model) -> tuple[Direction, np.ndarray]:
-    """The same in the plane across the track, at right angles to ``across_droppers``."""
+    """Transverse stiffness across the track, at right angles to that of ``across_droppers``."""
     unit, pull = _unit_vectors(model)
     return _along(model, np.cross(unit, _across(unit)), (_SIDEWAYS,)), pull
 
 
 def swings_of_droppers(model: Model) -> list[tuple[Direction, np.ndarray]]:
-    """What droppers' forces at rest do across them in the planes of the model beside the vertical
-    one: directions of all droppers, and N / l of each (n_droppers,) [N/m], of one plane after the
-    other."""
+    """Transverse stiffness of droppers in the planes of the model beside the vertical one, plane by
+    plane: directions of all droppers, and N / l of each (n_droppers,) [N/m]."""
     found = []
     if model.simulated.lateral:
         found.append(sideways_of_droppers(model))

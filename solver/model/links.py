@@ -39,7 +39,7 @@ class Direction(NamedTuple):
 
 
 class Bends(NamedTuple):
-    """Where the laws of links have another slope.
+    """Bends in the laws of links, beyond which their slope differs.
 
     Attributes
     ----------

@@ -33,7 +33,7 @@ class TimeFunction(NamedTuple):
 
 
 def constant(value: float = 1.0) -> TimeFunction:
-    """The same at all times."""
+    """A constant ``value`` at all times."""
     return TimeFunction(CONSTANT, np.array([value], dtype=float))
 
 
@@ -102,7 +102,7 @@ class FunctionLoad:
 
     Attributes
     ----------
-    name : what it is called in messages
+    name : its name in messages
     unknowns : (n,) numbers of unknowns
     values : forces [N], [N m] (n,) at a time [s]; depends on nothing else, since it may be called
         ahead of the step, and on ranks that own any of the unknowns

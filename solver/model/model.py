@@ -133,10 +133,10 @@ class Model:
     dropper_gap : (n_droppers,) stretch that a dropper slack at rest lacks to be taut, else 0 [m]
     loads : beside those of contacts and links, from the start of the march on
     links : droppers, and whatever else was added as links
-    droppers : those of the mesh, in its order; they only pull where they may slacken
+    droppers : links of the mesh's droppers, in its order; they only pull where they may slacken
     hanging_at_arms : (n_arms,) what of each arm's mass hangs at its wire [kg]
     form : the shape at rest that matrices are made about, None before it is found
-    hanging : what weighs on the line
+    hanging : masses that weigh on the line
     hanging_wires : by the number of a wire's block, masses (k, m) by which each kind of its
         elements weighs on its unknowns
     terms_of : effect name -> number of terms, laws and lifted limits that it contributes
@@ -176,7 +176,7 @@ class Model:
 
     @property
     def n_unknowns(self) -> int:
-        """How many unknowns all nodes have."""
+        """Number of unknowns of all nodes."""
         return self.numbering.n_unknowns
 
     @property

@@ -1,4 +1,4 @@
-"""Which rank owns which part of the line: contiguous runs of stations, cut between links."""
+"""Partition of the line among ranks: contiguous runs of stations, cut between links."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ _NO_FORCE = 1e-6
 
 @dataclass(frozen=True)
 class LateralShape:
-    """Where wires are laterally at rest, and what steady arms do there.
+    """Lateral shape of the wires at rest, and forces of steady arms there.
 
     Attributes
     ----------

@@ -295,7 +295,7 @@ def _one_sign(model: Model, links: Links) -> LinkArrays:
 
 
 def padded(links: LinkArrays, m: int) -> LinkArrays:
-    """The same with m unknowns each, or more: their last one again, without weight."""
+    """Pad links to m unknowns each, with their last one again, without weight."""
     more = m - links.unknowns.shape[1]
     unknowns = np.pad(links.unknowns, ((0, 0), (0, more)), mode="edge")
     weights = np.pad(links.weights, ((0, 0), (0, more)))

@@ -1,4 +1,4 @@
-"""Where wires end along the track, and by what they are held there."""
+"""Ends of wires along the track, and their fixings."""
 
 from __future__ import annotations
 

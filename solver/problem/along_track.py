@@ -50,7 +50,7 @@ class Tensioner:
 
 @dataclass(frozen=True)
 class AlongTrack:
-    """How wires end along the track, and what they are held by in between.
+    """Ends of wires along the track, and their fixings in between.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""How a line ends: held, in spans that absorb waves, or as if it went on periodically."""
+"""Ends of a line: held, in spans that absorb waves, or as if it went on periodically."""
 
 from __future__ import annotations
 

@@ -35,7 +35,7 @@ LineIncident = DropperBreak | TensionLoss
 
 @dataclass(frozen=True)
 class Happened:
-    """All that has happened to a line by the end of step ``step``, in order of time."""
+    """Incidents of a line up to the end of step ``step``, in order of time."""
 
     step: int
     incidents: tuple[LineIncident, ...] = field(default=())

@@ -156,7 +156,7 @@ def steps_of(problem: Problem) -> int:
 
 
 def n_halvings(dt: float, smallest: float | None) -> int:
-    """How often a step of ``dt`` may be halved if it is to be no shorter than ``smallest`` [s]."""
+    """Number of halvings of a step of ``dt`` that keep it no shorter than ``smallest`` [s]."""
     if smallest is None:
         return DEFAULT_HALVINGS
     return math.floor(math.log2(dt / smallest) + 1e-9)

@@ -55,10 +55,10 @@ class Simulated:
     lateral : whether wires move sideways
     relative_motion : whether twin wires move relative to each other; if not, they move as one
     uplift_stops : whether stops end the uplift at steady arms
-    irregular_heights : what contact wires are to be higher at rest where they are held
+    irregular_heights : added to the heights of contact wires at rest where they are held
     length_errors : of the droppers, None if all are cut to length
     missing, loose : places of droppers that are not there, and of those that carry nothing [m]
-    surface : what strips run on, above the axes of the contact wires, each adding to the others
+    surface : running surfaces above the axes of the contact wires, each adding to the others
     """
 
     contact: ContactLaw

@@ -15,7 +15,7 @@ _DAVENPORT = 6.0
 
 @dataclass(frozen=True)
 class Profile:
-    """How the mean speed grows with the height above ground.
+    """Profile of the mean speed over the height above ground.
 
     ln(z / ``roughness``) [m], or with an ``exponent`` z to the power of it.
     """
@@ -111,7 +111,7 @@ class Wind:
         return math.sqrt(_DAVENPORT) * self.gusts.friction_velocity / self.mean
 
     def with_gusts(self, gusts: Gusts | None) -> Wind:
-        """The same mean wind with other gusts."""
+        """Return this mean wind with other gusts."""
         return replace(self, gusts=gusts)
 
     @property

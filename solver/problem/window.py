@@ -1,4 +1,4 @@
-"""How much of a line a step takes on: all of it, or a window that moves with the train."""
+"""Part of a line that a step computes: all of it, or a window that moves with the train."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ ROUND_OFF = 1e-14
 
 @dataclass(frozen=True)
 class WindowChoice:
-    """Which stations move.
+    """Choice of the stations that move.
 
     ``mode`` is ``off`` (all), ``exact`` (all that any wave has reached) or ``bounded``: those whose
     motion exceeds ``tolerance`` times the largest one of the line, or those from ``spans_behind``

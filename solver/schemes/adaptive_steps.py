@@ -104,13 +104,13 @@ class StepLevels:
 
     Attributes
     ----------
-    pantographs : those of the level that was stepped last
+    pantographs : of the level that was stepped last
 
     Parameters
     ----------
     comm : mpi4py communicator
     numerics : of the run, with ``adaptive_tolerance`` and ``smallest_dt``
-    whole : what steps the whole interval; its maker destroys it, but for its scheme
+    whole : parts that step the whole interval; their maker destroys them, but for the scheme
     finer : makes what takes steps of dt / 2^level; collective
     """
 
@@ -137,7 +137,7 @@ class StepLevels:
 
     @property
     def counters(self) -> Counters:
-        """Of all levels together."""
+        """Counters of all levels together."""
         return self._counters
 
     @counters.setter

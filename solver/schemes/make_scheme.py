@@ -117,7 +117,7 @@ class SchemeFactory:
         interaction: ForcesOnLine,
         pantographs: Pantographs,
     ) -> None:
-        """Let the line's steps take on what is near the train. Collective: refuses on all ranks."""
+        """Restrict steps of the line to a window at the train. Collective: refuses on all ranks."""
         refuse_window(problem, self.comm.size, line.passes is not None)
         assert line.passes is not None
         links, reach = interaction.links, interaction.reach

@@ -1,4 +1,4 @@
-"""How wrong a step makes the contact forces: an estimate from depths that are known anyway.
+"""Error of the contact forces by a step: an estimate from depths that are known anyway.
 
 Average acceleration misses h^3 / 12 times the third derivative of a motion in a step of h. At a
 contact the motion is the depth, whose latest values a march has. With the second
@@ -93,7 +93,7 @@ class StepError:
         self._known = min(self._known + 1, _PAST)
 
     def state(self) -> np.ndarray:
-        """All that is remembered, as one array of fixed length."""
+        """Memory of the estimate, as one array of fixed length."""
         times, depths, forces = self._past
         return np.concatenate([[self._known], forces, times, depths.ravel()], dtype=float)
 

@@ -1,4 +1,4 @@
-"""How contact wires give way to static forces: their elasticity."""
+"""Elasticity of contact wires under static forces."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _SAME_PLACE = 1e-6
 
 @dataclass(frozen=True)
 class Elasticity:
-    """How contact wires give way to static forces at places along the track.
+    """Elasticity of contact wires at places along the track.
 
     Attributes
     ----------

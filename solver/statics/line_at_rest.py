@@ -43,7 +43,7 @@ class LineAtRest(NamedTuple):
         return self.model.mesh
 
     def under(self, problem: Problem) -> LineAtRest:
-        """The same line with the train and the contact law of another problem."""
+        """Return this line with the train and the contact law of another problem."""
         own = replace(self.problem, train=problem.train, contact=problem.contact)
         model = replace(self.model, problem=own, simulated=simulated(own))
         return LineAtRest(own, model, self.form, self.lift)
@@ -115,7 +115,7 @@ def line_at_rest_on_all(
     comm: Any,
     alone: Callable[[Callable[[], Any]], Callable[[], Any]] = lambda work: work,
 ) -> LineAtRest:
-    """The same on all ranks, found on rank 0. Collective.
+    """Find the line at rest on rank 0, and send it to all ranks. Collective.
 
     Parameters
     ----------

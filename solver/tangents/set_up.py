@@ -60,7 +60,7 @@ class SetUp:
     start : (n_contacts,) places of the contacts at the start [m]
     speed : of the train [m/s]
     follows_surface : whether contacts follow raked strips or an irregular running surface
-    fixed : what no parameter that can be differentiated changes, by what a sentence calls it
+    fixed : arrays that a differentiable parameter must not change, by their names in sentences
     """
 
     matrices: tuple[sparse.csc_matrix, ...]

@@ -210,7 +210,7 @@ class CompiledSteps:
         self._first, self._done, self._ready = step, 0, n_steps
 
     def _finish(self) -> bool:
-        """Let the scheme finish a step; whether there is no room for its motion."""
+        """Finish a step in the scheme; return whether there is no room for its motion."""
         at = self._done
         time = float(self.times[at])
         self.scheme.finish(time, stop=False)

@@ -56,7 +56,7 @@ from catenary.solver.window.moving_columns import MovingColumns
 
 @dataclass
 class Outcome:
-    """How a march ended.
+    """Result of a march.
 
     ``outcome`` is "done", "interrupted" or the sentence of what broke; ``wall`` [s] the time of the
     time loop alone, changes of the line on the way included, and ``cpu`` [s] what of it this
@@ -87,7 +87,7 @@ class March:
     Parameters
     ----------
     comm : mpi4py communicator
-    problem, model, form : what ``equilibrium.find_form`` was given and returned, on all ranks
+    problem, model, form : arguments and result of ``equilibrium.find_form``, on all ranks
     elasticity : of the contact wires in a running span, for the height at which static forces are
         defined
     """

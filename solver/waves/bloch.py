@@ -238,7 +238,7 @@ class _Spans:
     m_next: np.ndarray
 
     def basis(self, up_to: float) -> _Basis:
-        """With modes up to omega^2 ``up_to``."""
+        """Reduced basis with modes up to omega^2 ``up_to``."""
         n = self.k.shape[0]
         joined = self.k_next.any(axis=0) | self.m_next.any(axis=0)
         shared, inner = np.flatnonzero(joined), np.flatnonzero(~joined)

@@ -119,8 +119,8 @@ def _chain(
 def _held(
     whole: Model, model: Model, side: int, masts: np.ndarray, weights: np.ndarray
 ) -> np.ndarray:
-    """What the spans between ``masts``, from the end inwards, answer at the last one; held at the
-    first."""
+    """Dynamic stiffness (n, m, m) at the last of ``masts``, which are from the end inwards, of the
+    spans between them; held at the first."""
     unknowns = _unknowns_at(whole, side, masts)
     free = np.flatnonzero(~np.isin(unknowns[0], model.constrained))
     answer = _at(whole, unknowns[0], weights)[:, free][:, :, free]

@@ -39,7 +39,7 @@ class MovingForce:
         return FORCE
 
     def place(self, time: np.ndarray) -> np.ndarray:
-        """Where it is at times (n,) [s], shape (n,) [m]."""
+        """Places at times (n,) [s], shape (n,) [m]."""
         return self.start + self.speed * time
 
     def value(self, time: np.ndarray) -> np.ndarray:
@@ -86,7 +86,7 @@ class Blow:
         return HAMMER if self.hammer else PULSE
 
     def place(self, time: np.ndarray) -> np.ndarray:
-        """Where it is at times (n,) [s], shape (n,) [m]."""
+        """Places at times (n,) [s], shape (n,) [m]."""
         return np.full(np.shape(time), self.at)
 
     def shape(self, share: np.ndarray) -> np.ndarray:

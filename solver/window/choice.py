@@ -1,4 +1,4 @@
-"""How many spans of a line move with the train, what that costs in accuracy, and where none can.
+"""Number of spans that move with the train, its cost in accuracy, and lines that allow none.
 
 Waves that outrun the train come back from the end of a window. How many spans it takes until that
 is negligible follows from how waves fade on the way, and for how long they are on it.
@@ -56,7 +56,7 @@ class Reach(NamedTuple):
 
 
 def window_sentence(problem: Problem) -> str:
-    """Which part of the line moves, in words; empty if all of it does. Not collective."""
+    """Moving part of the line, in words; empty if all of it moves. Not collective."""
     window = problem.window
     if not window.moves:
         return ""

@@ -1,4 +1,4 @@
-"""Which columns of what a step shows change with which stations of a line."""
+"""Columns of the rows that steps show, which change with the moving stations of a line."""
 
 from __future__ import annotations
 
@@ -57,13 +57,13 @@ def columns_of(
 
 
 def widen(stations: np.ndarray, begin: int, end: int) -> None:
-    """Let a range (2,) of stations take in those from ``begin`` to ``end``."""
+    """Extend a range (2,) of stations, in place, to those from ``begin`` to ``end``."""
     stations[0] = min(int(stations[0]), begin)
     stations[1] = max(int(stations[1]), end)
 
 
 class MovingColumns:
-    """Which columns of what steps show have changed since the rows shown before them.
+    """Columns of the rows that steps show, with those that changed since the rows before.
 
     Those who step the line keep it up to date. Not collective.
     """

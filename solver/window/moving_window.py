@@ -47,7 +47,7 @@ class WindowArrays(NamedTuple):
     ends, kinds, turning : of ``StationFactors``
     links : (2,) the first link that may switch and the one after the last
     ranges : (2, 2) the same for the pass back, see ``StationPasses.track_links``
-    known : what the motion keeps besides x, y and z, or nothing
+    known : accelerations that the motion keeps besides x, y and z, or none
     """
 
     state: np.ndarray
@@ -89,7 +89,7 @@ _AROUND = 192
 
 
 class MovingWindow:
-    """Which stations move. Not collective.
+    """Window of the stations that move. Not collective.
 
     Attributes
     ----------
@@ -106,7 +106,7 @@ class MovingWindow:
     reach : how far a step reaches [m]
     links : (m, k) unknowns of each link, in the order along the track
     moving_links : (2,) int, filled with the first that may switch and the one after the last
-    known : what the motion keeps besides x, y and z, or nothing
+    known : accelerations that the motion keeps besides x, y and z, or none
     operators : of a line in pieces, None if it is whole
     """
 
@@ -273,7 +273,7 @@ class MovingWindow:
 
     @property
     def n_stations(self) -> int:
-        """How many stations move."""
+        """Number of moving stations."""
         return int(self.arrays.ends[3] - self.arrays.ends[2])
 
     def state(self) -> np.ndarray:
@@ -282,7 +282,7 @@ class MovingWindow:
         return np.array([*arrays.state, *arrays.ends[2:4], *arrays.peak], dtype=float)
 
     def wake(self) -> None:
-        """Let all stations move until the next look, as after a change of the line's motion."""
+        """Open the window to all stations until the next look, as after a change of the motion."""
         arrays = self.arrays
         arrays.state[:] = 0, 1
         self._open(0, arrays.low.size)
@@ -296,12 +296,12 @@ class MovingWindow:
         arrays.peak[:] = state[4:6]
 
     def _open(self, begin: int, end: int) -> None:
-        """Make the window that from station ``begin`` to ``end``, and touch no motion."""
+        """Set the window to stations from ``begin`` to ``end``; the motion stays as it is."""
         native.turn_to(self.arrays, begin, end)
 
 
 def wanted_pieces(problem: Problem, model: Model, contacts: np.ndarray) -> WantedPieces | None:
-    """What steps with a window need of a line at a time, None if that is not known beforehand.
+    """Part of a line that steps with a window need at a time, None if it is not known beforehand.
 
     ``contacts`` (n,) are where they are [m]. Not collective.
     """

@@ -61,7 +61,7 @@ def _begun(
 
 
 class Direction(StrEnum):
-    """Of the train along the line of the scene."""
+    """Direction of the train along the line of the scene."""
 
     FORWARD = "forward"
     BACKWARD = "backward"

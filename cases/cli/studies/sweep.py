@@ -187,7 +187,7 @@ def read_variants(vary: Sequence[str] | None, named: Path | None) -> list[Varian
 
 
 def run_study(words: RunWords, out: Path, runs: StudyRuns, part: str | None) -> int:
-    """What ``catenary run CASE --study`` does; returns the exit code. Collective."""
+    """Run ``catenary run CASE --study`` and return its exit code. Collective."""
     from catenary.cases.studies.case_study import Plan, find_study, make_plan
     from catenary.cases.studies.sweep.jobs import parse_part
 

@@ -64,7 +64,7 @@ def take_in_lengths(folder: Path) -> float | None:
     draft = read_draft(folder)
 
     def missing(pre_sag: np.ndarray) -> np.ndarray:
-        """By how much droppers would be too short [mm], cut for a pre-sag [mm]."""
+        """Shortage of droppers [mm], positive if too short, that are cut for a pre-sag [mm]."""
         scene = draft.assigned(_patterns(hung, pre_sag, f"in {path.name}")).scene()
         return np.asarray(1e3 * (wanted - _lengths(scene, rows)))
 

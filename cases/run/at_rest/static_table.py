@@ -87,7 +87,7 @@ def static_table(scene: Scene) -> dict[str, np.ndarray]:
 
 
 def rest_text(scene: Scene, table: Mapping[str, np.ndarray]) -> str:
-    """The same for people: dropper table, registration, sag and elasticity. Not collective."""
+    """Text of the table: droppers, registration, sag and elasticity. Not collective."""
     lengths = [scene.pantographs[place.name].strips.length_m for place in scene.train.pantographs]
     half_heads = [0.5 * length for length in lengths if length is not None]
     return static_text(table, problem_of(scene).line, min(half_heads, default=None))

@@ -30,7 +30,7 @@ SIDES = ("start", "end")
 
 
 def end_sentences(problem: Problem) -> tuple[str, str]:
-    """How the line begins and how it ends, in words."""
+    """Begin and end of the line, in words."""
     start, end = (f"{side} {_of_end(kind)}" for side, kind in zip(SIDES, problem.ends, strict=True))
     return start, end
 
@@ -186,7 +186,7 @@ def _traced(problem: Problem) -> Traced:
 
 
 def _without_let_out(found: Arrivals, ends: tuple[EndCondition, EndCondition]) -> Arrivals:
-    """The same without waves from ends that let them out."""
+    """Drop waves from ends that let them out."""
     start, end = map(lets_waves_out, ends)
     if start:
         found = found._replace(near_end=None)
@@ -194,7 +194,7 @@ def _without_let_out(found: Arrivals, ends: tuple[EndCondition, EndCondition]) -
 
 
 def _in_window(found: Arrivals, line: WaveLine, course: Course, problem: Problem) -> Arrivals:
-    """The same without waves that the ends of the line do not reflect, as they lie outside of a
+    """Drop waves that the ends of the line do not reflect, as they lie outside of a
     window of so many spans; what the window's own ends send back is in its error."""
     window = problem.window
     if not window.moves or window.by_motion > 0.0:

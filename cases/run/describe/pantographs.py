@@ -34,7 +34,7 @@ def description_of(data: PantographData, static_force: float) -> str:
 
 
 def _tied_of(data: LumpedData) -> str:
-    """By how much the force of a chain depends on the height of the line, if it is tied to its
+    """Clause on the dependence of a chain's force on the height of the line, if it is tied to its
     base."""
     if not data.tied:
         return ""

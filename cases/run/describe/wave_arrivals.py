@@ -1,4 +1,4 @@
-"""When waves that the start of a run sends out come back from the ends of the line.
+"""Arrival of waves from the start of a run that the ends of the line reflect.
 
 Wires that droppers join carry long waves together, with c = sqrt(sum of tensions / sum of masses);
 a conductor rail carries them by bending.
@@ -53,7 +53,7 @@ class WaveLine(NamedTuple):
 
 
 class Course(NamedTuple):
-    """Where one pantograph starts and ends [m], its speed [m/s] and the evaluated stretch [m];
+    """Course of one pantograph: start and end [m], its speed [m/s] and the evaluated stretch [m];
     ``leader`` and ``rear`` are the starts of the foremost and the last pantograph [m]."""
 
     start: float
@@ -65,7 +65,7 @@ class Course(NamedTuple):
 
 
 class Meeting(NamedTuple):
-    """Where [m] and when [s] a pantograph meets a wave."""
+    """Place [m] and time [s] at which a pantograph meets a wave."""
 
     at: float
     time: float

@@ -1,4 +1,4 @@
-"""How large the files of a run get, from the shapes in which they are written.
+"""Sizes of the files of a run, from the shapes in which they are written.
 
 What HDF5 and the report add beyond that was measured on runs of the shipped cases.
 """

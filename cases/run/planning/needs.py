@@ -1,4 +1,4 @@
-"""What a run needs, estimated before anything is made: time, memory and room for its files."""
+"""Needs of a run, estimated before anything is made: time, memory and room for its files."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ class Needs:
     memory : resident memory on one rank [B]
     march : wall time of the time loop on one rank [s]
     files : sizes of the files
-    recording : what is recorded
+    recording : records of the run
     slow_path : why steps of the line take longer than they could, None if they do not
     """
 

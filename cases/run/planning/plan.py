@@ -1,4 +1,4 @@
-"""What a scene will simulate and what not, with its size and what a run of it needs."""
+"""Plan of a run: effects simulated and left out, size, and needs."""
 
 from __future__ import annotations
 
@@ -70,13 +70,13 @@ class Plan:
     scheme : way through a step
     slow_path : why steps take longer than they could, empty if they do not
     halved : sentence on steps that adapt, empty if none do
-    slack : what a slack dropper does, in words; empty if no dropper slackens
+    slack : law of a slack dropper, in words; empty if no dropper slackens
     window : which part of the line moves, in words; empty if all of it
     moving : how much that is, and what a step of it costs, in words
     memory : estimate of the resident memory on one rank [B]
     march : estimate of the wall time of the time loop on one rank [s]
     files : sizes of the files
-    recorded : what is recorded of line and snapshots, in sentences by what it is
+    recorded : sentences on the records of line and snapshots, by the kind of record
     """
 
     case: str
@@ -201,7 +201,7 @@ def make_plan(scene: Scene, mesh: LineMesh | None = None) -> Plan:
 
 
 def _moving(problem: Problem, needs: Needs, n_dofs: int) -> str:
-    """How much of the line moves with a window, and what that is worth."""
+    """Sentence on the part of the line that moves with a window, and its benefit."""
     window = problem.window
     if not window.moves:
         return ""

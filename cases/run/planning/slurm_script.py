@@ -67,7 +67,7 @@ def slurm_script(
     words : arguments of ``catenary run`` but the folder
     out : folder of the results
     march_s, memory : estimates of a plan on one rank [s], [B]
-    petsc_options : those after --, which a job that continues the run takes as well
+    petsc_options : options after --, which a job that continues the run takes as well
 
     Raises
     ------
@@ -178,7 +178,7 @@ def array_script(
     job : ``ranks`` of a task, a run on each at the same time; ``chain``, how often a task may be
         started again
     n_tasks : tasks that make runs
-    petsc_options : those after --
+    petsc_options : options after --
 
     Raises
     ------

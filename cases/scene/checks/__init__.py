@@ -1,1 +1,1 @@
-"""Whether the tables of a scene fit together."""
+"""Checks that the tables of a scene fit together."""

@@ -72,7 +72,7 @@ def _calmed(scene: Scene) -> set[str]:
 
 
 def check_requirements_of_defaults(scene: Scene) -> Iterator[Fault]:
-    """Of effects that are on by default, unless the scene holds nothing for them to act on."""
+    """Check requirements of effects that are on by default and find something to act on."""
     problem, switches = functools.cache(lambda: problem_of(scene)), scene.switches()
     for name, effect in effects.registry().items():
         if name in scene.effects:

@@ -322,7 +322,7 @@ MOST_SPANS = 1.5
 
 
 def check_free_droppers(scene: Scene, line: LineData) -> Iterator[Fault]:
-    """Of each link the first span whose droppers are outside or too close together."""
+    """Find the first span of each link whose droppers are outside or too close together."""
     for i, table in enumerate(scene.line.links or []):
         if isinstance(table, FreeDroppersTable) and table.at_m is None:
             spans = numbered(line.span_lengths)

@@ -1,4 +1,4 @@
-"""How large a scene's mesh will be, counted from its tables before anything is made of them."""
+"""Size of a scene's mesh, counted from its tables before anything is made of them."""
 
 from __future__ import annotations
 
@@ -110,7 +110,7 @@ def _size(scene: Scene, n_droppers: int, nodes: dict[str, int], wires: Sequence[
 
 
 def kinds_by_number(table: LineTable) -> int:
-    """How many kinds of spans a line has by the numbers of its spans, 0 if lengths tell them."""
+    """Number of kinds of spans by the numbers of a line's spans, 0 if lengths tell them."""
     hung = [table.dropper, table.auxiliary_wire and table.auxiliary_wire.dropper]
     hung += [link for link in table.links or () if isinstance(link, FreeDroppersTable)]
     patterns = [pattern for own in hung if own for pattern in own.patterns or ()]

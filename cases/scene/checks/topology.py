@@ -163,7 +163,7 @@ def _overlap(scene: Scene, line: LineData) -> Iterator[Fault]:
 
 
 def check_droppers_inside_spans(scene: Scene, line: LineData) -> Iterator[Fault]:
-    """Of each group the first span whose droppers are outside or too close together."""
+    """Find the first span of each group whose droppers are outside or too close together."""
     table, spans = scene.line, numbered(line.span_lengths)
     if table.dropper is not None:
         yield from droppers_inside(scene, "line.dropper", table.dropper, spans)

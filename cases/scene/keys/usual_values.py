@@ -14,7 +14,7 @@ class Usual(NamedTuple):
     ----------
     words : typical values; a figure of a formula or of a shipped case names it. "" where the key
         has a default
-    least, most : what lines and pantographs of railways have, zero is always allowed; of a list
+    least, most : range in lines and pantographs of railways, zero is always allowed; of a list
         each number is meant. A number beyond the range by more than a factor of ten that would lie
         inside in a unit a thousand times larger or smaller is taken for a slip. None where words
         say it

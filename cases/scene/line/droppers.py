@@ -41,7 +41,7 @@ Curve = Annotated[list[PAIR], Field(min_length=2, max_length=20), AfterValidator
 
 
 class DropperPattern(Table):
-    """Where the droppers of all spans of one length hang, or of spans by their numbers."""
+    """Places of the droppers in all spans of one length, or in spans by their numbers."""
 
     span_m: Span | None = Field(None, description="length of the spans that have this pattern")
     spans: list[Annotated[int, Field(ge=1, le=20_000)]] | None = Field(
@@ -170,7 +170,7 @@ class DropperTable(HangingTable):
 
 
 def one_pre_sag_each(pre_sag: list[float] | None, n_droppers: int) -> None:
-    """That a list of pre-sags has one per dropper; ValueError if not, with a predicate."""
+    """Raise ValueError, with a predicate, unless a list of pre-sags has one per dropper."""
     if pre_sag is not None and len(pre_sag) != n_droppers:
         raise ValueError(
             f"must give one pre_sag_mm per dropper, but there are {len(pre_sag)} values "

@@ -41,7 +41,7 @@ class TensionerTable(Table):
 
 
 class TemperatureTable(Table):
-    """How warm the line is."""
+    """Temperature of the line."""
 
     difference_K: float = Field(
         0.0,
@@ -64,7 +64,7 @@ _NO_KIND = {
 
 
 class EndTable(Table):
-    """How the line ends on one side."""
+    """End of the line on one side."""
 
     kind: Literal["fixed", "absorbing_layer", "periodic"] = Field(
         "fixed",
@@ -112,7 +112,7 @@ class EndTable(Table):
 
 
 class EndsTable(Table):
-    """How the line ends on both sides."""
+    """Ends of the line on both sides."""
 
     start: EndTable = Field(default_factory=EndTable, description="where the line starts")
     end: EndTable = Field(default_factory=EndTable, description="where the line ends")

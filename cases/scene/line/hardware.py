@@ -13,7 +13,7 @@ from catenary.meshgen.hardware import Fittings, SteadyArm
 
 
 class SupportTable(Table):
-    """What carries the topmost wire at a mast."""
+    """Support of the topmost wire at a mast."""
 
     stiffness_N_per_m: float = Field(5e5, gt=0, le=1e10, description="vertical stiffness")
 

@@ -117,7 +117,7 @@ class LengthsTable(Table):
 
 
 class IrregularitiesTable(Table):
-    """What is irregular about the line from the start; each entry is an effect of its name."""
+    """Irregularities of the line from the start; each entry is an effect of its name."""
 
     contact_wire_height: WireHeightTable | None = Field(
         None, description="heights that droppers are cut for"
@@ -140,7 +140,7 @@ _WIRE = "name of a wire of the line, such as contact_wire, messenger_wire"
 
 
 class DropperDefectTable(Table):
-    """Which dropper it is."""
+    """Defect of a dropper, with its place."""
 
     span: int = Field(ge=1, le=20_000, description="number of its span, from 1")
     dropper: int = Field(ge=1, le=200, description="its number in the span, from 1")

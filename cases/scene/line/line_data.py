@@ -317,7 +317,7 @@ def _droppers(
 
 
 def overlaps_of(table: LineTable) -> Overlaps | None:
-    """Where a line's tension sections overlap; None if it has one section.
+    """Overlaps of a line's tension sections; None if it has one section.
 
     Overlaps are repeated as long as a running span is left behind them.
     """
@@ -332,7 +332,7 @@ def overlaps_of(table: LineTable) -> Overlaps | None:
 
 
 def along_of(table: LineTable) -> AlongTrack:
-    """How the wires of a line end along the track, and what else holds them."""
+    """Ends of a line's wires along the track, and their other fixings."""
     given = table.tensioner
     return AlongTrack(
         tensioner=Tensioner(

@@ -1,4 +1,4 @@
-"""What the case is, the stretch whose statistics are judged, and what is written: tables."""
+"""Tables of the case itself, of the stretch whose statistics are judged, and of the output."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from catenary.solver.time_loop.views.channels import line_channels
 
 
 class CaseTable(Table):
-    """What the case is."""
+    """Name, description and source of the case."""
 
     name: str = Field("", max_length=200, description="name; the folder's if absent")
     title: str = Field("", max_length=500, description="one line for lists and reports")
@@ -130,7 +130,7 @@ _AroundTrain = Annotated[
 
 
 class OutputTable(Table):
-    """Which files are written, and how much into them."""
+    """Files that are written, and how much into them."""
 
     field_every_s: float | None = Field(
         None,

@@ -1,4 +1,4 @@
-"""What happens during a run: tables, and conversion to SI."""
+"""Incidents during a run: tables, and conversion to SI."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ def line_incidents(
 
 
 def lowering_of(tables: Sequence[IncidentTable], number: int, dt: float) -> Lowering | None:
-    """How the pantograph ``number``, from 1, is lowered; None if it is not."""
+    """Lowering of the pantograph ``number``, from 1; None if it is not lowered."""
     for table in tables:
         if isinstance(table, LoweringTable) and table.pantograph == number:
             from catenary.mbs.lowering import Lowering

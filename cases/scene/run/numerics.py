@@ -204,7 +204,7 @@ _SPANS = ("spans_ahead", "spans_behind")
 
 
 class WindowTable(Table):
-    """Which part of the line moves."""
+    """Part of the line that moves."""
 
     mode: Literal["off", "exact", "bounded"] = Field(
         "off",

@@ -39,7 +39,7 @@ SomeInertia = _no_less(LEAST_INERTIA, "kg m2")
 
 
 class FlexureTable(Table):
-    """How strips on springs of their own bend, as beams whose ends are free."""
+    """Bending of strips on springs of their own, as beams whose ends are free."""
 
     bending_stiffness_N_m2: float = Field(gt=0, le=1e9, description="EI of a strip")
     spring_distance_m: float = Field(
@@ -128,7 +128,7 @@ class StripsTable(Table):
 
     @property
     def mass(self) -> float:
-        """Of all strips that have springs of their own [kg]."""
+        """Mass of all strips that have springs of their own [kg]."""
         return 0.0 if self.mass_kg is None else self.number * self.mass_kg
 
     @property

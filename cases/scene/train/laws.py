@@ -1,4 +1,4 @@
-"""What acts on a pantograph: nonlinear laws, a regulated lift, uplift by the air; in SI."""
+"""Forces on a pantograph: nonlinear laws, a regulated lift, aerodynamic uplift; in SI units."""
 
 from __future__ import annotations
 

@@ -34,7 +34,7 @@ _OF_ALL_BODIES = ("constraint_handling", "substeps")
 
 
 class _Pressing(Table):
-    """With what force, and where, a pantograph presses at rest."""
+    """Force and place at which a pantograph presses at rest."""
 
     static_force_N: float | None = Field(
         None, gt=0, le=1000, description="force on the wire at rest"
@@ -262,7 +262,7 @@ class MultibodyTable(_Pressing):
         return {key: value for key, value in plain.items() if key not in idle}
 
     def in_force(self) -> MultibodyTable:
-        """The same with the published numbers in place, if ``as_published``.
+        """Return this table with the published numbers in place, if ``as_published``.
 
         Raises
         ------

@@ -119,7 +119,7 @@ _BOGIE = ("bogie_mass_kg", "primary_stiffness_N_per_m", "primary_damping_N_s_per
 
 
 class SidewaysTable(Table):
-    """How a car body sways and rolls on its secondary suspension."""
+    """Sway and roll of a car body on its secondary suspension."""
 
     roll_inertia_kg_m2: float = Field(ge=10, le=1e7, description="of the car body")
     stiffness_N_per_m: float = Field(gt=0, le=1e8, description="of one bogie, sideways")
@@ -178,7 +178,7 @@ class SuspensionTable(Table):
 
 
 class VehicleTable(Table):
-    """How the vehicle moves the bases of its pantographs; acts with effects.vehicle_motion."""
+    """Motion of the pantographs' bases by the vehicle; acts with effects.vehicle_motion."""
 
     vertical: MotionTable | None = Field(None, description="motion upward")
     lateral: MotionTable | None = Field(
@@ -211,7 +211,7 @@ class VehicleTable(Table):
 
 
 def vehicle_of(table: VehicleTable) -> VehicleMotion:
-    """All that moves the bases, in both directions."""
+    """Sources of motion of the pantographs' bases, in both directions."""
     track = table.irregularity
     both: tuple[Source, ...] = ()
     if track is not None:

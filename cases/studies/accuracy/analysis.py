@@ -62,7 +62,7 @@ class Row:
     ----------
     axis, level : names
     outcome : "done", or what broke or is not possible
-    sizes : what is refined, by name
+    sizes : refined sizes by name
     errors : quantity -> difference from the reference in its unit, of the pantograph where it is
         largest, signed (``HISTORY``: rms)
     percent : quantity -> its magnitude in percent of the reference's scale
@@ -145,7 +145,7 @@ def _pairs(
 def uncertainties(
     reference: Found | None, chains: Sequence[Sequence[Found | None]]
 ) -> dict[str, float]:
-    """By how much a reference may be wrong itself, by quantity [%]; infinite if it is not known.
+    """Uncertainty of a reference itself, by quantity [%]; infinite if it is not known.
 
     Each of ``chains`` holds three runs, of which each has half the fineness of the one before it in
     one size. With d and D, by what the first two and the last two differ, the observed order is
@@ -248,7 +248,7 @@ _WRONG_COURSE = 10.0
 def advice(
     rows: Sequence[Row], quantity: str, target: float, uncertainty: float = 0.0, without: str = ""
 ) -> str:
-    """What to take for an error of at most ``target`` [%], as a sentence.
+    """Recommend settings for an error of at most ``target`` [%], in a sentence.
 
     Parameters
     ----------

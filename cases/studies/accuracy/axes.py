@@ -30,7 +30,7 @@ class Level:
     ----------
     name : short, unique within its axis
     assignments : ``key=value`` each, on top of the scene
-    sizes : what is refined, by name: ``dt`` [s], ``h`` as a share of a gap; empty if nothing is
+    sizes : refined sizes by name: ``dt`` [s], ``h`` as a share of a gap; empty if nothing is
     quick : whether the level also belongs to the short form of the axis
     """
 

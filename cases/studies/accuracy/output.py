@@ -1,4 +1,4 @@
-"""What an accuracy study leaves: tables as CSV, JSON, text and page, the work-precision diagram."""
+"""Output of an accuracy study: tables as CSV, JSON, text and page, the work-precision diagram."""
 
 from __future__ import annotations
 
@@ -123,7 +123,7 @@ def page(found: Measured, sentences: Sequence[str], picture: str) -> str:
 
     Parameters
     ----------
-    found : what was measured
+    found : result of the study
     sentences : the recommendations
     picture : file of the work-precision diagram, empty for none
     """
@@ -187,7 +187,7 @@ def runs_with_remarks(found: Measured) -> list[tuple[str, Sequence[str]]]:
 
 
 def uncertainty_text(planned: PlannedAxis, percent: Mapping[str, float]) -> str:
-    """How far the reference itself may be wrong, and from which runs that is known."""
+    """Sentence on the uncertainty of the reference, and the runs that it is known from."""
     chains = [", ".join(map(run_in_words, chain)) for chain in planned.chains]
     from_runs = " and from ".join(chains)
     known = {what: value for what, value in percent.items() if math.isfinite(value)}

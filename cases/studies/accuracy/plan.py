@@ -1,4 +1,4 @@
-"""Which runs ``catenary accuracy`` needs: each setting once, whichever axes need it."""
+"""Runs that ``catenary accuracy`` needs: each setting once, whichever axes need it."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class PlannedAxis:
 
 @dataclass(frozen=True)
 class Plan:
-    """All that is to be run: the case's name, axes, jobs, how often short runs are timed, and
+    """Plan of a study: the case's name, axes, jobs, how often short runs are timed, and
     whether levels are those of the short form; ``overrides`` are those of the command line,
     ``asked`` the axes, of which some may have nothing to vary."""
 

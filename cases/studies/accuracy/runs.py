@@ -35,7 +35,7 @@ class Measured:
 
     Attributes
     ----------
-    plan : what was run
+    plan : of the runs
     rows : all levels, axis by axis
     uncertainty : by axis name, of the reference itself (percent by quantity, infinite where it is
         not known), only of discretisation axes

@@ -226,7 +226,7 @@ def sentence(found: Costs, row: Measured) -> str:
 
 
 def record_of(found: Costs) -> dict[str, Any]:
-    """Everything for JSON."""
+    """Record of the study, for JSON."""
     return {
         "case": found.case,
         "assignments": list(found.wish.overrides),

@@ -1,4 +1,4 @@
-"""What a step costs: marches over the same stretch again and again, several of them in turns.
+"""Time of a step: marches over the same stretch again and again, several of them in turns.
 
 Other programs slow all contenders alike, and the least of many rounds is what a step takes when
 none does.
@@ -27,7 +27,7 @@ class RepeatedMarch:
     Parameters
     ----------
     comm : mpi4py communicator
-    at_rest : what is marched
+    at_rest : line that is marched
     first : step from which rounds start, which the march runs to once
     n_steps : of a round; those to the end of the run if there are fewer
 

@@ -1,4 +1,4 @@
-"""What each effect of a scene costs and changes: runs beside the scene as it is, and their steps.
+"""Cost of each effect of a scene, and the change by it: runs and steps beside the scene as it is.
 
 Figures are those of whole runs over a stretch, costs those of steps in turns on the same stretch.
 """
@@ -57,13 +57,13 @@ class Switch:
 
 @dataclass(frozen=True)
 class SwitchableEffects:
-    """Which effects of a scene can be switched, and why others cannot.
+    """Effects of a scene that can be switched, and why others cannot.
 
     Attributes
     ----------
     switches : effects that can be switched, those that are simulated first
     always : names of those that no scene leaves out
-    lacking : what a scene lacks for the others, by their names
+    lacking : data that a scene lacks for the others, by their names
     """
 
     switches: list[Switch]
@@ -72,7 +72,7 @@ class SwitchableEffects:
 
 
 def switchable_effects(scene: Scene) -> SwitchableEffects:
-    """Which effects of a scene can be switched. Not collective."""
+    """Find the effects of a scene that can be switched. Not collective."""
     problem, known = problem_of(scene), effects.registry()
     active = {effect.name for effect in effects.active(problem)}
     is_on = scene.switches()
@@ -100,7 +100,7 @@ def switchable_effects(scene: Scene) -> SwitchableEffects:
 
 
 def _taken_along(name: str, among: Iterable[str], takes: Callable[[str, str], bool]) -> list[str]:
-    """All that an effect takes along, directly and through others, in the registry's order."""
+    """Effects that one takes along, directly and through others, in the registry's order."""
     found, ahead, left = set(), [name], [other for other in among if other != name]
     while ahead:
         one = ahead.pop()
@@ -156,7 +156,7 @@ class Measured:
 
     Attributes
     ----------
-    switch : what is switched
+    switch : the switched effect
     outcome : "done", or the sentence of what is not possible or broke
     size : of the line
     ratio : time of a step over that of the scene as it is
@@ -178,7 +178,7 @@ class Measured:
 
     @property
     def cost(self) -> float:
-        """How many times as long a step takes with the effect as without."""
+        """Ratio of the times of a step with the effect and without."""
         return 1.0 / self.ratio if self.switch.on else self.ratio
 
 
@@ -189,7 +189,7 @@ class Costs:
     Attributes
     ----------
     case : name of the case
-    wish, effects : what was asked for, and what the scene leaves to choose
+    wish, effects : the wanted effects, and those that can be switched
     stretch : evaluated, from and to [m]
     n_steps : of a timed round
     size, figures, remarks : of the scene as it is, as in ``Measured``

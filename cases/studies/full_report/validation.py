@@ -1,4 +1,4 @@
-"""What `catenary validate` found of an installation, as a section of a run's report."""
+"""Statement of ``catenary validate`` on an installation, as a section of a run's report."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def statement_in(folder: Path) -> dict[str, Any]:
 
 
 def section(statement: Mapping[str, Any] | None, run: EvaluatedRun) -> Section:
-    """How the program that made a run was validated.
+    """Validation of the program that made a run.
 
     Parameters
     ----------

@@ -127,8 +127,8 @@ class LineBalance:
     def across(
         self, states: Mapping[str, np.ndarray], taut: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """What the energy of states (k, n_dofs) each lacks as slack droppers carry nothing across
-        them [J], (k,), and the work of what they leave in the steps between [J], (k - 1,)."""
+        """Energy that states (k, n_dofs) each lack [J], (k,), as slack droppers have no stiffness
+        across them, and work of the missing forces in the steps between [J], (k - 1,)."""
         moved, speed = states["displacement"], states["velocity"]
         lacks, work = np.zeros(len(moved)), np.zeros(len(moved) - 1)
         # Stored energy knows of no dampers.

@@ -32,7 +32,7 @@ _CORRECTION = (
 
 
 class Needs(Table):
-    """What must happen in a run for it to be the hard case that it is named after."""
+    """Events that must occur in a run for it to be the hard case that it is named after."""
 
     switches: int = Field(0, ge=0, description="droppers that slacken or tighten, summed")
     passes: int = Field(

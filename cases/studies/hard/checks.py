@@ -120,7 +120,7 @@ def check_cases(
     ----------
     comm : agreement of its ranks is measured if there are several
     short : the case's short form; steps are halved once only then
-    kept : what an earlier call has found, None to keep nothing
+    kept : results of earlier calls, None to keep nothing
     n_at_once : cases that are run at the same time, 1 on several ranks
     initialise : called first in each further process
     """
@@ -377,7 +377,7 @@ _PLAIN = ("runs to its end", "everything is finite", "the fixed-point correction
 
 
 def criteria(found: Sequence[Criterion], told: Told) -> StudyTable:
-    """All that was measured, a row each, and a row with the remarks on each case that has any."""
+    """Table of criteria, a row each, and a row with the remarks on each case that has any."""
     names = ("case", "criterion", "value", "limit", "kept", "note")
     rows: list[tuple[str, ...]] = [
         (row.case, row.name, f"{row.value:.3g}", f"{row.limit:.3g}", "yes" if row.passed else "no",

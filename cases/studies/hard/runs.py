@@ -55,7 +55,7 @@ class Watched:
     one_switch : the most that one dropper may have made in one switch [J], see `LineBalance`
     counters : of the scheme
     kept : by step, dropper forces [N] and the line's displacement as incidents found them
-    remarks : what a run's own watch told, see `RunWatch`; none without one
+    remarks : sentences of a run's own watch, see `RunWatch`; none without one
     """
 
     outcome: str = ""
@@ -152,7 +152,7 @@ class Watcher(Observer):
                 self._add_work()
 
     def watched(self, outcome: str, counters: dict[str, int]) -> Watched:
-        """All that was seen."""
+        """Return the record of the march."""
         if self._states:
             self._add_work()
         return Watched(

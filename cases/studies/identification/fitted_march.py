@@ -88,7 +88,7 @@ class FittedMarch:
         return self._measurement.pantograph
 
     def _signals(self, marched: Tangents) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Of each signal the values of all steps, and their derivatives (n_steps, m)."""
+        """Values of each signal in all steps, and their derivatives (n_steps, m)."""
         number, found = self._number, []
         for signal in self._measurement.signals:
             if signal.name == FORCE:

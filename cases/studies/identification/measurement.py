@@ -94,14 +94,14 @@ class Measurement:
     Attributes
     ----------
     place : (n,) of the samples that are compared [m]
-    signals : what was measured there
+    signals : that were measured there
     pantograph : its number on the train, from 0
 
     Parameters
     ----------
     table : of a CSV file, see ``table_file.read_table``
-    path : what sentences call it
-    task : what its columns are
+    path : its name in sentences
+    task : description of its columns
     speed : of the train [m/s]
     start : place of the pantograph at time zero [m]
     stretch : begin and end of the scene's evaluation [m]
@@ -169,14 +169,14 @@ class Measurement:
         return Signal(name, values, whitening, deviation, column.bias * column.factor)
 
     def _sampled(self, values: np.ndarray) -> np.ndarray:
-        """Of values (n, ...) at the file's places the filtered ones that are compared."""
+        """Filter values (n, ...) at the file's places, and keep those that are compared."""
         if self._dt is not None:
             values = filters.low_pass(values, self._dt, self._cut_off)
         return np.asarray(values[self._kept])
 
     def of_march(self, position: np.ndarray, values: np.ndarray, dt: float) -> np.ndarray:
-        """Of a march's values (n_steps, ...) at positions (n_steps,) [m], ``dt`` [s] apart, those
-        that are compared: filtered, and at the places of the samples.
+        """Sample a march's values (n_steps, ...) at positions (n_steps,) [m], ``dt`` [s] apart, as
+        the file's: filtered, and at the places of the samples.
 
         Raises
         ------

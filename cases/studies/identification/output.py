@@ -87,7 +87,7 @@ def residuals_table(found: Identification) -> StudyTable:
 
 
 def as_text(found: Identification) -> str:
-    """What is printed: parameters, what data say of them, and whether the model fits."""
+    """Text for the terminal: parameters, their information in the data, and fit of the model."""
     posterior, m = found.posterior, len(found.unknowns)
     lines = [parameters_table(found).text(), ""]
     lines.append(

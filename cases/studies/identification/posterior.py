@@ -1,4 +1,4 @@
-"""What data say of parameters beside what was known before, and whether residuals fit a model.
+"""Posterior of parameters from prior and data, and whether residuals fit a model.
 
 All is linear, with normal distributions. Parameters are counted in standard deviations of their
 priors, data in those of their noise. With the Jacobian J of data by parameters the posterior
@@ -7,7 +7,7 @@ the eigenvalue: data say as much of it as the prior where that is 1.
 
 **Residuals.** Before the measurement the data are normal about the prior's prediction with the
 covariance S = 1 + J J^T: noise, and what priors leave open. If model, noise and priors are right,
-innovations, what each sample differs by from its prediction by all samples before it, are
+innovations, the differences of each sample from its prediction by all samples before it, are
 independent with deviation one. Their sum of squares is the least value of the sum that was
 minimised, distributed as chi-square with as many degrees of freedom as there are samples; no
 parameter is taken off, as priors count as data do. Their autocorrelations are of order 1/sqrt(n),
@@ -50,12 +50,12 @@ class Posterior:
 
     @property
     def correlation(self) -> np.ndarray:
-        """Of the parameters (m, m)."""
+        """Correlation of the parameters (m, m)."""
         return self.covariance / np.outer(self.widths, self.widths)
 
     @property
     def n_found(self) -> float:
-        """How many parameters the data determine: degrees of freedom for signal."""
+        """Number of parameters that the data determine: degrees of freedom for signal."""
         return float((self.information / (1.0 + self.information)).sum())
 
     @property
@@ -65,8 +65,8 @@ class Posterior:
 
     @property
     def condition(self) -> float:
-        """Of J: root of the largest information over the least; infinite if data do not depend on a
-        direction."""
+        """Condition of J: root of the largest information over the least; infinite if data do not
+        depend on a direction."""
         least = self.information[-1]
         return float(np.sqrt(self.information[0] / least)) if least > 0.0 else float("inf")
 

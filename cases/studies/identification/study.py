@@ -47,7 +47,7 @@ _SEARCHES_IN_DOUBT = 3  # where the task names no number and the first leaves an
 
 
 class Unknown(NamedTuple):
-    """What is looked for, with its prior.
+    """Parameter that is identified, or a bias of the data, with its prior.
 
     Attributes
     ----------
@@ -72,7 +72,7 @@ class Identification:
     values : (m,) found
     posterior : their uncertainty, in deviations of the priors
     place : (n,) of the samples of each signal [m]
-    signals : what was measured
+    signals : that were measured
     modelled : of each signal the samples (n,) of the march that was found, without biases
     judged : the residuals of each signal and of "all"
     n_marches, n_jacobians : how many were made
@@ -158,7 +158,7 @@ class _Compared:
         return np.concatenate(rows)
 
     def _by(self, at: np.ndarray) -> list[float]:
-        """By how much the parameters of the scene are changed, in their units."""
+        """Changes of the parameters of the scene, in their units."""
         return list(self._offsets + self._deviations * at[: self._offsets.size])
 
 
@@ -175,7 +175,7 @@ def identify(
     ----------
     scene : checked
     measured : CSV file, or the table of one
-    task : what its columns are, and what is looked for
+    task : description of its columns, and the parameters to be identified
     comm : mpi4py communicator of this process alone
     progress : called with a line for each parameter and march
 

@@ -32,7 +32,7 @@ class Place(_Column):
 
     Attributes
     ----------
-    zero_m : what the file counts at the begin of the run's line [m]
+    zero_m : place by the file's count at the begin of the run's line [m]
     direction : whether it counts with the run's train, or against it
     """
 
@@ -132,7 +132,7 @@ class Uplift(Table):
 
 
 class Tolerances(Table):
-    """How far a run may be from the measurement, in place of the usual ones."""
+    """Tolerances of a run against the measurement, in place of the usual ones."""
 
     mean_N: POSITIVE | None = None
     std_percent: POSITIVE | None = None
@@ -143,7 +143,7 @@ class Tolerances(Table):
 
 
 class Description(Table):
-    """What a line test measured of a passage, for a comparison with a run."""
+    """Measured passage of a line test, for a comparison with a run."""
 
     measured: Measured
     others: Annotated[list[OtherPantograph], Field(max_length=20)] = []

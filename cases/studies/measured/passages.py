@@ -58,7 +58,7 @@ def passage_of(
     ----------
     table : of a CSV file
     path : of that file, for its name and sentences
-    description : what its columns are
+    description : of its columns
     folder : of further files that the description names
     results : of the run; with a column of times it has start and speed
 

@@ -49,7 +49,7 @@ def column_of(table: pd.DataFrame, path: str, name: str, may_lack: bool = False)
 
     Parameters
     ----------
-    path : what sentences call the table
+    path : name of the table in sentences
     may_lack : whether a cell without a finite number is NaN, not an error
 
     Raises
@@ -76,7 +76,7 @@ def places_of(
 
     Parameters
     ----------
-    path : what sentences call the table
+    path : name of the table in sentences
     speed : of the train [m/s]
     start : place of the pantograph at time zero [m]
 
@@ -99,7 +99,7 @@ def evened_out(places: np.ndarray, path: str) -> np.ndarray:
 
     Parameters
     ----------
-    path : what sentences call the table
+    path : name of the table in sentences
 
     Raises
     ------

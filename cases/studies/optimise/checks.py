@@ -158,7 +158,7 @@ def _figures(summary: Mapping[str, Any], pantograph: Mapping[str, Any]) -> dict[
 
 
 def change(row: Row, statistic: str) -> float:
-    """By how much a statistic changes, over its value as shipped; that of shares as they are.
+    """Relative change of a statistic over its value as shipped; of shares the change itself.
 
     Zero where a run does not give it.
     """
@@ -193,7 +193,7 @@ def not_improved(rows: Sequence[Row]) -> list[str]:
 
 
 def trap(rows: Sequence[Row]) -> str:
-    """What becomes of the direction that no search has seen; empty if all were seen."""
+    """Sentence on ``std_N`` in the direction that no search has seen; empty if all were seen."""
     own = [row for row in rows if row.check == AS_IS and row.outcome == "done"]
     seen, unseen = ([row for row in own if row.searched is side] for side in (True, False))
     if not seen or not unseen:

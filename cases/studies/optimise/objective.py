@@ -69,7 +69,7 @@ class Problem:
 
     Attributes
     ----------
-    scenes, variables : what is varied
+    scenes, variables : set of scenes, and quantities that are varied
     objective, constraints : as the task has them
     least_dropper_force : that droppers keep at rest, if the line is varied [N]
     evaluation : makes the runs
@@ -113,7 +113,7 @@ class Problem:
         return self._best
 
     def points(self, changes: Sequence[np.ndarray]) -> list[Point]:
-        """What comes of changes, (n,) each, of which all runs are made together.
+        """Evaluate and record changes, (n,) each, with the runs of all of them made together.
 
         Raises
         ------
@@ -223,7 +223,7 @@ class Problem:
 
     @property
     def _counts(self) -> list[bool]:
-        """Of which scenes the objective is."""
+        """Whether each scene counts in the objective."""
         speeds = self.objective.speeds_km_h
         return [speeds is None or member.speed in speeds for member in self.scenes.members]
 

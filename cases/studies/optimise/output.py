@@ -1,4 +1,4 @@
-"""What an optimisation leaves: tables for installers and of checks, the scene's keys, a page."""
+"""Output of an optimisation: tables for installers and of checks, the scene's keys, a page."""
 
 from __future__ import annotations
 

@@ -56,7 +56,7 @@ class Plan:
 
 @dataclass(frozen=True)
 class Optimum:
-    """What a method found.
+    """Result of a method.
 
     Attributes
     ----------
@@ -82,7 +82,7 @@ class Optimum:
 
     @property
     def said(self) -> list[str]:
-        """What it did not improve, the unseen direction first."""
+        """Sentences on what it did not improve, the unseen direction first."""
         said = [trap(self.rows)] if trap(self.rows) else []
         if not self.is_rounded:
             said.append("no changes in whole units keep all constraints: round_to is not kept")

@@ -51,7 +51,7 @@ class VariableTable(Table):
 
 
 class ObjectiveTable(Table):
-    """What is made as small as can be."""
+    """Statistic that is minimised."""
 
     statistic: Statistic = Field("std_N", description="statistic of a run")
     over: Literal["worst", "mean"] = Field(
@@ -73,7 +73,7 @@ class ConstraintTable(BoundTable):
 
 
 class SearchTable(Table):
-    """How the optimum is searched."""
+    """Search for the optimum."""
 
     methods: list[Literal["gradient", "cma"]] = Field(
         ["gradient"],

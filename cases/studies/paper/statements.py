@@ -54,7 +54,7 @@ class Condition(Table):
 
 
 class Alone(Table):
-    """By which figure inputs are ranked that move a statement, with one pantograph."""
+    """Figure by which the inputs that move a statement are ranked, with one pantograph."""
 
     figure: str = Field(description="one of FIGURES")
     damping: str = Field(description="with which it is taken")

@@ -47,7 +47,7 @@ MOST, _SLOWEST, _FASTEST = 2000, 1.0, 1000.0
 
 
 class Speeds(NamedTuple):
-    """Which speeds are marched, all [km/h].
+    """Speeds that are marched, all [km/h].
 
     Attributes
     ----------
@@ -103,7 +103,7 @@ class Stretch(NamedTuple):
 
 
 class Holds(NamedTuple):
-    """Where a criterion holds.
+    """Speeds at which a criterion holds.
 
     Attributes
     ----------
@@ -274,7 +274,7 @@ def _between(
 def _stretches(
     ended: _Marched, directions: Sequence[str], names: Sequence[str]
 ) -> tuple[Stretch, ...]:
-    """Where each of the criteria holds in each direction, ascending."""
+    """Speeds at which each criterion holds in each direction, ascending."""
     speeds = _speeds(ended)
     held = [_is_held(ended, speed, directions, names) for speed in speeds]
     stretches: list[Stretch] = []

@@ -57,7 +57,7 @@ _LEAST_FOR_PERIOD = 12  # distances from which a period can be read
 
 
 class Distances(NamedTuple):
-    """Which distances are marched: ``nearest``, ``farthest`` and ``step`` between them, all [m]."""
+    """Distances that are marched: ``nearest``, ``farthest`` and ``step`` between them, all [m]."""
 
     nearest: float = 31.0
     farthest: float = 400.0

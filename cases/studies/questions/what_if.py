@@ -1,4 +1,4 @@
-"""What a change of a scene changes: a run as it is, one with the change, and tables of both."""
+"""Differences by a change of a scene: a run as it is, one with the change, and tables of both."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class Differences(NamedTuple):
     supports : largest uplift at each steady arm that both runs have
     droppers : largest and smallest force, and time slack, of each dropper that both runs have
     criteria : values, limits and verdicts
-    remarks : what decides the results, by the name of the run
+    remarks : sentences on each run that bear on its results, by its name
     """
 
     case: str

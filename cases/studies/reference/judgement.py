@@ -106,7 +106,7 @@ def judged_row(
 
 
 def _words(row: Mapping[str, Any]) -> dict[str, str]:
-    """What readers see of a row beside what files have of it."""
+    """Further cells of a row for readers: meaning of its quantity, mark if it is not compared."""
     known = QUANTITIES.get(row["quantity"])
     mark = UNCOMPARED if row["compared"] is False else ""
     return {"meaning": known.meaning if known else row["quantity"], "mark": mark}

@@ -63,7 +63,7 @@ class Others:
 def read_results(
     files: Sequence[Path], configuration: str | None, is_filtered: bool
 ) -> list[Others]:
-    """What files hold, an entry for each configuration. Not collective.
+    """Read results of other programs, an entry for each configuration. Not collective.
 
     A file with a column ``quantity`` is a table of statistics with ``of``, ``value`` and, unless
     ``configuration`` is given, ``configuration``. Others have ``place_m`` or ``time_s``, since the

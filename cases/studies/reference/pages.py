@@ -1,4 +1,4 @@
-"""What ``judge`` and ``validate`` leave and print: a page, its tables, a text."""
+"""Output of ``judge`` and ``validate``: a page, its tables, and text for the terminal."""
 
 from __future__ import annotations
 

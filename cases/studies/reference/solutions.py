@@ -98,7 +98,7 @@ class Solution:
 
     Attributes
     ----------
-    configuration : what it is of
+    configuration : of line and train
     figures : value and error bar by place of the pantograph, or LINE, and quantity, in its unit
     place : (n,) equidistant along the evaluated stretch [m]
     forces : (n,) below 20 Hz by place of the pantograph [N]

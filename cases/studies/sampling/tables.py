@@ -34,7 +34,7 @@ SALTELLI = "saltelli"
 
 
 class _AlongLine(Table):
-    """How values are correlated along the line."""
+    """Correlation of values along the line."""
 
     correlation_length_m: float = Field(
         0.0,

@@ -34,7 +34,7 @@ Statistic = Annotated[str, AfterValidator(_is_statistic)]
 
 
 class BoundTable(Table):
-    """What every pantograph of every scene must keep."""
+    """Bound that every pantograph of every scene must keep."""
 
     statistic: Statistic = Field(description="statistic of a run")
     at_least: float | None = Field(None, description="least value allowed")
@@ -54,7 +54,7 @@ class BoundTable(Table):
         return f"{self.statistic} <= {self.at_most:g}"
 
     def margin(self, value: float) -> float:
-        """By how much a value is within the bound, in its unit; negative beyond."""
+        """Distance of a value from the bound, in its unit; negative beyond."""
         if self.at_least is not None:
             return value - self.at_least
         assert self.at_most is not None
@@ -62,7 +62,7 @@ class BoundTable(Table):
 
     @property
     def scale(self) -> float:
-        """What margins may be divided by: the bound, or 100 if that is smaller than 1."""
+        """Scale of margins: the absolute bound, or 100 if that is smaller than 1."""
         bound = self.at_most if self.at_least is None else self.at_least
         assert bound is not None
         return abs(bound) if abs(bound) >= 1.0 else 100.0
@@ -128,7 +128,7 @@ class Member(NamedTuple):
 
     @property
     def name(self) -> str:
-        """What tells it from others."""
+        """Distinguishing label: direction, and speed, train and seed as far as they are given."""
         parts = [self.direction]
         parts += [] if self.speed is None else [f"{self.speed:g} km/h"]
         parts += [self.train] if self.train else []

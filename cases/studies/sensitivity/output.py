@@ -70,7 +70,7 @@ def _rows(found: Sensitivity, number: int) -> list[dict[str, Any]]:
 
 
 def as_text(found: Sensitivity) -> str:
-    """What is printed: the statistics, the table, and how far the derivatives hold."""
+    """Text for the terminal: the statistics, the table, and the limits of the derivatives."""
     lines = []
     for name, own in zip(found.names, found.statistics, strict=True):
         lines.append(

@@ -88,7 +88,7 @@ class Parameter:
 
     @property
     def unit(self) -> str:
-        """That the key names."""
+        """Unit that the key names, mm for the length of a dropper."""
         return "mm" if _OF_DROPPER.fullmatch(self.key) else unit_of(self.key)
 
     @property
@@ -108,14 +108,14 @@ class Parameter:
 
     @property
     def step(self) -> float:
-        """By how much it is changed to differentiate set-ups."""
+        """Step by which it is changed to differentiate set-ups, in its unit."""
         if self.size > 0.0:
             return _STEP * self.size
         return _STEP_OF_ZERO.get(self.unit, _USUAL_STEP_OF_ZERO)
 
     @property
     def change(self) -> float:
-        """By how much a table lets it change: a millimetre, kilogram or newton, a kilonewton of
+        """Change of it that a table shows: a millimetre, kilogram or newton, a kilonewton of
         tension, or a hundredth of itself."""
         for end, by in _CHANGES_OF_FORCES.items():
             if self.key.endswith(end) and by < self.size:
@@ -292,7 +292,7 @@ def _change(raw: dict[str, Any], parameter: Parameter, by: float) -> None:
 
 
 def _lengthen(raw: dict[str, Any], span: int, number: int, error: float) -> None:
-    """Let a dropper have an error of its length [mm]."""
+    """Give a dropper an error of its length [mm]."""
     lengths = raw.setdefault("irregularities", {}).setdefault("dropper_lengths", {})
     others = [own for own in lengths.get("by_dropper", []) if own[:2] != [span, number]]
     lengths["by_dropper"] = [*others, [span, number, error]]

@@ -26,7 +26,7 @@ _BYTES = 2**28
 
 @dataclass(frozen=True)
 class Statistics:
-    """Of a pantograph's contact force below 20 Hz in the evaluated stretch [N]."""
+    """Statistics of a pantograph's contact force below 20 Hz in the evaluated stretch [N]."""
 
     mean: float
     std: float

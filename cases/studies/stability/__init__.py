@@ -1,1 +1,1 @@
-"""Where each coupling of line and pantograph is stable."""
+"""Stability limits of each coupling of line and pantograph."""

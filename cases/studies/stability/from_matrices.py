@@ -53,8 +53,8 @@ class PointModel:
 
     @property
     def mass(self) -> float:
-        """What forces there meet before anything else has moved [kg], at the least: of one wire
-        1 / b . M^-1 b."""
+        """Least apparent mass of the wires under sudden forces there [kg]: of one wire
+        1 / (b . M^-1 b)."""
         return 1.0 / _largest(self.load.T @ self.load)
 
 
@@ -104,7 +104,7 @@ def loads_at(wires: ContactWires, x: float, n_dofs: int) -> np.ndarray:
 def lightest_place(
     model: Model, wires: ContactWires, low: float, high: float, every: bool = False
 ) -> float | None:
-    """Where in [low, high] [m] the contact wires meet forces with the least mass.
+    """Place in [low, high] [m] where the apparent mass of the contact wires is least.
 
     Ends of elements and eight places in between are tried, of those where a head meets the most
     wires; None where wires are too far apart in height for that, or if ``every`` one is wanted and
@@ -199,13 +199,13 @@ def step_matrix(both: Coupled, step: Step, implicit: float, explicit: float) -> 
 
 
 def radius(both: Coupled, step: Step, stiffness: float, coupling: str) -> float:
-    """What a step multiplies a perturbation by, at most, with ``implicit`` or ``explicit``."""
+    """Spectral radius of a step with the ``implicit`` or ``explicit`` coupling."""
     parts = (stiffness, 0.0) if coupling == "implicit" else (0.0, stiffness)
     return float(np.abs(linalg.eigvals(step_matrix(both, step, *parts))).max())
 
 
 def exchange_ratio(both: Coupled, step: Step, stiffness: float) -> float:
-    """What an exchange of forces and motions multiplies errors of the forces by, at most."""
+    """Largest factor by which an exchange of forces and motions multiplies errors of the forces."""
     operator = both.mass + step.gamma * step.dt * both.damping
     operator = operator + step.beta * step.dt**2 * both.stiffness
     answer = linalg.solve(operator, both.depth, assume_a="sym")
@@ -227,7 +227,7 @@ def largest_step(
     newmark : beta and gamma
     coupling : "implicit", "explicit", or any other, which exchanges
     steps : least and greatest [s]
-    allowed : what a step or an exchange may multiply errors by
+    allowed : largest factor by which a step or an exchange may multiply errors
     """
 
     def excess(log_dt: float) -> float:

@@ -220,7 +220,7 @@ class _FindLimits:
         return type(self), (self._scene,)
 
     def bench(self, comm: Any) -> tuple[Bench, theory.PointModel]:
-        """Where heads are tried, and the line as they meet it there."""
+        """Bench at the place where heads are tried, and the line reduced to that place."""
         if self._bench is None:
             rest = at_rest(self._scene, comm)
             data = rest.problem.train.placements[0].data
@@ -239,8 +239,8 @@ class _FindLimits:
 
 
 def _place(rest: LineAtRest, wires: ContactWires) -> float:
-    """Where heads are tried [m]: in the middle span, or where a head passes from one wire to the
-    next if the line has such a place and all its contact wires do not run in that span."""
+    """Place where heads are tried [m]: in the middle span, or where a head passes from one wire to
+    the next if the line has such a place and all its contact wires do not run in that span."""
     spans = middle_span(rest.problem.line)
     place = theory.lightest_place(rest.model, wires, *spans, every=True)
     if place is None:

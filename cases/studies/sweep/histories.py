@@ -41,8 +41,9 @@ Put = Callable[[int, Mapping[str, np.ndarray]], None]
 
 @contextmanager
 def piece_file(path: Path | None, names: Sequence[str]) -> Iterator[Put]:
-    """What takes the histories of a piece of work: number of a variant, and its tables by their
-    paths in a result file. A context manager; the file appears whole at its end. Not collective.
+    """Yield a function that writes histories of a piece of work: of the number of a variant, and
+    its tables by their paths in a result file. The file appears whole at the end of the context.
+    Not collective.
 
     Parameters
     ----------

@@ -81,7 +81,7 @@ class Job:
 
 
 class RunOptions(NamedTuple):
-    """How the runs of a sweep or study are made.
+    """Options for the runs of a sweep or study.
 
     Attributes
     ----------
@@ -102,14 +102,14 @@ AS_USUAL = RunOptions()
 
 @dataclass(frozen=True)
 class Ended:
-    """How a variant ended.
+    """Result of a variant.
 
     Attributes
     ----------
     variant : which one
     outcome : "done", "interrupted" or the sentence of what broke
     summary : content of ``summary.json``, empty unless done
-    measured : what ``Measure`` took, empty unless done
+    measured : values that ``Measure`` took, empty unless done
     wall : time that the run took [s], the earlier run's if it was not run again
     skipped : whether it was done already
     """

@@ -1,4 +1,4 @@
-"""What a sweep leaves: a table as CSV, JSON and text, and statistics drawn over what was varied."""
+"""Output of a sweep: a table as CSV, JSON and text, and statistics over the varied keys."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def table_of(ended: Sequence[Ended]) -> StudyTable:
 
 
 def _columns_of(variant: Variant) -> dict[str, Any]:
-    """What tells a variant from others: its name in a file, its direction, and the values of varied
+    """Columns that identify a variant: its name in a file, its direction, and the values of varied
     keys as a scene reads them."""
     named = {NAMED: variant.named, DIRECTION: variant.direction}
     columns: dict[str, Any] = {name: text for name, text in named.items() if text}
@@ -207,7 +207,7 @@ def _is_number(value: Any) -> bool:
 
 
 def key_in_words(key: str) -> str:
-    """What a dotted key is, with its table and unit: ``contact wire: tension [N]``."""
+    """Meaning of a dotted key, with its table and unit: ``contact wire: tension [N]``."""
     parts = [part for part in key.split(".") if not part.isdigit()]
     known = _known(key)
     told = known is not None and len(known.meaning) <= _LONGEST

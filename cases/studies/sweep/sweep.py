@@ -130,7 +130,7 @@ def run_sweep(
 
     Parameters
     ----------
-    command : what this process does, for others that want the folder
+    command : work of this process in words, for others that want the folder
     plotted : statistics that are drawn; the usual ones if there are none, no picture of None
     histogram : whether histograms of the contact forces are written too
 

@@ -163,7 +163,7 @@ def check_key(key: str, where: str) -> None:
 
 
 def _quoted(value: Any) -> str:
-    """The same within a list or a table, where texts stand in quotes."""
+    """Text of a value within a list or a table, where texts stand in quotes."""
     return json.dumps(value) if isinstance(value, str) else text_of(value)
 
 

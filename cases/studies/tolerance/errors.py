@@ -39,7 +39,7 @@ class Group:
     names : of each error, n of them
     near : which of them are near the evaluated stretch, shape (n,)
     unit : of errors and tolerances
-    given : what the scene has of its own under the key that the errors are written to
+    given : the scene's own value of the key that the errors are written to
     """
 
     table: ErrorKind

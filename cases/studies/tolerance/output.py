@@ -1,4 +1,4 @@
-"""What a study of tolerances leaves: the table of an installer, and that of all criteria."""
+"""Output of a study of tolerances: the table of an installer, and that of all criteria."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def _level(one: Tolerance) -> str:
 
 
 def installer_table(plan: Plan, found: Sequence[Tolerance]) -> StudyTable:
-    """How far each error may go for all criteria at once that the line keeps without errors."""
+    """Tolerance of each error for all criteria at once that the line keeps without errors."""
     rows = []
     together = _of_each([one for one in found if one.error == ALL])
     for group in plan.groups:

@@ -22,7 +22,7 @@ Margins = dict[str, list[float]]
 
 
 def margins_of(summary: Mapping[str, Any], criteria: Sequence[BoundTable]) -> Margins:
-    """How far a run is within each criterion, in its unit, for each pantograph; negative beyond.
+    """Margin of a run to each criterion, in its unit, for each pantograph; negative beyond.
 
     A run that broke keeps no criterion: all are minus infinity, with the name "".
 

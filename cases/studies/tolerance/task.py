@@ -70,7 +70,7 @@ ErrorKind = Annotated[
 
 
 class SamplesTable(Table):
-    """How tolerances are found."""
+    """Search for tolerances."""
 
     probability: float = Field(
         0.99, gt=0.5, lt=1, description="share of the installed lines that keep a criterion"

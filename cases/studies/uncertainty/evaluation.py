@@ -1,4 +1,4 @@
-"""What a table of runs says of a line with uncertain keys."""
+"""Evaluation of a table of runs of a line with uncertain keys."""
 
 from __future__ import annotations
 

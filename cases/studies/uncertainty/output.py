@@ -1,4 +1,4 @@
-"""What an evaluation leaves: JSON, pictures, and sections of text for a terminal."""
+"""Output of an evaluation: JSON, pictures, and sections of text for a terminal."""
 
 from __future__ import annotations
 

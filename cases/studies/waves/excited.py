@@ -41,7 +41,7 @@ _ASIDE = LumpedData((8.0,), (0.0,), (0.0,))
 
 
 class Asked(NamedTuple):
-    """What is asked for beside its kind; None for what the scene or the kind gives.
+    """Values of an excitation beside its kind; None for that of the scene or of the kind.
 
     Attributes
     ----------
@@ -176,7 +176,7 @@ class Watch(Observer):
     Parameters
     ----------
     every : steps from one time to the next
-    seen : what it is shown to
+    seen : receivers of the uplift
     """
 
     def __init__(self, every: int, seen: Sequence[NodeMotion]) -> None:

@@ -48,7 +48,7 @@ def arrived(
     time: np.ndarray, first: np.ndarray, second: np.ndarray, distance: float, frequency: float,
     width: float,
 ) -> Arrived:  # fmt: skip
-    """How fast the energy of a band of frequencies travels from one station to another.
+    """Speed of the energy in a band of frequencies from one station to another.
 
     The centre of energy of a signal in time is the mean of its group delays, each frequency by its
     share of the energy: whatever the phases are.
@@ -138,7 +138,7 @@ class Transmitted(NamedTuple):
 
 
 def transmitted(theory: WaveTheory, seen: WavesSeen) -> Transmitted | None:
-    """What passes from one station to another; None without a blow, periodic line or room."""
+    """Spectra at two stations after a blow; None without a blow, periodic line or room."""
     columns = _stations(theory, seen)
     if columns is None:
         return None

@@ -51,7 +51,7 @@ class Bench(NamedTuple):
     wires : they are what waves run on, in this order
     parts : the obstacle: groups of one member each, empty for none
     dropper_length : of the dropper, if it is one [m]
-    beyond : what the first wire is beyond the obstacle, None for the same
+    beyond : conductor of the first wire beyond the obstacle, None for the same
     ends : whether the wires end at the obstacle, held
     """
 

@@ -54,7 +54,7 @@ def space_time(
 def train_frame(
     seen: WavesSeen, theory: WaveTheory, behind: float, ahead: float, what: str
 ) -> Figure:
-    """The same against the distance from the first pantograph."""
+    """Picture of the velocity over time and distance from the first pantograph."""
     figure = figures.new_figure(6.4)
     axes = figure.add_subplot()
     relative, velocity = seen.in_the_train(behind, ahead)

@@ -117,7 +117,7 @@ class WireMotion:
     def seen(
         self, position: Callable[[np.ndarray], np.ndarray], struck: float = np.nan
     ) -> WavesSeen:
-        """All that was added; ``position`` gives (t, p) of what moves at times (t,).
+        """Return all that was added; ``position`` gives the places (t, p) that move at times (t,).
 
         Raises
         ------
@@ -267,7 +267,7 @@ class EnergyMotion:
         self._before = time, now
 
     def seen(self) -> EnergySeen:
-        """All that was added."""
+        """Return all that was added."""
         return EnergySeen(np.array(self._times), self._middles, np.array(self._rows))
 
     def _density(self, uplift: np.ndarray, velocity: np.ndarray) -> np.ndarray:
@@ -288,8 +288,8 @@ class EnergyMotion:
         return vector
 
     def _switched(self, d: np.ndarray) -> np.ndarray:
-        """What the energy of droppers differs by from k e^2 / 2 as they are slack, or on another
-        slope of their curve than at rest, by link and bend [J].
+        """Energy of droppers less k e^2 / 2, as they are slack or on another slope of their curve
+        than at rest, by link and bend [J].
 
         A dropper of tension N at rest and stretch e beyond it has (N + k e)^2 / 2 k - N^2 / 2 k -
         N e, the last term being the work of the weights: k e^2 / 2 if it pulls, -N^2 / 2 k - N e if

@@ -61,7 +61,7 @@ _BEHIND, _AHEAD = 300.0, 200.0
 
 
 class Studied(NamedTuple):
-    """What theory says, what is measured, the files that show it, and remarks on the run."""
+    """Result of the study: theory, measured figures, files that show both, remarks on the run."""
 
     theory: WaveTheory
     measured: list[Row]

@@ -1,4 +1,4 @@
-"""What theory says of the waves of a scene: closed forms, the periodic line, its ends."""
+"""Theory of the waves of a scene: closed forms, the periodic line, its ends."""
 
 from __future__ import annotations
 

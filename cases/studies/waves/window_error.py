@@ -48,7 +48,7 @@ class Error(NamedTuple):
     sigma : difference of the standard deviation, with its sign [%]
     estimated : of ``history`` by the program [%]
     is_default : whether the program chooses this window
-    remarks : what the march in this window told of itself
+    remarks : sentences of the march in this window
     """
 
     ahead: float

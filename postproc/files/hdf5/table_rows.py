@@ -15,7 +15,7 @@ _NO_FILTER = 0xFFFFFFFF
 
 
 def append_rows(dataset: h5py.Dataset, start: int, rows: np.ndarray) -> None:
-    """Let a growing dataset end with ``rows`` (n, ...) behind its first ``start``."""
+    """Write ``rows`` (n, ...) behind the first ``start`` of a growing dataset, which ends there."""
     grow((dataset,), start + rows.shape[0])
     if not rows.size:
         return
@@ -26,7 +26,7 @@ def append_rows(dataset: h5py.Dataset, start: int, rows: np.ndarray) -> None:
 
 
 def grow(datasets: Iterable[h5py.Dataset], rows: int) -> None:
-    """Let growing datasets have so many rows, which read as NaN until they are written."""
+    """Resize growing datasets to so many rows, which read as NaN until they are written."""
     for dataset in datasets:
         dataset.id.set_extent((rows, *dataset.id.shape[1:]))
 

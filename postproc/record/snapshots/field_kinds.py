@@ -29,7 +29,7 @@ class FieldKind:
     ----------
     name : of the field in files
     unit : SI unit, "-" if none
-    meaning : what it is, and which sign it has
+    meaning : description with its sign, in words
     components : numbers of a value
     motions : unknowns that it takes at all nodes, each with whether their rate is meant
     of_wires : whether wires alone have it, and not other blocks that move
@@ -66,7 +66,7 @@ class FieldKind:
         return block.is_wire if self.of_wires else block.moves
 
     def values_of(self, n_points: _Count) -> _Count:
-        """How many values blocks with so many points have."""
+        """Number of values of blocks with so many points."""
         return n_points // 2 if self.of_droppers else n_points
 
 

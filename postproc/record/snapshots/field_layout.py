@@ -1,4 +1,4 @@
-"""Where the values of snapshots stand in their file, known before the first step.
+"""Places of the values of snapshots in their file, known before the first step.
 
 All values of a field and block stand one after another in one table, snapshot by snapshot. Which
 points a snapshot shows follows from the course of the train, so that a window around it takes no
@@ -26,7 +26,7 @@ _TABLES = 1024
 
 @dataclass(frozen=True)
 class Course:
-    """Where the last and the first pantograph are at time zero [m], and their speed [m/s]."""
+    """Places of the last and the first pantograph at time zero [m], and their speed [m/s]."""
 
     last: float
     first: float
@@ -35,7 +35,7 @@ class Course:
 
 @dataclass(frozen=True)
 class FieldRecord:
-    """Which part of the fields is recorded.
+    """Recorded part of the fields.
 
     Attributes
     ----------

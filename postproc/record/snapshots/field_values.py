@@ -80,7 +80,7 @@ class FieldValues:
     def _components(
         self, kind: FieldKind, block: Block, known: Gathered
     ) -> list[tuple[np.ndarray | None, np.ndarray]]:
-        """Of each component its values (rows, k), None where it is zero, and which of these the
+        """Values of each component (rows, k), None where it is zero, and which of these the
         points of a block take: zero where that is below zero."""
         if kind.of_droppers:
             force = known.dropper_force

@@ -34,7 +34,7 @@ class FieldRecorder(FileObserver[FieldsFile]):
     comm : mpi4py communicator
     path_xdmf : the XDMF file; the numbers go into the file of the same name ending in ``.h5``;
         its folder is made
-    line : what of the line snapshots show
+    line : parts of the line that snapshots show
     every : steps between two snapshots
     record : which part of it is recorded
     flush_every : steps after which what is kept in memory is written; if it is the ``Recorder``'s,

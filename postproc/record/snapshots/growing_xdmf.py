@@ -72,7 +72,7 @@ class GrowingXdmf:
         self._handle = os.open(path, os.O_WRONLY)
 
     def show(self, n_shown: int) -> None:
-        """Let the first ``n_shown`` snapshots be there, not fewer than before; OSError if not."""
+        """Show the first ``n_shown`` snapshots, not fewer than before; OSError if not."""
         if n_shown == self._n_shown:
             return
         for marks in self._marks:

@@ -335,7 +335,7 @@ def _prepared(figure: Figure) -> FigureCanvasAgg:
 
 
 def _make_room_for_legends(figure: Figure, canvas: FigureCanvasAgg) -> None:
-    """Let a figure of ``stacked`` grow where a legend does not fit beside its title.
+    """Enlarge a figure of ``stacked`` where a legend does not fit beside its title.
 
     The legend then has fewer columns, and the title stands above it.
     """

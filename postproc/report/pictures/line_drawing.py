@@ -36,7 +36,7 @@ _LINE = 0.22  # of text [inch]
 
 
 class Mark(NamedTuple):
-    """What is marked on a ``wire`` at ``x`` [m], and what a line below ``says`` of it."""
+    """Mark on a ``wire`` at ``x`` [m], and the text on it in a line below."""
 
     x: float
     wire: str

@@ -245,7 +245,7 @@ def energies(results: Results) -> Figure | None:
 
 @own_style()
 def plan_view(results: Results) -> Figure | None:
-    """Where contact wires are laterally, and radial forces of arms; None where no wire moves so."""
+    """Lateral places of contact wires, and radial forces of arms; None where no wire moves so."""
     registration = results.registration()
     if registration is None or not results.has_static("contact_y"):
         return None

@@ -28,7 +28,7 @@ _BROKEN_OFF = {
 
 
 def status(run: EvaluatedRun) -> Section:
-    """What a reader is to know first."""
+    """Verdict, the limits that are nearest, and faults of the run."""
     return Section("", _status(run))
 
 
@@ -163,7 +163,7 @@ def _turned(
 
 
 def _start_up(run: EvaluatedRun) -> dict[str, dict[str, float]]:
-    """What the start of the run leaves by quantity and pantograph [N], as estimated.
+    """Estimated error that the start of the run leaves, by quantity and pantograph [N].
 
     It is an rms error of the force history, as that of the time step is.
     """

@@ -1,4 +1,4 @@
-"""What the force and the line do in detail: spectra, contact height, every support and dropper."""
+"""Dynamics of force and line in detail: spectra, contact height, every support and dropper."""
 
 from __future__ import annotations
 
@@ -183,7 +183,7 @@ def _extremes(
 
 
 def _note(n_shown: int, n_all: int, file: str) -> str:
-    """What a table leaves out."""
+    """Sentence on the rows that a table leaves out; empty if it has all."""
     if n_shown == n_all:
         return ""
     return f"{n_shown} of {n_all} are shown, the extremes and any beyond a limit; {file} has all."

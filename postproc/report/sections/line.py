@@ -111,7 +111,7 @@ def has_registration(run: EvaluatedRun) -> bool:
 
 
 def from_above(run: EvaluatedRun) -> Section:
-    """Where the contact wires are laterally, and their steady arms."""
+    """Lateral places of the contact wires, and their steady arms."""
     from catenary.postproc.report.pictures.line_pictures import plan_view
 
     results = run.results

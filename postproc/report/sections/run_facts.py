@@ -1,4 +1,4 @@
-"""What was simulated and what was not, and the run: sizes, times, versions, configuration."""
+"""Facts on a run: effects simulated and left out, sizes, times, versions, configuration."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ INPUT = "input.toml"
 
 
 def checks(run: EvaluatedRun) -> Section:
-    """What the march found of itself: energy, motion beyond linear theory, iterations."""
+    """Own checks of the march: energy, motion beyond linear theory, iterations."""
     return Section("The run's own checks", _checks(run))
 
 
@@ -92,7 +92,7 @@ def effects(run: EvaluatedRun, costs: tuple[Mapping[str, str], str] = ({}, "")) 
 
 
 def signatures(text: str | None, run: EvaluatedRun) -> Section:
-    """How to make the run again, and room for those who answer for it.
+    """Commands to make the run again, and room for signatures.
 
     Parameters
     ----------
@@ -184,7 +184,7 @@ def _facts(results: Results) -> list[tuple[str, str]]:
 
 
 def _of_program(results: Results) -> list[tuple[str, str]]:
-    """When and how fast the program ran, and its versions."""
+    """Time and speed of the program's run, and its versions."""
     about = results.attributes
     phases = about.get("phase_wall_s", {}).items()
     factors = [

@@ -1,4 +1,4 @@
-"""What a section of a report is made of: sentences, tables, pictures, and what is folded away."""
+"""Parts of a section of a report: sentences, tables, pictures, folded blocks."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class Text(NamedTuple):
 
     Attributes
     ----------
-    text : what it says
+    text : sentence or sentences
     look : "good", "bad" or "open" for a verdict, "note" for a box, "remark" for a remark, "code"
         for what is shown to the letter; empty for plain text
     first : words before the text, in bold
@@ -79,7 +79,7 @@ class Picture(NamedTuple):
 
 
 class Folded(NamedTuple):
-    """What a reader unfolds: a title, and a text or table."""
+    """Folded block: a title, and a text or table that a reader unfolds."""
 
     title: str
     block: Text | StudyTable
@@ -92,8 +92,8 @@ class Section(NamedTuple):
     ----------
     heading : empty for what stands below the title of the page
     blocks : texts and tables; made when the page is, such as by a generator
-    pictures : those that the run has
-    folded : what few want to see
+    pictures : of the section, as far as the run has them
+    folded : blocks of details
     """
 
     heading: str

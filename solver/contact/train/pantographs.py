@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 
 class Leads(NamedTuple):
-    """How far contacts are ahead of the middle of their raked strips, as kernels take it.
+    """Advance of contacts before the middle of their raked strips, for kernels.
 
     Attributes
     ----------
@@ -82,7 +82,7 @@ def leads_of(wires: ContactWires, wire: np.ndarray, rake: np.ndarray) -> Leads:
 
 
 class StripEnds(NamedTuple):
-    """Which contacts a strip has, and which strips a pantograph: numbers of the first ones, and of
+    """Contacts of each strip, and strips of each pantograph: numbers of the first ones, and of
     all; ``of_strip`` (n_strips + 1,), ``of_pantograph`` (n_pantographs + 1,)."""
 
     of_strip: np.ndarray
@@ -396,7 +396,7 @@ def _make(
 
 
 def _base(problem: Problem, simulated: Simulated, placement: Placement) -> BaseMotion | None:
-    """How the vehicle moves a pantograph, None if it does not."""
+    """Motion of a pantograph's base by the vehicle, None without any."""
     if simulated.vehicle is None:
         return None
     vehicle = replace(simulated.vehicle, suspension=simulated.suspension)

@@ -44,7 +44,7 @@ def _given(problem: Problem) -> Damping:
 
 
 def _added(problem: Problem) -> dict[str, float]:
-    """By component the alpha [s] that its links lack to have dt."""
+    """Alpha [s] by component that its links lack to have dt."""
     given, dt = _given(problem), problem.numerics.dt
     found = {}
     for name, stiffness in _one_sided(problem):

@@ -55,13 +55,13 @@ class EndMemories:
     Attributes
     ----------
     places : (k,) among what the rank solves for, where its own memories act
-    arguments : what kernels know of them, for the arrays of a motion
+    arguments : of the kernels, for the arrays of a motion
 
     Parameters
     ----------
     comm : mpi4py communicator
     loads : of the model, the same on all ranks
-    domain : what the rank solves for
+    domain : range that the rank solves for
     values : (domain.size,) forces of all loads, which those of memories are among
     """
 

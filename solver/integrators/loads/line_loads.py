@@ -66,7 +66,7 @@ class LineLoads:
     Parameters
     ----------
     loads : of the model, the same on all ranks
-    domain : what the rank solves for
+    domain : range that the rank solves for
     held : numbers of held unknowns
     comm : mpi4py communicator of the ranks that the line is on
 
@@ -75,7 +75,7 @@ class LineLoads:
     memories : of ends that go on, None if there are none
     values : (domain.size,) their sum at the latest time [N], [N m]
     changes : whether they change with time
-    arguments : what the kernel that fills ``values`` is called with, once its clock is set and the
+    arguments : of the kernel that fills ``values``, once its clock is set and the
         time is ``cover``ed
     """
 
@@ -119,7 +119,7 @@ class LineLoads:
         self.read(None)
 
     def read(self, motion: LineState | None) -> None:
-        """Let forces that remember a motion take it from here. Not collective."""
+        """Set the motion that forces with memory read. Not collective."""
         if self.memories is not None:
             self.memories.read(motion)
             self.arguments = self.arguments._replace(memories=self.memories.arguments)
@@ -218,7 +218,8 @@ class _Sampled:
 def _changing_of(
     shapes: list[tuple[ShapeLoad, np.ndarray, np.ndarray]], others: np.ndarray
 ) -> Changing:
-    """What changes with ``shapes``, each with its places and forces there, and ``others``."""
+    """Sparse table of the forces of ``shapes``, each with its places and forces there; ``others``
+    are further places that change."""
     at = np.concatenate([np.zeros(0, np.int64), *(places for _, places, _ in shapes)])
     term = np.repeat(np.arange(len(shapes)), [places.size for _, places, _ in shapes])
     forces = np.concatenate([np.zeros(0), *(values for _, _, values in shapes)])

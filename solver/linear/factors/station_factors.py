@@ -60,7 +60,7 @@ def softened(whole: np.ndarray, eliminated: np.ndarray) -> np.ndarray:
 
 
 def edges(towards_end: np.ndarray, towards_start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Where steps of a part of the line may begin and end, from each station outwards, (n + 1,).
+    """Stations where steps of a part of the line may begin and end, from each outwards, (n + 1,).
 
     ``towards_end`` and ``towards_start`` (n,) are what ``softened`` says of each station after
     elimination to either side.
@@ -133,7 +133,7 @@ class StationFactors:
     low : first station of a rank's own
     ends : (5,) int, read at each step: first station that a step solves for and the one after the
         last, first own one that it takes on and the one after the last, and where elimination ends
-    turning : what may move the place where elimination ends, None if it stays
+    turning : arrays by which the place where elimination ends moves, None if it stays
     n_stations, n_kinds : in the matrix, and how many have different factors
     stations : Sections
     arrays : FactorArrays

@@ -57,7 +57,7 @@ class ColumnPieces:
 
     Parameters
     ----------
-    responses : what solves for columns
+    responses : solver for columns
     operators : of the line, whose pieces these are
     places, made : as of ``columns_of``
     """

@@ -78,7 +78,7 @@ class Pieces:
 
     @property
     def n_stations(self) -> int:
-        """Of the line."""
+        """Number of stations of the line."""
         return int(self.edges[-1])
 
     @property
@@ -87,7 +87,7 @@ class Pieces:
         return self._slots.size <= self.n_slots
 
     def add(self, make: Maker) -> None:
-        """Let ``make`` work something out for each piece, after what was added before."""
+        """Add ``make``, which is called for each piece after those added before."""
         self._makers.append(make)
 
     def first(self) -> Piece:

@@ -1,4 +1,4 @@
-"""Which stretches of a line are alike, found from its elements before there are matrices.
+"""Like stretches of a line, found from its elements before there are matrices.
 
 Spans of a line are alike. A station's mark follows from all that stands in its rows of M, K and C:
 the matrices of its elements, and which unknowns of this and of other stations these join. Stations

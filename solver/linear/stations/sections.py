@@ -16,7 +16,7 @@ from catenary.solver.model.unknowns.registry import Unknowns
 
 
 class Places(NamedTuple):
-    """Where stations stand in vectors, as kernels read it: arrays without entries if all are alike.
+    """Places of stations in vectors, for kernels: arrays without entries if all are alike.
 
     Attributes
     ----------
@@ -84,7 +84,7 @@ class Sections:
         return Places(self.starts[:-1].astype(np.int64), self.station_type.astype(np.uint8))
 
     def padded(self) -> Sections:
-        """The same with a station of all places more at both ends."""
+        """Return these sections with a further station of all places at both ends."""
         whole = tuple(range(self.width))
         station_types = (
             self.station_types if whole in self.station_types else (*self.station_types, whole)

@@ -1,4 +1,4 @@
-"""Which unknowns of a station matrices join, and how blocks are packed for kernels.
+"""Sparsity patterns of station blocks, and their packing for kernels.
 
 Which lane of a vector an unknown stands in, and in which order kernels read the numbers of a block,
 is known to them alone (``layout.hpp``).
@@ -20,7 +20,7 @@ _SETTINGS = ("widths", "own", "beside", "damped", "station_types", "factors")
 
 
 class Layout:
-    """Which unknowns of a station the rows of K and C, or factors of A, join.
+    """Sparsity pattern of a station's blocks in K and C, or in factors of A.
 
     Planes are sets of unknowns that no matrix joins. They stand side by side.
 
@@ -70,13 +70,13 @@ class Layout:
 
     @property
     def key(self) -> tuple[object, ...]:
-        """All that makes a layout."""
+        """Parameters of the layout, hashable."""
         own = self.widths, self.own.tobytes(), self.beside.tobytes()
         more = self.damped, self.station_types, self.factors, self.number
         return (*own, *more, None if self.whole is None else self.whole.key)
 
     def changed(self, **settings: Any) -> Layout:
-        """The same with some other parameters, by their names."""
+        """Return this layout with some other parameters, by their names."""
         return Layout(**{**{name: getattr(self, name) for name in _SETTINGS}, **settings})
 
     @property

@@ -45,7 +45,7 @@ def of_pairs(size: int) -> np.ndarray:
 
 
 def with_damping(layout: Layout, damping: np.ndarray | None) -> Layout:
-    """The same for products with C, by its blocks, as well."""
+    """Extend a layout to products with C, by its blocks."""
     found = layout if damping is None else joining(layout, damping)
     return found.changed(damped=True)
 

@@ -1,1 +1,1 @@
-"""Which unknowns a line has, at which stations, and their numbers."""
+"""Unknowns of a line, their stations and their numbers."""

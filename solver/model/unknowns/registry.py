@@ -85,7 +85,7 @@ class Unknowns:
 
     @cached_property
     def missing(self) -> np.ndarray:
-        """Numbers that no node has."""
+        """Numbers of unknowns that no node has."""
         taken = np.zeros(self.size, dtype=bool)
         taken[self.numbers[self.numbers >= 0]] = True
         return np.flatnonzero(~taken)

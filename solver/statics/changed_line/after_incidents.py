@@ -71,7 +71,7 @@ class ChangedLine:
     model : of the line as it is now; displacements count from the first rest
     form : the first rest, with the tension that droppers of the model have there
     load : (n_dofs,) balance lost [N], [N m], zero at held unknowns
-    energy : what the line's energy at the first rest has changed by [J]
+    energy : change of the line's energy at the first rest [J]
     """
 
     model: Model

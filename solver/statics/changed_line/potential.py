@@ -209,7 +209,7 @@ class _Arms:
         self.was = self.force(np.zeros(model.n_dofs))[:, : len(names)]
 
     def tension(self, moved: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Of each, (n,) [N], and the unit vectors from clamps to hinges, (n, 3)."""
+        """Tension of each arm, (n,) [N], and the unit vectors from clamps to hinges, (n, 3)."""
         to_hinge = self._hinge.copy()
         to_hinge[:, : self.unknowns.shape[1]] -= moved[self.unknowns]
         length = np.linalg.norm(to_hinge, axis=1)

@@ -30,7 +30,7 @@ class BandedFactors:
 
     Parameters
     ----------
-    parts : what is summed
+    parts : summands of the matrix
     given, values : unknowns (m,) that are given, and their values (m,)
     forces : rows, columns and numbers (k,) of the columns of given unknowns
     size : n

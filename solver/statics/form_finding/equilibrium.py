@@ -205,7 +205,7 @@ class _HangingWires:
 
     Attributes
     ----------
-    moments : what exact elements add to all loads, None if they are Hermite's
+    moments : additions of exact elements to all loads, None if they are Hermite's
     """
 
     def __init__(self, model: Model, exact: bool = False) -> None:
@@ -275,7 +275,7 @@ class _HangingWires:
 
 
 def _holding(model: Model) -> np.ndarray:
-    """Which steady arms hold their wire at its height, (n_arms,) bool."""
+    """Mask of steady arms that hold their wire at its height, (n_arms,) bool."""
     holds = [arms.kind.holds_height for arms in model.problem.line.steady_arms]
     return np.array([*holds, False])[model.mesh.arm_group]
 

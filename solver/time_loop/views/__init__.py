@@ -1,1 +1,1 @@
-"""What observers are shown of a march: channels, rows of values, motion, energy, checkpoints."""
+"""Views of a march for observers: channels, rows of values, motion, energy, checkpoints."""

@@ -65,14 +65,14 @@ class Energies(NamedTuple):
 
 
 class TrainLayout(NamedTuple):
-    """What decides which channels a run has.
+    """Properties of train and line that determine the channels of a run.
 
     Attributes
     ----------
     n_strips : of each pantograph in running order
     joints_in_loop : whether a pantograph has joints that may open, all its bodies being moved
     n_wires : number of contact wires
-    laws : what effects have set, None without effects
+    laws : settings of the effects, None without effects
     moves_along : whether wires move along the track
     """
 
@@ -96,8 +96,8 @@ class Channel:
     ----------
     name : name of the dataset in the result file
     unit : SI unit, "-" if none
-    meaning : what it is and which sign it has, in words
-    per : what a column stands for: ``PANTOGRAPH``, ``STRIP``, ``ARM`` or ``DROPPER``; ``WIRE_END``
+    meaning : description with its sign, in words
+    per : subject of a column: ``PANTOGRAPH``, ``STRIP``, ``ARM`` or ``DROPPER``; ``WIRE_END``
         for each end of a wire and side of a mid-point, of lines whose wires move along the track;
         ``WIRE`` for each contact wire under each pantograph; ``CONTACT`` for each contact wire on
         each strip, strip by strip; ``RUN`` for one value a row

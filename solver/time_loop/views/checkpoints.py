@@ -62,7 +62,7 @@ class Checkpoints:
         self._outputs += ["across"] if pantographs.lateral else []
 
     def make(self, step: int) -> State | None:
-        """Everything needed to continue after ``step``, the latest one, on rank 0. Collective."""
+        """State to continue from after ``step``, the latest one, on rank 0. Collective."""
         line, pantographs = self._line, self._pantographs
         by_row = self._unknowns_by_row
         made_by: dict[str, Callable[[], Any]] = {}

@@ -33,7 +33,7 @@ class ObserverList:
         return bool(self._observers)
 
     def start(self, stage: Stage) -> None:
-        """Let all begin. If one cannot, those before end with its sentence, and RunBroken is
+        """Start all observers. If one cannot, those before end with its sentence, and RunBroken is
         raised."""
         for number, observer in enumerate(self._observers):
             try:

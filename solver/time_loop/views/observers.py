@@ -22,7 +22,7 @@ class Stage:
 
     Attributes
     ----------
-    train : what decides which channels are recorded
+    train : properties that determine which channels are recorded
     dt, start_time : time step and time of the initial state [s]
     n_steps : steps planned
     arm_x, dropper_x : positions of steady arms and droppers [m]

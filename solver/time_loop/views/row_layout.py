@@ -14,7 +14,7 @@ from catenary.solver.time_loop.views.channels import CHANNELS, Sources
 
 
 class RowLayout:
-    """Where in a row each channel is, and what fills it. Not collective.
+    """Layout of a row: part of each channel, and its source. Not collective.
 
     Attributes
     ----------

@@ -338,7 +338,7 @@ class Showing:
         return kinetic, elastic + self._changed.energy if self._unbalanced else elastic
 
     def _state(self) -> State | None:
-        """Everything needed to continue after the step shown last, on rank 0. Collective."""
+        """State to continue from after the step shown last, on rank 0. Collective."""
         self._refuse_unseen(_STATE)
         return self.checkpoints.make(self._view.step)
 
