@@ -80,11 +80,16 @@ def table_of(ended: Sequence[Ended]) -> StudyTable:
     return StudyTable(columns, rows)
 
 
+def _labels_of(variant: Variant) -> dict[str, str]:
+    """Name in a file and direction of a variant, if it has them."""
+    labels = {NAMED: variant.named, DIRECTION: variant.direction}
+    return {name: text for name, text in labels.items() if text}
+
+
 def _columns_of(variant: Variant) -> dict[str, Any]:
-    """Columns that identify a variant: its name in a file, its direction, and the values of varied
-    keys as a scene reads them."""
-    named = {NAMED: variant.named, DIRECTION: variant.direction}
-    columns: dict[str, Any] = {name: text for name, text in named.items() if text}
+    """Columns that identify a variant: its labels, and the values of varied keys as a scene reads
+    them."""
+    columns: dict[str, Any] = dict(_labels_of(variant))
     for key, text in variant.varied.items():
         value = parse_assignment(f"{key}={text}", "--vary")[1]
         columns[key] = None if value is REMOVED else value
@@ -114,7 +119,8 @@ def _of_line(summary: dict[str, Any]) -> dict[str, Any]:
 
 def varied_keys(ended: Sequence[Ended]) -> list[str]:
     """Columns that tell variants apart, varied keys foremost, as they first appear."""
-    return list(dict.fromkeys(key for one in ended for key in _columns_of(one.variant)))
+    variants = (one.variant for one in ended)
+    return list(dict.fromkeys(key for one in variants for key in (*_labels_of(one), *one.varied)))
 
 
 def as_text(ended: Sequence[Ended]) -> str:
