@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import re
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -43,7 +44,9 @@ class Column(NamedTuple):
             return "yes" if value else "no"
         if not self.format:
             return str(cell(value))
-        text = format(value, self.format)
+        # A count has no decimals among figures that have some.
+        form = re.sub(r"\.\d+f$", "d", self.format) if isinstance(value, int) else self.format
+        text = format(value, form)
         return text.removeprefix("-") if not text.strip("-0.") else text
 
 

@@ -87,6 +87,16 @@ def test_a_terminal_has_columns_that_stand_below_their_heads() -> None:
     assert not any(line.endswith(" ") for line in (head, first, second, lost))
 
 
+def test_a_count_has_no_decimals_among_figures() -> None:
+    column = Column("change", "change", "+.2f")
+    assert [column.shown(value, "") for value in (4, 4.0, -2, 0.001)] == [
+        "+4",
+        "+4.00",
+        "-2",
+        "+0.00",
+    ]
+
+
 def test_a_page_has_no_column_that_is_empty() -> None:
     assert TABLE.markdown().splitlines() == [
         "| run | std [N] | shown |",

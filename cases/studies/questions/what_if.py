@@ -134,10 +134,7 @@ def _columns(name: str, head: str, form: str) -> list[Column]:
 def _figures(name: str, first: float, second: float) -> dict[str, Any]:
     """Two values and their difference as cells; None for what is not known."""
     values = {AS_IT_IS: first, CHANGED: second, DIFFERENCE: second - first}
-    return {
-        _key(name, key): float(value) if np.isfinite(value) else None
-        for key, value in values.items()
-    }
+    return {_key(name, key): value if np.isfinite(value) else None for key, value in values.items()}
 
 
 def _key(name: str, of: str) -> str:
