@@ -12,7 +12,7 @@ from catenary.base.parallel import total
 from catenary.meshgen.mesh import DROPPERS
 from catenary.solver.contact.followed_links import FollowedLinks
 from catenary.solver.contact.forces_on_line import ForcesOnLine
-from catenary.solver.contact.train.pantographs import Pantographs
+from catenary.solver.contact.pantographs import Pantographs
 from catenary.solver.integrators.line_state import Motion
 from catenary.solver.kernels import native
 from catenary.solver.model.gauges import Gauges, gauges_of

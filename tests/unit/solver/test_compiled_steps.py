@@ -27,7 +27,7 @@ from catenary.mbs.vehicle.irregularity import Irregularity
 from catenary.meshgen.mesh import CONTACT_WIRE, LineMesh
 from catenary.solver.contact_problem import complementarity
 from catenary.solver.effects.effect import Effect
-from catenary.solver.integrators.loads import line_loads
+from catenary.solver.integrators import line_loads
 from catenary.solver.model.builder import ModelBuilder
 from catenary.solver.model.loads import FieldLoad, FunctionLoad, ShapeLoad, harmonics, table
 from catenary.solver.problem.contact_laws import HertzLaw, KinematicLaw, LinearLaw

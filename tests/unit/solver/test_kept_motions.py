@@ -12,9 +12,8 @@ from small_lines import WHOLE, ac_simple_line, mesh_of, numerics, problem_of, tr
 
 from catenary.meshgen.mesh import MESSENGER_WIRE
 from catenary.solver.contact_problem import complementarity
-from catenary.solver.problem.incidents import TensionLoss
-from catenary.solver.problem.problem import Problem
-from catenary.solver.problem.window import BOUNDED, EXACT, WindowChoice
+from catenary.solver.problem.defects import TensionLoss
+from catenary.solver.problem.problem import BOUNDED, EXACT, Problem, WindowChoice
 from catenary.solver.time_loop import compiled_steps
 from catenary.solver.time_loop import march as time_loop
 from catenary.solver.time_loop.views import line_energy, step_views
