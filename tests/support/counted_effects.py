@@ -11,9 +11,8 @@ from small_lines import BARE, EN_PANTOGRAPH, ac_simple_line, problem_of, train
 
 from catenary.mbs.air import Polynomial, Uplift
 from catenary.mbs.control import Regulation
-from catenary.mbs.head.flexure import Flexure
 from catenary.mbs.head.laws import Law
-from catenary.mbs.head.strips import Strips, Suspension, Turning
+from catenary.mbs.head.strips import Flexure, Strips, Suspension, Turning
 from catenary.mbs.lowering import Lowering
 from catenary.mbs.vehicle.base_motion import Harmonic, VehicleMotion
 from catenary.mbs.vehicle.suspension import Vehicle

@@ -29,10 +29,9 @@ from catenary.solver.time_loop.views.channels import (
     energies_of,
 )
 from catenary.solver.time_loop.views.checkpoints import Checkpoints, State
-from catenary.solver.time_loop.views.line_energy import LineEnergy
 from catenary.solver.time_loop.views.observers import Stage, StepView
 from catenary.solver.time_loop.views.row_layout import RowLayout
-from catenary.solver.time_loop.views.shown_motion import ShownMotion
+from catenary.solver.time_loop.views.shown_line import LineEnergy, ShownMotion
 from catenary.solver.window.moving_columns import Columns, MovingColumns, columns_of
 
 # Parts of a step that can be seen, more with each.

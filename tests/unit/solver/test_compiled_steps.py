@@ -15,9 +15,8 @@ from small_lines import WHOLE, ac_simple_line, mesh_of, numerics, problem_of, tr
 from catenary.base.errors import RunBroken
 from catenary.mbs.air import Polynomial, Tunnel, Uplift
 from catenary.mbs.control import Regulation
-from catenary.mbs.head.flexure import Flexure
 from catenary.mbs.head.laws import Law
-from catenary.mbs.head.strips import Strips, Suspension, Turning
+from catenary.mbs.head.strips import Flexure, Strips, Suspension, Turning
 from catenary.mbs.lowering import Lowering
 from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.mechanism.full_pantograph import FullPantograph
