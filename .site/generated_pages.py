@@ -11,8 +11,7 @@ from mkdocs.structure.files import File, Files
 
 from catenary.cases.cli.main import app
 from catenary.cases.terminal.json_schema import scene_schema
-from catenary.cases.terminal.key_list import Key, allowed, keys_of_a_scene
-from catenary.cases.terminal.rule_list import comparison
+from catenary.cases.terminal.lists import Key, allowed, comparison, keys_of_a_scene
 from catenary.postproc.standards.library import shipped
 from catenary.postproc.standards.quantities import LIMIT_KEYS, QUANTITIES
 

@@ -123,7 +123,7 @@ class Run:
         >>> run.summary["case"], run.summary["speed_km_h"]
         ('en50318_2002', 250.0)
         """
-        from catenary.postproc.evaluate.acceptance import criteria_of
+        from catenary.postproc.evaluate.verdict import criteria_of
         from catenary.postproc.report.summary import summarise
 
         criteria = criteria_of(self._results, self._evaluated)

@@ -27,7 +27,7 @@ def assignments(incomplete: str) -> list[tuple[str, str]]:
     Keys below what a scene names itself, such as its kinds of pantograph, are left out.
     """
     from catenary.cases.scene.keys.keys import ANY
-    from catenary.cases.terminal.key_list import keys_of_a_scene, words_of
+    from catenary.cases.terminal.lists import keys_of_a_scene, words_of
 
     name, equals, begun = incomplete.partition("=")
     every = [key for key in keys_of_a_scene() if ANY not in key.name.split(".")]
@@ -40,7 +40,7 @@ def assignments(incomplete: str) -> list[tuple[str, str]]:
 
 def keys(incomplete: str) -> list[tuple[str, str]]:
     """All keys of a scene, for the filter of ``list --keys``."""
-    from catenary.cases.terminal.key_list import keys_of_a_scene
+    from catenary.cases.terminal.lists import keys_of_a_scene
 
     return [(key.name, key.meaning) for key in keys_of_a_scene() if key.name.startswith(incomplete)]
 

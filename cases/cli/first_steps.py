@@ -65,12 +65,12 @@ def list_cases(
             f"{' and '.join(given)}"
         )
     if rules:
-        from catenary.cases.terminal.rule_list import book_table, criteria_text
+        from catenary.cases.terminal.lists import book_table, criteria_text
 
         console.say(book_table() if wanted is None else criteria_text(wanted))
         return
     if keys:
-        from catenary.cases.terminal.key_list import key_details, key_table
+        from catenary.cases.terminal.lists import key_details, key_table
 
         console.say(key_table() if wanted is None else key_details(wanted))
         return

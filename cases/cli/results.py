@@ -79,8 +79,7 @@ def report(
         measured_costs,
         measured_errors,
     )
-    from catenary.cases.studies.full_report.sections import full_sections
-    from catenary.cases.studies.full_report.validation import statement_in
+    from catenary.cases.studies.full_report.sections import full_sections, statement_in
     from catenary.postproc.read.results import Results
     from catenary.postproc.report.report import write_report
     from catenary.postproc.report.sections.run_facts import INPUT
@@ -167,8 +166,7 @@ def _compare_measured(
 
     wanted = None if description is None else read_description(description)
     from catenary.cases.result_folder.output_folder import refuse_table
-    from catenary.cases.studies.measured.passages import passage_of, usual_description
-    from catenary.cases.studies.measured.table_file import read_table
+    from catenary.cases.studies.measured.passages import passage_of, read_table, usual_description
     from catenary.postproc.measurements import output
     from catenary.postproc.measurements.comparison import compare_with
     from catenary.postproc.read.results import Results
@@ -297,7 +295,7 @@ def _records(folder: Path) -> Records | None:
 
 
 def _shapes(folder: Path, records: Records | None) -> list[Shape] | None:
-    """How the pantographs of a run are drawn, None if its scene is not one of this version."""
+    """Shapes of the pantographs of a run, None if its scene is not one of this version."""
     from catenary.cases.scene.input.faults import Origin
     from catenary.cases.scene.load import scene_from
     from catenary.cases.scene.problem import problem_of

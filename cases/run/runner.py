@@ -49,8 +49,7 @@ from catenary.postproc.record.recorder import Recorder
 from catenary.postproc.record.run_watch import RunWatch, StripWatch, watch_cadence, watched
 from catenary.postproc.record.snapshots.blocks import RecordedLine
 from catenary.postproc.record.snapshots.fields import FieldRecorder
-from catenary.solver.problem.problem import Problem
-from catenary.solver.problem.window import OFF
+from catenary.solver.problem.problem import OFF, Problem
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest_on_all
 from catenary.solver.statics.stability_of_rest import refuse_lost_wire
 from catenary.solver.time_loop.march import March, Outcome

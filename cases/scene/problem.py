@@ -26,8 +26,15 @@ from catenary.meshgen.line import Line
 from catenary.meshgen.topologies.all_topologies import make_line
 from catenary.meshgen.topologies.line_data import LineData
 from catenary.postproc.standards.library import book_named
-from catenary.solver.problem.problem import Damping, Numerics, Placement, Problem, Train
-from catenary.solver.problem.window import BOUNDED, WindowChoice
+from catenary.solver.problem.problem import (
+    BOUNDED,
+    Damping,
+    Numerics,
+    Placement,
+    Problem,
+    Train,
+    WindowChoice,
+)
 from catenary.solver.window.choice import spans_of_window
 
 if TYPE_CHECKING:

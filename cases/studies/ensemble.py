@@ -29,7 +29,7 @@ from catenary.cases.scene.scene import Scene
 from catenary.postproc.channels.facts import facts_of
 from catenary.postproc.channels.header import Header, static_datasets
 from catenary.postproc.evaluate import statistics as stats
-from catenary.postproc.evaluate.acceptance import criteria_of
+from catenary.postproc.evaluate.verdict import criteria_of
 from catenary.postproc.files.run_schema import DONE
 from catenary.postproc.read.marched_results import MarchedFile
 from catenary.postproc.read.results import Results
@@ -353,7 +353,7 @@ def _is_unusual(history: SceneHistory) -> bool:
 
 
 def _begin_of(problem: Problem) -> float:
-    """Where the last strip starts [m], or before."""
+    """Lower bound of the place at which the last strip starts [m]."""
     train = problem.train
     return float(train.start - max(place.behind for place in train.placements))
 

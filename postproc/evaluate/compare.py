@@ -12,7 +12,6 @@ import numpy as np
 from catenary.base.errors import InputError
 from catenary.postproc.evaluate import filters
 from catenary.postproc.evaluate import statistics as stats
-from catenary.postproc.evaluate.acceptance import criteria_of, judged_by
 from catenary.postproc.evaluate.error_indicators import indicate
 from catenary.postproc.evaluate.remarks import all_remarks
 from catenary.postproc.evaluate.span_differences import (
@@ -21,7 +20,7 @@ from catenary.postproc.evaluate.span_differences import (
     differences,
     span_sums,
 )
-from catenary.postproc.evaluate.verdict import Criterion, labels
+from catenary.postproc.evaluate.verdict import Criterion, criteria_of, judged_by, labels
 from catenary.postproc.evaluate.wording import UNCOMPARED, UNCOMPARED_SAYS, counted, fixed
 from catenary.postproc.read.records import Records
 from catenary.postproc.read.results import Results

@@ -22,7 +22,7 @@ from catenary.postproc.channels.facts import FACTS, WIRE
 from catenary.postproc.evaluate import filters
 from catenary.postproc.evaluate.statistics import covers
 from catenary.postproc.read.results import Results
-from catenary.solver.model.elements import beam
+from catenary.solver.model import beam
 from catenary.solver.problem.integrator_parameters import (
     AVERAGE_ACCELERATION,
     Integration,

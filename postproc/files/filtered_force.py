@@ -16,8 +16,7 @@ import numpy as np
 from catenary.base.errors import InputError
 from catenary.postproc.files.dimensions import describe_filtered
 from catenary.postproc.files.disk import MARGIN, NoRoom, reserve
-from catenary.postproc.files.hdf5.array_writes import set_attribute
-from catenary.postproc.files.hdf5.checked import HDF5_ERRORS, create_checked, text_of
+from catenary.postproc.files.hdf5.checked import HDF5_ERRORS, create_checked, set_attribute, text_of
 from catenary.postproc.files.hdf5.table_rows import column
 
 logger = logging.getLogger("catenary.results")

@@ -12,8 +12,7 @@ import h5py
 import numpy as np
 
 from catenary.postproc.files.dimensions import describe_extremes
-from catenary.postproc.files.hdf5.array_writes import put_array
-from catenary.postproc.files.hdf5.checked import seal_arrays, sum_is_kept
+from catenary.postproc.files.hdf5.checked import put_array, seal_arrays, sum_is_kept
 
 GROUP, ROWS = "extremes", "rows"
 _SLOTS = ("0", "1")

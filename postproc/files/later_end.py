@@ -17,12 +17,13 @@ from catenary.base.errors import RunBroken
 from catenary.postproc.channels.header import Header
 from catenary.postproc.files.disk import as_attribute, open_to_write
 from catenary.postproc.files.disk_errors import reason
-from catenary.postproc.files.hdf5.array_writes import put_array, set_attribute
 from catenary.postproc.files.hdf5.checked import (
     ATTRIBUTE_SUMS,
     FORMAT_BOUNDS,
+    put_array,
     seal_arrays,
     seal_attributes,
+    set_attribute,
     text_of,
 )
 from catenary.postproc.files.own_files import new_part

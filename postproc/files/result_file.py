@@ -33,14 +33,15 @@ from catenary.postproc.files.disk import (
     trimmed,
 )
 from catenary.postproc.files.filtered_force import ForceFilter, drop_filtered, store_filtered
-from catenary.postproc.files.hdf5.array_writes import put_array, set_attribute
 from catenary.postproc.files.hdf5.checked import (
     FORMAT_BOUNDS,
     HDF5_ERRORS,
     create_checked,
+    put_array,
     put_sealed_arrays,
     seal_arrays,
     seal_attributes,
+    set_attribute,
 )
 from catenary.postproc.files.hdf5.chunk_shapes import Chunk, chunks_of, room_of
 from catenary.postproc.files.hdf5.self_contained import open_own
@@ -428,7 +429,7 @@ def _length(file: h5py.File, path: str) -> int:
 
 
 def fault_to_continue(path: Path, time: float) -> str:
-    """Why a run cannot go on in a result file, as a clause; empty if it can. Not collective.
+    """Fault of a result file in which a run is to go on, as a clause; "" if none. Not collective.
 
     Parameters
     ----------
@@ -456,7 +457,7 @@ def fault_to_continue(path: Path, time: float) -> str:
 
 
 def _fault_to_append(table: Any, rows: int) -> str:
-    """Why a table cannot be appended to behind its first ``rows``, empty if it can."""
+    """Fault of a table that is to be appended to behind its first ``rows``, "" if none."""
     if not isinstance(table, h5py.Dataset) or table.dtype != np.float64 or not table.ndim:
         return "is no table of numbers"
     if table.chunks is None or table.maxshape[0] is not None:

@@ -1,4 +1,4 @@
-"""A page of sections as one HTML file that needs no network, with its pictures in it."""
+"""A page of sections as one HTML file that needs no network, and as PDF on A4."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from catenary.base.errors import InputError
 from catenary.postproc.evaluate.wording import with_minus
 from catenary.postproc.report.sections.section import Section
 
@@ -83,3 +84,91 @@ def _with_commands(text: str) -> Any:
 def _data_uri(data: bytes) -> str:
     kind = "png" if data.startswith(b"\x89PNG") else "svg+xml"
     return f"data:image/{kind};base64," + base64.b64encode(data).decode("ascii")
+
+
+# A figure is printed this much smaller at most, where it then fits the rest of a sheet [-].
+_SMALLEST = 0.8
+# Height of a sheet between the margins that the style of the page has, less what rows and headings
+# leave that move to the next sheet; height of a caption, which keeps its size [px of CSS].
+_SHEET, _CAPTION = (297.0 - 15.0 - 18.0 - 9.0) * 96.0 / 25.4, 28.0
+# A sheet on which all of a report has room: it tells how high everything is.
+_ENDLESS = "@page { size: 210mm 100000mm !important; }"
+# A heading so close above a figure goes with it to the next sheet [px of CSS].
+_CLOSE = 60.0
+
+
+def pdf(html: str) -> bytes:
+    """A page as PDF on A4, with page numbers and bookmarks. Not collective.
+
+    A figure that just misses the rest of a sheet is printed smaller, and does not leave it white.
+
+    Parameters
+    ----------
+    html : str
+        What ``page`` returned; what is folded away there is not printed.
+
+    Raises
+    ------
+    InputError
+        If the package WeasyPrint or a library that it needs is missing.
+    """
+    CSS, HTML, URLFetcher = _weasyprint()
+    fetcher = URLFetcher(allowed_protocols=["data"])  # pictures are in the page
+    cache: dict[str, Any] = {}  # of pictures, which are laid out twice
+    page = HTML(string=html, url_fetcher=fetcher)
+    # What a reader unfolds is not printed; without it large tables are laid out in a third.
+    for folded in page.etree_element.iter("details"):
+        folded[:] = folded.findall("summary")
+    figures = list(page.etree_element.iter("figure"))
+    for n, figure in enumerate(figures):
+        figure.set("id", f"figure-{n}")
+    layout = page.render(stylesheets=[CSS(string=_ENDLESS)], cache=cache)
+    tops = {name: (box[1], box[3]) for name, box in layout.pages[0].anchors.items()}
+    boxes = [tops.pop(figure.get("id")) for figure in figures]
+    found = shares(boxes, [top for top, _ in tops.values()])
+    for figure, share in zip(figures, found, strict=True):
+        figure.set("style", f"--share: {share:.3f}")
+    return bytes(page.write_pdf(cache=cache))
+
+
+def shares(figures: Sequence[tuple[float, float]], headings: Sequence[float]) -> list[float]:
+    """Size of each figure over its usual one, so that few sheets end early. Not collective.
+
+    Parameters
+    ----------
+    figures : sequence of tuple of float
+        Top and bottom of each figure in order, on an endless sheet that begins at the first heading
+        [px of CSS].
+    headings : sequence of float
+        Tops of the headings there [px of CSS].
+    """
+    found = []
+    at, last = 0.0, min(headings, default=0.0)  # on the sheet, on the endless one
+    for top, bottom in figures:
+        at = (at + top - last) % _SHEET
+        height, room = bottom - top, _SHEET - at
+        share = min((room - _CAPTION) / (height - _CAPTION), 1.0)
+        if share < _SMALLEST:
+            close = [top - heading for heading in headings if 0.0 < top - heading < _CLOSE]
+            at, share = min(close, default=0.0), 1.0
+        at += share * (height - _CAPTION) + _CAPTION
+        last = bottom
+        found.append(share)
+    return found
+
+
+def refuse_without_pdf() -> None:
+    """Raise `InputError` if no PDF can be written. Not collective."""
+    _weasyprint()
+
+
+def _weasyprint() -> tuple[Any, Any, Any]:
+    try:
+        from weasyprint import CSS, HTML
+        from weasyprint.urls import URLFetcher
+    except (ImportError, OSError) as error:  # OSError: of Pango, which is no package of Python
+        raise InputError(
+            f"--pdf needs the package weasyprint and the library Pango ({error}): pip install "
+            "'catenary[report]', and on Debian apt-get install libpango-1.0-0 libpangoft2-1.0-0"
+        ) from error
+    return CSS, HTML, URLFetcher

@@ -12,9 +12,8 @@ from pathlib import Path
 
 from catenary.postproc.evaluate import statistics as stats
 from catenary.postproc.evaluate import verdict as acceptance
-from catenary.postproc.evaluate.acceptance import criteria_of
 from catenary.postproc.evaluate.statistics import RunStatistics
-from catenary.postproc.evaluate.verdict import Criterion
+from catenary.postproc.evaluate.verdict import Criterion, criteria_of
 from catenary.postproc.evaluate.wording import counted
 from catenary.postproc.files.disk import write_into
 from catenary.postproc.files.own_files import (
@@ -26,8 +25,7 @@ from catenary.postproc.files.own_files import (
 from catenary.postproc.read.records import Records
 from catenary.postproc.read.results import Results
 from catenary.postproc.report import csv_tables
-from catenary.postproc.report.page import page
-from catenary.postproc.report.paper import pdf, refuse_without_pdf
+from catenary.postproc.report.page import page, pdf, refuse_without_pdf
 from catenary.postproc.report.sections import acceptance as acceptance_section
 from catenary.postproc.report.sections import contact_force, dynamics, line, run_facts
 from catenary.postproc.report.sections.section import (

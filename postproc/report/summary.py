@@ -12,12 +12,11 @@ from typing import Any
 import numpy as np
 
 from catenary.meshgen.wires import Role
-from catenary.postproc.evaluate.acceptance import judged_by
 from catenary.postproc.evaluate.error_indicators import Indicators, as_table, indicate
 from catenary.postproc.evaluate.lateral_places import as_table as as_lateral_table
 from catenary.postproc.evaluate.remarks import all_remarks
 from catenary.postproc.evaluate.statistics import PantographStatistics, RunStatistics
-from catenary.postproc.evaluate.verdict import Criterion, verdict
+from catenary.postproc.evaluate.verdict import Criterion, judged_by, verdict
 from catenary.postproc.files.disk import plain
 from catenary.postproc.read.results import Results
 from catenary.postproc.standards.quantities import KMH

@@ -18,8 +18,8 @@ from typing import Protocol
 import numpy as np
 
 from catenary.base.errors import NotConverged, RunBroken
+from catenary.solver.contact.head_states import Heads
 from catenary.solver.contact.line_response import Coupled, LineResponse
-from catenary.solver.contact.train.head_states import Heads
 from catenary.solver.contact_problem.complementarity import InnerProblem, InnerSolution
 from catenary.solver.contact_problem.law_tangents import LawInSteps
 from catenary.solver.kernels.native import NOWHERE

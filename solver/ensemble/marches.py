@@ -13,7 +13,7 @@ from catenary.mbs.head.head_arrays import drive_width
 from catenary.solver.contact.followed_links import no_links
 from catenary.solver.contact.forces_on_line import ForcesOnLine
 from catenary.solver.contact.line_response import affine
-from catenary.solver.contact.train.pantographs import Pantographs, nominal_height_rule
+from catenary.solver.contact.pantographs import Pantographs, nominal_height_rule
 from catenary.solver.contact_problem.coupling import Implicit, make_coupling
 from catenary.solver.contact_problem.law_tangents import law_in_steps
 from catenary.solver.effects.all_effects import simulated

@@ -17,8 +17,8 @@ import numpy as np
 from catenary.base.mpi import MPI
 from catenary.base.parallel import total
 from catenary.base.petsc import PETSc
+from catenary.solver.integrators.line_loads import LineLoads
 from catenary.solver.integrators.line_state import AlphaSteps, LineState, PredictedLineState, Steps
-from catenary.solver.integrators.loads.line_loads import LineLoads
 from catenary.solver.integrators.slow_path import GENERAL, LIBRARY, PARTS, SlowPath
 from catenary.solver.integrators.two_pass_step import StationPasses
 from catenary.solver.kernels import aligned_arrays, native

@@ -21,7 +21,7 @@ from catenary.solver.integrators.line_state import (
     Steps,
 )
 from catenary.solver.kernels import native
-from catenary.solver.linear.factors.station_factors import FactorArrays
+from catenary.solver.linear.station_factors import FactorArrays
 from catenary.solver.linear.stations.station_products import ProductArrays
 from catenary.solver.linear.step_operators import ByStations
 from catenary.solver.model.switching_links import NO_LINKS, LinkArrays

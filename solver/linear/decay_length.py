@@ -13,7 +13,7 @@ from scipy.sparse import linalg as sparse_linalg
 
 from catenary.solver.model.entries import iterate_entries
 from catenary.solver.model.model import Model
-from catenary.solver.model.unknowns.stations import SAME_STATION
+from catenary.solver.model.stations import SAME_STATION
 
 # Beyond the reach a column is below this share of its peak; two orders under what an iteration
 # over a whole run may add up to and still agree to 1e-9.

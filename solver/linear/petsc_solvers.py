@@ -18,7 +18,7 @@ from scipy import sparse
 
 from catenary.base.errors import InputError
 from catenary.base.petsc import PETSc
-from catenary.solver.linear.factors.station_factors import StationFactors, station_factors
+from catenary.solver.linear.station_factors import StationFactors, station_factors
 from catenary.solver.linear.stations.sections import Sections
 from catenary.solver.linear.stations.station_layout import Layout
 from catenary.solver.linear.stations.station_rows import StationRows

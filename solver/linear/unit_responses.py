@@ -20,7 +20,7 @@ from catenary.solver.model.alike import kinds_of
 from catenary.solver.model.entries import iterate_entries
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import Ownership
-from catenary.solver.model.unknowns.registry import Unknowns
+from catenary.solver.model.unknown_registry import Unknowns
 
 # Allowed part outside the windows, relative to the peak: round-off of one solve.
 _LEAK = 1e-13

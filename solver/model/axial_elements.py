@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from catenary.meshgen.track import Curve
-from catenary.solver.model.elements import beam
+from catenary.solver.model import beam
 from catenary.solver.model.model import Model, wire_elements
 
 # Slopes at rest that differ by less are one, so that like spans have like matrices [-]. What that

@@ -12,9 +12,9 @@ import numpy as np
 from catenary.meshgen.wires import End
 from catenary.solver.model import axial_elements, wire_ends
 from catenary.solver.model.model import Model
+from catenary.solver.model.stations import SAME_STATION
 from catenary.solver.model.switching_links import RESERVE, LinkArrays
-from catenary.solver.model.unknowns.stations import SAME_STATION
-from catenary.solver.problem.along_track import Tensioner
+from catenary.solver.problem.ends import Tensioner
 from catenary.solver.problem.problem import Problem
 from catenary.solver.problem.watched_links import (
     GAUGES,

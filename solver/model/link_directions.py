@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from catenary.solver.model.elements.beam import shape_values
+from catenary.solver.model.beam import shape_values
 from catenary.solver.model.links import Direction
 
 if TYPE_CHECKING:

@@ -20,7 +20,7 @@ from catenary.solver.model.alike import alike
 from catenary.solver.model.links import Links
 from catenary.solver.model.loads import Load
 from catenary.solver.model.rest_shape import Equilibrium
-from catenary.solver.model.unknowns.registry import Unknowns
+from catenary.solver.model.unknown_registry import Unknowns
 from catenary.solver.problem.problem import Problem
 from catenary.solver.problem.simulated import Simulated
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from catenary.meshgen.wires import End
 from catenary.solver.model.model import Model
-from catenary.solver.model.unknowns.stations import SAME_STATION
+from catenary.solver.model.stations import SAME_STATION
 
 # An end is at its stop if it is nearer than this [m].
 _AT_STOP = 1e-9

@@ -12,14 +12,11 @@ from catenary.mbs.vehicle.base_motion import VehicleMotion
 from catenary.meshgen.line import Line
 from catenary.meshgen.slowest_wave import slowest_wave
 from catenary.meshgen.wires import Role
-from catenary.solver.problem.along_track import AlongTrack
 from catenary.solver.problem.contact_laws import ContactLaw
-from catenary.solver.problem.defects import Defect, WrongTension
-from catenary.solver.problem.ends import EndCondition, Fixed
-from catenary.solver.problem.incidents import LineIncident, TensionLoss
+from catenary.solver.problem.defects import Defect, LineIncident, TensionLoss, WrongTension
+from catenary.solver.problem.ends import AlongTrack, EndCondition, Fixed
 from catenary.solver.problem.irregularities import Irregularities
 from catenary.solver.problem.wind import Wind
-from catenary.solver.problem.window import WindowChoice
 
 if TYPE_CHECKING:
     from catenary.mbs.build import PantographData
@@ -27,6 +24,9 @@ if TYPE_CHECKING:
     from catenary.mbs.lowering import Lowering
 
 
+OFF, EXACT, BOUNDED = "off", "exact", "bounded"
+# Of motions in an exact window, in terms of the largest one: below that they are round-off.
+ROUND_OFF = 1e-14
 # Halvings of a step where the scene names no smallest one.
 DEFAULT_HALVINGS = 5
 
@@ -80,6 +80,35 @@ class Train:
     placements: tuple[Placement, ...]
     vehicle: VehicleMotion | None = None
     start_below: float = 0.0
+
+
+@dataclass(frozen=True)
+class WindowChoice:
+    """Choice of the stations that move.
+
+    ``mode`` is ``off`` (all), ``exact`` (all that any wave has reached) or ``bounded``: those whose
+    motion exceeds ``tolerance`` times the largest one of the line, or those from ``spans_behind``
+    behind the last pantograph to ``spans_ahead`` ahead of the first one. ``fading`` [m2/s], over
+    the square of its length, is the damping on mass with which the outer part of it ends.
+    """
+
+    mode: str = OFF
+    tolerance: float | None = None
+    spans_ahead: float = 0.0
+    spans_behind: float = 0.0
+    fading: float = 0.0
+
+    @property
+    def moves(self) -> bool:
+        """Whether there is a window."""
+        return self.mode != OFF
+
+    @property
+    def by_motion(self) -> float:
+        """Share of the largest motion above which stations move, 0 if spans decide."""
+        if self.mode == EXACT:
+            return ROUND_OFF
+        return self.tolerance or 0.0
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from typing import Any
 from catenary.solver.contact.contact_wire import ContactWires
 from catenary.solver.contact.followed_links import FollowedLinks, no_links
 from catenary.solver.contact.forces_on_line import ForceColumns, ForcesOnLine
-from catenary.solver.contact.train.pantographs import Pantographs
+from catenary.solver.contact.pantographs import Pantographs
 from catenary.solver.contact_problem.coupling import make_coupling
 from catenary.solver.contact_problem.law_tangents import law_in_steps
 from catenary.solver.integrators.line_integrator import LineIntegrator

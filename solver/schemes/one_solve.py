@@ -11,9 +11,9 @@ from catenary.base.errors import RunBroken
 from catenary.base.parallel import on_root
 from catenary.base.petsc import EVENTS, event
 from catenary.solver.contact.forces_on_line import ForcesOnLine
+from catenary.solver.contact.head_states import Heads
 from catenary.solver.contact.line_response import Bounds, LineResponse
-from catenary.solver.contact.train.head_states import Heads
-from catenary.solver.contact.train.pantographs import Pantographs
+from catenary.solver.contact.pantographs import Pantographs
 from catenary.solver.contact_problem.complementarity import NOT_FINITE, InnerSolution
 from catenary.solver.contact_problem.coupling import Coupling
 from catenary.solver.contact_problem.force_exchange import Exchange, Reply, Verdict

@@ -8,7 +8,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from catenary.solver.contact.forces_on_line import ForcesOnLine
-from catenary.solver.contact.train.pantographs import Pantographs
+from catenary.solver.contact.pantographs import Pantographs
 
 
 def find_crossings(interaction: ForcesOnLine, pantographs: Pantographs, time: float) -> None:

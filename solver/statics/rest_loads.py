@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from catenary.solver.model import beam, exact_beam
 from catenary.solver.model.axial_elements import curve_rows
-from catenary.solver.model.elements import beam, exact_beam
 from catenary.solver.model.model import Model, wire_elements
 from catenary.solver.wind.wind_at import mean_load
 

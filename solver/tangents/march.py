@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from catenary.solver.contact.train.pantographs import Pantographs
+from catenary.solver.contact.pantographs import Pantographs
 from catenary.solver.kernels.flush_to_zero import flushed
 from catenary.solver.model.partition import Ownership
 from catenary.solver.statics.changed_line.after_incidents import divided_by_mass

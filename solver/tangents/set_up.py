@@ -20,7 +20,7 @@ from catenary.mbs.head.head_arrays import N_DRIVE, LinearStep, drive_width
 from catenary.mbs.head.newmark_head import SteppedHead
 from catenary.mbs.lumped import LumpedPantograph
 from catenary.solver.contact.contact_wire import ContactWires
-from catenary.solver.contact.train.pantographs import Pantographs, nominal_height_rule
+from catenary.solver.contact.pantographs import Pantographs, nominal_height_rule
 from catenary.solver.contact_problem.law_tangents import law_in_steps
 from catenary.solver.model.loads import FieldLoad, FunctionLoad, MemoryLoad, ShapeLoad
 from catenary.solver.model.matrices import whole_matrix

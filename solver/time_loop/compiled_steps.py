@@ -15,11 +15,11 @@ from catenary.base.petsc import event
 from catenary.mbs.head.head_arrays import drive_width
 from catenary.solver.contact.contacts import Contacts
 from catenary.solver.contact.line_response import affine
-from catenary.solver.contact.train.pantographs import Pantographs, TrainPlaces
+from catenary.solver.contact.pantographs import Pantographs, TrainPlaces
 from catenary.solver.contact_problem.complementarity import SmallProblem
 from catenary.solver.contact_problem.coupling import Implicit
 from catenary.solver.contact_problem.law_tangents import StepLaw
-from catenary.solver.integrators.loads.line_loads import LoadArguments
+from catenary.solver.integrators.line_loads import LoadArguments
 from catenary.solver.kernels import native
 from catenary.solver.schemes.one_solve import OneSolve
 from catenary.solver.schemes.scheme import Scheme

@@ -24,14 +24,14 @@ from catenary.base.freed_memory import give_back
 from catenary.base.mpi import MPI
 from catenary.base.petsc import PETSc
 from catenary.solver.contact.contact_wire import ContactWires
-from catenary.solver.contact.train.pantographs import Pantographs, nominal_height_rule
+from catenary.solver.contact.pantographs import Pantographs, nominal_height_rule
 from catenary.solver.effects.all_effects import simulated
 from catenary.solver.integrators.slow_path import SlowPath, warn_of_slow_path
 from catenary.solver.kernels.flush_to_zero import flushed
 from catenary.solver.linear.petsc_solvers import wants_single_steps, wants_solution
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import distribute
-from catenary.solver.problem.incidents import Happened, LineIncident, in_steps
+from catenary.solver.problem.defects import Happened, LineIncident, in_steps
 from catenary.solver.problem.problem import Problem, steps_of
 from catenary.solver.schemes.make_scheme import Parts, SchemeFactory
 from catenary.solver.schemes.one_solve import OneSolve

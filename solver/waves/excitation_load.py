@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from scipy import sparse
 
-from catenary.solver.model.elements.beam import shape_values
+from catenary.solver.model.beam import shape_values
 from catenary.solver.model.loads import FieldLoad, Load, ShapeLoad, table
 from catenary.solver.model.model import Model
 from catenary.solver.waves.excitation import Blow, Excitation

@@ -17,8 +17,8 @@ from collections.abc import Callable
 import numpy as np
 from scipy import sparse
 
+from catenary.solver.model import beam
 from catenary.solver.model.alike import alike
-from catenary.solver.model.elements import beam
 from catenary.solver.model.loads import FieldLoad
 from catenary.solver.model.model import Block, Model, wire_elements
 from catenary.solver.problem.wind import Wind

@@ -16,8 +16,7 @@ from catenary.meshgen.slowest_wave import slowest_wave, slowest_wave_of
 from catenary.meshgen.wires import Role
 from catenary.solver.effects import all_effects as effects
 from catenary.solver.problem.ends import Periodic
-from catenary.solver.problem.problem import Problem
-from catenary.solver.problem.window import BOUNDED, EXACT, ROUND_OFF, WindowChoice
+from catenary.solver.problem.problem import BOUNDED, EXACT, ROUND_OFF, Problem, WindowChoice
 
 # Case by which the error was measured: en50318_2002 at 250 km/h, its rate of fading at 2 Hz [1/s].
 _OMEGA = 2.0 * math.pi * 2.0

@@ -11,12 +11,11 @@ import numpy as np
 
 from catenary.base.errors import RunBroken
 from catenary.solver.kernels import native
-from catenary.solver.linear.factors.station_factors import StationFactors, Turning
 from catenary.solver.linear.pieces.operator_pieces import OperatorPieces, WantedPieces
+from catenary.solver.linear.station_factors import StationFactors, Turning
 from catenary.solver.model.loads import Load
 from catenary.solver.model.model import Model
-from catenary.solver.problem.problem import Problem
-from catenary.solver.problem.window import EXACT, WindowChoice
+from catenary.solver.problem.problem import EXACT, Problem, WindowChoice
 from catenary.solver.window.choice import why_no_window
 
 # Numbers of ``WindowArrays.state``.

@@ -17,7 +17,7 @@ from mpi4py import MPI
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.problem import problem_of
-from catenary.solver.problem.window import EXACT, OFF, WindowChoice
+from catenary.solver.problem.problem import EXACT, OFF, WindowChoice
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest
 from catenary.solver.time_loop.march import March
 from catenary.solver.time_loop.views.observers import Observer, StepView

@@ -23,7 +23,7 @@ from catenary.solver.integrators.line_state import PredictedLineState, Steps
 from catenary.solver.integrators.make_line import NewmarkLine
 from catenary.solver.integrators.two_pass_step import StationPasses
 from catenary.solver.kernels import aligned_arrays
-from catenary.solver.linear.factors.station_factors import station_factors
+from catenary.solver.linear.station_factors import station_factors
 from catenary.solver.linear.stations.station_products import station_product
 from catenary.solver.linear.step_operators import ByStations
 from catenary.solver.model.partition import distribute

@@ -11,7 +11,7 @@ from mpi4py import MPI
 from rank_histories import on_one
 from small_lines import mesh_of, numerics, problem_of, train
 
-from catenary.solver.problem.along_track import AlongTrack, Tensioner
+from catenary.solver.problem.ends import AlongTrack, Tensioner
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest, line_at_rest_on_all
 from catenary.solver.time_loop.march import March
 from catenary.solver.time_loop.views.observers import Observer, Stage, StepView

@@ -58,7 +58,7 @@ def test_an_unforeseen_error_in_a_step_of_one_rank_ends_the_run(
     script = f"""{FAIL}
 from mpi4py import MPI
 from catenary.cases.cli.main import main
-from catenary.solver.contact.train.pantographs import Pantographs
+from catenary.solver.contact.pantographs import Pantographs
 
 move_to = Pantographs.move_to
 

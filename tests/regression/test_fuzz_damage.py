@@ -24,8 +24,8 @@ from verb_runner import CliRunner
 
 from catenary.base.errors import InputError
 from catenary.cases.cli.main import app
-from catenary.postproc.evaluate import acceptance
 from catenary.postproc.evaluate import statistics as stats
+from catenary.postproc.evaluate import verdict
 from catenary.postproc.evaluate.compare import compare
 from catenary.postproc.read import guard
 from catenary.postproc.read.guard import examined
@@ -56,7 +56,7 @@ def figures(folder: Path, records: Any = None) -> dict[str, Any]:
     """All that is read of a run: figures, histories, the state to continue from."""
     with Results(folder, records) as results:
         statistics = stats.evaluate(results)
-        told = summary.summarise(results, statistics, acceptance.criteria_of(results, statistics))
+        told = summary.summarise(results, statistics, verdict.criteria_of(results, statistics))
         told["complaints"] = statistics.complaints
         sums = {
             name: results.channel(name).sum()

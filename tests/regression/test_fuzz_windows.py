@@ -20,7 +20,7 @@ from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.hard import runs as hard_runs
 from catenary.cases.studies.hard.runs import Watched
 from catenary.solver.linear.pieces import pieces
-from catenary.solver.problem.window import BOUNDED, EXACT, WindowChoice
+from catenary.solver.problem.problem import BOUNDED, EXACT, WindowChoice
 from catenary.solver.statics.line_at_rest import LineAtRest
 from catenary.solver.window import moving_window
 from catenary.solver.window.choice import why_no_window

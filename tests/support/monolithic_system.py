@@ -20,8 +20,8 @@ from catenary.mbs.air import AirForces
 from catenary.mbs.build import steady_forces
 from catenary.mbs.head.newmark_head import raised
 from catenary.mbs.lumped_data import LumpedData
-from catenary.solver.integrators.loads.line_loads import LineLoads
-from catenary.solver.model.elements.beam import shape_slopes, shape_values
+from catenary.solver.integrators.line_loads import LineLoads
+from catenary.solver.model.beam import shape_slopes, shape_values
 from catenary.solver.model.entries import iterate_entries
 from catenary.solver.model.model import Model
 from catenary.solver.model.switching_links import switching_links

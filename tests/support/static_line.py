@@ -9,7 +9,7 @@ from scipy import sparse
 from scipy.sparse import linalg as sparse_linalg
 
 from catenary.meshgen.wires import End
-from catenary.solver.model.elements import beam
+from catenary.solver.model import beam
 from catenary.solver.model.model import Model
 from catenary.solver.statics.form_finding.equilibrium import Equilibrium
 

@@ -17,7 +17,7 @@ from monolithic_system import WholeSystem
 from catenary.base.errors import NotConverged
 from catenary.base.petsc import PETSc
 from catenary.solver.contact.forces_on_line import ForcesOnLine
-from catenary.solver.contact.train.pantographs import Pantographs
+from catenary.solver.contact.pantographs import Pantographs
 from catenary.solver.linear.petsc_solvers import PREFIX
 from catenary.solver.model.model import Model
 from catenary.solver.problem.integrator_parameters import GENERALIZED_ALPHA, NEWMARK, integration_of

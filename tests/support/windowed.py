@@ -9,7 +9,7 @@ from mpi4py import MPI
 
 from catenary.cases.studies.hard import runs as hard_runs
 from catenary.cases.studies.hard.runs import Watched
-from catenary.solver.problem.window import WindowChoice
+from catenary.solver.problem.problem import WindowChoice
 from catenary.solver.statics.line_at_rest import LineAtRest
 
 COMM = MPI.COMM_SELF

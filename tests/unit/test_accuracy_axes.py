@@ -14,7 +14,7 @@ from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.problem import resolved
 from catenary.cases.studies.accuracy import axes as models
 from catenary.cases.studies.accuracy.axes import AXES, DISCRETISATION, parse_axes
-from catenary.cases.studies.accuracy.plan import Plan, make_plan
+from catenary.cases.studies.accuracy.runs import Plan, make_plan
 
 CASE = "en50318_2002"
 

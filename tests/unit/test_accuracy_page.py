@@ -10,8 +10,7 @@ import pytest
 from catenary.cases.studies.accuracy import output, runs
 from catenary.cases.studies.accuracy.analysis import QUANTITIES, Row
 from catenary.cases.studies.accuracy.axes import AXES, mesh
-from catenary.cases.studies.accuracy.plan import Plan, PlannedAxis
-from catenary.cases.studies.accuracy.runs import Measured
+from catenary.cases.studies.accuracy.runs import Measured, Plan, PlannedAxis
 from catenary.cases.studies.sweep.jobs import Ended
 from catenary.cases.studies.sweep.variants import Variant
 

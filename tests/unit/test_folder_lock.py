@@ -13,9 +13,14 @@ from pathlib import Path
 import pytest
 
 from catenary.base.errors import InputError
-from catenary.cases.result_folder import folder_lock, lock_owner
-from catenary.cases.result_folder.folder_lock import LOCK_FILE, FolderLock
-from catenary.cases.result_folder.lock_owner import Owner, myself, read_owner
+from catenary.cases.result_folder import folder_lock
+from catenary.cases.result_folder.folder_lock import (
+    LOCK_FILE,
+    FolderLock,
+    Owner,
+    myself,
+    read_owner,
+)
 
 HOLD = """
 import sys
@@ -235,7 +240,7 @@ def test_a_process_is_known_by_when_it_started() -> None:
     assert me.alive and me.started and me.boot
     assert not dataclasses.replace(me, started="1").alive
     assert read_owner(me.text()) == me
-    assert lock_owner.read_owner(me.text().replace("pid", "pit")) is None
+    assert folder_lock.read_owner(me.text().replace("pid", "pit")) is None
 
 
 @pytest.mark.process

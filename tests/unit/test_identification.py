@@ -31,7 +31,7 @@ from catenary.cases.studies.identification.posterior import (
 )
 from catenary.cases.studies.identification.task import Task
 from catenary.cases.studies.measured.description import Measured
-from catenary.cases.studies.measured.table_file import read_table
+from catenary.cases.studies.measured.passages import read_table
 from catenary.cases.studies.task_files import checked_table
 from catenary.postproc.evaluate import filters
 

@@ -11,7 +11,7 @@ from catenary.base.errors import InputError
 from catenary.cases.cli.main import app
 from catenary.cases.scene.keys.usual_values import USUAL
 from catenary.cases.scene.load import load_scene
-from catenary.cases.terminal.key_list import key_details, key_table, keys_of_a_scene
+from catenary.cases.terminal.lists import key_details, key_table, keys_of_a_scene
 
 WIRES = ("contact", "messenger", "auxiliary", "stitch")
 

@@ -34,7 +34,7 @@ from catenary.meshgen.topologies.all_topologies import make_line
 from catenary.meshgen.wires import Role
 from catenary.postproc.channels.header import line_datasets
 from catenary.postproc.record.snapshots.blocks import RecordedLine, blocks_of
-from catenary.solver.model.elements.beam import uniform_load
+from catenary.solver.model.beam import uniform_load
 from catenary.solver.problem.problem import Damping
 from catenary.solver.statics.form_finding.equilibrium import Equilibrium, find_form
 

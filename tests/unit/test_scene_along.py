@@ -7,7 +7,7 @@ import pytest
 from catenary.base.errors import InputError
 from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.problem import problem_of
-from catenary.solver.problem.along_track import AlongTrack, Tensioner
+from catenary.solver.problem.ends import AlongTrack, Tensioner
 
 ON = "effects.axial_motion=true"
 CONTACT = "line.contact_wire"

@@ -19,7 +19,7 @@ from catenary.cases.scene.problem import problem_of, static_force
 from catenary.cases.scene.scene import Scene
 from catenary.cases.scene.train.multibody import multibody_of
 from catenary.cases.scene.train.pantograph import MultibodyTable
-from catenary.cases.terminal.key_list import key_table
+from catenary.cases.terminal.lists import key_table
 from catenary.mbs.build import PantographData, actuator_force
 from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.mechanism.pantograph_data import MultibodyData, stand

@@ -8,7 +8,7 @@ from catenary.base.errors import InputError
 from catenary.cases.run.planning.plan import make_plan, plan_text
 from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.problem import problem_of
-from catenary.solver.problem.window import WindowChoice
+from catenary.solver.problem.problem import WindowChoice
 from catenary.solver.window.choice import estimated_error
 
 BOUNDED = "window.mode=bounded"

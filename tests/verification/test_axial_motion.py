@@ -48,7 +48,7 @@ from catenary.solver.effects.effect import Effect
 from catenary.solver.model.builder import ModelBuilder
 from catenary.solver.model.loads import ShapeLoad
 from catenary.solver.model.model import Model
-from catenary.solver.problem.along_track import AlongTrack, Tensioner
+from catenary.solver.problem.ends import AlongTrack, Tensioner
 from catenary.solver.problem.problem import Problem
 from catenary.solver.statics.form_finding.equilibrium import find_form
 

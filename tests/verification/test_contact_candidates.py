@@ -16,8 +16,7 @@ from dense_line import DenseLine
 from measuring import History, check, march
 from small_lines import WHOLE, mesh_of, numerics, train
 
-from catenary.mbs.head.flexure import Flexure
-from catenary.mbs.head.strips import Strips, Suspension, Turning
+from catenary.mbs.head.strips import Flexure, Strips, Suspension, Turning
 from catenary.mbs.head.wire_crossing import LateralPath, SeveralPaths
 from catenary.mbs.lumped import LumpedPantograph
 from catenary.mbs.lumped_data import LumpedData

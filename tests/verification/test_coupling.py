@@ -15,8 +15,8 @@ from catenary.mbs.lumped import LumpedPantograph
 from catenary.mbs.lumped_data import LumpedData
 from catenary.meshgen.mesh import LineMesh
 from catenary.solver.contact.followed_links import no_links
+from catenary.solver.contact.head_states import Heads
 from catenary.solver.contact.line_response import LineResponse
-from catenary.solver.contact.train.head_states import Heads
 from catenary.solver.contact_problem.coupling import Coupling, make_coupling
 from catenary.solver.contact_problem.law_tangents import LinearInSteps
 from catenary.solver.problem.contact_laws import HertzLaw, KinematicLaw, LinearLaw

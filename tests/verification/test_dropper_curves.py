@@ -21,9 +21,9 @@ from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of, trai
 from catenary.meshgen.hardware import DropperKind
 from catenary.meshgen.mesh import CONTACT_WIRE, LineMesh
 from catenary.meshgen.topologies.line_data import LineData
-from catenary.solver.contact_problem.dense_systems import Signs, System, room_for
+from catenary.solver.contact_problem.complementarity import Signs, System, room_for
 from catenary.solver.kernels import native
-from catenary.solver.model.elements.beam import shape_values
+from catenary.solver.model.beam import shape_values
 from catenary.solver.model.matrices import whole_matrix
 from catenary.solver.model.model import Model
 from catenary.solver.problem.defects import LooseClamp

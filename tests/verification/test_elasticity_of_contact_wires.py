@@ -14,7 +14,7 @@ from catenary.meshgen.line import Line
 from catenary.meshgen.topologies.all_topologies import make_line
 from catenary.meshgen.topologies.line_data import Overlaps
 from catenary.solver.contact.contact_wire import ContactWires
-from catenary.solver.contact.train.pantographs import nominal_height_rule
+from catenary.solver.contact.pantographs import nominal_height_rule
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import distribute
 from catenary.solver.statics.elasticity import Elasticity, elasticity, middle_span

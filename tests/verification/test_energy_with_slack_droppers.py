@@ -15,7 +15,7 @@ from small_lines import HANGING, en50318_line, mesh_of, numerics, problem_of, tr
 
 from catenary.mbs.lumped_data import LumpedData
 from catenary.meshgen.mesh import CONTACT_WIRE
-from catenary.solver.model.elements.beam import shape_values
+from catenary.solver.model.beam import shape_values
 from catenary.solver.problem.problem import Damping
 from catenary.solver.statics.form_finding.equilibrium import find_form
 

@@ -17,7 +17,7 @@ from small_lines import (
 )
 
 from catenary.meshgen.mesh import CONTACT_WIRE, LineMesh
-from catenary.solver.model.elements.beam import shape_slopes, shape_values
+from catenary.solver.model.beam import shape_slopes, shape_values
 from catenary.solver.problem.contact_laws import LinearLaw
 from catenary.solver.problem.problem import Problem, Train
 from catenary.solver.statics.form_finding.equilibrium import find_form

@@ -11,8 +11,15 @@ from measuring import check
 from scipy import linalg
 from scipy.integrate import simpson
 
-from catenary.mbs.head.flexure import Flexure, mode_tables, shapes
-from catenary.mbs.head.strips import HeadParts, Strips, Suspension, head_parts
+from catenary.mbs.head.strips import (
+    Flexure,
+    HeadParts,
+    Strips,
+    Suspension,
+    head_parts,
+    mode_tables,
+    shapes,
+)
 from catenary.mbs.head.wire_crossing import LateralPath
 from catenary.mbs.lumped import LumpedPantograph
 from catenary.mbs.lumped_data import LumpedData

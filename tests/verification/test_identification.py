@@ -25,7 +25,7 @@ from catenary.cases.studies.identification.output import as_text, verdict
 from catenary.cases.studies.identification.posterior import innovations_of, judge, posterior_of
 from catenary.cases.studies.identification.study import Identification, identify
 from catenary.cases.studies.identification.task import Task
-from catenary.cases.studies.measured.table_file import read_table
+from catenary.cases.studies.measured.passages import read_table
 from catenary.cases.studies.sensitivity.parameters import ChangedScenes
 from catenary.cases.studies.task_files import read_task
 

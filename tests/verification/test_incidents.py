@@ -24,10 +24,10 @@ from static_line import absolute_rest, first_rest
 
 from catenary.cases.studies.hard import runs as hard_runs
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
-from catenary.solver.model.elements.beam import shape_slopes
+from catenary.solver.model.beam import shape_slopes
 from catenary.solver.model.model import Model
 from catenary.solver.problem.contact_laws import HertzLaw, KinematicLaw, LinearLaw
-from catenary.solver.problem.incidents import (
+from catenary.solver.problem.defects import (
     DropperBreak,
     Happened,
     LineIncident,

@@ -14,8 +14,8 @@ from static_line import absolute_rest, first_rest
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE, LineMesh
 from catenary.meshgen.wires import worn_bending
 from catenary.solver.effects.effect import Effect
+from catenary.solver.model import beam
 from catenary.solver.model.builder import ModelBuilder
-from catenary.solver.model.elements import beam
 from catenary.solver.model.link_directions import between_nodes
 from catenary.solver.model.links import PULLS, law
 from catenary.solver.model.model import Model

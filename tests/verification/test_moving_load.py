@@ -28,8 +28,8 @@ from small_lines import (
 
 from catenary.meshgen.mesh import CONTACT_WIRE
 from catenary.solver.effects.effect import Effect
+from catenary.solver.model.beam import shape_values
 from catenary.solver.model.builder import ModelBuilder
-from catenary.solver.model.elements.beam import shape_values
 from catenary.solver.model.loads import FunctionLoad
 from catenary.solver.problem.contact_laws import LinearLaw
 

@@ -25,8 +25,8 @@ from hypothesis import strategies as st
 from measuring import matrix_of
 from small_lines import WHOLE, ac_simple_line, mesh_of, numerics, problem_of, train
 
+from catenary.solver.contact.head_states import Heads
 from catenary.solver.contact.line_response import Coupled, LineResponse
-from catenary.solver.contact.train.head_states import Heads
 from catenary.solver.contact_problem.complementarity import InnerProblem, InnerSolution
 from catenary.solver.contact_problem.law_tangents import LinearInSteps
 from catenary.solver.model.link_directions import swings_of_droppers

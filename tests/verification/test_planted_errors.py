@@ -20,8 +20,7 @@ from scipy import signal
 from catenary.cases.run.runner import run_case
 from catenary.cases.scene.load import load_scene
 from catenary.cases.studies.measured.description import read_description
-from catenary.cases.studies.measured.passages import passage_of
-from catenary.cases.studies.measured.table_file import read_table
+from catenary.cases.studies.measured.passages import passage_of, read_table
 from catenary.postproc.measurements.comparison import Comparison, compare_with
 from catenary.postproc.read.results import Results
 

@@ -14,7 +14,7 @@ from small_lines import EN_PANTOGRAPH, WHOLE, en50318_line, mesh_of, numerics, p
 from catenary.mbs.head.strips import Strips
 from catenary.meshgen.topologies.line_data import LineData
 from catenary.solver.contact.contact_wire import ContactWires
-from catenary.solver.contact.train.pantographs import TrainPlaces, leads_of
+from catenary.solver.contact.pantographs import TrainPlaces, leads_of
 from catenary.solver.kernels import native
 from catenary.solver.model.partition import distribute
 from catenary.solver.problem.problem import Problem

@@ -16,7 +16,7 @@ from catenary.meshgen.topologies.line_data import LineData
 from catenary.meshgen.track import Curve
 from catenary.solver.model.model import Model
 from catenary.solver.model.rest_shape import Equilibrium
-from catenary.solver.problem.along_track import AlongTrack
+from catenary.solver.problem.ends import AlongTrack
 from catenary.solver.problem.irregularities import Irregularities, LengthErrors
 from catenary.solver.problem.problem import Problem
 from catenary.solver.problem.wind import Wind

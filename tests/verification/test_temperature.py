@@ -25,7 +25,7 @@ from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
 from catenary.meshgen.topologies.line_data import LineData
 from catenary.solver.model.model import Model
 from catenary.solver.model.rest_shape import Equilibrium
-from catenary.solver.problem.along_track import AlongTrack, Tensioner
+from catenary.solver.problem.ends import AlongTrack, Tensioner
 from catenary.solver.statics.form_finding.equilibrium import find_form
 
 ALPHA = 1.7e-5

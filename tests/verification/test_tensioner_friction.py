@@ -8,13 +8,13 @@ from measuring import check, march, registered
 from small_lines import BARE, mesh_of, numerics, problem_of, train
 
 from catenary.meshgen.mesh import CONTACT_WIRE
-from catenary.solver.contact_problem.dense_systems import Signs, System, room_for
+from catenary.solver.contact_problem.complementarity import Signs, System, room_for
 from catenary.solver.effects.effect import Effect
 from catenary.solver.effects.shipped.axial_effects import CREEP
 from catenary.solver.kernels import native
 from catenary.solver.model.builder import ModelBuilder
 from catenary.solver.model.loads import ShapeLoad
-from catenary.solver.problem.along_track import AlongTrack, Tensioner
+from catenary.solver.problem.ends import AlongTrack, Tensioner
 
 LENGTH, DT = 60.0, 1e-3
 STRAIGHT = (BARE | AXIAL) - {"structural_damping"}

@@ -18,7 +18,7 @@ from catenary.meshgen.topologies.all_topologies import BRIDLE_WIRE, make_line, s
 from catenary.meshgen.topologies.line_data import ClampedWire, LineData, Overlaps, Twin
 from catenary.meshgen.topologies.overlaps import of_next
 from catenary.meshgen.wires import Conductor, Role
-from catenary.solver.model.elements import beam
+from catenary.solver.model import beam
 from catenary.solver.statics.elasticity import elasticity
 from catenary.solver.statics.form_finding.equilibrium import Equilibrium, find_form
 

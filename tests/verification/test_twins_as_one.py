@@ -20,7 +20,7 @@ from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.problem import problem_of
 from catenary.cases.studies.hard import runs as hard_runs
-from catenary.solver.problem.window import EXACT, WindowChoice
+from catenary.solver.problem.problem import EXACT, WindowChoice
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest
 from catenary.solver.time_loop.views.observers import StepView
 

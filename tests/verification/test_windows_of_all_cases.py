@@ -16,7 +16,7 @@ from windowed import apart, march
 from catenary.base.errors import InputError
 from catenary.cases.scene.load import load_scene
 from catenary.cases.studies.hard import runs as hard_runs
-from catenary.solver.problem.window import EXACT, WindowChoice
+from catenary.solver.problem.problem import EXACT, WindowChoice
 
 pytestmark = pytest.mark.study
 

@@ -11,7 +11,7 @@ from small_lines import mesh_of, numerics, problem_of, train
 
 from catenary.solver.effects.shipped.axial_effects import moves_along
 from catenary.solver.model.gauges import gauge_places
-from catenary.solver.problem.along_track import AlongTrack, Tensioner
+from catenary.solver.problem.ends import AlongTrack, Tensioner
 from catenary.solver.problem.watched_links import GAUGES
 
 UNDAMPED = ALONG - {"structural_damping"}

@@ -25,7 +25,7 @@ from catenary.cases.result_folder.output_folder import refuse_impossible, refuse
 from catenary.cases.terminal import console
 
 if TYPE_CHECKING:
-    from catenary.cases.studies.accuracy.plan import Plan
+    from catenary.cases.studies.accuracy.runs import Plan
     from catenary.cases.studies.hard.cases import HardCase
     from catenary.cases.studies.hard.checks import Criterion
 
@@ -71,7 +71,7 @@ def accuracy(
     """Collective."""
     from catenary.cases.studies.accuracy.analysis import parse_target
     from catenary.cases.studies.accuracy.axes import parse_axes
-    from catenary.cases.studies.accuracy.plan import make_plan
+    from catenary.cases.studies.accuracy.runs import make_plan
 
     wanted = parse_target(target)
 

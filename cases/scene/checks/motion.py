@@ -17,7 +17,7 @@ from catenary.cases.scene.scene import Scene
 from catenary.meshgen.topologies.all_topologies import make_line
 from catenary.meshgen.topologies.line_data import LineData
 from catenary.meshgen.wires import End, Wire
-from catenary.solver.problem.along_track import AlongTrack
+from catenary.solver.problem.ends import AlongTrack
 
 _ACROSS = "lateral_motion"
 

@@ -37,7 +37,7 @@ from catenary.meshgen.topologies.line_data import (
     Twin,
 )
 from catenary.meshgen.wires import Conductor, Role
-from catenary.solver.problem.along_track import AlongTrack, Tensioner
+from catenary.solver.problem.ends import AlongTrack, Tensioner
 
 
 def line_data(table: LineTable, origin: Origin) -> LineData:

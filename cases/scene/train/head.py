@@ -8,8 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from catenary.cases.scene.keys.table import TAKE_AWAY, Table
-from catenary.mbs.head.flexure import Flexure
-from catenary.mbs.head.strips import Strips, Suspension, Turning
+from catenary.mbs.head.strips import Flexure, Strips, Suspension, Turning
 
 # What belongs together: a strip's own suspension, a head's pitch.
 _SUSPENSION = ("mass_kg", "stiffness_N_per_m")
@@ -133,7 +132,7 @@ class StripsTable(Table):
 
     @property
     def ahead(self) -> float:
-        """How far strips reach from the head's middle, along the track [m]."""
+        """Largest distance of strips from the head's middle, along the track [m]."""
         raked = math.tan(math.radians(abs(self.rake_deg))) * (self.length_m or 0.0)
         return 0.5 * ((self.spacing_m or 0.0) + raked)
 

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 import numpy as np
 from scipy.sparse import csr_matrix
 
-from catenary.solver.integrators.loads.line_loads import LineLoads
+from catenary.solver.integrators.line_loads import LineLoads
 from catenary.solver.linear.halo import Subdomain
 from catenary.solver.model.link_directions import swings_of_droppers
 from catenary.solver.model.links import Direction

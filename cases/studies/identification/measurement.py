@@ -12,7 +12,7 @@ from scipy.interpolate import CubicSpline
 
 from catenary.base.errors import InputError
 from catenary.cases.studies.measured.description import Force, Height, Measured
-from catenary.cases.studies.measured.table_file import LEAST_SAMPLES, column_of, places_of
+from catenary.cases.studies.measured.passages import LEAST_SAMPLES, column_of, places_of
 from catenary.postproc.evaluate import filters
 from catenary.postproc.evaluate.filters import power_kept
 
@@ -99,7 +99,7 @@ class Measurement:
 
     Parameters
     ----------
-    table : of a CSV file, see ``table_file.read_table``
+    table : of a CSV file, see ``passages.read_table``
     path : its name in sentences
     task : description of its columns
     speed : of the train [m/s]

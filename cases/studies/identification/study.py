@@ -33,7 +33,7 @@ from catenary.cases.studies.identification.posterior import (
     posterior_of,
 )
 from catenary.cases.studies.identification.task import Task
-from catenary.cases.studies.measured.table_file import read_table
+from catenary.cases.studies.measured.passages import read_table
 from catenary.cases.studies.sensitivity.parameters import ChangedScenes, Parameter
 from catenary.postproc.evaluate.filters import check_sampling
 

@@ -1,23 +1,131 @@
-"""From the files of a measurement to a passage in SI units."""
+"""From the CSV files of a measurement to columns, and to a passage in SI units."""
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
 from catenary.base.errors import InputError
+from catenary.cases.scene.input.plain_text import plain, read_text
 from catenary.cases.studies.measured.description import (
     Description,
     Force,
+    Measured,
     Tolerances,
     Uplift,
 )
-from catenary.cases.studies.measured.table_file import column_of, places_of, read_table
 from catenary.cases.studies.task_files import checked_table
 from catenary.postproc.measurements.passage import MeasuredForce, MeasuredUplift, Passage
 from catenary.postproc.read.results import Results
+
+LEAST_SAMPLES = 20
+# Samples are equidistant if their spacings differ by less than this part.
+_EVEN = 0.02
+
+
+def read_table(path: Path) -> pd.DataFrame:
+    """The table of a CSV file, with commas or with semicolons and decimal commas or points.
+
+    Raises
+    ------
+    InputError
+        If it is none.
+    """
+    text = read_text(path, str(path))
+    semicolons = ";" in text
+    try:
+        return pd.read_csv(
+            io.StringIO(text.replace(",", ".") if semicolons else text),
+            sep=";" if semicolons else ",",
+            comment="#",
+            skipinitialspace=True,
+        )
+    except ValueError as error:  # pandas' ParserError is one
+        why = str(error).strip().removeprefix("Error tokenizing data. C error: ")
+        raise InputError(f"{path} is no table of CSV: {plain(why, 200)}") from error
+
+
+def columns_in(table: pd.DataFrame) -> str:
+    """Names of the first columns of a table, for a sentence."""
+    return ", ".join(plain(str(column), 40) for column in table.columns[:12])
+
+
+def column_of(table: pd.DataFrame, path: str, name: str, may_lack: bool = False) -> np.ndarray:
+    """The numbers (n,) of a column in the file's unit.
+
+    Parameters
+    ----------
+    path : name of the table in sentences
+    may_lack : whether a cell without a finite number is NaN, not an error
+
+    Raises
+    ------
+    InputError
+        If there is no such column, or a cell without a number.
+    """
+    if name not in table:
+        raise InputError(f'{path} has no column "{plain(name, 100)}": it has {columns_in(table)}')
+    values = pd.to_numeric(table[name], errors="coerce").to_numpy(dtype=float, copy=True)
+    wrong = np.flatnonzero(~np.isfinite(values))
+    if wrong.size and not may_lack:
+        raise InputError(
+            f'{path} has in row {wrong[0] + 1} of column "{plain(name, 100)}" no finite number'
+        )
+    values[wrong] = np.nan
+    return np.asarray(values)
+
+
+def places_of(
+    table: pd.DataFrame, path: str, measured: Measured, speed: float, start: float
+) -> np.ndarray:
+    """Places (n,) of all samples of the file [m], evened out.
+
+    Parameters
+    ----------
+    path : name of the table in sentences
+    speed : of the train [m/s]
+    start : place of the pantograph at time zero [m]
+
+    Raises
+    ------
+    InputError
+        If they are not equidistant, or too few.
+    """
+    if measured.place is not None:
+        places = measured.place.on_line(column_of(table, path, measured.place.column))
+    else:
+        assert measured.time is not None
+        times = column_of(table, path, measured.time.column) * measured.time.factor
+        places = start + speed * times
+    return evened_out(places, path)
+
+
+def evened_out(places: np.ndarray, path: str) -> np.ndarray:
+    """Places (n,) that were rounded, at equal distances [m].
+
+    Parameters
+    ----------
+    path : name of the table in sentences
+
+    Raises
+    ------
+    InputError
+        If they are not equidistant, or too few.
+    """
+    if len(places) < LEAST_SAMPLES:
+        raise InputError(f"{path} has {len(places)} rows; at least {LEAST_SAMPLES} are needed")
+    even = np.linspace(places[0], places[-1], len(places))
+    spacing = even[1] - even[0]
+    if spacing <= 0.0 or np.abs(np.diff(places) - spacing).max() > _EVEN * spacing + 1e-4:
+        raise InputError(
+            f"{path} must have equidistant samples in ascending order; resample it at even "
+            "steps of place or time"
+        )
+    return even
+
 
 # Names of columns that need no description, with their units.
 _USUAL = {

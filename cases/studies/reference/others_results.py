@@ -13,7 +13,7 @@ from scipy.interpolate import CubicSpline
 from catenary.base.errors import InputError
 from catenary.cases.scene.input.plain_text import plain
 from catenary.cases.scene.problem import problem_of
-from catenary.cases.studies.measured.table_file import (
+from catenary.cases.studies.measured.passages import (
     column_of,
     columns_in,
     evened_out,

@@ -16,7 +16,7 @@ from catenary.cases.scene.keys.units import SUFFIXES, unit_of
 from catenary.cases.studies.sweep import force_histograms
 from catenary.cases.studies.sweep.jobs import OF_LINE, OF_PANTOGRAPH, STATISTICS, Ended
 from catenary.cases.studies.sweep.variants import Variant
-from catenary.cases.terminal.key_list import Key, keys_of_a_scene
+from catenary.cases.terminal.lists import Key, keys_of_a_scene
 from catenary.cases.terminal.terminal_text import labelled
 from catenary.postproc.report.pictures import figures
 from catenary.postproc.report.study_table import (

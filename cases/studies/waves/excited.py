@@ -19,8 +19,7 @@ from catenary.meshgen.slowest_wave import slowest_wave_of
 from catenary.solver.contact_problem.coupling import DIVERGED
 from catenary.solver.effects.all_effects import move_together
 from catenary.solver.problem.contact_laws import LinearLaw
-from catenary.solver.problem.problem import Placement, Problem, Train
-from catenary.solver.problem.window import BOUNDED
+from catenary.solver.problem.problem import BOUNDED, Placement, Problem, Train
 from catenary.solver.time_loop.views.observers import NEVER, Observer, Stage, StepView
 from catenary.solver.waves.excitation import (
     FORCE,

@@ -25,7 +25,7 @@ from catenary.postproc.evaluate.filters import low_pass
 from catenary.postproc.record.run_watch import RunWatch, watch_cadence, watched
 from catenary.postproc.report.pictures import figures
 from catenary.postproc.report.study_table import Column, StudyTable, remark_lines, write_files
-from catenary.solver.problem.window import WindowChoice
+from catenary.solver.problem.problem import WindowChoice
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest
 from catenary.solver.time_loop.march import March
 from catenary.solver.window.choice import estimated_error, spans_of_window

@@ -19,7 +19,7 @@ import numpy as np
 from h5py import h5d, h5p, h5s, h5t
 
 from catenary.postproc.files.disk import MARGIN, check_in_place, opened, reserve, write_at
-from catenary.postproc.files.hdf5.array_writes import put_array, set_attribute
+from catenary.postproc.files.hdf5.checked import put_array, set_attribute
 from catenary.postproc.files.own_files import new_part
 from catenary.postproc.record.snapshots.blocks import Block
 from catenary.postproc.record.snapshots.field_layout import (
@@ -241,7 +241,7 @@ class FieldsFile:
                 set_attribute(made, "meaning", kind.meaning)
 
     def _find_places(self, file: h5py.File) -> None:
-        """Where in the file the times and the tables begin [B]; KeyError without one."""
+        """Offsets of the times and the tables in the file [B]; KeyError without one."""
         self._times_at = _place_of(file, "times")
         self._places_at = _place_of(file, PLACES)
         self._places: list[dict[str, int]] = []
@@ -297,5 +297,5 @@ def _create(
 
 
 def _place_of(group: h5py.Group, name: str) -> int:
-    """Where in the file a table begins [B], 0 if it has no numbers; KeyError without one."""
+    """Offset of a table in the file [B], 0 if it has no numbers; KeyError without one."""
     return h5d.open(group.id, name.encode()).get_offset() or 0

@@ -6,8 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
-from catenary.postproc.evaluate.acceptance import judged_by
-from catenary.postproc.evaluate.verdict import Criterion, labels
+from catenary.postproc.evaluate.verdict import Criterion, judged_by, labels
 from catenary.postproc.evaluate.wording import decimals_that_tell
 from catenary.postproc.report.sections.section import EvaluatedRun, Section, Text, number
 from catenary.postproc.report.study_table import StudyTable, texts_table

@@ -15,7 +15,7 @@ from catenary.solver.model.alike import alike
 from catenary.solver.model.link_directions import across_droppers, between_nodes
 from catenary.solver.model.links import PULLS, PUSHES, Direction, law, slips
 from catenary.solver.model.model import Block
-from catenary.solver.model.unknowns.stations import SAME_STATION
+from catenary.solver.model.stations import SAME_STATION
 from catenary.solver.problem.problem import Problem
 
 if TYPE_CHECKING:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from catenary.base.errors import RunBroken
-from catenary.solver.linear.factors.station_factors import (
+from catenary.solver.linear.pieces.pieces import Piece, Pieces, Slots
+from catenary.solver.linear.station_factors import (
     MIDDLES,
     FoundFactors,
     StationFactors,
@@ -16,7 +17,6 @@ from catenary.solver.linear.factors.station_factors import (
     packed_factors,
     softened,
 )
-from catenary.solver.linear.pieces.pieces import Piece, Pieces, Slots
 from catenary.solver.linear.stations.sections import Sections
 from catenary.solver.linear.stations.station_layout import Layout
 from catenary.solver.linear.stations.station_rows import StationRows

@@ -8,13 +8,13 @@ from typing import NamedTuple
 import numpy as np
 
 from catenary.base.errors import RunBroken
-from catenary.solver.linear.factors.station_factors import (
-    layout_of_factors,
-    station_factors,
-)
 from catenary.solver.linear.petsc_solvers import DIRECT, wants_own_solver
 from catenary.solver.linear.pieces.factor_pieces import JOINED_OTHERWISE, FactorPieces
 from catenary.solver.linear.pieces.pieces import Piece, Pieces, Slots
+from catenary.solver.linear.station_factors import (
+    layout_of_factors,
+    station_factors,
+)
 from catenary.solver.linear.stations.like_stations import LikeStations
 from catenary.solver.linear.stations.sections import Sections, places_of
 from catenary.solver.linear.stations.station_layout import Layout

@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from catenary.solver.kernels import aligned_arrays
-from catenary.solver.linear.factors.station_factors import MIDDLES
-from catenary.solver.model.unknowns.registry import Unknowns
+from catenary.solver.linear.station_factors import MIDDLES
+from catenary.solver.model.unknown_registry import Unknowns
 
 # Stations of a piece, some twenty spans: a multiple of ``MIDDLES``.
 _SIZE = 1024

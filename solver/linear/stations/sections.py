@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy import sparse
 
-from catenary.solver.model.unknowns.registry import Unknowns
+from catenary.solver.model.unknown_registry import Unknowns
 
 
 class Places(NamedTuple):

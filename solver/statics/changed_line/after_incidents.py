@@ -45,7 +45,7 @@ from catenary.solver.effects.build_model import build
 from catenary.solver.linear.decay_length import reach
 from catenary.solver.linear.step_operators import LineOperators
 from catenary.solver.linear.unit_responses import Windows
-from catenary.solver.model.elements import beam
+from catenary.solver.model import beam
 from catenary.solver.model.entries import iterate_entries
 from catenary.solver.model.links import Direction
 from catenary.solver.model.loads import ShapeLoad
@@ -55,7 +55,7 @@ from catenary.solver.model.partition import Ownership
 from catenary.solver.model.rest_shape import Equilibrium
 from catenary.solver.model.switching_links import switching_links
 from catenary.solver.model.wire_ends import tensioned_ends
-from catenary.solver.problem.incidents import DropperBreak, LineIncident
+from catenary.solver.problem.defects import DropperBreak, LineIncident
 from catenary.solver.statics.changed_line.potential import Potential
 from catenary.solver.statics.changed_line.rest_nearby import RestNearby
 from catenary.solver.statics.rest_loads import dead_loads

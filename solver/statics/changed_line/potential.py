@@ -18,8 +18,8 @@ import numpy as np
 
 from catenary.meshgen.hardware import SteadyArm
 from catenary.meshgen.wires import Wire
+from catenary.solver.model import beam
 from catenary.solver.model.axial_elements import curve_rows, shape_of
-from catenary.solver.model.elements import beam
 from catenary.solver.model.model import Model, wire_elements
 from catenary.solver.model.rest_shape import Equilibrium
 

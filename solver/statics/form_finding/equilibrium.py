@@ -25,10 +25,10 @@ from catenary.solver.model.rest_shape import LateralShape
 from catenary.solver.problem.problem import Problem
 from catenary.solver.statics.changed_line.rest_nearby import StiffLine
 from catenary.solver.statics.changed_line.rest_with_defects import errors_of_length, hang
-from catenary.solver.statics.form_finding.banded_factors import BandedFactors
 from catenary.solver.statics.form_finding.lateral_equilibrium import lateral_shape
 from catenary.solver.statics.form_finding.repeated_ends import repeated_ends, settled
 from catenary.solver.statics.form_finding.sparse_sum import (
+    BandedFactors,
     Part,
     clamp_parts,
     columns_of,

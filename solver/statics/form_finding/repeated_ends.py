@@ -15,7 +15,7 @@ import numpy as np
 
 from catenary.base.errors import InputError
 from catenary.solver.model.model import Model
-from catenary.solver.model.unknowns.stations import SAME_STATION
+from catenary.solver.model.stations import SAME_STATION
 
 # Change from turn to turn that is round-off [m], and the most turns.
 _SETTLED, _MOST_TURNS = 1e-14, 40

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     import numpy as np
 
     from catenary.solver.contact.forces_on_line import ForcesOnLine
-    from catenary.solver.contact.train.pantographs import Pantographs
+    from catenary.solver.contact.pantographs import Pantographs
     from catenary.solver.problem.simulated import Simulated
     from catenary.solver.schemes.scheme import Scheme
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from catenary.base.errors import InputError
 from catenary.base.parallel import on_root
-from catenary.solver.contact.train.pantographs import Pantographs
+from catenary.solver.contact.pantographs import Pantographs
 from catenary.solver.integrators.line_integrator import MOTION, LineIntegrator
 from catenary.solver.model.model import Model
 from catenary.solver.schemes.scheme import Scheme

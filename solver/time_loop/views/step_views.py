@@ -12,7 +12,7 @@ from catenary.base.parallel import total
 from catenary.meshgen.mesh import DROPPERS
 from catenary.solver.contact.followed_links import FollowedLinks
 from catenary.solver.contact.forces_on_line import ForcesOnLine
-from catenary.solver.contact.train.pantographs import Pantographs
+from catenary.solver.contact.pantographs import Pantographs
 from catenary.solver.integrators.line_state import Motion
 from catenary.solver.kernels import native
 from catenary.solver.model.gauges import Gauges, gauges_of
@@ -29,10 +29,9 @@ from catenary.solver.time_loop.views.channels import (
     energies_of,
 )
 from catenary.solver.time_loop.views.checkpoints import Checkpoints, State
-from catenary.solver.time_loop.views.line_energy import LineEnergy
 from catenary.solver.time_loop.views.observers import Stage, StepView
 from catenary.solver.time_loop.views.row_layout import RowLayout
-from catenary.solver.time_loop.views.shown_motion import ShownMotion
+from catenary.solver.time_loop.views.shown_line import LineEnergy, ShownMotion
 from catenary.solver.window.moving_columns import Columns, MovingColumns, columns_of
 
 # Parts of a step that can be seen, more with each.

@@ -21,8 +21,7 @@ from PIL import Image, ImageSequence
 from catenary.base.errors import InputError
 from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.shape import HEAD, shape_of
-from catenary.postproc.files.hdf5.array_writes import set_attribute
-from catenary.postproc.files.hdf5.checked import seal_attributes
+from catenary.postproc.files.hdf5.checked import seal_attributes, set_attribute
 from catenary.postproc.film import animate, drawing, projection, scenery, video
 from catenary.postproc.film.animate import Pictures
 from catenary.postproc.film.film_data import film_data

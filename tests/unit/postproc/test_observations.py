@@ -15,16 +15,15 @@ import pytest
 
 from catenary.meshgen.wires import Role
 from catenary.postproc.evaluate import statistics
-from catenary.postproc.evaluate.acceptance import criteria_of
 from catenary.postproc.evaluate.compare import compare
 from catenary.postproc.evaluate.observations import (
     OBSERVED,
     ObservedRun,
     bending_strain,
     observe,
+    wire_at_rest,
 )
-from catenary.postproc.evaluate.verdict import Criterion
-from catenary.postproc.evaluate.wire_at_rest import wire_at_rest
+from catenary.postproc.evaluate.verdict import Criterion, criteria_of
 from catenary.postproc.files.hdf5.checked import ATTRIBUTE_SUMS
 from catenary.postproc.read.line_of_run import ContactProfile
 from catenary.postproc.read.results import Results

@@ -22,7 +22,7 @@ from catenary.postproc.evaluate.error_indicators import (
     step_error,
 )
 from catenary.postproc.read.results import Results
-from catenary.solver.model.elements import beam
+from catenary.solver.model import beam
 from catenary.solver.problem.integrator_parameters import Integration, integration_of
 
 UNDAMPED = Method(0.0, 0.0)

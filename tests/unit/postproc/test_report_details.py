@@ -15,10 +15,9 @@ from matplotlib.lines import Line2D
 
 from catenary.base.errors import InputError
 from catenary.postproc.evaluate import statistics
-from catenary.postproc.evaluate.acceptance import criteria_of
-from catenary.postproc.evaluate.verdict import Criterion
+from catenary.postproc.evaluate.verdict import Criterion, criteria_of
 from catenary.postproc.read.results import Results
-from catenary.postproc.report import page, paper
+from catenary.postproc.report import page as pages
 from catenary.postproc.report.pictures import figures, force_pictures, interactive, line_pictures
 from catenary.postproc.report.report import SECTIONS, write_report
 from catenary.postproc.report.sections import acceptance, dynamics
@@ -208,7 +207,7 @@ def test_the_limit_of_the_uplift_is_in_its_picture(run_folder: Path) -> None:
 
 
 def test_commands_and_figures_with_units_stay_together() -> None:
-    said = page._with_commands("-7.8 N of 41.7 % <here>: `catenary report -o A` shows 12 of 18.")
+    said = pages._with_commands("-7.8 N of 41.7 % <here>: `catenary report -o A` shows 12 of 18.")
     assert said == (
         "\u22127.8\u00a0N of 41.7\u00a0% &lt;here&gt;: <code>catenary report -o A</code> shows "
         "12 of 18."
@@ -291,7 +290,7 @@ def test_without_its_package_nothing_is_written(
     assert not list(tmp_path.iterdir())
 
 
-SHEET, CAPTION = paper._SHEET, paper._CAPTION
+SHEET, CAPTION = pages._SHEET, pages._CAPTION
 
 
 def figure(top: float, share_of_sheet: float) -> tuple[float, float]:
@@ -302,11 +301,11 @@ def test_a_figure_that_just_misses_the_rest_of_a_sheet_is_printed_smaller() -> N
     first = figure(0.0, 0.5)
     # Of a second one as high as 0.55 the picture shrinks, and the caption does not.
     expected = (0.5 * SHEET - CAPTION) / (0.55 * SHEET - CAPTION)
-    assert paper.shares([first, figure(0.5 * SHEET, 0.55)], [0.0]) == pytest.approx([1.0, expected])
+    assert pages.shares([first, figure(0.5 * SHEET, 0.55)], [0.0]) == pytest.approx([1.0, expected])
     assert 0.8 < expected < 1.0
     # What fits stays, and so does what would shrink by more than a fifth: it has the next sheet.
-    assert paper.shares([first, figure(0.5 * SHEET, 0.49)], [0.0]) == [1.0, 1.0]
-    assert paper.shares([first, figure(0.5 * SHEET, 0.7)], [0.0]) == [1.0, 1.0]
+    assert pages.shares([first, figure(0.5 * SHEET, 0.49)], [0.0]) == [1.0, 1.0]
+    assert pages.shares([first, figure(0.5 * SHEET, 0.7)], [0.0]) == [1.0, 1.0]
 
 
 def test_a_figure_on_the_next_sheet_leaves_the_rest_of_it() -> None:
@@ -314,8 +313,8 @@ def test_a_figure_on_the_next_sheet_leaves_the_rest_of_it() -> None:
     heading = 30.0
     at = 0.5 * SHEET + heading
     figures = [figure(0.0, 0.5), figure(at, 0.6), figure(at + 0.6 * SHEET, 0.43)]
-    alone = paper.shares(figures, [0.0])
-    with_heading = paper.shares(figures, [0.0, at - heading])
+    alone = pages.shares(figures, [0.0])
+    with_heading = pages.shares(figures, [0.0, at - heading])
     assert alone[:2] == with_heading[:2] == [1.0, 1.0]
     assert alone[2] == pytest.approx((0.4 * SHEET - CAPTION) / (0.43 * SHEET - CAPTION))
     assert with_heading[2] == pytest.approx(
@@ -325,5 +324,5 @@ def test_a_figure_on_the_next_sheet_leaves_the_rest_of_it() -> None:
 
 def test_text_goes_on_to_the_next_sheet() -> None:
     """Before the figure are 2.3 sheets of text, and 0.7 of a sheet are left."""
-    assert paper.shares([figure(2.3 * SHEET, 0.65)], [0.0]) == [1.0]
-    assert paper.shares([figure(2.3 * SHEET, 0.75)], [0.0])[0] < 1.0
+    assert pages.shares([figure(2.3 * SHEET, 0.65)], [0.0]) == [1.0]
+    assert pages.shares([figure(2.3 * SHEET, 0.75)], [0.0])[0] < 1.0

@@ -12,7 +12,7 @@ from small_lines import HANGING, mesh_of, problem_of
 from catenary.meshgen.mesh import LineMesh
 from catenary.solver.effects.build_model import build
 from catenary.solver.model.model import Model
-from catenary.solver.problem.along_track import AlongTrack, Tensioner
+from catenary.solver.problem.ends import AlongTrack, Tensioner
 
 ENDS = AlongTrack(Tensioner(travel=0.5), end=True)
 

@@ -15,9 +15,8 @@ from small_lines import WHOLE, ac_simple_line, mesh_of, numerics, problem_of, tr
 from catenary.base.errors import RunBroken
 from catenary.mbs.air import Polynomial, Tunnel, Uplift
 from catenary.mbs.control import Regulation
-from catenary.mbs.head.flexure import Flexure
 from catenary.mbs.head.laws import Law
-from catenary.mbs.head.strips import Strips, Suspension, Turning
+from catenary.mbs.head.strips import Flexure, Strips, Suspension, Turning
 from catenary.mbs.lowering import Lowering
 from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.mechanism.full_pantograph import FullPantograph
@@ -27,7 +26,7 @@ from catenary.mbs.vehicle.irregularity import Irregularity
 from catenary.meshgen.mesh import CONTACT_WIRE, LineMesh
 from catenary.solver.contact_problem import complementarity
 from catenary.solver.effects.effect import Effect
-from catenary.solver.integrators.loads import line_loads
+from catenary.solver.integrators import line_loads
 from catenary.solver.model.builder import ModelBuilder
 from catenary.solver.model.loads import FieldLoad, FunctionLoad, ShapeLoad, harmonics, table
 from catenary.solver.problem.contact_laws import HertzLaw, KinematicLaw, LinearLaw

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from catenary.solver.model.elements import beam, exact_beam
-from catenary.solver.model.elements.beam import shape_slopes, shape_values
+from catenary.solver.model import beam, exact_beam
+from catenary.solver.model.beam import shape_slopes, shape_values
 
 EPS = np.finfo(float).eps
 lengths = st.floats(0.05, 20.0)

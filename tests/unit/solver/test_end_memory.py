@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from catenary.base.errors import InputError
+from catenary.solver.integrators.end_memory import NEAR
+from catenary.solver.integrators.line_loads import LineLoads
 from catenary.solver.integrators.line_state import LineState
-from catenary.solver.integrators.loads.end_memory import NEAR
-from catenary.solver.integrators.loads.line_loads import LineLoads
 from catenary.solver.linear.halo import Subdomain
 from catenary.solver.model.loads import MemoryLoad, ShapeLoad
 

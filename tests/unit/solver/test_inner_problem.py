@@ -11,8 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from catenary.solver.contact.followed_links import no_links
+from catenary.solver.contact.head_states import Heads
 from catenary.solver.contact.line_response import Coupled, LineResponse
-from catenary.solver.contact.train.head_states import Heads
 from catenary.solver.contact_problem import complementarity
 from catenary.solver.contact_problem.complementarity import InnerProblem, InnerSolution
 from catenary.solver.contact_problem.law_tangents import HertzInSteps, LinearInSteps

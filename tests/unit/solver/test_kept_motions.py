@@ -12,14 +12,13 @@ from small_lines import WHOLE, ac_simple_line, mesh_of, numerics, problem_of, tr
 
 from catenary.meshgen.mesh import MESSENGER_WIRE
 from catenary.solver.contact_problem import complementarity
-from catenary.solver.problem.incidents import TensionLoss
-from catenary.solver.problem.problem import Problem
-from catenary.solver.problem.window import BOUNDED, EXACT, WindowChoice
+from catenary.solver.problem.defects import TensionLoss
+from catenary.solver.problem.problem import BOUNDED, EXACT, Problem, WindowChoice
 from catenary.solver.time_loop import compiled_steps
 from catenary.solver.time_loop import march as time_loop
-from catenary.solver.time_loop.views import line_energy, step_views
+from catenary.solver.time_loop.views import shown_line, step_views
 from catenary.solver.time_loop.views.observers import Observer, StepView
-from catenary.solver.time_loop.views.shown_motion import ShownMotion
+from catenary.solver.time_loop.views.shown_line import ShownMotion
 
 N_STEPS, EVERY = 250, 7
 
@@ -124,8 +123,8 @@ def test_motions_of_a_window_are_those_of_the_whole_line(
     """Single steps look at all stations. Energies are summed in parts of a few stations."""
     run = train(75.0, 330.0, 330.0 + N_STEPS * 0.075, raise_time=0.0)
     scene = replace(problem_of(ac_simple_line(12), WHOLE, train=run), window=window)
-    monkeypatch.setattr(line_energy, "_STATIONS", 16)
-    monkeypatch.setattr(line_energy, "_LINKS", 4)
+    monkeypatch.setattr(shown_line, "_STATIONS", 16)
+    monkeypatch.setattr(shown_line, "_LINKS", 4)
     with monkeypatch.context() as patch:
         patch.setattr(time_loop, "compiled_steps", lambda *arguments: None)
         patch.setattr(step_views.ShownMotion, "take_changes", whole_line)

@@ -9,8 +9,8 @@ from small_lines import HANGING, en50318_line, mesh_of, problem_of
 
 from catenary.meshgen.mesh import CONTACT_WIRE
 from catenary.solver.effects.build_model import build
-from catenary.solver.integrators.loads import line_loads
-from catenary.solver.integrators.loads.line_loads import LineLoads
+from catenary.solver.integrators import line_loads
+from catenary.solver.integrators.line_loads import LineLoads
 from catenary.solver.linear.halo import Subdomain
 from catenary.solver.model.loads import (
     FieldLoad,

@@ -28,7 +28,7 @@ from catenary.solver.integrators.line_integrator import LineIntegrator
 from catenary.solver.linear.decay_length import DECAY, reach
 from catenary.solver.linear.unit_responses import UnitResponses, Windows
 from catenary.solver.model.model import Model
-from catenary.solver.model.unknowns.registry import Unknowns
+from catenary.solver.model.unknown_registry import Unknowns
 from catenary.solver.problem.problem import Damping
 from catenary.solver.statics.form_finding.equilibrium import find_form
 

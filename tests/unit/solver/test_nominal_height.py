@@ -16,7 +16,7 @@ from small_lines import (
 
 from catenary.meshgen.topologies.line_data import LineData
 from catenary.solver.contact.contact_wire import ContactWires
-from catenary.solver.contact.train.pantographs import nominal_height_rule
+from catenary.solver.contact.pantographs import nominal_height_rule
 from catenary.solver.model.partition import distribute
 from catenary.solver.problem.problem import Placement
 from catenary.solver.statics.elasticity import elasticity, middle_span

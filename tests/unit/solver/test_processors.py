@@ -11,7 +11,7 @@ from repeating_line import layout, line
 from catenary.solver.integrators.line_state import PredictedLineState, Steps
 from catenary.solver.integrators.two_pass_step import StationPasses
 from catenary.solver.kernels import native
-from catenary.solver.linear.factors.station_factors import station_factors
+from catenary.solver.linear.station_factors import station_factors
 from catenary.solver.linear.stations.station_products import station_product
 from catenary.solver.linear.step_operators import ByStations
 

@@ -10,7 +10,7 @@ from repeating_line import layout, line, widths_of
 from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
-from catenary.solver.linear.factors.station_factors import station_factors
+from catenary.solver.linear.station_factors import station_factors
 from catenary.solver.linear.stations.sections import neighbours
 from catenary.solver.linear.stations.station_layout import MOST_UNKNOWNS, Layout
 from catenary.solver.linear.stations.station_products import (

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from catenary.solver.contact_problem.dense_systems import room_for
+from catenary.solver.contact_problem.complementarity import room_for
 from catenary.solver.kernels import native
 
 SMALL = 1e-11

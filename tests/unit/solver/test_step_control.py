@@ -7,8 +7,7 @@ import pytest
 from measuring import check
 
 from catenary.solver.problem.problem import n_halvings
-from catenary.solver.schemes.adaptive_steps import StepSize
-from catenary.solver.schemes.step_error import StepError
+from catenary.solver.schemes.adaptive_steps import StepError, StepSize
 
 
 def test_the_next_size_is_that_of_petscs_basic_controller() -> None:

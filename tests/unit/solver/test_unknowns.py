@@ -9,7 +9,7 @@ import pytest
 from small_lines import ac_simple_line, mesh_of
 
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE, LineMesh
-from catenary.solver.model.unknowns.registry import (
+from catenary.solver.model.unknown_registry import (
     MOST_STATION_TYPES,
     Group,
     Unknowns,

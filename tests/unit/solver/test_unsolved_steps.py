@@ -14,8 +14,8 @@ from small_lines import WHOLE, en50318_line, mesh_of, problem_of
 
 from catenary.base.errors import InputError, NotConverged, RunBroken
 from catenary.solver.contact.followed_links import no_links
+from catenary.solver.contact.head_states import Heads
 from catenary.solver.contact.line_response import LineResponse
-from catenary.solver.contact.train.head_states import Heads
 from catenary.solver.contact_problem.complementarity import InnerProblem
 from catenary.solver.contact_problem.coupling import Explicit
 from catenary.solver.contact_problem.law_tangents import (

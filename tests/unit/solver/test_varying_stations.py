@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from repeating_line import holding, lacking, line, sections_of
 
-from catenary.solver.linear.factors.station_factors import StationFactors, station_factors
+from catenary.solver.linear.station_factors import StationFactors, station_factors
 from catenary.solver.linear.stations.sections import neighbours
 from catenary.solver.linear.stations.station_products import (
     StationProduct,

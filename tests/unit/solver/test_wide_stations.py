@@ -17,8 +17,7 @@ from catenary.solver.linear import unit_responses
 from catenary.solver.model.loads import ShapeLoad, table
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import distribute
-from catenary.solver.problem.problem import Damping, Numerics
-from catenary.solver.problem.window import WindowChoice
+from catenary.solver.problem.problem import Damping, Numerics, WindowChoice
 from catenary.solver.statics.form_finding.equilibrium import find_form
 
 STEPS = 40

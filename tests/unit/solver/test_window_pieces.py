@@ -14,8 +14,7 @@ from stitched_line import stitched_line
 from catenary.base.errors import RunBroken
 from catenary.solver.linear import unit_responses
 from catenary.solver.linear.pieces import factor_pieces, pieces
-from catenary.solver.problem.problem import Damping, Problem
-from catenary.solver.problem.window import BOUNDED, WindowChoice
+from catenary.solver.problem.problem import BOUNDED, Damping, Problem, WindowChoice
 from catenary.solver.window import moving_window
 
 SPEED, START, SPANS = 70.0, 330.0, 60

@@ -17,7 +17,7 @@ from functools import cached_property
 import numpy as np
 
 from catenary.meshgen.mesh import LineMesh
-from catenary.solver.model.unknowns.stations import Stations, stations_of
+from catenary.solver.model.stations import Stations, stations_of
 
 # Unknowns of a group in a station above which solving by nodes is faster.
 _WIDEST_GROUP = 12

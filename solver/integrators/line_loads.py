@@ -9,8 +9,8 @@ import numpy as np
 from scipy import sparse
 
 from catenary.base.mpi import MPI
+from catenary.solver.integrators.end_memory import NO_MEMORIES, EndMemories, Memories
 from catenary.solver.integrators.line_state import LineState
-from catenary.solver.integrators.loads.end_memory import NO_MEMORIES, EndMemories, Memories
 from catenary.solver.kernels import aligned_arrays, native
 from catenary.solver.linear.halo import Subdomain
 from catenary.solver.model.loads import (

@@ -23,7 +23,7 @@ from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.vehicle.base_motion import BaseMotion
 from catenary.solver.contact.contact_wire import Candidates, ContactWires
 from catenary.solver.contact.contacts import no_work
-from catenary.solver.contact.train.head_states import Heads
+from catenary.solver.contact.head_states import Heads
 from catenary.solver.kernels import native
 from catenary.solver.problem.contact_laws import ContactLaw, KinematicLaw
 from catenary.solver.problem.problem import Placement, Problem

@@ -1,1 +1,0 @@
-"""The train's side of the contacts: pantographs, their strips and where these are."""

@@ -1,1 +1,0 @@
-"""Loads in time that a step adds: gusts, given forces, what ends of the line remember."""

@@ -1,1 +1,0 @@
-"""The step operator factored by stations: elimination, and solves with its factors."""

@@ -1,1 +1,0 @@
-"""Beams under tension: matrices of elements, and functions between nodes."""

@@ -1,1 +1,0 @@
-"""Unknowns of a line, their stations and their numbers."""
