@@ -286,7 +286,7 @@ def test_a_measurement_that_does_not_do_is_told(change: dict[str, Any], told: st
 
 
 def test_gaps_and_holes_are_told() -> None:
-    with pytest.raises(InputError, match="must have equidistant samples in ascending order"):
+    with pytest.raises(InputError, match="but row 501 stands 0.6 m behind the row before, and oth"):
         measurement(samples().drop(index=[500, 501]))
     with pytest.raises(InputError, match="must have equidistant samples in ascending order"):
         measurement(samples()[::-1])
@@ -321,6 +321,10 @@ SOUGHT = [{"key": FORCE, "deviation": 4.0}]
         ({"measured": MEASURED, "parameters": [{"key": FORCE, "deviation": 0.0}]},
          "parameters.0.deviation is 0.0 in t.toml; it must be greater than 0"),
         ({"measured": MEASURED, "droppers": {"spans": [], "deviation_mm": 2.0}}, "droppers.spans"),
+        ({"measured": MEASURED, "droppers": {"spans": [5, 5], "deviation_mm": 2.0}},
+         "must name each span once"),
+        ({"measured": {**MEASURED, "from_m": 300.0, "to_m": 200.0}, "parameters": SOUGHT},
+         "must have to_m greater than from_m, but they are 200 and 300"),
         ({"measured": {**MEASURED, "force": {"column": "F", "noise": 1.0, "unit": "kg"}},
           "parameters": SOUGHT}, "measured.force.unit"),
     ],
@@ -391,7 +395,11 @@ def test_python_gives_the_same(files: Path) -> None:
 @pytest.mark.parametrize(
     ("task", "told"),
     [
-        (TASK.replace("static_force_N", "statik_force_N"), "did you mean"),
+        (
+            TASK.replace("static_force_N", "statik_force_N"),
+            "in parameters.0.key of the task is unknown; did you mean",
+        ),
+        (TASK.replace(FORCE, "line.n_spans").replace("117.0", "6.0"), "is a whole number"),
         (TASK.replace(FORCE, "train.speed_km_h").replace("117.0", "250.0"), "moves the pantograph"),
         (TASK.replace("[measured]", "[measured]\npantograph = 2"), "train of the scene has 1"),
         (TASK + f'\n[[parameters]]\nkey = "{FORCE}"\ndeviation = 1.0', "is looked for twice"),

@@ -294,6 +294,10 @@ def test_bounds_of_values_are_bounds_of_changes() -> None:
             {"key": "line.dropper.pre_sag_mm", "entries": [[1], [10]], "change": [-1.0, 1.0]},
             "from 1 to 9",
         ),
+        (
+            {"key": "train.speed_km_h", "change": [-4.0, 5.0], "round_to": 6.0},
+            "round_to is 6, but train.speed_km_h may change by 5 at most",
+        ),
     ],
 )
 def test_variables_that_a_case_has_not_are_refused(table: dict[str, Any], says: str) -> None:
@@ -309,6 +313,14 @@ def test_variables_that_a_case_has_not_are_refused(table: dict[str, Any], says: 
         ({"objective": {"statistic": "sigma"}}, "must be one of mean_N"),
         ({"constraints": [{"statistic": "min_N"}]}, "at_least or at_most"),
         ({"serch": {}}, "did you mean"),
+        *(
+            (
+                {"variables": [{"key": "a", "change": [-1.0, 1.0], "entries": entries}]},
+                r"variables.0.entries is .* in the table of the task; it must be symmetric, free, "
+                "together or lists",
+            )
+            for entries in ([], [[]], [[0]], "some")
+        ),
         ({"set": {"directions": ["forward", "forward"]}}, "name a direction once"),
     ],
 )

@@ -221,7 +221,7 @@ def test_a_step_follows_from_the_size_of_a_value() -> None:
         ("line.topology", "line.topology has no value in this scene that is a number"),
         ("pantographs.reference.masses_kg.7", "masses_kg.7 has no value in this scene"),
         ("line.curve.radius_m", "has no value in this scene"),
-        ("line.n_spans", "must be a whole number"),
+        ("line.n_spans", "is a whole number, by which a march has no derivative"),
         ("irregularities.dropper_lengths.3.44", "and 9 droppers in this one"),
         ("irregularities.dropper_lengths.99.4", "names no dropper: the line has 22 spans"),
     ],
@@ -259,7 +259,7 @@ def test_a_ready_pantograph_keeps_its_numbers() -> None:
 
 
 def test_the_geometry_of_the_mesh_is_no_parameter() -> None:
-    for key in ("line.dropper.positions_m.2", "numerics.dt_s"):
+    for key in ("line.dropper.positions_m.2", "numerics.dt_s", "line.n_spans"):
         with pytest.raises(InputError, match="by which a march has no derivative"):
             sensitivity_of(load_scene(CASE, TINY), [key], MPI.COMM_SELF)
 

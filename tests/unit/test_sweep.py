@@ -366,8 +366,8 @@ def test_statistics_are_drawn_over_the_key_with_numbers() -> None:
         "leading, law soft": [(200.0, 200.0), (300.0, 300.0)],
     }
     assert figure.axes[1].get_xlabel() == "train speed [km/h]"
-    assert figure.axes[0].get_ylabel() == "standard deviation, 0-20 Hz [N]"
-    assert figure.axes[1].get_ylabel() == "largest uplift at arms [mm]"
+    assert figure.axes[0].get_ylabel() == "standard deviation,\n0-20 Hz [N]"
+    assert figure.axes[1].get_ylabel() == "largest uplift at\narms [mm]"
 
 
 def test_words_stand_on_the_axis_where_no_key_has_numbers() -> None:

@@ -134,10 +134,51 @@ def test_pictures_show_their_runs(sample: dict[str, Any] | None) -> None:
     convergence = output.convergence(table, ["std_N"])
     assert convergence is not None
     mean = convergence.axes[0].lines[0]
-    assert mean.get_ydata()[-1] == pytest.approx(table.of("std_N")["first"]["std_N"].mean())
+    worst = table.of("std_N")["second"]["std_N"]  # by 5 N
+    assert mean.get_ydata()[-1] == pytest.approx(worst.mean())
+    assert convergence.axes[0].get_title(loc="left") == "second, the worst one"
     histogram = output.histograms(table, ["std_N"])
     assert histogram is not None
     assert sum(bar.get_height() for bar in histogram.axes[0].patches) == 60
+
+
+def test_the_quantile_of_a_minimum_is_the_low_one() -> None:
+    """Of least forces 1 to 40 N one in twenty is below 2.95 N, of deviations one above 38.05 N."""
+    rows = [
+        {"variant": f"v{i}", SPEED: float(i), "outcome": "done", "pantograph": name,
+         "std_N": float(i), "min_N": float(i) + shift}
+        for i in range(1, 41)
+        for name, shift in (("first", 5.0), ("second", 0.0))
+    ]  # fmt: skip
+    table = run_table(rows)
+    for statistic, expected in (("min_N", 2.95), ("std_N", 38.05)):
+        drawn = output.convergence(table, [statistic])
+        assert drawn is not None
+        ends = [line.get_ydata()[-1] for line in drawn.axes[0].lines]
+        assert ends[3] == pytest.approx(expected)  # after the mean and its bounds
+    histogram = output.histograms(table, ["min_N"])
+    assert histogram is not None
+    uprights = [line.get_xdata()[0] for line in histogram.axes[0].lines]
+    assert uprights == pytest.approx([25.5, 7.95, 20.5, 2.95])
+
+
+def test_rows_that_are_drawn_of_many_lie_in_all_of_the_space() -> None:
+    """Every fourth point of a Sobol sequence lies in one half of an interval."""
+    from scipy.stats import qmc
+
+    speeds = qmc.Sobol(1, seed=1).random_base2(12)[:4000, 0]
+    assert np.ptp(speeds[::4]) < 0.51
+    rows = [
+        {"variant": f"v{i}", SPEED: own, "outcome": "done", "std_N": own}
+        for i, own in enumerate(speeds.tolist())
+    ]
+    drawn = output.parallel_coordinates(run_table(rows))
+    assert drawn is not None
+    (lines,) = drawn.axes[0].collections
+    starts = np.array([own[0, 1] for own in lines.get_segments()])
+    assert starts.size == 1000
+    # Binomial of 1000: 4 deviations are 63.
+    assert (starts < 0.5).sum() == pytest.approx(500, abs=63)
 
 
 def test_few_samples_of_two_pantographs_have_no_curve_of_convergence() -> None:

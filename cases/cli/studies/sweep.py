@@ -96,6 +96,7 @@ def sweep(
     runs: StudyRuns,
 ) -> int:
     """Collective."""
+    from catenary.base.parallel import on_root
     from catenary.cases.studies.sampling.samples import samples
     from catenary.cases.studies.sampling.tables import read_sampling
     from catenary.cases.studies.sweep.jobs import check_statistics, parse_part
@@ -135,7 +136,12 @@ def sweep(
     if len(made.refused) > _SHOWN_REFUSED:
         console.warn(f"{len(made.refused) - _SHOWN_REFUSED} more variants are not run")
     if own is not None:
-        return verdict(run_part(made, own, out, comm, options), "sweep")
+        ended = run_part(made, own, out, comm, options)
+        if sampling is not None:
+            from catenary.cases.studies.uncertainty.run_table import write_sampling
+
+            on_root(comm, lambda: write_sampling(out / own.folder, sampling))
+        return verdict(ended, "sweep")
     command = f"catenary sweep {words.case}"
     drawn = _names(plotted)
     lines = drawn if sampling is None else None  # samples are drawn as points
@@ -145,7 +151,6 @@ def sweep(
     if sampling is None:
         text = sweep_output.as_text(ended)
     else:
-        from catenary.base.parallel import on_root
         from catenary.cases.result_folder.folder_lock import held
         from catenary.cases.studies.uncertainty import output
 

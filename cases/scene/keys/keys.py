@@ -63,8 +63,8 @@ def _known_keys(
 
 
 def kind_of(table: type[BaseModel]) -> str:
-    """The ``type`` of a table that is one of several kinds, "" if it has none."""
-    field = table.model_fields.get("type")
+    """The ``type`` or ``kind`` of a table that is one of several, "" if it has none."""
+    field = table.model_fields.get("type", table.model_fields.get("kind"))
     choices = typing.get_args(field.annotation) if field is not None else ()
     return str(choices[0]) if choices else ""
 

@@ -104,8 +104,8 @@ class FittedMarch:
             return self._scenes.all_changed(pairs)
         except InputError as error:
             raise InputError(
-                f"the search comes to a value that the scene refuses: {error}; the deviation of "
-                "its prior may be too large"
+                f"the search comes to a value that the scene refuses: {error}; mean or "
+                "deviation of its prior may be too large"
             ) from error
 
     def _at_rest(self, by: Sequence[float]) -> LineAtRest:

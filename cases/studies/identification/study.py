@@ -279,8 +279,8 @@ def _origin(parameter: Parameter) -> float:
 def _sought(scenes: ChangedScenes, task: Task) -> tuple[list[Parameter], list[Unknown]]:
     """The parameters of the scene that are looked for, and their priors."""
     parameters, unknowns = [], []
-    for one in task.parameters:
-        parameter = scenes.parameter(one.key)
+    for number, one in enumerate(task.parameters):
+        parameter = scenes.parameter(one.key, f"in parameters.{number}.key of the task")
         own = _origin(parameter)
         if one.mean is not None and len(parameter.values) > 1:
             raise InputError(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from catenary.cases.scene.keys.table import Table
 from catenary.cases.studies.measured.description import NAME, POSITIVE, Measured
@@ -31,6 +31,13 @@ class Droppers(Table):
 
     spans: Annotated[list[Annotated[int, Field(ge=1)]], Field(min_length=1, max_length=1000)]
     deviation_mm: POSITIVE
+
+    @field_validator("spans")
+    @classmethod
+    def _differ(cls, given: list[int]) -> list[int]:
+        if len(set(given)) < len(given):
+            raise ValueError("must name each span once")
+        return given
 
 
 class Task(Table):

@@ -99,6 +99,11 @@ class Measured(Table):
             raise ValueError("must name the column of one of place and time")
         if self.force is None and self.head_height is None:
             raise ValueError("must name the column of force, of head_height, or of both")
+        if self.from_m is not None and self.to_m is not None and self.to_m <= self.from_m:
+            raise ValueError(
+                f"must have to_m greater than from_m, but they are {self.to_m:g} and "
+                f"{self.from_m:g}"
+            )
         return self
 
 

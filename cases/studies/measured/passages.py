@@ -35,7 +35,7 @@ def read_table(path: Path) -> pd.DataFrame:
         If it is none.
     """
     text = read_text(path, str(path))
-    semicolons = ";" in text
+    semicolons = any(";" in line.partition("#")[0] for line in text.splitlines())
     try:
         return pd.read_csv(
             io.StringIO(text.replace(",", ".") if semicolons else text),
@@ -118,11 +118,14 @@ def evened_out(places: np.ndarray, path: str) -> np.ndarray:
     if len(places) < LEAST_SAMPLES:
         raise InputError(f"{path} has {len(places)} rows; at least {LEAST_SAMPLES} are needed")
     even = np.linspace(places[0], places[-1], len(places))
-    spacing = even[1] - even[0]
-    if spacing <= 0.0 or np.abs(np.diff(places) - spacing).max() > _EVEN * spacing + 1e-4:
+    spacing, spacings = even[1] - even[0], np.diff(places)
+    if spacing <= 0.0 or np.abs(spacings - spacing).max() > _EVEN * spacing + 1e-4:
+        usual = float(np.median(spacings))
+        row = int(np.abs(spacings - usual).argmax()) + 2
         raise InputError(
-            f"{path} must have equidistant samples in ascending order; resample it at even "
-            "steps of place or time"
+            f"{path} must have equidistant samples in ascending order, but row {row} stands "
+            f"{spacings[row - 2]:.4g} m behind the row before, and others {usual:.4g} m; resample "
+            "it at even steps of place or time, or cut it at gaps"
         )
     return even
 

@@ -100,7 +100,7 @@ def make_plan(draft: Draft, task: OptimiseTask) -> Plan:
     whole = draft.scene()
     searched = _shortened(draft) if task.search.short else draft
     own = (parse_assignment(text, "search.values:") for text in task.search.values)
-    searched = searched.assigned((key, value, "search.values") for key, value in own)
+    searched = searched.assigned((key, value, "in search.values") for key, value in own)
     scenes = _of_any_values(SceneSet(searched, members_of(task.set)).checked())
     variables = variables_of(task.variables, whole)
     checks = [Check(one.name, _of_any_values(one.scenes)) for one in checks_of(draft, task)]

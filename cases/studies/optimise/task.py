@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import (
+    Field,
+    ValidationError,
+    ValidatorFunctionWrapHandler,
+    WrapValidator,
+    model_validator,
+)
 
 from catenary.cases.scene.keys.table import Table
 from catenary.cases.scene.line.imperfections import Seed
@@ -12,14 +18,31 @@ from catenary.cases.studies.scene_sets.scene_set import BoundTable, SetTable, St
 
 GRADIENT, CMA = "gradient", "cma"
 Bounds = Annotated[list[float], Field(min_length=2, max_length=2)]
-Number = Annotated[int, Field(ge=1, le=10_000)]
+_Number = Annotated[int, Field(ge=1, le=10_000)]
+_Alike = Annotated[list[_Number], Field(min_length=1)]
+
+
+def _in_one_sentence(given: Any, check: ValidatorFunctionWrapHandler) -> Any:
+    try:
+        return check(given)
+    except ValidationError as error:
+        raise ValueError(
+            "must be symmetric, free, together or lists of the numbers, from 1, of entries that "
+            "change alike, such as [[1, 9], [2, 8]]"
+        ) from error
+
+
+Entries = Annotated[
+    Literal["symmetric", "free", "together"] | Annotated[list[_Alike], Field(min_length=1)],
+    WrapValidator(_in_one_sentence),
+]
 
 
 class VariableTable(Table):
     """A key of the scene that is varied: a number, or the entries of a list."""
 
     key: str = Field(min_length=1, max_length=200, description="dotted key of the scene")
-    entries: Literal["symmetric", "free", "together"] | list[list[Number]] = Field(
+    entries: Entries = Field(
         "symmetric",
         description="of a list: symmetric entries about its middle change alike, each is free, all "
         "change together, or lists of the numbers, from 1, of entries that change alike",

@@ -145,10 +145,10 @@ def _classes(table: VariableTable, n: int, number: int) -> list[tuple[int, ...]]
         is_place = table.key.endswith(_PLACES)  # the one in the middle stays there
         return pairs if is_place or n % 2 == 0 else [*pairs, (n // 2,)]
     given = [entry for own in table.entries for entry in own]
-    if len(set(given)) < len(given) or max(given, default=0) > n or not all(table.entries):
+    if len(set(given)) < len(given) or max(given) > n:
         raise InputError(
             f"variables.{number}.entries must name each entry of {table.key} once at most, from 1 "
-            f"to {n}, in lists that are not empty"
+            f"to {n}"
         )
     return [tuple(entry - 1 for entry in own) for own in table.entries]
 
@@ -175,5 +175,10 @@ def _component(
         high = float(np.where(up, most - own, own - least).min())
         if high <= low:
             raise InputError(f"variables.{number}.bounds leave {table.key} no change")
+    if table.round_to is not None and table.round_to > max(-low, high):
+        raise InputError(
+            f"variables.{number}.round_to is {table.round_to:g}, but {table.key} may change by "
+            f"{max(-low, high):g} at most, so that no whole multiple is left but none"
+        )
     step = table.step or _USUAL_STEP * (high - low)
     return Component(table.key, entries, signs, low, high, step, table.round_to or 0.0)

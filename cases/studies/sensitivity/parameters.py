@@ -156,13 +156,13 @@ class ChangedScenes:
             _change(raw, parameter, by)
         return self._checked(raw)
 
-    def parameter(self, key: str) -> Parameter:
-        """The parameter of a key.
+    def parameter(self, key: str, where: str = "in --parameter") -> Parameter:
+        """The parameter of a key; ``where`` it was written, for sentences.
 
         Raises
         ------
         InputError
-            If the scene has no number there, or if a ready pantograph has it.
+            If the scene has no number there or a whole one, or if a ready pantograph has it.
         """
         if dropper := _OF_DROPPER.fullmatch(key):
             return self._length_of(key, *map(int, dropper.groups()))
@@ -171,7 +171,7 @@ class ChangedScenes:
         if not is_known(key, known) and not (
             parts[-1].isdigit() and is_known(key.rpartition(".")[0], known)
         ):
-            raise InputError(unknown_key(key, "in --parameter", known))
+            raise InputError(unknown_key(key, where, known))
         if parts[0] == "pantographs" and len(parts) > 2:
             if self._is_ready(parts[1]):
                 model = self._raw["pantographs"][parts[1]]["model"]
@@ -185,7 +185,9 @@ class ChangedScenes:
                 f"{shown(key)[1:-1]} has no value in this scene that is a number, by which a march "
                 "could be differentiated"
             )
-        return Parameter(key, values)
+        if any(isinstance(one, int) for one in values):
+            raise InputError(f"{key} is a whole number, by which a march has no derivative")
+        return Parameter(key, tuple(map(float, values)))
 
     def droppers(self) -> list[Parameter]:
         """The length of each dropper in the evaluated stretch."""
@@ -260,14 +262,14 @@ class ChangedScenes:
                 else:
                     yield own
 
-    def _values(self, key: str) -> tuple[float, ...] | None:
+    def _values(self, key: str) -> tuple[float | int, ...] | None:
         above, _, place = key.rpartition(".")
         holder, value = value_at(self._raw, above), value_at(self._raw, key)
         if place == _FORCE and isinstance(holder, dict) and holder.get(_BY_SPEED):
             speeds, forces = np.array(holder[_BY_SPEED]).T
             return (float(np.interp(self._raw["train"]["speed_km_h"], speeds, forces)),)
         values = value if isinstance(value, list) else [value]
-        return tuple(map(float, values)) if values and all(map(is_number, values)) else None
+        return tuple(values) if values and all(map(is_number, values)) else None
 
     @staticmethod
     def _checked(raw: dict[str, Any]) -> Scene:

@@ -198,7 +198,7 @@ def draw(table: Sequence[Mapping[str, Any]], keys: Sequence[str], plotted: Seque
             y = [np.nan if row[name] is None else float(row[name]) for row in own]
             order = np.argsort(x, kind="stable")
             figures.curve(axes, np.array(x)[order], np.array(y)[order], number, label, "o-")
-        figures.tidy(axes, "", STATISTICS[name].meaning)
+        figures.tidy(axes, "", figures.wrapped(STATISTICS[name].meaning))
     if len(curves) <= _MOST_LABELS:
         figures.legend_above(panels[0], columns=min(len(curves), 3))
     if key is None:

@@ -142,6 +142,7 @@ def _of_key(table: KeyErrors, tables: dict[str, Any], where: str) -> Group:
     own = value if number is None else value_at(value, str(number - 1))
     if not is_number(own):
         at = "" if number is None else f" at entry {number}"
-        raise InputError(f"{where}.key is {table.key}, which has no number{at} in the scene")
+        hint = f"; {where}.entry names one of its list" if isinstance(own, list) else ""
+        raise InputError(f"{where}.key is {table.key}, which has no number{at} in the scene{hint}")
     one = np.ones(1, dtype=bool)
     return Group(table, [table.key], one, unit_of(table.key), [None], value)

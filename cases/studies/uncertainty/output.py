@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from textwrap import fill
 
 import numpy as np
+import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
@@ -23,23 +23,60 @@ from catenary.cases.studies.uncertainty.evaluation import (
     evaluate,
     independent_runs,
 )
-from catenary.cases.studies.uncertainty.run_table import SAMPLING, RunTable, run_table
+from catenary.cases.studies.uncertainty.run_table import RunTable, run_table, sampling_file
 from catenary.cases.studies.uncertainty.sensitivity import ranked_inputs
 from catenary.postproc.evaluate.wording import capital
 from catenary.postproc.report.pictures import figures
 from catenary.postproc.report.study_table import Column, Content, StudyTable, write_files
 
-# Panels, points and lines that a picture has room for; of more, evenly chosen ones are drawn.
+# Panels, points and lines that a picture has room for.
 _MOST_KEYS, _MOST_STATISTICS, _MOST_POINTS, _MOST_LINES = 6, 5, 5000, 1000
-_UPPER = 0.95  # quantile that is drawn
+_LOW, _HIGH = 0.05, 0.95  # quantiles that are drawn and printed
+# Statistics of which the low quantile is the adverse one: little of them is bad.
+_BAD_IF_LOW = ("min_N", "stat_min_N", "min_dropper_force_N")
 _MANY = 300  # points that are drawn small
+_MOST_TICKS = 10  # along a row of panels
+_WIDTH_OF_LABEL, _WIDTH_OF_ALL = 23, 100  # characters of a line: of a label, of all in a row
 _STEPS, _LEAST_SAMPLES = 25, 10  # points of a curve of convergence, and where it begins
+_ADVERSE = f"{100 * _HIGH:g} % quantile, of minima {100 * _LOW:g} %"
+_SEED = 1  # of the choice of rows that are drawn
 
 
 def drawn_statistics(table: RunTable, wanted: Sequence[str] = ()) -> list[str]:
     """The statistics that are drawn: the wanted ones, else the usual ones, else the first."""
     usual = [name for name in wanted or PLOTTED if name in table.statistics]
     return usual or table.statistics[:_MOST_STATISTICS]
+
+
+def adverse_probability(name: str) -> float:
+    """Probability of the quantile at the adverse end of a statistic."""
+    return _LOW if name in _BAD_IF_LOW else _HIGH
+
+
+def worst_pantograph(table: RunTable, name: str) -> tuple[str, pd.DataFrame]:
+    """Pantograph whose statistic has the worst adverse quantile, and its rows with the statistic.
+
+    Returns
+    -------
+    str
+        Its name; empty for a statistic of the line.
+    DataFrame
+        Its rows, in the order of the table.
+    """
+    known = {one: rows[rows[name].notna()] for one, rows in table.of(name).items()}
+    probability = adverse_probability(name)
+    sign = -1.0 if probability == _LOW else 1.0
+    worst = max(known, key=lambda one: sign * known[one][name].quantile(probability))
+    return worst, known[worst]
+
+
+def _some(rows: pd.DataFrame, most: int) -> pd.DataFrame:
+    """Rows, or ``most`` of them at random, in their order. Every k-th of Sobol points or of
+    Saltelli's blocks would leave out parts of the space."""
+    if len(rows) <= most:
+        return rows
+    chosen = np.random.default_rng(_SEED).choice(len(rows), most, replace=False)
+    return rows.iloc[np.sort(chosen)]
 
 
 @figures.own_style()
@@ -53,16 +90,20 @@ def scatter(table: RunTable, wanted: Sequence[str] = ()) -> Figure | None:
     for row, name in zip(panels, statistics, strict=True):
         for axes, key in zip(row, keys, strict=True):
             for number, (pantograph, rows) in enumerate(table.of(name).items()):
-                some = rows.iloc[:: -(-len(rows) // _MOST_POINTS)]
+                some = _some(rows, _MOST_POINTS)
                 figures.curve(
                     axes, some[key], some[name], number, pantograph or None, "o",
                     ms=4.0 if len(some) < _MANY else 1.5, alpha=0.6, mew=0.0,
                 )  # fmt: skip
             _panel(axes, "", _meaning(name) if key == keys[0] else "")
+    most = max(2, _MOST_TICKS // len(keys))
     for axes, key in zip(panels[-1], keys, strict=True):
-        axes.set_xlabel(fill(key_in_words(key), 26), fontsize="small")
+        axes.xaxis.set_major_locator(figures.FewTicks(most, steps=figures.STEPS))
+        axes.set_xlabel(_beside(key_in_words(key), len(keys)), fontsize="small")
     if len(table.of(statistics[0])) > 1:
-        figures.legend_above(panels[0][-1])
+        legend = figures.legend_above(panels[0][-1])
+        for handle in legend.get_lines():
+            handle.set(markersize=4.0, alpha=1.0)
     return figure
 
 
@@ -70,16 +111,17 @@ def scatter(table: RunTable, wanted: Sequence[str] = ()) -> Figure | None:
 def parallel_coordinates(table: RunTable, wanted: Sequence[str] = ()) -> Figure | None:
     """A line for each run through its inputs and a statistic, by which it is coloured.
 
-    Each axis runs from the least to the greatest value. None with fewer than two axes.
+    Independent samples only, of the worst pantograph. Each axis runs from the least to the greatest
+    value. None with fewer than two axes.
     """
+    table = independent_runs(table)
     keys, statistics = ranked_inputs(table), drawn_statistics(table, wanted)
     if not keys or not statistics:
         return None
     name = "std_N" if "std_N" in statistics else statistics[0]
-    pantograph, rows = next(iter(table.of(name).items()))
+    pantograph, rows = worst_pantograph(table, name)
     axes_names = [*keys[:_MOST_KEYS], name]
-    numbers = rows[axes_names].dropna().to_numpy(float)
-    numbers = numbers[:: max(1, -(-len(numbers) // _MOST_LINES))]
+    numbers = _some(rows[axes_names].dropna(), _MOST_LINES).to_numpy(float)
     if len(numbers) < 2:
         return None
     low, high = numbers.min(axis=0), numbers.max(axis=0)
@@ -97,9 +139,10 @@ def parallel_coordinates(table: RunTable, wanted: Sequence[str] = ()) -> Figure 
     axes.set_xlim(-0.2, len(x) - 0.8)
     axes.set_ylim(-0.02, 1.02)
     axes.set_yticks([])
+    meanings = [*map(key_in_words, axes_names[:-1]), _meaning(name)]
     labels = [
-        f"{_meaning(one) if one == name else key_in_words(one)}\n{a:.5g} to {b:.5g}"
-        for one, a, b in zip(axes_names, low, high, strict=True)
+        f"{a:.5g} to {b:.5g}\n{_beside(meaning, len(meanings))}"
+        for meaning, a, b in zip(meanings, low, high, strict=True)
     ]
     axes.set_xticks(x, labels, fontsize="small")
     for place in x:
@@ -113,13 +156,14 @@ def parallel_coordinates(table: RunTable, wanted: Sequence[str] = ()) -> Figure 
 
 @figures.own_style()
 def convergence(table: RunTable, wanted: Sequence[str] = ()) -> Figure | None:
-    """Mean and 95 % quantile with their bounds over the number of samples; None of fewer than 10.
+    """Mean and adverse quantile with their bounds over the number of samples; None of fewer than
+    10.
 
-    Samples are taken in their order, independent ones only, of the first pantograph.
+    Samples are taken in their order, independent ones only, of the worst pantograph.
     """
     table = independent_runs(table)
-    first = {name: next(iter(table.of(name).items())) for name in drawn_statistics(table, wanted)}
-    samples = {name: rows[name].dropna().to_numpy(float) for name, (_, rows) in first.items()}
+    worst = {name: worst_pantograph(table, name) for name in drawn_statistics(table, wanted)}
+    samples = {name: rows[name].to_numpy(float) for name, (_, rows) in worst.items()}
     samples = {name: x for name, x in samples.items() if len(x) >= _LEAST_SAMPLES}
     if not samples:
         return None
@@ -128,14 +172,13 @@ def convergence(table: RunTable, wanted: Sequence[str] = ()) -> Figure | None:
     for axes, (name, x) in zip(panels, samples.items(), strict=True):
         counts = np.unique(np.geomspace(_LEAST_SAMPLES, len(x), _STEPS).round().astype(int))
         means = np.array([student(x[:n]) for n in counts])
-        uppers = np.array([quantile(x[:n], _UPPER) for n in counts])
-        for number, (label, found) in enumerate(
-            (("mean", means), (f"{100 * _UPPER:g} % quantile", uppers))
-        ):
+        adverse = np.array([quantile(x[:n], adverse_probability(name)) for n in counts])
+        for number, (label, found) in enumerate((("mean", means), (_ADVERSE, adverse))):
             figures.curve(axes, counts, found[:, 0], number, label, ".-")
             for bound in (found[:, 1], found[:, 2]):
                 figures.curve(axes, counts, bound, number, None, "--", 0.7)
-        _panel(axes, "", _meaning(name), first[name][0])
+        several = len(table.of(name)) > 1
+        _panel(axes, "", _meaning(name), f"{worst[name][0]}, the worst one" if several else "")
     panels[-1].set_xlabel("number of samples; dashed: 95 % confidence", fontsize="small")
     panels[-1].set_xscale("log")
     panels[-1].xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
@@ -147,7 +190,7 @@ def convergence(table: RunTable, wanted: Sequence[str] = ()) -> Figure | None:
 
 @figures.own_style()
 def histograms(table: RunTable, wanted: Sequence[str] = ()) -> Figure | None:
-    """Histogram of each statistic with its median and 95 % quantile; None without any."""
+    """Histogram of each statistic with its median and adverse quantile; None without any."""
     table = independent_runs(table)
     statistics = drawn_statistics(table, wanted)
     if not statistics:
@@ -161,19 +204,24 @@ def histograms(table: RunTable, wanted: Sequence[str] = ()) -> Figure | None:
             bins = min(60, len(np.histogram_bin_edges(x, "fd")))
             colour = figures.colour(number)
             axes.hist(x, bins=bins, color=colour, alpha=0.5, label=pantograph or None)
-            for probability, look in ((0.5, "-"), (_UPPER, "--")):
+            for probability, look in ((0.5, "-"), (adverse_probability(name), "--")):
                 axes.axvline(float(np.quantile(x, probability)), color=colour, ls=look, lw=1.2)
         _panel(axes, _meaning(name), "runs")
     if len(table.of(statistics[0])) > 1:
         figures.legend_above(panels[0])
-    panels[0].set_title("solid: median, dashed: 95 % quantile", loc="left", fontsize="medium")
+    panels[0].set_title(f"solid: median, dashed: {_ADVERSE}", loc="left", fontsize="medium")
     return figure
 
 
 def _panel(axes: Axes, x: str, y: str, title: str = "") -> None:
     figures.tidy(axes, x, y, title)
-    axes.yaxis.label.set_fontsize("small")
+    axes.set_ylabel(figures.wrapped(y), fontsize="small")
     axes.xaxis.label.set_fontsize("small")
+
+
+def _beside(label: str, n: int) -> str:
+    """One of ``n`` labels side by side."""
+    return figures.wrapped(label, min(_WIDTH_OF_LABEL, _WIDTH_OF_ALL // n))
 
 
 def _meaning(name: str) -> str:
@@ -188,7 +236,6 @@ PICTURES = {
     "uncertainty_convergence.png": convergence,
     "uncertainty_histogram.png": histograms,
 }
-_LOW, _HIGH = 0.05, 0.95
 _MOST_REMARKS = 5  # on a terminal; all are in the file
 
 
@@ -206,7 +253,7 @@ def write(
     """
     content: dict[str, Content] = {RECORD: vars(found)}
     if table.sampling is not None:
-        content[SAMPLING] = table.sampling.model_dump(exclude_none=True)
+        content |= sampling_file(table.sampling)
     for name, draw in PICTURES.items():
         content[name] = partial(draw, table, plotted)
     return write_files(out, content)
@@ -256,6 +303,7 @@ def _statistics(found: Uncertainty) -> StudyTable:
         Column("mean_bounds", "95 %", ">"),
         Column("standard_deviation", "std", ".3g"),
         Column("low", f"q{100 * _LOW:g} %", ".4g"),
+        Column("low_bounds", "95 %", ">"),
         Column("high", f"q{100 * _HIGH:g} %", ".4g"),
         Column("high_bounds", "95 %", ">"),
     ]
@@ -269,6 +317,7 @@ def _statistics(found: Uncertainty) -> StudyTable:
         shown = {
             "mean_bounds": _bounds(row, "mean"),
             "low": low["value"],
+            "low_bounds": _bounds(low, "value"),
             "high": high["value"],
             "high_bounds": _bounds(high, "value"),
         }

@@ -13,6 +13,7 @@ from catenary.base.errors import InputError
 from catenary.cases.studies.sampling.tables import SamplingTable, sampling_of
 from catenary.cases.studies.sweep.jobs import OF_LINE
 from catenary.cases.studies.sweep.output import PARQUET, TABLE
+from catenary.postproc.report.study_table import Content, write_files
 
 SAMPLING = "sampling.json"
 DONE = "done"
@@ -136,6 +137,16 @@ def read_run_table(path: Path) -> RunTable:
         said = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise InputError(f"{file} cannot be read as a table of runs: {said}") from error
     return run_table(frame, read_sampling_beside(folder), str(file))
+
+
+def sampling_file(sampling: SamplingTable) -> dict[str, Content]:
+    """File with the sampling of a table, which stands beside the table."""
+    return {SAMPLING: sampling.model_dump(exclude_none=True)}
+
+
+def write_sampling(folder: Path, sampling: SamplingTable) -> None:
+    """Write the sampling of a table into the table's folder. Not collective."""
+    write_files(folder, sampling_file(sampling))
 
 
 def read_sampling_beside(folder: Path) -> SamplingTable | None:

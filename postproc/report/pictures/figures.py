@@ -10,6 +10,7 @@ import io
 import logging
 import warnings
 from collections.abc import Callable, Iterator
+from textwrap import fill
 from typing import Any
 
 import matplotlib
@@ -44,7 +45,7 @@ _LEFT, _RIGHT, _ABOVE, _BELOW = 0.9, 0.2, 0.32, 0.52
 _SHARED_GAP = 0.44
 # Intervals between ticks at most, along x and y, and their sizes: a tick with its label and its
 # line of the grid takes as long to draw as a curve.
-_MOST_TICKS, _STEPS = (8, 5), (1.0, 2.0, 2.5, 5.0, 10.0)
+_MOST_TICKS, STEPS = (8, 5), (1.0, 2.0, 2.5, 5.0, 10.0)
 # Compression of a PNG: a higher level costs half as much time again and saves a twentieth.
 _LEVEL = 3
 
@@ -212,7 +213,7 @@ def tidy(axes: Axes, x_label: str, y_label: str, title: str = "") -> None:
     """
     for axis, most in zip((axes.xaxis, axes.yaxis), _MOST_TICKS, strict=True):
         if isinstance(axis.get_major_locator(), AutoLocator):
-            axis.set_major_locator(FewTicks(most, steps=_STEPS))
+            axis.set_major_locator(FewTicks(most, steps=STEPS))
     axes.set_xlabel(x_label)
     axes.set_ylabel(y_label)
     _fix_labels(axes)
@@ -221,6 +222,12 @@ def tidy(axes: Axes, x_label: str, y_label: str, title: str = "") -> None:
     axes.set_axisbelow(True)
     for side in ("top", "right"):
         axes.spines[side].set_visible(False)
+
+
+def wrapped(label: str, width: int = 22) -> str:
+    """A label in lines of at most ``width`` characters, its unit on the line of its last word."""
+    kept = fill(label.replace(" [", "\u00a0["), width, break_on_hyphens=False)
+    return kept.replace("\u00a0", " ")
 
 
 def log_log(axes: Axes) -> None:
