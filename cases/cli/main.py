@@ -82,12 +82,12 @@ def main() -> None:
         console.complain(f"interrupted by {stopped.name}")
         sys.stdout.flush()
         sys.stderr.flush()
-        # What was in the making holds objects of PETSc, which is not to free them half made.
+        # Unfinished objects hold some of PETSc, which is not to free them half made.
         os._exit(console.BROKEN)
     except typer.Abort:
         code = console.BROKEN
     except OSError as error:
-        # What --version prints, and what typer prints of --help.
+        # The output of --version, and that of --help by typer.
         if not isinstance(error, console.OutputLost) and not _OF_HELP.intersection(sys.argv):
             raise
         code = console.tell_output_lost(error)

@@ -45,14 +45,14 @@ class Finding:
 
     part: str
     state: str
-    says: str
+    facts: str
     remedy: str = ""
     needed: bool = False
 
     def line(self) -> str:
         """The finding in one line."""
         mend = f"; to mend it: {self.remedy}" if self.state != OK else ""
-        return f"{self.state:8} {self.part:15} {self.says}{mend}"
+        return f"{self.state:8} {self.part:15} {self.facts}{mend}"
 
     @property
     def prevents_runs(self) -> bool:
@@ -214,8 +214,8 @@ def _packages() -> Iterator[Finding]:
         if _fits(version, bounds):
             fine.append(f"{name[0]} {version}")
         else:
-            says = f"{version} is outside of {bounds.strip()}"
-            yield Finding(name[0], BROKEN, says, f"{_SETUP}; it may work all the same")
+            facts = f"{version} is outside of {bounds.strip()}"
+            yield Finding(name[0], BROKEN, facts, f"{_SETUP}; it may work all the same")
     yield Finding("packages", OK, ", ".join(fine))
 
 
@@ -290,21 +290,23 @@ def _folder(folder: Path) -> Finding:
     except OSError as error:
         said = f"{folder} cannot be written to ({(error.strerror or str(error)).lower()})"
         return Finding(part, BROKEN, said, elsewhere)
-    says = f"{folder} can be written to, {free / 1e9:.0f} GB are free"
+    facts = f"{folder} can be written to, {free / 1e9:.0f} GB are free"
     if lacking:
-        why = f"{says}, but it has no {' and no '.join(lacking)}: two runs may write to one folder"
+        why = f"{facts}, but it has no {' and no '.join(lacking)}: two runs may write to one folder"
         return Finding(part, MISSING, why, elsewhere)
-    return Finding(part, OK, f"{says}, files can be locked")
+    return Finding(part, OK, f"{facts}, files can be locked")
 
 
 def _memory() -> Finding:
     limit, _ = resource.getrlimit(resource.RLIMIT_AS)
     free = _available()
     limited = "" if limit == resource.RLIM_INFINITY else f", ulimit -v {limit / 1e9:.1f} GB"
-    says = f"{free / 1e9:.1f} GB available{limited}, {len(os.sched_getaffinity(0))} cores"
+    facts = f"{free / 1e9:.1f} GB available{limited}, {len(os.sched_getaffinity(0))} cores"
     if free < _LEAST_MEMORY:
-        return Finding("memory", BROKEN, f"only {says}", "end other programs; `plan` says how much")
-    return Finding("memory", OK, says)
+        return Finding(
+            "memory", BROKEN, f"only {facts}", "end other programs; `plan` says how much"
+        )
+    return Finding("memory", OK, facts)
 
 
 def _available() -> float:

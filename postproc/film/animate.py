@@ -29,7 +29,7 @@ _WIDTH = 110.0
 _LEAST_WIDTH = 5.0
 # Share of a picture that is behind the train.
 _BEHIND = 0.55
-# How far a picture may reach beyond what the snapshots have [m].
+# Distance by which a picture may reach beyond the snapshots [m].
 _NEAR = 3.0
 # Travel between two pictures, as a share of what they show.
 _TRAVEL = 0.01
@@ -216,7 +216,7 @@ class Pictures:
             self.chart = RingingChart(self.drawing.chart, data, blow, snapshots, numbers)
         else:
             first, last = (data.row_at(float(end)) for end in shown[[0, -1]])
-            # What the first picture shows of the force lies behind the train already.
+            # The force in the first picture lies behind the train already.
             low = self._span(first, width)[0]
             begin = min(int(x.searchsorted(low)) for x in data.position[: first + 1].T)
             rows = min(begin, first), last + 1
@@ -248,7 +248,7 @@ class Pictures:
         return middle - _BEHIND * width, middle + (1.0 - _BEHIND) * width
 
     def _seen(self, number: int) -> np.ndarray:
-        """Which nodes a picture shows at a snapshot, (n_nodes,), all where it shows none."""
+        """Mask (n_nodes,) of nodes that a picture shows at a snapshot, all where it shows none."""
         data = self._scenery.data
         row = data.row_at(float(self._snapshots.times[number]))
         low, high = self._span(row, self._width)

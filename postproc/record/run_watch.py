@@ -52,7 +52,7 @@ def watch_cadence(dt: float) -> int:
 
 
 @dataclass(frozen=True)
-class Watched:
+class WatchInputs:
     """The data of a run that its watch needs.
 
     Attributes
@@ -75,7 +75,7 @@ class Watched:
     speed: float
 
 
-def watched(at_rest: LineAtRest, has_train: bool = True) -> Watched:
+def watch_inputs(at_rest: LineAtRest, has_train: bool = True) -> WatchInputs:
     """Inputs of the watch of a run on a line at rest; without a train contacts are none. Not
     collective."""
     problem, model = at_rest.problem, at_rest.model
@@ -86,7 +86,7 @@ def watched(at_rest: LineAtRest, has_train: bool = True) -> Watched:
     outer = any(not isinstance(load, MemoryLoad) for load in model.loads)
     steady = not outer and not model.simulated.incidents
     summed = numerics.adaptive_tolerance is None
-    return Watched(
+    return WatchInputs(
         static_energy=0.5 * static * float(np.max(at_rest.lift.lift, initial=0.0)),
         counts_energy=steady and summed,
         arm_length=lengths[model.mesh.arm_group],
@@ -117,10 +117,10 @@ class RunWatch(Observer):
     remarks : sentences on what was wrong, on rank 0
     """
 
-    def __init__(self, comm: Any, run: Watched, every: int) -> None:
+    def __init__(self, comm: Any, run: WatchInputs, every: int) -> None:
         self._comm, self._run, self._every = comm, run, every
         self.remarks: list[str] = []
-        self._told: set[str] = set()
+        self._reported: set[str] = set()
         self._start: tuple[float, float] | None = None
         self._energy = self._most_energy = self._work = self._most_work = self._made = 0.0
         self._rotation = self._turned = 0.0
@@ -154,7 +154,7 @@ class RunWatch(Observer):
     def finish(self, outcome: str) -> None:
         """Tell of contacts that are lost to the end."""
         for p in np.flatnonzero(np.isfinite(self._lost_since)):
-            if f"lost {p}" in self._told:
+            if f"lost {p}" in self._reported:
                 self._say(
                     f"lost for good {p}",
                     f"Pantograph {p + 1} touches no wire from {self._lost_since[p]:.4g} s, "
@@ -238,9 +238,9 @@ class RunWatch(Observer):
         what: str,
         model: str,
     ) -> None:
-        found, told, most = value
-        if not found <= told:
-            self._say(key, f"At {self._where(view)} {what}; {model} holds up to {told:g}.")
+        found, limit, most = value
+        if not found <= limit:
+            self._say(key, f"At {self._where(view)} {what}; {model} holds up to {limit:g}.")
         if not found <= most:
             raise RunBroken(
                 f"at {self._where(view)} {what}, and {model} ends at {most:g}: look for steady "
@@ -287,8 +287,8 @@ class RunWatch(Observer):
 
     def _say(self, key: str, sentence: str) -> None:
         """Tell a sentence once."""
-        if key not in self._told:
-            self._told.add(key)
+        if key not in self._reported:
+            self._reported.add(key)
             self.remarks.append(sentence)
             if self._comm.rank == 0:
                 logger.warning(sentence)

@@ -229,12 +229,12 @@ def remark_lines(runs: Iterable[tuple[str, Sequence[str]]]) -> list[str]:
     runs : iterable of tuple
         Name of each run, and its remarks.
     """
-    told = list(runs)
+    named = list(runs)
     names: dict[str, list[str]] = {}
-    for name, remarks in told:
+    for name, remarks in named:
         for text in dict.fromkeys(remarks):
             names.setdefault(text, []).append(name)
-    return [f"REMARK      {_of(own, len(told))}: {text}" for text, own in names.items()]
+    return [f"REMARK      {_of(own, len(named))}: {text}" for text, own in names.items()]
 
 
 def _of(names: Sequence[str], n_runs: int) -> str:

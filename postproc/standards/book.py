@@ -303,8 +303,8 @@ def _sentence(failed: ValidationError) -> str:
     if fault["type"] == "missing":
         return f"has no {key}"
     if fault["type"] == "value_error":
-        says = _plain(str(fault["ctx"]["error"]), 400)
-        return says if not key else f"has {key}, which {says}"
+        sentence = _plain(str(fault["ctx"]["error"]), 400)
+        return sentence if not key else f"has {key}, which {sentence}"
     wanted = _plain(fault["msg"].removeprefix("Input "), 200)
     if not key:
         return "is no table"

@@ -19,7 +19,13 @@ from catenary.cases.scene.input.case_files import find_case
 from catenary.cases.scene.load import Draft, read_draft
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.optimise import output, study
-from catenary.cases.studies.optimise.checks import AS_IS, Row, change, not_improved, trap
+from catenary.cases.studies.optimise.checks import (
+    AS_IS,
+    Row,
+    change,
+    not_improved,
+    unseen_direction,
+)
 from catenary.cases.studies.optimise.droppers import dropper_table, least_forces
 from catenary.cases.studies.optimise.task import OptimiseTask, VariableTable
 from catenary.cases.studies.optimise.variables import variables_of
@@ -473,10 +479,12 @@ def row(check: str, direction: str, searched: bool, before: float, after: float)
 
 def test_what_gets_worse_is_told() -> None:
     rows = [row(AS_IS, "forward", True, 60.0, 45.0), row(AS_IS, "backward", False, 60.0, 63.0)]
-    assert trap(rows).endswith("by -25.0 % at most, and in the other direction by +5.0 %")
+    assert unseen_direction(rows).endswith(
+        "by -25.0 % at most, and in the other direction by +5.0 %"
+    )
     (worse,) = not_improved(rows)
     assert worse.startswith("std_N gets worse in 1 of 2 rows") and "60 to 63" in worse
-    assert trap(rows[:1]) == "" and not_improved(rows[:1]) == []
+    assert unseen_direction(rows[:1]) == "" and not_improved(rows[:1]) == []
 
 
 # --- the verb ------------------------------------------------------------------------------------

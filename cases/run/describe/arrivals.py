@@ -203,7 +203,7 @@ def _in_window(found: Arrivals, line: WaveLine, course: Course, problem: Problem
         found = found._replace(near_end=None)
     if found.far_end is None:
         return found
-    # Where this pantograph is when the window reaches the far end, and where it meets what is then
+    # Place of this pantograph when the window reaches the far end, and where it meets what is then
     # reflected there.
     leader_then = line.end - window.spans_ahead * line.span
     here = leader_then - (course.leader - course.start)

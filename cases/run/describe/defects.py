@@ -40,14 +40,14 @@ def defect_facts(scene: Scene, problem: Problem) -> list[dict[str, Any]]:
     for name in scene.irregularities.given:
         if name in problem.effects:
             table = getattr(scene.irregularities, name)
-            says = _lengths(table) if isinstance(table, LengthsTable) else _heights(table, line)
-            found.append({"type": name, "says": f"{_WHAT[name]}: {says}"})
+            sentence = _lengths(table) if isinstance(table, LengthsTable) else _heights(table, line)
+            found.append({"type": name, "says": f"{_WHAT[name]}: {sentence}"})
     for fitting in scene.line.fittings if "fittings" in problem.effects else []:
         over = f" over {fitting.length_m:g} m" if fitting.length_m else ""
-        says = f"{fitting.kind.replace('_', ' ')} of {fitting.mass_kg:g} kg{over} on the "
-        says += f"{wire_words(fitting.wire)} at {fitting.at_m:g} m"
+        sentence = f"{fitting.kind.replace('_', ' ')} of {fitting.mass_kg:g} kg{over} on the "
+        sentence += f"{wire_words(fitting.wire)} at {fitting.at_m:g} m"
         place = {"at_m": fitting.at_m, "wire": fitting.wire}
-        found.append({"type": fitting.kind, **place, "says": says})
+        found.append({"type": fitting.kind, **place, "says": sentence})
     for defect in scene.defects:
         if defect.type in problem.effects:
             found.append({"type": defect.type, **_defect(defect, line)})

@@ -97,7 +97,7 @@ def _kinematic(scene: Scene) -> Iterator[Fault]:
 
 _CORRECTED = 'scheme = "fixed_point"'
 _EXCHANGED = 'coupling = "iterated"'
-# What reads each key.
+# Choices of numerics that read each key.
 _READ_BY = {
     "eps_d_m": (_CORRECTED,),
     "eps_v_m_per_s": (_CORRECTED,),

@@ -158,7 +158,7 @@ def _strip_lengths(scene: Scene, line: LineData) -> Iterator[Fault]:
 
 
 def _farthest(scene: Scene, line: LineData, number: int) -> tuple[float, float]:
-    """Where the wire is farthest from the middle of a pantograph's strips on its run, and the
+    """Farthest place of the wire from the middle of a pantograph's strips on its run, and the
     pantograph's place then [m]."""
     place, speed = scene.train.pantographs[number], scene.train.speed_km_h / 3.6
     start = scene.train.start_m - place.behind_m
@@ -295,7 +295,7 @@ def _names(scene: Scene, kind: str, table: MultibodyTable) -> Iterator[Fault]:
     if table.actuator is not None:
         yield from scene.among(f"{key}.actuator", list(table.forces))
     for place in _uses(table):
-        # What is on one body alone would be without effect on what is at rest.
+        # A force or mass on one body alone would have no effect on the space at rest.
         on_one = place.endswith(".body")
         yield from scene.among(f"{key}.{place}", bodies if on_one else [*bodies, SPACE])
     for what in ("joints", "forces"):
@@ -352,8 +352,8 @@ def _mechanism(scene: Scene, name: str, table: MultibodyTable) -> Iterator[Fault
         yield scene.fault(key, f"cannot be built: {error}")
 
 
-def _refusal(scene: Scene, key: str, says: str) -> Fault:
-    return Fault(key, f"{key} {says} {scene.origin.of(key)}")
+def _refusal(scene: Scene, key: str, sentence: str) -> Fault:
+    return Fault(key, f"{key} {sentence} {scene.origin.of(key)}")
 
 
 def check_laws(scene: Scene) -> Iterator[Fault]:

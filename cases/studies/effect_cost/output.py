@@ -135,8 +135,8 @@ def as_text(found: Costs) -> str:
     lines += ["", leading.text(), "", "Advice:"]
     width = max(len(row.switch.name) for row in found.rows) if found.rows else 0
     lines += [f"  {row.switch.name:{width}}  {sentence(found, row)}" for row in found.rows]
-    told = remark_lines([("as it is", found.remarks), *map(_told, found.rows)])
-    lines += ["", *told] if told else []
+    remarks = remark_lines([("as it is", found.remarks), *map(_remarks_of, found.rows)])
+    lines += ["", *remarks] if remarks else []
     if found.wish.only:
         return "\n".join(lines)
     if found.effects.always:
@@ -176,7 +176,7 @@ def table_of(found: Costs) -> StudyTable:
 def _rows(found: Costs, one: Measured) -> list[dict[str, Any]]:
     """The rows of a switch, or of the scene as it is, one of each pantograph."""
     switch, size, step = one.switch, one.size, found.step * one.ratio
-    run, remarks = _told(one)
+    run, remarks = _remarks_of(one)
     simulated = "as it is"
     if switch.name:
         simulated = LEFT_OUT if switch.on else "switched on"
@@ -209,7 +209,7 @@ def _rows(found: Costs, one: Measured) -> list[dict[str, Any]]:
     return rows
 
 
-def _told(row: Measured) -> tuple[str, list[str]]:
+def _remarks_of(row: Measured) -> tuple[str, list[str]]:
     """A run's name as in the table, and its remarks."""
     if not row.switch.name:
         return "as it is", row.remarks

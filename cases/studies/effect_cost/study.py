@@ -27,7 +27,7 @@ from catenary.cases.studies.sweep.variants import Variant
 from catenary.solver.effects import all_effects as effects
 from catenary.solver.problem.problem import Problem, steps_of
 
-# What an effect without data lacks, where it does not say so itself.
+# Data that an effect lacks, if it does not name them itself.
 _NO_DATA = "the scene has no data for it"
 
 
@@ -114,7 +114,7 @@ def _taken_along(name: str, among: Iterable[str], takes: Callable[[str, str], bo
 AS_IT_IS = "as-it-is"
 # Steps of a round at least, some milliseconds, and at most; a span between them.
 _FEWEST, _MOST = 200, 4000
-# What one figure is called, and where a pantograph's and the line's stand in a summary.
+# Names of the figures, and their keys in a summary, of a pantograph and of the line.
 FIGURES = ("mean_N", "std_N", "max_N", "min_N")
 UPLIFT = "max_uplift_mm"
 

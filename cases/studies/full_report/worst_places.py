@@ -29,7 +29,7 @@ from catenary.postproc.report.pictures.marks import mark_line
 from catenary.postproc.report.sections.section import EvaluatedRun, Picture, Section, Text, number
 from catenary.postproc.report.study_table import StudyTable, texts_table
 
-# What is shown beside a dropper and its extreme [m], and how many places tables have.
+# Length that is shown beside a dropper and its extreme [m], and number of places in tables.
 _BESIDE, _MOST = 30.0, 5
 
 

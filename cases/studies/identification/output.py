@@ -161,7 +161,7 @@ def verdict(found: Identification) -> str:
     judged = found.judged
     large = [name for name, one in judged.items() if one.is_too_large]
     small = [name for name, one in judged.items() if one.is_too_small]
-    # What lies far below the noise has the colour of round-off, or of a noise that was overstated.
+    # A residual far below the noise has the colour of round-off, or of a noise that was overstated.
     coloured = [name for name, one in judged.items() if one.is_coloured and name not in small]
     wrong = []
     if large:

@@ -24,7 +24,7 @@ from catenary.cases.studies.scene_sets.scene_set import (
 )
 
 AS_IS, FINER_MESH, SHORTER_STEP, UNSEEN = "as it is", "mesh x 2", "step / 2", "unseen errors"
-# What is compared, and the direction in which it gets worse.
+# Statistics that are compared, and the direction in which each gets worse.
 COMPARED = {"std_N": 1.0, "max_N": 1.0, "min_N": -1.0, "loss_percent": 1.0, "max_uplift_mm": 1.0}
 # Changes below this share, or this much of a percentage, are no change.
 _SAME = 0.005
@@ -192,7 +192,7 @@ def not_improved(rows: Sequence[Row]) -> list[str]:
     return said
 
 
-def trap(rows: Sequence[Row]) -> str:
+def unseen_direction(rows: Sequence[Row]) -> str:
     """Sentence on ``std_N`` in the direction that no search has seen; empty if all were seen."""
     own = [row for row in rows if row.check == AS_IS and row.outcome == "done"]
     seen, unseen = ([row for row in own if row.searched is side] for side in (True, False))

@@ -20,7 +20,7 @@ from catenary.cases.studies.optimise.checks import (
     checks_of,
     compare,
     not_improved,
-    trap,
+    unseen_direction,
 )
 from catenary.cases.studies.optimise.droppers import dropper_table
 from catenary.cases.studies.optimise.objective import Point, Problem
@@ -83,7 +83,7 @@ class Optimum:
     @property
     def said(self) -> list[str]:
         """Sentences on what it did not improve, the unseen direction first."""
-        said = [trap(self.rows)] if trap(self.rows) else []
+        said = [unseen_direction(self.rows)] if unseen_direction(self.rows) else []
         if not self.is_rounded:
             said.append("no changes in whole units keep all constraints: round_to is not kept")
         return said + not_improved(self.rows)

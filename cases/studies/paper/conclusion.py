@@ -76,10 +76,10 @@ def conclude(study: PaperStudy, runs: Mapping[str, StudyRun], draw: Draw) -> Stu
         elsewhere = {other["title"]: found[other["name"]][i] for other in others}
         explained.append(_explained(one, named[i], elsewhere, statements[i], ranked))
     shown = [one for one in readings if one.get("figures")]
-    told = [
+    judged = [
         Reading(one["name"], one["title"], changes_of(one), found[one["name"]]) for one in readings
     ]
-    told[0] = replace(told[0], findings=explained)
+    judged[0] = replace(judged[0], findings=explained)
     tables = [
         _side_by_side(shown, found),
         search_table(study, statements, _searched(study, runs)),
@@ -88,7 +88,7 @@ def conclude(study: PaperStudy, runs: Mapping[str, StudyRun], draw: Draw) -> Stu
         ranking_table(study, ranked),
     ]
     pictures = _drawn(study, runs, shown, rows, draw)
-    return Study(table["title"], table["lead"], told, tables, pictures)
+    return Study(table["title"], table["lead"], judged, tables, pictures)
 
 
 def _drawn(
@@ -148,7 +148,7 @@ def _side_by_side(
     """All statements under some readings, each with its figures."""
     columns = [found[one["name"]] for one in readings]
     met = [sum(one.verdict == REPRODUCED for one in column) for column in columns]
-    told = [
+    notes = [
         f"{reading['title']}: {n} of {len(column)} reproduced"
         for reading, n, column in zip(readings, met, columns, strict=True)
     ]
@@ -158,7 +158,7 @@ def _side_by_side(
         for one in zip(*columns, strict=True)
     ]
     title = "The statements beside each other"
-    return texts_table(heads, rows, title=title, note=f"{'; '.join(told)}.")
+    return texts_table(heads, rows, title=title, note=f"{'; '.join(notes)}.")
 
 
 def _table_of(reading: Mapping[str, Any], rows: Rows) -> StudyTable:

@@ -118,7 +118,7 @@ def holds_alone(statement: Statement, rows: Rows) -> bool:
 
 
 def n_met(statement: Statement, rows: Rows) -> tuple[int, int]:
-    """How many pantographs keep the bounds of a statement's conditions, and of how many."""
+    """Number of pantographs that keep the bounds of a statement's conditions, and of all."""
     kept = [
         one.met_by(row[one.figure])
         for one in statement.conditions

@@ -177,7 +177,7 @@ class Causes:
                     yield f"{wire_words(name)} begins or ends at {x:.0f} m (overlap, section)"
 
     def _defect_end(self, defect: dict[str, Any]) -> float:
-        """Where a defect ends along the track [m]: worn wires have a length."""
+        """End of a defect along the track [m]: worn wires have a length."""
         at = float(defect["at_m"])
         for table in self._results.attributes.get("config", {}).get("defects", []):
             if table.get("type") == defect["type"] and table.get("from_m") == at:
@@ -236,7 +236,7 @@ class Causes:
         x, lift = self._elasticity
         found = {}
         for span in spans_in_stretch(self._results):
-            # Where a wire is anchored it does not give way; that is no elasticity of the line.
+            # An anchored wire does not give way; that is no elasticity of the line.
             (own,) = np.nonzero(
                 (x >= self._masts[span]) & (x <= self._masts[span + 1]) & (lift > _ANCHORED)
             )

@@ -218,7 +218,7 @@ def _directions(scene: Scene, wanted: str | None) -> tuple[tuple[str, ...], bool
     return DIRECTIONS, False, ""
 
 
-# How each direction and speed ended.
+# Outcomes by direction and speed.
 _Marched = dict[tuple[str, float], Ended]
 
 

@@ -95,7 +95,7 @@ def _of_spans(
             f"median {one.median:.1f} N, force {one.minimum:.0f} to {one.maximum:.0f} N"
             f"{out(one.stands_out)}"
         )
-        lines += _told(causes.of_passage(one), one.stands_out)
+        lines += _cause_lines(causes.of_passage(one), one.stands_out)
     return lines
 
 
@@ -104,7 +104,7 @@ def _of_spots(title: str, spots: Sequence[Spot], words: str, causes: Causes) -> 
     for one in spots:
         said = words.format(at=one.place, v=one.value, m=one.median)
         lines.append(f"  {said}{out(one.stands_out)}")
-        lines += _told(causes.at(one), one.stands_out)
+        lines += _cause_lines(causes.at(one), one.stands_out)
     return lines
 
 
@@ -113,7 +113,7 @@ def candidates(said: Sequence[str], is_out: bool | None) -> Sequence[str]:
     return said or ([NONE] if is_out else [])
 
 
-def _told(said: Sequence[str], is_out: bool | None) -> list[str]:
+def _cause_lines(said: Sequence[str], is_out: bool | None) -> list[str]:
     """Lines for the candidates of a place."""
     lines = [f"    {text}" for text in candidates(said, is_out)[:_MOST_CAUSES]]
     more = len(said) - _MOST_CAUSES

@@ -89,7 +89,7 @@ def validation_text(found: Validation) -> str:
 
 def _said(step: Step) -> str:
     return (
-        f"{counts(step.rows)} {step.told}".rstrip() if step.rows else f"{NOT_JUDGED}: {step.told}"
+        f"{counts(step.rows)} {step.text}".rstrip() if step.rows else f"{NOT_JUDGED}: {step.text}"
     )
 
 

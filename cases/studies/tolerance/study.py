@@ -34,7 +34,7 @@ def margins_of(summary: Mapping[str, Any], criteria: Sequence[BoundTable]) -> Ma
     if BROKE in summary:
         return {"": [-np.inf]}
     if criteria:
-        return {one.says: _margins(summary, one) for one in criteria}
+        return {one.text: _margins(summary, one) for one in criteria}
     found: Margins = {}
     for row in summary["acceptance"]:
         if row["passed"] is not None:

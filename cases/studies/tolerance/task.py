@@ -115,7 +115,7 @@ class SamplesTable(Table):
 
     @property
     def allowed(self) -> int:
-        """How many of the samples may fail: the most whose lower bound of Clopper and Pearson is
+        """Number of samples that may fail: the most whose lower bound of Clopper and Pearson is
         not below the share."""
         from scipy.stats import binom
 

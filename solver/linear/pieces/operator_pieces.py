@@ -198,7 +198,7 @@ def _residual(rows: StationRows, layout: Layout, stations: Sections) -> float:
 
 
 def joined_by(model: Model, *sums: Coefficients) -> list[np.ndarray] | None:
-    """Which places of a cross-section each of some sums of M, K and C may join, (3, 1, b, b): to
+    """Mask of the pairs of places that some sums of M, K and C may join, (3, 1, b, b): to
     the station before, within one, and to the one after; None if stations further apart are."""
     stations = Sections.of(model.numbering, 0, model.numbering.size)
     station, place = places_of(np.arange(model.numbering.size), stations)
