@@ -73,7 +73,7 @@ class Effect:
     title: str
     adds: str
     source: str
-    default: bool
+    default: bool = True
     unknowns_of_wire: Callable[[NamedWire], tuple[str, ...]] | None = None
     requires: tuple[str, ...] = ()
     always: bool = False
@@ -98,20 +98,20 @@ class Effect:
 _REGISTRY: dict[str, Effect] = {}
 
 
-def register(effect: Effect) -> Effect:
-    """Add an effect to the table and return it.
+def register(*effects: Effect) -> None:
+    """Add effects to the table, in building order.
 
     Raises
     ------
     ValueError
-        If there is one of that name, or if the effect contributes nothing.
+        If there is one of that name, or if an effect contributes nothing.
     """
-    if effect.name in _REGISTRY:
-        raise ValueError(f"effect {effect.name} is registered already")
-    if not (effect.unknowns_of_wire or effect.build or effect.n_laws):
-        raise ValueError(f"effect {effect.name} has no unknowns, build, law or lifted limit")
-    _REGISTRY[effect.name] = effect
-    return effect
+    for effect in effects:
+        if effect.name in _REGISTRY:
+            raise ValueError(f"effect {effect.name} is registered already")
+        if not (effect.unknowns_of_wire or effect.build or effect.n_laws):
+            raise ValueError(f"effect {effect.name} has no unknowns, build, law or lifted limit")
+        _REGISTRY[effect.name] = effect
 
 
 def unregister(name: str) -> None:
