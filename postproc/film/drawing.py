@@ -18,6 +18,7 @@ from matplotlib.figure import Figure
 
 from catenary.meshgen.mesh import DROPPERS
 from catenary.postproc.film import scenery as drawn
+from catenary.postproc.film.options import View
 from catenary.postproc.film.projection import EYE, Colours, Picture, Projection, room_above
 from catenary.postproc.film.scenery import (
     LOOKS,
@@ -28,7 +29,6 @@ from catenary.postproc.film.scenery import (
     Places,
     Scenery,
 )
-from catenary.postproc.film.wish import View
 from catenary.postproc.record.snapshots.blocks import ARMS, CLAMPS, MASTS
 
 SIZE = (1920, 1080)

@@ -16,8 +16,8 @@ import numpy as np
 from catenary.mbs.shape import BELOW_HEAD, BODY, HEAD, SPRING, Pose, Shape, schematic
 from catenary.meshgen.mesh import DROPPERS
 from catenary.postproc.film.film_data import FilmData
+from catenary.postproc.film.options import View
 from catenary.postproc.film.snapshots import Frame, Snapshots
-from catenary.postproc.film.wish import View
 from catenary.postproc.record.snapshots.blocks import ARMS, CLAMPS, FIXED, MASTS
 
 CONTACT, WIRE = "contact", "wire"

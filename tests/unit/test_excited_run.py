@@ -25,9 +25,9 @@ from catenary.postproc.files.run_schema import RunAttributes
 from catenary.postproc.film import animate
 from catenary.postproc.film.chart import RingingChart
 from catenary.postproc.film.film_data import film_data
+from catenary.postproc.film.options import FilmOptions
 from catenary.postproc.film.scenery import Scenery
 from catenary.postproc.film.snapshots import Snapshots
-from catenary.postproc.film.wish import Wish
 from catenary.postproc.paraview import open_in_paraview
 from catenary.postproc.read.results import Results
 from catenary.postproc.report.report import write_report
@@ -133,7 +133,9 @@ def test_report_and_film_of_a_blow_have_no_train(struck: tuple[Path, WavesSeen])
     with Results(folder) as results:
         data = film_data(results)
         with Snapshots(folder, len(data.points)) as snapshots:
-            made = animate.Pictures(results, Scenery(data, snapshots), snapshots, Wish(end=0.05))
+            made = animate.Pictures(
+                results, Scenery(data, snapshots), snapshots, FilmOptions(end=0.05)
+            )
             first, second = (np.array(one) for one, _ in zip(made, range(2), strict=False))
     assert (first != second).any()
 

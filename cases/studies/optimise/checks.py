@@ -10,16 +10,14 @@ from catenary.cases.scene.load import Draft
 from catenary.cases.scene.problem import line_of
 from catenary.cases.scene.turned import DIRECTIONS
 from catenary.cases.studies.optimise.task import OptimiseTask
-from catenary.cases.studies.scene_sets.evaluation import (
+from catenary.cases.studies.scene_sets import (
     BROKE,
     OF_EACH_PANTOGRAPH,
-    Evaluation,
-    Wanted,
-)
-from catenary.cases.studies.scene_sets.scene_set import (
     ErrorSamples,
+    Evaluation,
     Member,
     SceneSet,
+    Wanted,
     members_of,
 )
 

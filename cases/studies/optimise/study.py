@@ -28,8 +28,7 @@ from catenary.cases.studies.optimise.search import search
 from catenary.cases.studies.optimise.task import OptimiseTask
 from catenary.cases.studies.optimise.variables import Variables, variables_of
 from catenary.cases.studies.records import KeptRows
-from catenary.cases.studies.scene_sets.evaluation import Evaluation
-from catenary.cases.studies.scene_sets.scene_set import SceneSet, members_of
+from catenary.cases.studies.scene_sets import Evaluation, SceneSet, members_of
 from catenary.cases.studies.sweep.variants import value_at
 from catenary.postproc.report.study_table import StudyTable
 
@@ -81,7 +80,7 @@ class Optimum:
     droppers: StudyTable
 
     @property
-    def said(self) -> list[str]:
+    def remarks(self) -> list[str]:
         """Sentences on what it did not improve, the unseen direction first."""
         said = [unseen_direction(self.rows)] if unseen_direction(self.rows) else []
         if not self.is_rounded:

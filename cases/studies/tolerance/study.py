@@ -12,8 +12,15 @@ from catenary.base.errors import InputError
 from catenary.cases.process.workers import Pool
 from catenary.cases.scene.load import Draft
 from catenary.cases.studies.records import KeptRows
-from catenary.cases.studies.scene_sets.evaluation import BROKE, Evaluation, Wanted, values_of
-from catenary.cases.studies.scene_sets.scene_set import BoundTable, SceneSet, members_of
+from catenary.cases.studies.scene_sets import (
+    BROKE,
+    BoundTable,
+    Evaluation,
+    SceneSet,
+    Wanted,
+    members_of,
+    values_of,
+)
 from catenary.cases.studies.tolerance.errors import Group, groups_of
 from catenary.cases.studies.tolerance.task import SamplesTable, ToleranceTask
 

@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 
 from catenary.cases.scene.keys.table import Table
 from catenary.cases.scene.line.imperfections import Seed, WireName
-from catenary.cases.studies.scene_sets.scene_set import BoundTable, SetTable
+from catenary.cases.studies.scene_sets import BoundTable, SetTable
 
 Label = Annotated[str, Field(min_length=1, max_length=100)]
 
