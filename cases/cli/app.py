@@ -267,7 +267,7 @@ def options(
 def lone_task(n_ranks: int) -> str:
     """The sentence for a process that SLURM started as one of several and MPI as a single one.
 
-    "" for all others, and for tasks but the first, so that it is told once. Not collective.
+    "" for all others, and for tasks but the first, so that it is printed once. Not collective.
 
     Parameters
     ----------

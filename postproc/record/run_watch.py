@@ -14,8 +14,8 @@ T sin(phi) in place of T phi: at 0.1 rad wrong by 0.2 %, at 1 rad by 16 %, and t
 constant, by 0.5 and 46 %. A steady arm turns by its lift over its length: at 30 degrees its force
 is off by some 15 %, and its end cannot be lifted by more than its length.
 
-*Contact.* A pantograph that is raised and does not touch the wire for as long as the train takes
-for a span is told.
+*Contact.* A raised pantograph that does not touch the wire for as long as the train takes for a
+span is reported.
 """
 
 from __future__ import annotations
@@ -35,12 +35,12 @@ from catenary.solver.time_loop.views.observers import NEVER, Observer, Stage, St
 logger = logging.getLogger("catenary.watch")
 strip_logger = logging.getLogger("catenary.strips")
 
-# Energy made by the scheme is told above this share of the work of the contacts.
-TOLD_SHARE = 0.05
-# Rotation of a wire from rest [rad], and lift of a steady arm over its length [-]: what is told and
-# what ends a march.
-TOLD_ROTATION, MOST_ROTATION = 0.1, 1.0
-TOLD_ARM, MOST_ARM = 0.5, 1.0
+# Share of the work of the contacts above which energy made by the scheme is reported.
+REPORTED_SHARE = 0.05
+# Rotation of a wire from rest [rad], and lift of a steady arm over its length [-], above which the
+# watch reports it, and ends the march.
+REPORTED_ROTATION, MOST_ROTATION = 0.1, 1.0
+REPORTED_ARM, MOST_ARM = 0.5, 1.0
 _ROTATIONS = ("theta_y", "theta_z")
 # Time between two looks at energy and motion [s]. A look takes as long as twenty steps of 1 ms.
 _LOOKS = 1.0
@@ -63,7 +63,7 @@ class WatchInputs:
         is summed
     arm_length : (n_arms,) lengths of steady arms [m], infinite where arms have none
     raised : (n_pantographs,) time from which on each is raised [s], infinite if it is lowered
-    span : how far a train may run without contact before it is told [m]
+    span : distance without contact above which a loss is reported [m]
     speed : of the train [m/s]
     """
 
@@ -104,7 +104,7 @@ def watch_inputs(at_rest: LineAtRest, has_train: bool = True) -> WatchInputs:
 class RunWatch(Observer):
     """Observer that judges a march while it goes on. Collective.
 
-    Each fault is told once, when it is seen; ``facts`` has them at the end.
+    Each fault is reported once, when it is seen; ``facts`` has them at the end.
 
     Parameters
     ----------
@@ -192,7 +192,7 @@ class RunWatch(Observer):
         given = self._most_work + self._run.static_energy
         made = self._energy - self._work
         self._made = max(self._made, made)
-        if not made <= TOLD_SHARE * given:
+        if not made <= REPORTED_SHARE * given:
             self._say(
                 "energy",
                 f"The time integration makes energy: at {self._where(view)} the line has "
@@ -216,7 +216,7 @@ class RunWatch(Observer):
         self._judge(
             view,
             "rotation",
-            (rotation, TOLD_ROTATION, MOST_ROTATION),
+            (rotation, REPORTED_ROTATION, MOST_ROTATION),
             f"a wire has turned by {rotation:.3g} rad from rest at {x:.4g} m",
             "the linear model of a wire",
         )
@@ -225,7 +225,7 @@ class RunWatch(Observer):
         self._judge(
             view,
             "arm",
-            (turned, TOLD_ARM, MOST_ARM),
+            (turned, REPORTED_ARM, MOST_ARM),
             f"the steady arm at {x:.4g} m is lifted by {turned:.3g} of its length",
             "the linear model of an arm",
         )

@@ -63,7 +63,7 @@ class Effect:
     of_form : whether ``build`` reads the shape at rest, ``Model.form``
     lifts : limits of a scene that do not hold with the effect
     data : keys of the scene's data that it acts on; empty if it acts on any scene
-    after_cutting : True for what befalls a line whose droppers are cut: form finding leaves it out,
+    after_cutting : True for an effect on a line whose droppers are cut: form finding leaves it out,
         and the line then hangs with it (`statics.with_defects`)
     cut_for : of an effect after cutting, True where droppers are cut for it
     hangs : of an effect after cutting, what the line's wires become with it

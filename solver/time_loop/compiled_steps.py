@@ -192,7 +192,7 @@ class CompiledSteps:
             self._showing.follow(self._moved.now)
 
     def _prepare(self, step: int, left: int) -> None:
-        """Fill in what steps after the one of number ``step`` are told, ``left`` of them at most.
+        """Fill in the inputs of the steps after number ``step``, ``left`` of them at most.
 
         Where states are looked at often these are many blocks.
         """

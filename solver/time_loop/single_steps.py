@@ -63,7 +63,7 @@ def single_steps_of(problem: Problem, layout: RowLayout | None = None) -> SlowPa
     """Reason why steps of a problem leave the compiled kernels on one rank, None if they do not.
 
     Not collective. A scheme other than ``one_solve``, and a coupling that is not implicit, step in
-    their own way, which is told elsewhere.
+    their own way, which is reported elsewhere.
     """
     numerics = problem.numerics
     if numerics.scheme != "one_solve" or numerics.coupling == "explicit":

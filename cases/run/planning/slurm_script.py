@@ -40,7 +40,7 @@ class Job:
     chain : jobs that may follow the first one
     directives : further options of sbatch, such as ``--account=track``
     before : lines of shell before the run, such as ``module load catenary``
-    signalled : "B:" if the shell of the script is told of the limit, "" if its programs are
+    signalled : "B:" if the shell of the script gets the signal of the limit, "" if its programs do
     """
 
     ranks: int = 1

@@ -101,7 +101,7 @@ def as_text(found: Identification) -> str:
     sums = ", ".join(f"{one:.1f}" for one in found.sums)
     if len(found.sums) > 1:
         lines.append(
-            f"Sums of squares of {len(found.sums)} searches, of which the first is told: {sums}"
+            f"Sums of squares of {len(found.sums)} searches, the first of which is shown: {sums}"
         )
     else:
         lines.append(

@@ -1,4 +1,4 @@
-"""Effects of irregularities and defects: what befalls a line once its droppers have been cut."""
+"""Effects of irregularities and defects, which change a line once its droppers have been cut."""
 
 from __future__ import annotations
 
