@@ -51,9 +51,9 @@ def _complain_of_usage(error: Any) -> None:
         if console.speaks():
             error.show()
         return
-    said = error.format_message().rstrip(".")
+    sentence = error.format_message().rstrip(".")
     command = context.command_path if context is not None else "catenary"
-    console.complain(f"{said}; see `{command} --help`")
+    console.complain(f"{sentence}; see `{command} --help`")
 
 
 def main() -> None:

@@ -27,7 +27,7 @@ LIMIT = 60.0
 _SETUP = "run `make setup` in the folder of the source"
 # Free memory below which even short runs may end early [B]; they take 0.4 GB.
 _LEAST_MEMORY = 1e9
-_SAID = 200  # characters of what a library said
+_LONGEST = 200  # characters of a library's answer
 
 
 @dataclass(frozen=True)
@@ -126,12 +126,12 @@ if MPI.COMM_WORLD.rank == 0: print("ranks", n, MPI.Get_library_version().split("
 
 def _tried(part: str, program: str, remedy: str, needed: bool = False) -> Finding:
     """Output of a short Python program on a part, if it ends well."""
-    code, said = _answer([sys.executable, "-c", program])
+    code, answer = _answer([sys.executable, "-c", program])
     if code == 0:
-        return Finding(part, OK, said)
-    lacks = "No module named" in said or "Could not locate" in said
+        return Finding(part, OK, answer)
+    lacks = "No module named" in answer or "Could not locate" in answer
     state = MISSING if lacks else BROKEN
-    return Finding(part, state, said, remedy, needed)
+    return Finding(part, state, answer, remedy, needed)
 
 
 def _answer(command: list[str], limit: float = LIMIT) -> tuple[int, str]:
@@ -168,7 +168,7 @@ def _answer(command: list[str], limit: float = LIMIT) -> tuple[int, str]:
         return code, f"no answer within {limit:g} s"
     if code < 0:
         return code, f"ended by signal {-code}"
-    return code, (lines[-1] if lines else f"exit code {code}")[:_SAID]
+    return code, (lines[-1] if lines else f"exit code {code}")[:_LONGEST]
 
 
 def _python() -> Finding:
@@ -221,20 +221,20 @@ def _packages() -> Iterator[Finding]:
 
 def _mpi() -> Finding:
     remedy = "apt-get install openmpi-bin python3-mpi4py; runs on one rank do without mpirun"
-    code, said = _answer([sys.executable, "-c", _RANKS])
-    if code or not said.startswith("ranks 1 "):
-        state = MISSING if "No module named" in said else BROKEN
-        return Finding("MPI", state, said, remedy, True)
+    code, answer = _answer([sys.executable, "-c", _RANKS])
+    if code or not answer.startswith("ranks 1 "):
+        state = MISSING if "No module named" in answer else BROKEN
+        return Finding("MPI", state, answer, remedy, True)
     launcher = shutil.which("mpirun")
     if launcher is None:
         return Finding("MPI", MISSING, "there is no mpirun in PATH", remedy)
-    code, said = _answer([launcher, "-n", "2", sys.executable, "-c", _RANKS])
-    if code == 0 and said.startswith("ranks 2 "):
-        library = said.removeprefix("ranks 2 ")
+    code, answer = _answer([launcher, "-n", "2", sys.executable, "-c", _RANKS])
+    if code == 0 and answer.startswith("ranks 2 "):
+        library = answer.removeprefix("ranks 2 ")
         return Finding("MPI", OK, f"{library}, two ranks started and added up")
     if code == 0:
-        said = "mpirun and mpi4py belong to different MPI libraries: two ranks did not meet"
-    return Finding("MPI", BROKEN, said, remedy)
+        answer = "mpirun and mpi4py belong to different MPI libraries: two ranks did not meet"
+    return Finding("MPI", BROKEN, answer, remedy)
 
 
 def _compiler() -> Finding:
@@ -288,8 +288,8 @@ def _folder(folder: Path) -> Finding:
                 lacking.append("hard links")
             free = shutil.disk_usage(folder).free
     except OSError as error:
-        said = f"{folder} cannot be written to ({(error.strerror or str(error)).lower()})"
-        return Finding(part, BROKEN, said, elsewhere)
+        fault = f"{folder} cannot be written to ({(error.strerror or str(error)).lower()})"
+        return Finding(part, BROKEN, fault, elsewhere)
     facts = f"{folder} can be written to, {free / 1e9:.0f} GB are free"
     if lacking:
         why = f"{facts}, but it has no {' and no '.join(lacking)}: two runs may write to one folder"

@@ -113,8 +113,8 @@ class RunStatistics:
     @property
     def complaints(self) -> list[str]:
         """Sentences that say which statistics could not be formed, and why."""
-        said = (p.complaint or p.unjudged for p in self.pantographs)
-        return [sentence for sentence in said if sentence]
+        reasons = (p.complaint or p.unjudged for p in self.pantographs)
+        return [sentence for sentence in reasons if sentence]
 
 
 def evaluate(results: Results) -> RunStatistics:

@@ -275,8 +275,8 @@ class _Comparing:
             self._find("other pantograph", name, *other)
             return None
         if found is None or found.correlation < _LEAST_CORRELATION:
-            said = "" if found is None else f" (correlation {found.correlation:.2f})"
-            text = f"{name}: the forces are not those of the run{said}: nothing is aligned by them"
+            shown = "" if found is None else f" (correlation {found.correlation:.2f})"
+            text = f"{name}: the forces are not those of the run{shown}: nothing is aligned by them"
             self._find("unlike", name, text)
             return None
         return found

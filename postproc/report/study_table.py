@@ -256,8 +256,8 @@ def _is_done(row: Row) -> bool:
 
 
 def _outcome(row: Row) -> str:
-    said = str(row["outcome"])
-    return said if said.startswith("not possible") else f"BROKE: {said}"
+    outcome = str(row["outcome"])
+    return outcome if outcome.startswith("not possible") else f"BROKE: {outcome}"
 
 
 def cell(value: Any) -> Any:

@@ -62,10 +62,10 @@ _WHAT = {
 
 
 def _heights(table: HeightTable, line: Line) -> str:
-    said = []
+    parts = []
     if table.standard_deviation_mm is not None:
         start, end = stretch_of(table, line)
-        said.append(
+        parts.append(
             f"standard deviation {table.standard_deviation_mm:g} mm, waves of {table.shortest_m:g} "
             f"to {table.longest_m:g} m, spectrum falling with the power {table.exponent:g} of the "
             f"wave number, from {start:g} to {end:g} m, seed {table.seed}"
@@ -73,20 +73,20 @@ def _heights(table: HeightTable, line: Line) -> str:
     if table.by_place is not None:
         heights = [1e3 * height for _, height in table.by_place]
         at = counted(len(heights), "place")
-        said.append(f"{min(heights):g} to {max(heights):g} mm at {at} of a table")
-    return "; ".join(said)
+        parts.append(f"{min(heights):g} to {max(heights):g} mm at {at} of a table")
+    return "; ".join(parts)
 
 
 def _lengths(table: LengthsTable) -> str:
-    said = []
+    parts = []
     if table.standard_deviation_mm:
-        said.append(
+        parts.append(
             f"standard deviation {table.standard_deviation_mm:g} mm, cut off at {table.cut_off:g} "
             f"times that, seed {table.seed}"
         )
     if table.by_dropper is not None:
-        said.append(f"given for {counted(len(table.by_dropper), 'dropper')}")
-    return "; ".join(said)
+        parts.append(f"given for {counted(len(table.by_dropper), 'dropper')}")
+    return "; ".join(parts)
 
 
 def _defect(table: Defect, line: Line) -> dict[str, Any]:

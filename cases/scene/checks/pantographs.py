@@ -42,10 +42,10 @@ def check_vehicle(scene: Scene, line: LineData) -> Iterator[Fault]:
 
 
 def _vehicle_acts(scene: Scene) -> Iterator[Fault]:
-    on, said = scene.switches()["vehicle_motion"], "vehicle_motion" in scene.effects
+    on, is_given = scene.switches()["vehicle_motion"], "vehicle_motion" in scene.effects
     if scene.vehicle is None:
         return
-    if not on and not said:
+    if not on and not is_given:
         yield _idle(scene, "vehicle", "vehicle_motion")
     acts = any(scene.switches()[name] for name in ("head_roll", "lateral_motion"))
     if on and scene.vehicle.lateral is not None and not acts:
@@ -58,12 +58,12 @@ def _vehicle_acts(scene: Scene) -> Iterator[Fault]:
 
 
 def _roll_acts(scene: Scene) -> Iterator[Fault]:
-    on, said = scene.switches()["head_roll"], "head_roll" in scene.effects
+    on, is_given = scene.switches()["head_roll"], "head_roll" in scene.effects
     speed = scene.train.speed_km_h
     names = list(dict.fromkeys(place.name for place in scene.train.pantographs))
     for name in names:
         kind = scene.pantographs[name]
-        if isinstance(kind, LumpedTable) and kind.roll is not None and not on and not said:
+        if isinstance(kind, LumpedTable) and kind.roll is not None and not on and not is_given:
             yield _idle(scene, f"pantographs.{name}.roll", "head_roll")
     if not on:
         return

@@ -59,9 +59,9 @@ def _blocks(results: Results, places: WorstPlaces, causes: Causes) -> Iterator[T
         )
     for first, spots, words in _KINDS:
         for spot in spots(places)[:1]:
-            said = words.format(at=spot.place, v=spot.value, m=spot.median)
+            sentence = words.format(at=spot.place, v=spot.value, m=spot.median)
             items = candidates(causes.at(spot), spot.stands_out)
-            yield Text(f"{said}{out(spot.stands_out)}.", "note", first, items)
+            yield Text(f"{sentence}{out(spot.stands_out)}.", "note", first, items)
     everywhere = causes.of_line()
     if everywhere:
         yield Text("acts on all spans alike:", "note", "The line as a whole", everywhere)

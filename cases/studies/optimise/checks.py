@@ -169,25 +169,27 @@ def change(row: Row, statistic: str) -> float:
 
 def not_improved(rows: Sequence[Row]) -> list[str]:
     """Sentences on what gets worse somewhere, and on runs that broke; none if nothing does."""
-    said = []
+    sentences = []
     done = [row for row in rows if row.outcome == "done"]
     for name, sign in COMPARED.items():
         worse = [row for row in done if sign * change(row, name) > _SAME]
         if worse:
             most = max(worse, key=lambda row: sign * change(row, name))
-            said.append(
+            sentences.append(
                 f"{name} gets worse in {len(worse)} of {len(done)} rows, most with {most.check}, "
                 f"{most.scene}{f', {most.pantograph}' if most.pantograph else ''}: "
                 f"{most.shipped[name]:.4g} to {most.optimum[name]:.4g}"
             )
     for criterion in sorted({name for row in done for name in row.failed}):
         where = [row for row in done if criterion in row.failed]
-        said.append(
+        sentences.append(
             f"the criterion {criterion} fails in {len(where)} rows where the case as shipped "
             f"keeps it, first with {where[0].check}, {where[0].scene}"
         )
-    said += [f"{row.check}, {row.scene}: {row.outcome}" for row in rows if row.outcome != "done"]
-    return said
+    sentences += [
+        f"{row.check}, {row.scene}: {row.outcome}" for row in rows if row.outcome != "done"
+    ]
+    return sentences
 
 
 def unseen_direction(rows: Sequence[Row]) -> str:

@@ -82,10 +82,10 @@ class Optimum:
     @property
     def remarks(self) -> list[str]:
         """Sentences on what it did not improve, the unseen direction first."""
-        said = [unseen_direction(self.rows)] if unseen_direction(self.rows) else []
+        sentences = [unseen_direction(self.rows)] if unseen_direction(self.rows) else []
         if not self.is_rounded:
-            said.append("no changes in whole units keep all constraints: round_to is not kept")
-        return said + not_improved(self.rows)
+            sentences.append("no changes in whole units keep all constraints: round_to is not kept")
+        return sentences + not_improved(self.rows)
 
 
 def make_plan(draft: Draft, task: OptimiseTask) -> Plan:

@@ -280,17 +280,19 @@ def movers(statement: Statement, ranked: Sequence[Ranked]) -> str:
     def of(one: Ranked) -> float:
         return one.rows.at(alone.figure, damping=alone.damping)[0]
 
-    def said(value: float) -> str:
+    def in_words(value: float) -> str:
         return format(value, column.format)
 
     case, *varied = ranked
     start = of(case)
     most = sorted(varied, key=lambda one: abs(of(one) - start), reverse=True)[:_NAMED]
     listed = "; ".join(
-        f"{one.title}: {said(of(one))}" for one in most if said(of(one)) != said(start)
+        f"{one.title}: {in_words(of(one))}" for one in most if in_words(of(one)) != in_words(start)
     )
     moved = f"moved most by {listed}" if listed else "moved by no variation"
-    text = f"One pantograph, {alone.damping}: {column.head} {said(start)} in the case; {moved}. "
+    text = (
+        f"One pantograph, {alone.damping}: {column.head} {in_words(start)} in the case; {moved}. "
+    )
     holds = holds_alone(statement, case.rows)
     turned = [one.title for one in varied if holds_alone(statement, one.rows) != holds]
     if holds:

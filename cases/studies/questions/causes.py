@@ -140,7 +140,7 @@ class Causes:
 
     def of_line(self) -> list[str]:
         """Sentences on what acts on all spans alike."""
-        said = [
+        candidates = [
             f"known of the line, at no single place: {defect['says']}"
             for defect in self._results.attributes.get("defects", [])
             if "at_m" not in defect
@@ -149,16 +149,16 @@ class Causes:
         wave = self._results.attributes.get("arrivals", {}).get("wave_speed_m_per_s")
         span = float(np.median(np.diff(self._masts)))
         if wave and abs(2.0 * speed / wave - 1.0) <= _NEAR:
-            said.append(
+            candidates.append(
                 f"spans are passed at {speed / span:.2f} Hz, near their lowest natural frequency "
                 f"c / 2 L = {wave / (2.0 * span):.2f} Hz"
             )
         if any(name == "gusts" for name, *_ in self._results.attributes.get("effects_on", [])):
-            said.append(
+            candidates.append(
                 "gusts blow; one run does not tell which share of sigma is theirs, catenary "
                 "what-if CASE --set effects.gusts=false does"
             )
-        return said
+        return candidates
 
     def _near(self, start: float, end: float) -> Iterator[str]:
         """Defects and ends of contact wires, up to half a stretch before and behind it."""
