@@ -170,7 +170,7 @@ def is_current(target: Path, command: str) -> bool:
 
 
 def extension(name: str, sources: list[str]) -> Pybind11Extension:
-    """What is built of some of the kernels; objects are shared."""
+    """Extension module of some of the kernels; objects are shared."""
     return Pybind11Extension(
         f"catenary.solver.kernels.{name}",
         sources,
@@ -217,7 +217,7 @@ setup(
         "catenary.solver": ["kernels/simulation/catenary.h"],
     },
     exclude_package_data={"catenary.cases": ["api/*"], "catenary.solver": ["base/*"]},
-    # What is installed is named above; the source archive has the sources of the extension too.
+    # Installed files are named above; the source archive has the sources of the extension too.
     include_package_data=False,
     ext_modules=[extension("native", SOURCES), extension("libcatenary", WITHOUT_PYTHON)],
     cmdclass={"build_ext": BuildKernels},

@@ -14,7 +14,7 @@ from pathlib import Path
 
 PACKAGES = ("numpy", "scipy", "h5py", "mpi4py", "petsc4py")
 
-# What Catenary imports of them; run by the environment's Python, without the user's variables.
+# Catenary's imports of them; run by the environment's Python, without the user's variables.
 PROBE = """
 import numpy, h5py, mpi4py
 import scipy.integrate, scipy.interpolate, scipy.linalg, scipy.optimize, scipy.signal, scipy.sparse

@@ -21,7 +21,7 @@ _EQUATION = re.compile(
 # Names of functions stand apart from their neighbours, which the converter leaves out.
 _FUNCTION = r"<mi>(?:sin|cos|tan|tanh|cosh|coth|log)</mi>"
 _SPACE = '<mspace width="0.167em" />'
-# What the converter leaves of a command, or of an alignment, that it does not know.
+# Remains of a command, or of an alignment, that the converter does not know.
 _LEFT_OVER = re.compile(r"\\[A-Za-z]+|&")
 
 

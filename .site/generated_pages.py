@@ -10,8 +10,7 @@ import typer
 from mkdocs.structure.files import File, Files
 
 from catenary.cases.cli.main import app
-from catenary.cases.terminal.json_schema import scene_schema
-from catenary.cases.terminal.lists import Key, allowed, comparison, keys_of_a_scene
+from catenary.cases.terminal.lists import Key, allowed, comparison, keys_of_a_scene, scene_schema
 from catenary.postproc.standards.library import shipped
 from catenary.postproc.standards.quantities import LIMIT_KEYS, QUANTITIES
 

@@ -25,7 +25,7 @@ class Tunnel:
     portal: float
 
     def depth(self, places: np.ndarray) -> np.ndarray:
-        """How far places [m] are inside, from 0 before the portals to 1, shape as ``places``."""
+        """Depth of places [m] inside, from 0 before the portals to 1, shape as ``places``."""
         inside = np.minimum(places - self.start, self.end - places)
         if self.portal <= 0.0:
             return np.where(inside > 0.0, 1.0, 0.0)

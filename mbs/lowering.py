@@ -145,7 +145,7 @@ class LoweredPantograph:
         self._memory.view(float)[:] = state[-3:]
 
     def places(self) -> np.ndarray:
-        """Where the model's masses or bodies are; those of what is caught as it was then."""
+        """Places of the model's masses or bodies; once it is caught, those at that time."""
         return self.model.places()
 
     def base(self, time: float) -> float:

@@ -202,7 +202,7 @@ class LumpedPantograph(SteppedHead):
         return in_place(data.laws, numbers, self._n, rest)
 
     def _rise(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """How far and how fast a base that rises with the lift is above where it stands under all
+        """Height and velocity of a base that rises with the lift, above where it stands under all
         of it, at times (t,) [m], [m/s]."""
         way = self._started_at - self._base_height
         before, now, after = (

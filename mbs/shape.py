@@ -100,13 +100,13 @@ class LumpedShape:
         self._points, self.cells = _joined([head, arms, spring[:2]])
         apex = 1.0 if self._n > 1 else 0.0
         roof = float(self._n)
-        # Which mass each point moves with: the head is 0, the roof n.
+        # Number of the mass that each point moves with: the head is 0, the roof n.
         of_arms = [apex] * 3 + [0.5 * (apex + roof)] + [roof] * 5
         self._share = np.concatenate([np.zeros(len(head[0])), of_arms, apex * spring[2]])
         self.kinds = np.repeat([HEAD, BODY, SPRING], [len(own[1]) for own in (head, arms, spring)])
 
     def pose(self, places: np.ndarray, base: float, head: float, wire: float) -> Pose:
-        """Where the points are, see `Shape`."""
+        """Places of the points, see `Shape`."""
         lower = places[places.size - self._n + 1 :] if self._n > 1 and places.size else np.zeros(0)
         # All masses are at one height with the springs relaxed; the last place is the roof's.
         lifted = np.concatenate([[head], lower, [wire + base]]) - wire
@@ -172,7 +172,7 @@ class MechanismShape:
         self._head_above_arm = standing.head.offset
 
     def pose(self, places: np.ndarray, base: float, head: float, wire: float) -> Pose:
-        """Where the points are, see `Shape`; of a reduced mechanism those of its arm's height."""
+        """Places of the points, see `Shape`; of a reduced mechanism those of its arm's height."""
         rest = self._raised(wire - base - self._head_above_arm, wire - base)
         n = self._data.system.start().n_bodies
         if places.size == 7 * n:

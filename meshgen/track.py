@@ -38,8 +38,8 @@ class Spans:
 
     @property
     def running_range(self) -> tuple[float, float]:
-        """Where a pantograph may run: from the end of the first transition to the start of the
-        last one [m]."""
+        """Range in which a pantograph may run: from the end of the first transition to the start
+        of the last one [m]."""
         masts = self.support_positions
         return float(masts[self.n_transition[0]]), float(masts[self.n_spans - self.n_transition[1]])
 
@@ -62,7 +62,7 @@ class Curve:
     transition: float = 0.0
 
     def share(self, x: np.ndarray) -> np.ndarray:
-        """How much of curvature and cant there is at places ``x`` [m], 0 to 1, shape as ``x``."""
+        """Share of curvature and cant at places ``x`` [m], 0 to 1, shape as ``x``."""
         x = np.asarray(x, dtype=float)
         first, last = self.stretch
         inside = np.minimum(x - first, last - x)

@@ -25,7 +25,7 @@ class Role(StrEnum):
 
 
 class End(StrEnum):
-    """How a piece of wire ends: held in height by a tensioner, or carried by a clamp there."""
+    """End of a piece of wire: held in height by a tensioner, or carried by a clamp."""
 
     HELD = "held"
     CLAMPED = "clamped"

@@ -77,7 +77,7 @@ _FILES = {
 }
 _FILE_OF = {name: file for file, names in _FILES.items() for name in names}
 
-# A program that sets up no logging is told nothing; one that does hears what it asks for.
+# A program that sets up no logging gets no messages; one that does gets those of its level.
 logging.getLogger(__name__).addHandler(logging.NullHandler())
 
 

@@ -148,7 +148,7 @@ def _optimum(scene: Scene, plan: Plan, found: Found) -> Optimum:
         found.shipped.value,
         found.found.value,
         not found.found.violation,
-        found.said,
+        found.remarks,
         pd.DataFrame(output.checks_table(found.rows).records()),
         pd.DataFrame(found.droppers.records()),
         output.as_text(plan, [found]),
@@ -228,7 +228,7 @@ def _found(
         If a signal ends the study.
     """
     from catenary.cases.process.interrupts import Interrupted
-    from catenary.cases.studies.scene_sets.evaluation import workers
+    from catenary.cases.studies.scene_sets import workers
 
     kept = KeptRows(None if out is None else Path(out), force)
     try:

@@ -129,7 +129,7 @@ class Scene:
         return f"<catenary.Scene {self.name}: {self.title}>"
 
 
-# What every function that takes a scene accepts.
+# Types that every function of a scene accepts.
 SceneLike = Scene | str | Path | Mapping[str, Any]
 
 

@@ -267,15 +267,15 @@ def options(
 def lone_task(n_ranks: int) -> str:
     """The sentence for a process that SLURM started as one of several and MPI as a single one.
 
-    "" for all others, and for tasks but the first, so that it is told once. Not collective.
+    "" for all others, and for tasks but the first, so that it is printed once. Not collective.
 
     Parameters
     ----------
     n_ranks : ranks that MPI sees
     """
     # A step of one task within a larger job is meant so.
-    told = os.environ.get("SLURM_STEP_NUM_TASKS") or os.environ.get("SLURM_NTASKS", "")
-    n_tasks = int(told) if told.isascii() and told.isdigit() else 1
+    n_stated = os.environ.get("SLURM_STEP_NUM_TASKS") or os.environ.get("SLURM_NTASKS", "")
+    n_tasks = int(n_stated) if n_stated.isascii() and n_stated.isdigit() else 1
     if n_ranks > 1 or n_tasks == 1 or os.environ.get("SLURM_PROCID", "0") != "0":
         return ""
     return (

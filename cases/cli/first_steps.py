@@ -79,7 +79,7 @@ def list_cases(
     if schema:
         import json
 
-        from catenary.cases.terminal.json_schema import scene_schema
+        from catenary.cases.terminal.lists import scene_schema
 
         console.say(json.dumps(scene_schema(), indent=1))
         return

@@ -32,7 +32,7 @@ def check(
         for line in error.lines():
             console.complain(line)
         return console.BAD_INPUT
-    # What a refusal does not need is imported once the scene is valid.
+    # Modules that a refusal does not need are imported once the scene is valid.
     from catenary.cases.run.at_rest.static_table import check_line
 
     found = check_line(scene)

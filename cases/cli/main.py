@@ -51,9 +51,9 @@ def _complain_of_usage(error: Any) -> None:
         if console.speaks():
             error.show()
         return
-    said = error.format_message().rstrip(".")
+    sentence = error.format_message().rstrip(".")
     command = context.command_path if context is not None else "catenary"
-    console.complain(f"{said}; see `{command} --help`")
+    console.complain(f"{sentence}; see `{command} --help`")
 
 
 def main() -> None:
@@ -82,12 +82,12 @@ def main() -> None:
         console.complain(f"interrupted by {stopped.name}")
         sys.stdout.flush()
         sys.stderr.flush()
-        # What was in the making holds objects of PETSc, which is not to free them half made.
+        # Unfinished objects hold some of PETSc, which is not to free them half made.
         os._exit(console.BROKEN)
     except typer.Abort:
         code = console.BROKEN
     except OSError as error:
-        # What --version prints, and what typer prints of --help.
+        # The output of --version, and that of --help by typer.
         if not isinstance(error, console.OutputLost) and not _OF_HELP.intersection(sys.argv):
             raise
         code = console.tell_output_lost(error)

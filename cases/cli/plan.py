@@ -12,7 +12,7 @@ from catenary.cases.cli.app import Force, Jobs, SceneWords, folder_option, seria
 from catenary.cases.terminal import console
 
 if TYPE_CHECKING:
-    from catenary.cases.studies.effect_cost.study import Costs, Wish
+    from catenary.cases.studies.effect_cost.study import CostOptions, Costs
 
 _RUNS = "runs"
 _MOST_ROUNDS = 1000
@@ -66,10 +66,10 @@ def plan(
     """Serial."""
     if cost:
         from catenary.cases.studies.accuracy.analysis import parse_target
-        from catenary.cases.studies.effect_cost.study import Wish
+        from catenary.cases.studies.effect_cost.study import CostOptions
 
         wanted = 0.01 if tolerance is None else parse_target(tolerance, "--tolerance") / 100
-        wish = Wish(
+        options = CostOptions(
             words.case,
             words.changes,
             words.shortened,
@@ -78,7 +78,7 @@ def plan(
             wanted,
             [] if only is None else [name.strip() for name in only.split(",")],
         )
-        return _cost(wish, out, as_json, n_jobs, force)
+        return _cost(options, out, as_json, n_jobs, force)
     belonging = {
         "--only": only, "--stretch-m": stretch, "--rounds": rounds, "--tolerance": tolerance,
         "-o": out, "--json": as_json or None, "--force": force or None,
@@ -100,7 +100,7 @@ def _within(option: str, value: float, low: float, high: float) -> float:
     return value
 
 
-def _cost(wish: Wish, out: Path | None, as_json: bool, n_jobs: int, force: bool) -> int:
+def _cost(options: CostOptions, out: Path | None, as_json: bool, n_jobs: int, force: bool) -> int:
     """Runs ``--cost``; returns the exit code."""
     import tempfile
 
@@ -117,7 +117,7 @@ def _cost(wish: Wish, out: Path | None, as_json: bool, n_jobs: int, force: bool)
         )
     if out is not None:
         refuse_impossible(out)
-    scene = load_scene(wish.case, wish.overrides, wish.shortened)
+    scene = load_scene(options.case, options.overrides, options.shortened)
     comm = console.alone()
     start_petsc(as_arguments(scene.petsc.given(), []))
     from catenary.cases.studies.effect_cost import output, study
@@ -128,12 +128,12 @@ def _cost(wish: Wish, out: Path | None, as_json: bool, n_jobs: int, force: bool)
 
     if out is None:
         with tempfile.TemporaryDirectory(prefix="catenary_cost_") as folder:
-            found = study.measure(wish, Path(folder), say, n_jobs=n_jobs)
+            found = study.measure(options, Path(folder), say, n_jobs=n_jobs)
         files: list[Path] = []
     else:
-        with held(out, comm, f"catenary plan {wish.case} --cost"):
+        with held(out, comm, f"catenary plan {options.case} --cost"):
             refuse_table(out / output.RECORD, force)
-            found = study.measure(wish, out / _RUNS, say, force, n_jobs)
+            found = study.measure(options, out / _RUNS, say, force, n_jobs)
             files = [] if found is None else output.write(found, out)
     if found is None:
         again = "" if out is None else "; the same command continues it"

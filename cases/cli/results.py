@@ -10,7 +10,7 @@ import typer
 from catenary.base.errors import CatenaryError, InputError
 from catenary.cases.cli.app import Force, RunFolder, folder_option, serial_verb
 from catenary.cases.terminal import console
-from catenary.postproc.film.wish import View
+from catenary.postproc.film.options import View
 
 if TYPE_CHECKING:
     from catenary.mbs.shape import Shape
@@ -226,12 +226,12 @@ def animate(
 ) -> None:
     """Serial."""
     from catenary.postproc.film.animate import animate as make_film
-    from catenary.postproc.film.wish import Wish
+    from catenary.postproc.film.options import FilmOptions
 
-    wish = Wish(start, end, rate, every, width, motion, view, camera)
+    options = FilmOptions(start, end, rate, every, width, motion, view, camera)
     records = _records(folder)
     shapes = _shapes(folder, records)
-    film = make_film(folder, wish, records, not console.is_quiet(), shapes)
+    film = make_film(folder, options, records, not console.is_quiet(), shapes)
     pace = (
         f"{film.slowed:.2g} times slower"
         if film.slowed >= 1

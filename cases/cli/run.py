@@ -245,19 +245,19 @@ def submit(
     if array is None and (vary or named or study):
         raise InputError("--vary, --variants and --study belong to --array")
     chosen, options = words.split()
-    told = [str(Path(words.case).absolute()) if Path(words.case).exists() else words.case]
-    told += ["--short"] if words.shortened else []
+    case_words = [str(Path(words.case).absolute()) if Path(words.case).exists() else words.case]
+    case_words += ["--short"] if words.shortened else []
     # The folder comes last, so that nothing is taken for a further assignment.
-    told += [word for value in chosen for word in ("--set", value)]
+    case_words += [word for value in chosen for word in ("--set", value)]
     job = Job(ranks, nodes, minutes, chain, directives or [], before or [], "B:" if array else "")
     if array is None:
         from catenary.cases.run.planning.plan import make_plan
         from catenary.cases.scene.load import load_scene
 
         plan = make_plan(load_scene(words.case, chosen, words.shortened))
-        script = slurm_script(told, out, job, plan.march, plan.memory, options)
+        script = slurm_script(case_words, out, job, plan.march, plan.memory, options)
     else:
-        script = _array_script(words, told, out, job, array, vary, named, study)
+        script = _array_script(words, case_words, out, job, array, vary, named, study)
     if only_print:
         console.print_as_is(script)
         return
@@ -273,7 +273,7 @@ def submit(
 
 def _array_script(
     words: RunWords,
-    told: list[str],
+    case_words: list[str],
     out: Path,
     job: Job,
     n_tasks: int,
@@ -293,11 +293,11 @@ def _array_script(
         if vary or named:
             raise InputError("--study has runs of its own; leave --vary and --variants away")
         jobs = make_plan(words.case, chosen, words.shortened).jobs
-        verb = ["run", *told, "--study"]
+        verb = ["run", *case_words, "--study"]
     else:
         variants = read_variants(vary, named)
         jobs = whole_runs_of(words.draft()[0], variants, out).jobs
-        verb = ["sweep", *told, *(word for text in vary or [] for word in ("--vary", text))]
+        verb = ["sweep", *case_words, *(word for text in vary or [] for word in ("--vary", text))]
         verb += [] if named is None else ["--variants", str(named.absolute())]
     needs = total_needs(each.scene for each in jobs)
     return array_script(verb, out, job, n_tasks, needs, options)

@@ -27,7 +27,7 @@ LIMIT = 60.0
 _SETUP = "run `make setup` in the folder of the source"
 # Free memory below which even short runs may end early [B]; they take 0.4 GB.
 _LEAST_MEMORY = 1e9
-_SAID = 200  # characters of what a library said
+_LONGEST = 200  # characters of a library's answer
 
 
 @dataclass(frozen=True)
@@ -45,14 +45,14 @@ class Finding:
 
     part: str
     state: str
-    says: str
+    facts: str
     remedy: str = ""
     needed: bool = False
 
     def line(self) -> str:
         """The finding in one line."""
         mend = f"; to mend it: {self.remedy}" if self.state != OK else ""
-        return f"{self.state:8} {self.part:15} {self.says}{mend}"
+        return f"{self.state:8} {self.part:15} {self.facts}{mend}"
 
     @property
     def prevents_runs(self) -> bool:
@@ -126,12 +126,12 @@ if MPI.COMM_WORLD.rank == 0: print("ranks", n, MPI.Get_library_version().split("
 
 def _tried(part: str, program: str, remedy: str, needed: bool = False) -> Finding:
     """Output of a short Python program on a part, if it ends well."""
-    code, said = _answer([sys.executable, "-c", program])
+    code, answer = _answer([sys.executable, "-c", program])
     if code == 0:
-        return Finding(part, OK, said)
-    lacks = "No module named" in said or "Could not locate" in said
+        return Finding(part, OK, answer)
+    lacks = "No module named" in answer or "Could not locate" in answer
     state = MISSING if lacks else BROKEN
-    return Finding(part, state, said, remedy, needed)
+    return Finding(part, state, answer, remedy, needed)
 
 
 def _answer(command: list[str], limit: float = LIMIT) -> tuple[int, str]:
@@ -168,7 +168,7 @@ def _answer(command: list[str], limit: float = LIMIT) -> tuple[int, str]:
         return code, f"no answer within {limit:g} s"
     if code < 0:
         return code, f"ended by signal {-code}"
-    return code, (lines[-1] if lines else f"exit code {code}")[:_SAID]
+    return code, (lines[-1] if lines else f"exit code {code}")[:_LONGEST]
 
 
 def _python() -> Finding:
@@ -214,27 +214,27 @@ def _packages() -> Iterator[Finding]:
         if _fits(version, bounds):
             fine.append(f"{name[0]} {version}")
         else:
-            says = f"{version} is outside of {bounds.strip()}"
-            yield Finding(name[0], BROKEN, says, f"{_SETUP}; it may work all the same")
+            facts = f"{version} is outside of {bounds.strip()}"
+            yield Finding(name[0], BROKEN, facts, f"{_SETUP}; it may work all the same")
     yield Finding("packages", OK, ", ".join(fine))
 
 
 def _mpi() -> Finding:
     remedy = "apt-get install openmpi-bin python3-mpi4py; runs on one rank do without mpirun"
-    code, said = _answer([sys.executable, "-c", _RANKS])
-    if code or not said.startswith("ranks 1 "):
-        state = MISSING if "No module named" in said else BROKEN
-        return Finding("MPI", state, said, remedy, True)
+    code, answer = _answer([sys.executable, "-c", _RANKS])
+    if code or not answer.startswith("ranks 1 "):
+        state = MISSING if "No module named" in answer else BROKEN
+        return Finding("MPI", state, answer, remedy, True)
     launcher = shutil.which("mpirun")
     if launcher is None:
         return Finding("MPI", MISSING, "there is no mpirun in PATH", remedy)
-    code, said = _answer([launcher, "-n", "2", sys.executable, "-c", _RANKS])
-    if code == 0 and said.startswith("ranks 2 "):
-        library = said.removeprefix("ranks 2 ")
+    code, answer = _answer([launcher, "-n", "2", sys.executable, "-c", _RANKS])
+    if code == 0 and answer.startswith("ranks 2 "):
+        library = answer.removeprefix("ranks 2 ")
         return Finding("MPI", OK, f"{library}, two ranks started and added up")
     if code == 0:
-        said = "mpirun and mpi4py belong to different MPI libraries: two ranks did not meet"
-    return Finding("MPI", BROKEN, said, remedy)
+        answer = "mpirun and mpi4py belong to different MPI libraries: two ranks did not meet"
+    return Finding("MPI", BROKEN, answer, remedy)
 
 
 def _compiler() -> Finding:
@@ -288,23 +288,25 @@ def _folder(folder: Path) -> Finding:
                 lacking.append("hard links")
             free = shutil.disk_usage(folder).free
     except OSError as error:
-        said = f"{folder} cannot be written to ({(error.strerror or str(error)).lower()})"
-        return Finding(part, BROKEN, said, elsewhere)
-    says = f"{folder} can be written to, {free / 1e9:.0f} GB are free"
+        fault = f"{folder} cannot be written to ({(error.strerror or str(error)).lower()})"
+        return Finding(part, BROKEN, fault, elsewhere)
+    facts = f"{folder} can be written to, {free / 1e9:.0f} GB are free"
     if lacking:
-        why = f"{says}, but it has no {' and no '.join(lacking)}: two runs may write to one folder"
+        why = f"{facts}, but it has no {' and no '.join(lacking)}: two runs may write to one folder"
         return Finding(part, MISSING, why, elsewhere)
-    return Finding(part, OK, f"{says}, files can be locked")
+    return Finding(part, OK, f"{facts}, files can be locked")
 
 
 def _memory() -> Finding:
     limit, _ = resource.getrlimit(resource.RLIMIT_AS)
     free = _available()
     limited = "" if limit == resource.RLIM_INFINITY else f", ulimit -v {limit / 1e9:.1f} GB"
-    says = f"{free / 1e9:.1f} GB available{limited}, {len(os.sched_getaffinity(0))} cores"
+    facts = f"{free / 1e9:.1f} GB available{limited}, {len(os.sched_getaffinity(0))} cores"
     if free < _LEAST_MEMORY:
-        return Finding("memory", BROKEN, f"only {says}", "end other programs; `plan` says how much")
-    return Finding("memory", OK, says)
+        return Finding(
+            "memory", BROKEN, f"only {facts}", "end other programs; `plan` says how much"
+        )
+    return Finding("memory", OK, facts)
 
 
 def _available() -> float:

@@ -39,7 +39,7 @@ LEAST = 700_000_000
 
 
 def too_little_memory() -> str:
-    """Why the program cannot work within this process's limit, "" if it can. Not collective."""
+    """Sentence if this process's limit leaves too little memory, else "". Not collective."""
     limit, _ = resource.getrlimit(resource.RLIMIT_AS)
     if limit == resource.RLIM_INFINITY or limit >= LEAST:
         return ""

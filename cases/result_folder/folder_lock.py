@@ -318,17 +318,17 @@ def held(folder: Path, comm: Any, command: str) -> Iterator[None]:
 
 def refusal(folder: Path, error: OSError) -> InputError:
     """The sentence for a folder that cannot be made or written to."""
-    said, advice = reason(error), remedy(error)
+    fault, advice = reason(error), remedy(error)
     if code_of(error) in (errno.ENOTDIR, errno.EEXIST):
         blocked = next(
             (one for one in (folder, *folder.parents) if os.path.lexists(one) and not one.is_dir()),
             folder,
         )
         broken_link = blocked.is_symlink() and not blocked.exists()
-        said = f"{blocked} is {'a link that leads nowhere' if broken_link else 'no folder'}"
+        fault = f"{blocked} is {'a link that leads nowhere' if broken_link else 'no folder'}"
         advice = "choose another output folder"
     return InputError(
-        f"the folder {folder} for the results cannot be made or written to ({said}): {advice}"
+        f"the folder {folder} for the results cannot be made or written to ({fault}): {advice}"
     )
 
 

@@ -25,10 +25,10 @@ from catenary.postproc.read.results import Results
 from catenary.solver.model.model import Model
 from catenary.solver.time_loop.views.channels import CHANNELS
 
-# What a restart finds again; the rest of the head may be another version's.
+# Attributes that a restart must find again; the rest of the head may be another version's.
 _SAME = ("case", "n_dofs", "system")
 _SAME_FACTS = ("time_step", "speed", "wave_speed")
-# What a state and the records of its step both hold, copied from the same arrays; so far apart
+# Values that a state and the records of its step share, copied from the same arrays; so far apart
 # they may be, as a share of the largest or of 1 m or 1 N.
 _RECORDED = ("contact_force", "head_height", "wire_height", "strip_force", "contact_wire_force")
 _ROUNDING = 1e-9

@@ -37,9 +37,11 @@ class ExcitedRun:
 
     def attributes(self) -> dict[str, Any]:
         """Attributes of the result file that replace those of a train."""
-        says = self.excitation.says()
+        sentence = self.excitation.in_words()
         return {
             "excitation": as_facts(self.excitation),
-            "pantographs": [{"kind": self.excitation.kind, "model": "none", "description": says}],
+            "pantographs": [
+                {"kind": self.excitation.kind, "model": "none", "description": sentence}
+            ],
             "arrivals": {"ends": list(end_sentences(self.problem))},
         }

@@ -14,7 +14,7 @@ from catenary.solver.statics.stability_of_rest import refuse_lost_wire
 from catenary.solver.time_loop.march import March
 
 _KERNELS = Path(catenary.solver.kernels.__path__[0])
-# What C programs include and link.
+# Header and library of C programs.
 HEADER, LIBRARY = _KERNELS / "simulation/catenary.h", _KERNELS / "libcatenary.so"
 
 

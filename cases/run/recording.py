@@ -11,7 +11,7 @@ from catenary.mbs.build import has_joints
 from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import LineMesh
 from catenary.meshgen.wires import Role
-from catenary.postproc.channels.line_record import GZIP, NONE, LineRecord, says
+from catenary.postproc.channels.line_record import GZIP, NONE, LineRecord, record_words
 from catenary.postproc.record.snapshots.field_kinds import USUAL_FIELDS
 from catenary.postproc.record.snapshots.field_layout import Course, FieldRecord
 from catenary.solver.effects.all_effects import simulated
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 # Size up to which the line's channels are recorded at every step, and snapshots at their usual
 # cadence, unless the scene says otherwise [B].
 WHOLE_UP_TO = 500e6
-# What is recorded of the line's channels beyond it: every so often [s], so far behind and ahead of
+# Record of the line's channels beyond it: every so often [s], so far behind and ahead of
 # the train [m].
 THINNED_EVERY, THINNED_WINDOW = 5e-3, (300.0, 200.0)
 FIELD_EVERY = 0.05  # [s]
@@ -94,20 +94,20 @@ class Recording:
         """Records in words, by their kind, at a time step of ``dt`` [s]."""
         ends = ", tensions and travel at wire ends" if self.end_x.size else ""
         what = f"arm uplift and dropper forces{ends}"
-        told = {"line": f"{what} {says(self.line, dt)}"}
+        texts = {"line": f"{what} {record_words(self.line, dt)}"}
         if self.field_every:
             chosen = " (chosen by size)" if self.field_by_size else ""
-            told["film"] = f"a snapshot of the line every {self.field_every * dt:.3g} s{chosen}"
+            texts["film"] = f"a snapshot of the line every {self.field_every * dt:.3g} s{chosen}"
             if self.fields.fields != USUAL_FIELDS:
-                told["film"] += f" with {', '.join(self.fields.fields)}"
+                texts["film"] += f" with {', '.join(self.fields.fields)}"
             if self.fields.wave_speed:
-                told["film"] += f" as far as waves of {self.fields.wave_speed:.3g} m/s have come"
+                texts["film"] += f" as far as waves of {self.fields.wave_speed:.3g} m/s have come"
             elif self.fields.window is not None:
                 behind, ahead = self.fields.window
-                told["film"] += f" from {behind:g} m behind to {ahead:g} m ahead of the train"
+                texts["film"] += f" from {behind:g} m behind to {ahead:g} m ahead of the train"
             if self.fields.rests_beyond:
-                told["film"] += "; the line beyond is at rest"
-        return told
+                texts["film"] += "; the line beyond is at rest"
+        return texts
 
     def thinned(self, dt: float) -> list[str]:
         """The sentences of what its size has thinned, for the log."""

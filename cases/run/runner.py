@@ -46,7 +46,7 @@ from catenary.postproc.files.filtered_force import ForceFilter
 from catenary.postproc.files.own_files import remove_stale
 from catenary.postproc.record.progress import Progress
 from catenary.postproc.record.recorder import Recorder
-from catenary.postproc.record.run_watch import RunWatch, StripWatch, watch_cadence, watched
+from catenary.postproc.record.run_watch import RunWatch, StripWatch, watch_cadence, watch_inputs
 from catenary.postproc.record.snapshots.blocks import RecordedLine
 from catenary.postproc.record.snapshots.fields import FieldRecorder
 from catenary.solver.problem.problem import OFF, Problem
@@ -267,7 +267,7 @@ def _run(order: _Order, judge: Callable[[RunSize], None]) -> RunOutcome:
 def _marched(
     order: _Order, judge: Callable[[RunSize], None], phases: Phases
 ) -> tuple[Outcome, int]:
-    """How the march ended, after which the result file is closed, and how many unknowns the line
+    """End of the march, after which the result file is closed, and number of unknowns that the line
     had. Collective."""
     scene, comm = order.scene, order.comm
     left = f"{order.result} is as it was" if order.resume else "nothing was written"
@@ -293,7 +293,9 @@ def _marched(
                 if order.state is not None:
                     march.restore(order.state)
                 if order.extends:
-                    on_root(comm, lambda: _let_go_on(order, header, march.n_steps), takes_long=True)
+                    on_root(
+                        comm, lambda: _extend_run(order, header, march.n_steps), takes_long=True
+                    )
             observers, recorder, watch = _observers(
                 order, problem, at_rest, header, phases.progress, march.n_steps
             )
@@ -397,7 +399,7 @@ def _observers(
         first.append(StripWatch(half_lengths))
     if excited is not None:
         first += excited.watching(at_rest)
-    watch = RunWatch(comm, watched(at_rest, excited is None), watch_cadence(dt))
+    watch = RunWatch(comm, watch_inputs(at_rest, excited is None), watch_cadence(dt))
     return [*first, progress, watch, recorder], recorder, watch
 
 
@@ -459,11 +461,11 @@ def _refuse_other_run(
     refuse_other_state(order.result, order.state, at_rest.model)
 
 
-def _let_go_on(order: _Order, header: Header | None, n_steps: int) -> None:
-    from catenary.postproc.files.later_end import let_go_on
+def _extend_run(order: _Order, header: Header | None, n_steps: int) -> None:
+    from catenary.postproc.files.later_end import extend_run
 
     assert header is not None
-    let_go_on(order.result, header, n_steps)
+    extend_run(order.result, header, n_steps)
 
 
 def _begun_for(order: _Order) -> int | None:

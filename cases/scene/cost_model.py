@@ -16,7 +16,7 @@ STEP_PER_UNKNOWN = 2.6e-9  # [s]
 # add planes join them to the others, as arms and the slope of wires at rest do. Those of ten are
 # wires that stretch, in three planes: no two of their stations are alike, and answers are long.
 STATION_COST = {2: 0.6, 4: 1.0, 6: 1.8, 8: 2.2, 10: 7.1, 12: 5.6, 16: 8.0}
-# What stations of several types take more than as many of one.
+# Factor on the time of stations of several types over that of as many of one.
 SEVERAL_TYPES = 1.25
 # Gusts on wires [s an unknown], measured with the case windy_viaduct.
 GUSTS_PER_UNKNOWN = 4e-9
@@ -36,7 +36,7 @@ MEMORY_PER_UNKNOWN = 800.0  # [B]
 # The same where a window of spans moves with the train, of 10 000 spans: matrices and factors are
 # made near the train alone, and the line makes room for the report.
 MEMORY_PER_UNKNOWN_AT_REST = 340.0  # [B]
-# What a step adds, as the report takes the history of one pantograph after the other.
+# Memory of a step, as the report takes the history of one pantograph after the other.
 MEMORY_PER_STEP = 40.0  # [B]
 
 

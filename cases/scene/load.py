@@ -159,8 +159,8 @@ def scene_from(raw: dict[str, Any], origin: Origin, folder: Path | None = None) 
         scene = Scene.model_validate(raw)
     except ValidationError as failed:
         of_schema, more = schema_faults(failed, raw, Scene, origin)
-        told = {fault.key for fault in faults}
-        faults += [fault for fault in of_schema if fault.key not in told]
+        known = {fault.key for fault in faults}
+        faults += [fault for fault in of_schema if fault.key not in known]
     if faults:
         raise SceneError(faults, more)
     scene._origin = origin

@@ -77,7 +77,7 @@ def end_of(scene: Scene) -> float:
 
 
 def strips_ahead(scene: Scene) -> list[float]:
-    """How far the outer strips of each pantograph are from its middle, along the track [m]."""
+    """Distance of the outer strips of each pantograph from its middle, along the track [m]."""
     kinds = (scene.pantographs.get(place.name) for place in scene.train.pantographs)
     return [0.0 if kind is None else kind.strips.ahead for kind in kinds]
 

@@ -76,7 +76,7 @@ class Scene(Table):
 
     @property
     def origin(self) -> Origin:
-        """Where the keys were written, for sentences about them."""
+        """Origin of the keys, for sentences about them."""
         return self._origin
 
     def refused(self, key: str, why: str, *, value: object = None) -> Fault:
@@ -118,9 +118,9 @@ class Scene(Table):
                 here = here[int(part) if isinstance(here, list) else part]
         return here
 
-    def fault(self, key: str, says: str) -> Fault:
+    def fault(self, key: str, sentence: str) -> Fault:
         """The fault of a key whose sentence ``says`` goes on after its name and its place."""
-        return Fault(key, f"{key} {self._origin.of(key)} {says}")
+        return Fault(key, f"{key} {self._origin.of(key)} {sentence}")
 
     def needs_effect(self, key: str, effect: str) -> Fault:
         """The fault of a key that acts only with an effect that is off by default."""

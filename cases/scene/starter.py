@@ -146,7 +146,7 @@ def starting_text(kind: str, name: str, spans: Sequence[float] = (), droppers: b
     if spans:
         body = _with_files(body, spans, droppers)
     head = (
-        f"# {plain(name)}: a new case, begun from {path.parent.name}. Change what is otherwise\n"
+        f"# {plain(name)}: a new case, begun from {path.parent.name}. Change what differs\n"
         "# on your line. `catenary list --keys WORD` explains keys.\n"
         '# Behind "usual" stands what other lines have, in the unit of the key.\n\n'
     )

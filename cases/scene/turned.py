@@ -18,7 +18,7 @@ FORWARD, BACKWARD = DIRECTIONS = ("forward", "backward")
 # Places are rounded to this [m, as decimals], so that a line which is its own mirror image is so
 # to the last digit.
 _DECIMALS = 9
-# Tables that have no part in the line, nor in what befalls it.
+# Tables that concern neither the line nor its defects and incidents.
 _NOT_OF_LINE = ("case", "train", "pantographs", "evaluation", "output", "test")
 
 

@@ -172,10 +172,10 @@ def _conclude(plan: Plan, out_dir: Path, ended: Sequence[Ended], begin: float) -
     }
     files = write_study(study, out_dir, table.records(), facts)
     files += write_files(out_dir, {"study.csv": table})
-    told = [f"{name}: {value}" for name, value in facts.items()]
+    fact_lines = [f"{name}: {value}" for name, value in facts.items()]
     listed = [str(path) for path in files if path.stem == "study"]
     remarks = sweep_output.remarks_of(ended)
-    return "\n".join([verdict_text(study), "", *told, *remarks, "", *listed])
+    return "\n".join([verdict_text(study), "", *fact_lines, *remarks, "", *listed])
 
 
 def _load(path: Path) -> ModuleType:

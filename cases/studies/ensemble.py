@@ -33,7 +33,7 @@ from catenary.postproc.evaluate.verdict import criteria_of
 from catenary.postproc.files.run_schema import DONE
 from catenary.postproc.read.marched_results import MarchedFile
 from catenary.postproc.read.results import Results
-from catenary.postproc.record.run_watch import RunWatch, watch_cadence, watched
+from catenary.postproc.record.run_watch import RunWatch, watch_cadence, watch_inputs
 from catenary.postproc.report.summary import summarise
 from catenary.solver.ensemble.marches import SceneHistory, march_side_by_side
 from catenary.solver.ensemble.shared_line import SharedLine, why_alone
@@ -94,7 +94,7 @@ _OF_THE_REST = "dropper_lengths"
 # where that may have something to say: of an uplift at an arm [m], a contact force [N], a share of
 # the time without contact.
 _UPLIFT, _FORCE, _LOST = 0.25, 1000.0, 0.1
-# How far columns of a shared line reach beyond runs [m]: trains that come later may be longer.
+# Length of a shared line's columns beyond runs [m]: trains that come later may be longer.
 _BEYOND = 60.0
 
 
@@ -377,7 +377,7 @@ def _alone(line: _Line, number: int, scene: Scene, problem: Problem, rest: LineA
     keeper, dt = Keeper(), problem.numerics.dt
     try:
         with March(alone(), *rest) as march:
-            watch = RunWatch(alone(), watched(rest, True), watch_cadence(dt))
+            watch = RunWatch(alone(), watch_inputs(rest, True), watch_cadence(dt))
             outcome = march.run([watch, keeper])
     except CatenaryError as error:
         return Marched(number, str(error), {})

@@ -20,7 +20,7 @@ from catenary.cases.studies.uncertainty.run_table import read_sampling_beside
 from catenary.postproc.report.study_table import Column, StudyTable, write_files
 
 _DONE = "done"
-# What differs between two runs of the same variant.
+# Figures that differ between two runs of the same variant.
 _OWN = ("wall_s", "remarks")
 
 

@@ -117,8 +117,8 @@ def study(scene: Scene, kind: str | None, n_masses: int | None, over: Range) -> 
     at = np.geomspace(over.fit_low, over.high, N_FITTED)
     fit = fit_chain(at, response.model.receptance(at), n_masses)
     receptance = response.model.receptance(over.frequencies())
-    told = kind, scene.case.name, speed, force, table.nominal_height_m
-    return PantographStudy(*told, data, response, over, receptance, fit)
+    of_case = kind, scene.case.name, speed, force, table.nominal_height_m
+    return PantographStudy(*of_case, data, response, over, receptance, fit)
 
 
 def study_text(found: PantographStudy) -> str:
@@ -191,7 +191,7 @@ def _peaks(found: PantographStudy) -> str:
 
 
 def fit_error(fit: ChainFit) -> str:
-    """How far a fit is off, for people."""
+    """Error of a fit, in words."""
     return f"rms error {100 * fit.rms_error:.2g} %, largest {100 * fit.largest_error:.2g} %"
 
 

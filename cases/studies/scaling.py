@@ -131,7 +131,7 @@ MOST_RANKS = 1_000_000
 # Times in the table of a prediction, and their heads.
 _PARTS = (("step", "us a step"), ("line", "line"), ("neighbours", "neighbours"), ("tree", "tree"),
           ("fixed", "rank 0"))  # fmt: skip
-# What steps take longer that are taken one by one, as on several ranks, and not in blocks: measured
+# Ratio of times of steps taken one by one, as on several ranks, and in blocks: measured
 # on lines of 25 to 1000 spans before and after there were blocks [s].
 _ONE_BY_ONE = 1e-5
 

@@ -47,8 +47,8 @@ def checked_table(raw: Mapping[str, Any], model: type[Model], file: str) -> Mode
         table = model.model_validate(tables)
     except ValidationError as failed:
         of_schema, more = schema_faults(failed, tables, model, origin)
-        told = {fault.key for fault in faults}
-        faults += [fault for fault in of_schema if fault.key not in told]
+        known = {fault.key for fault in faults}
+        faults += [fault for fault in of_schema if fault.key not in known]
     if not faults:
         return table
     first = faults[0].sentence.removeprefix("the scene in ")  # of no key: of the file

@@ -29,7 +29,7 @@ _RANK_VARIABLES = ("OMPI_COMM_WORLD_RANK", "PMI_RANK", "PMIX_RANK")
 Quiet = Annotated[bool, typer.Option("-q", "--quiet", help="Print nothing but errors.")]
 _quiet = False
 _BY_NAME = inspect.Parameter.KEYWORD_ONLY
-# What the verb that runs tells when it has come to its end.
+# Calls at the end of the verb that runs, which print what it has left to say.
 _last_words: list[Callable[[], None]] = []
 
 

@@ -8,7 +8,7 @@ import sys
 from collections.abc import Callable
 from typing import Any, TextIO
 
-# Where this takes messages a run shows its own progress; several at once share a bar.
+# A run shows its own progress if this logger takes messages; several at once share a bar.
 _logger = logging.getLogger("catenary.progress")
 
 

@@ -76,9 +76,9 @@ def summary_text(
         "",
     ]
     lines += _acceptance(summary)
-    told = [*summary.get("complaints", []), *summary.get("remarks", [])]
-    lines += ["", *(f"  REMARK      {text}" for text in told)]
-    lines += [""] * bool(told) + [f"Results: {folder}"]
+    remarks = [*summary.get("complaints", []), *summary.get("remarks", [])]
+    lines += ["", *(f"  REMARK      {text}" for text in remarks)]
+    lines += [""] * bool(remarks) + [f"Results: {folder}"]
     return "\n".join(lines)
 
 

@@ -50,7 +50,7 @@ class SteppedHead(ABC):
     ) -> None:
         s = len(head.offsets)
         self.strip_offsets = head.offsets
-        # Where the wire crosses the strips of a head that cannot roll makes no difference.
+        # The place of the wire on strips of a head that cannot roll makes no difference.
         moves = head.roll >= 0 or head.bending is not None
         self._part: Callable[[float], float] = Raising(raise_time)
         self._n, self._lateral = n, lateral if moves else None

@@ -22,13 +22,13 @@ from catenary.mbs.mechanism.pantograph_data import MultibodyData, stand
 from catenary.mbs.rigid.arrays import ORIGIN, body_products
 from catenary.mbs.rigid.bodies import SPACE, Motion
 from catenary.mbs.rigid.forces import Force, Gravity, OffLine, PointForce
+from catenary.mbs.rigid.implicit_steps import Stepper
 from catenary.mbs.rigid.joints import Constant, PrescribedPoint, steady
 from catenary.mbs.rigid.kinematics import point
 from catenary.mbs.rigid.spin_locks import without_spins
 from catenary.mbs.rigid.statics import equilibrium, held_force
+from catenary.mbs.rigid.step_solvers import StepSolver
 from catenary.mbs.rigid.system import System
-from catenary.mbs.time_steps.implicit_steps import Stepper
-from catenary.mbs.time_steps.step_solvers import StepSolver
 from catenary.mbs.vehicle.base_motion import BaseMotion
 from catenary.solver.kernels import native
 

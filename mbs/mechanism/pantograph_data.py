@@ -59,7 +59,7 @@ ROLL, PITCH = 0, 1
 
 @dataclass(frozen=True)
 class AllBodies:
-    """How all bodies are moved in the time loop: joints kept by ``handling``, one of
+    """Integration of all bodies in the time loop: joints kept by ``handling``, one of
     `step_solvers.METHODS`, in so many ``substeps`` of the line's step."""
 
     handling: str = "coordinate_partitioning"
@@ -103,7 +103,7 @@ class MultibodyData:
 
     @property
     def roll(self) -> Turning | None:
-        """How the head turns about the track as its joints allow it, None if they do not."""
+        """Roll of the head about the track as its joints allow it, None if they do not."""
         return head_turning(self, ROLL)
 
     @property
@@ -354,7 +354,7 @@ def _joined(what: Joint | Force) -> tuple[str, ...]:
 
 
 def _part(motion: Motion, system: System) -> Motion:
-    """Where the bodies of a smaller system are in the motion of a larger one."""
+    """Motion of the bodies of a smaller system, taken from that of a larger one."""
     kept = [motion.numbers[name] for name in system.start().numbers]
     return replace(
         system.start(), position=motion.position[kept], parameters=motion.parameters[kept]

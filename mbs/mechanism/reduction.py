@@ -290,7 +290,7 @@ class _Raised:
         way = root * least_squares(jacobian * root, unit_speed, 1e-8)
         lift = way @ system.generalised_forces(motion, 0.0)
         damping = lift - way @ system.generalised_forces(motion.with_velocities(way), 0.0)
-        # Where the third of the six numbers of a body is its velocity upward.
+        # The third of the six numbers of a body is its velocity upward.
         carried = system.mass[2::6] @ way[2::6]
         columns = np.array([system.mass @ way**2, damping, carried])
         return _Place(height, motion, columns, float(lift), way)

@@ -101,7 +101,7 @@ def pressed_at_rest(data: MultibodyData) -> tuple[System, Motion, float]:
 
 
 def peaks(model: LinearModel, frequencies: Vector) -> tuple[Peak, ...]:
-    """Where the receptance is largest between its neighbours, found to 1e-6 of the frequency.
+    """Frequencies of the receptance's local maxima, to 1e-6 of each.
 
     ``frequencies`` (n,) [Hz], growing: each peak is searched for around one of them.
     """

@@ -1,1 +1,1 @@
-"""Rigid bodies, joints and forces in space, and their arrays."""
+"""Rigid bodies, joints and forces in space, their arrays, and their motion in time steps."""

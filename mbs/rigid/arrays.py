@@ -191,7 +191,7 @@ class FlatLines:
         return len(self.names)
 
     def geometry(self, motion: Motion) -> LineGeometry:
-        """How the lines are in a motion.
+        """Geometry of the lines in a motion.
 
         Raises InputError where the two points of a line coincide.
         """

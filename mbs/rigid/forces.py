@@ -194,7 +194,7 @@ class BumpStop(_BetweenPoints):
     damping: float = 0.0
 
     def _depth(self, length: float) -> tuple[float, float]:
-        """How far beyond a limit [m], and the sign of the way back in length."""
+        """Depth beyond a limit [m], and the sign of the way back in length."""
         if length < self.shortest:
             return self.shortest - length, 1.0
         return max(length - self.longest, 0.0), -1.0

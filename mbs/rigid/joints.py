@@ -106,14 +106,20 @@ class _RowsAreProducts:
 
 
 @dataclass(frozen=True)
-class Spherical(_RowsAreProducts):
-    """A point of body i is a point of body j: three rows."""
+class _BetweenPoints(_RowsAreProducts):
+    """A joint between a point ``at_i`` of body ``i`` and a point ``at_j`` of body ``j``."""
 
     name: str
     i: str
     j: str
     at_i: Vector = ORIGIN
     at_j: Vector = ORIGIN
+
+
+@dataclass(frozen=True)
+class Spherical(_BetweenPoints):
+    """A point of body i is a point of body j: three rows."""
+
     n_lengths: ClassVar[int] = 3
 
     def products(self) -> list[Product]:
@@ -122,14 +128,9 @@ class Spherical(_RowsAreProducts):
 
 
 @dataclass(frozen=True)
-class Revolute(_RowsAreProducts):
+class Revolute(_BetweenPoints):
     """Bodies i and j turn about a common axis through a common point: five rows."""
 
-    name: str
-    i: str
-    j: str
-    at_i: Vector = ORIGIN
-    at_j: Vector = ORIGIN
     axis_i: Vector = (0.0, 1.0, 0.0)
     axis_j: Vector = (0.0, 1.0, 0.0)
     n_lengths: ClassVar[int] = 3
@@ -143,14 +144,9 @@ class Revolute(_RowsAreProducts):
 
 
 @dataclass(frozen=True)
-class PointOnLine(_RowsAreProducts):
+class PointOnLine(_BetweenPoints):
     """A point of body j stays on a line fixed in body i: two rows."""
 
-    name: str
-    i: str
-    j: str
-    at_i: Vector = ORIGIN
-    at_j: Vector = ORIGIN
     axis_i: Vector = (1.0, 0.0, 0.0)
     n_lengths: ClassVar[int] = 2
 
@@ -160,17 +156,12 @@ class PointOnLine(_RowsAreProducts):
 
 
 @dataclass(frozen=True)
-class Prismatic(_RowsAreProducts):
+class Prismatic(_BetweenPoints):
     """Body j slides along an axis of body i without turning: five rows.
 
     ``normal_i`` and ``normal_j`` are across the axis and point the same way in both bodies.
     """
 
-    name: str
-    i: str
-    j: str
-    at_i: Vector = ORIGIN
-    at_j: Vector = ORIGIN
     axis_i: Vector = (1.0, 0.0, 0.0)
     axis_j: Vector = (1.0, 0.0, 0.0)
     normal_i: Vector = (0.0, 0.0, 1.0)
@@ -189,18 +180,13 @@ class Prismatic(_RowsAreProducts):
 
 
 @dataclass(frozen=True)
-class RevolutePrismatic(_RowsAreProducts):
+class RevolutePrismatic(_BetweenPoints):
     """Body j slides along its own axis and turns about an axis of body i: four rows.
 
     A massless piece between both turns on body i about ``turn_axis_i`` and lets body j slide along
     ``slide_axis_j``; ``turn_axis_j`` is the axis of turning in axes of body j.
     """
 
-    name: str
-    i: str
-    j: str
-    at_i: Vector = ORIGIN
-    at_j: Vector = ORIGIN
     turn_axis_i: Vector = (1.0, 0.0, 0.0)
     turn_axis_j: Vector = (1.0, 0.0, 0.0)
     slide_axis_j: Vector = (0.0, 0.0, 1.0)

@@ -180,7 +180,7 @@ class System:
 
     @property
     def row_ranges(self) -> dict[str, slice]:
-        """Which rows belong to which joint."""
+        """Ranges of rows by joint."""
         return self._rows.ranges
 
     def redundant(self, motion: Motion) -> tuple[str, ...]:

@@ -59,7 +59,7 @@ def line_of(
     by_name = {wire.name: wire for wire in wires}
     if not any(wire.role is Role.CONTACT for wire in wires):
         raise InputError("no wire of the line has the role contact")
-    droppers = _those(links, FreeDroppers)
+    droppers = _of_kind(links, FreeDroppers)
     loads = _loads(data, wires, droppers)
     made: dict[str, Wire] = {}
     for name in in_order((one.name, one.bearers) for one in wires):
@@ -71,9 +71,9 @@ def line_of(
         topology,
         tuple(replace(wire, taken=_taken(wire.name, wires)) for wire in listed),
         tuple(_plain(group) for group in droppers),
-        _those(links, SteadyArms),
-        _those(links, Supports),
-        (*_those(links, Clamps), *_end_clamps(wires)),
+        _of_kind(links, SteadyArms),
+        _of_kind(links, Supports),
+        (*_of_kind(links, Clamps), *_end_clamps(wires)),
         twins=twins,
     )
 
@@ -82,9 +82,9 @@ def hung(data: LineData) -> set[str]:
     """Names of the wires that have a wanted height at rest."""
     assert data.wires is not None and data.links is not None
     found = {wire.name for wire in data.wires if wire.role is Role.CONTACT}
-    found |= {link.lower for link in _those(data.links, FreeDroppers)}
-    found |= {link.holds for link in _those(data.links, Supports) if link.holds}
-    found |= {link.wire for link in _those(data.links, SteadyArms) if link.kind.holds_height}
+    found |= {link.lower for link in _of_kind(data.links, FreeDroppers)}
+    found |= {link.holds for link in _of_kind(data.links, Supports) if link.holds}
+    found |= {link.wire for link in _of_kind(data.links, SteadyArms) if link.kind.holds_height}
     return found
 
 
@@ -123,7 +123,7 @@ def carriers(data: LineData, wire: FreeWire) -> np.ndarray:
     return np.unique(places)
 
 
-def _those(links: tuple[FreeLink, ...], kind: type[_Group]) -> tuple[_Group, ...]:
+def _of_kind(links: tuple[FreeLink, ...], kind: type[_Group]) -> tuple[_Group, ...]:
     return tuple(link for link in links if isinstance(link, kind))
 
 
@@ -307,7 +307,7 @@ def _profile(data: LineData, free: FreeWire) -> Profile:
     """Heights wanted of a wire, with the pre-sag that its droppers give it."""
     assert free.heights is not None and data.links is not None
     masts = data.support_positions
-    holding = [link for link in _those(data.links, FreeDroppers) if link.lower == free.name]
+    holding = [link for link in _of_kind(data.links, FreeDroppers) if link.lower == free.name]
     x = np.concatenate([masts, *(link.lower_x for link in holding)])
     sag = np.concatenate([np.zeros(masts.size), *(link.pre_sag for link in holding)])
     order = np.argsort(x)

@@ -97,23 +97,23 @@ def from_table(table: Mapping[str, Any]) -> LineRecord:
     )
 
 
-def says(record: LineRecord, dt: float) -> str:
+def record_words(record: LineRecord, dt: float) -> str:
     """Recorded part, in words, at a time step of ``dt`` [s]."""
     if not record.names:
         return "not recorded; extremes are kept of every step"
     if record.whole:
-        told = "recorded at every step"
+        words = "recorded at every step"
     else:
         every = "at every step" if record.every == 1 else f"every {1e3 * record.every * dt:g} ms"
-        told = f"recorded {every}"
+        words = f"recorded {every}"
         if record.window is not None:
             behind, ahead = record.window
-            told += f" within {behind:g} m behind and {ahead:g} m ahead of the train"
+            words += f" within {behind:g} m behind and {ahead:g} m ahead of the train"
         if record.stretch is not None:
-            told += f" from {record.stretch[0]:g} to {record.stretch[1]:g} m"
+            words += f" from {record.stretch[0]:g} to {record.stretch[1]:g} m"
         if not set(record.names) >= set(channels.line_channels_of_all()):
-            told = f"of these {', '.join(record.names)} {told}"
-        told += "; extremes are kept of every step"
+            words = f"of these {', '.join(record.names)} {words}"
+        words += "; extremes are kept of every step"
     if record.compression != NONE:
-        told += "; compressed"
-    return told + (" (chosen by size)" if record.by_size else "")
+        words += "; compressed"
+    return words + (" (chosen by size)" if record.by_size else "")

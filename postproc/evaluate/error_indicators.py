@@ -28,7 +28,7 @@ from catenary.solver.problem.integrator_parameters import (
     Integration,
 )
 
-# How long an error of phase goes on growing [s]: on the line without damping, where waves run
+# Time over which an error of phase grows [s]: on the line without damping, where waves run
 # away from the pantograph, and at the pantograph itself, which no damping of the line shortens.
 # Both are calibrated, once, on the shipped cases (docs/accuracy.md).
 LINE_MEMORY, NEAR_MEMORY = 0.75, 0.025
@@ -116,8 +116,8 @@ def indicate(results: Results) -> Indicators:
     resolved, required = min(
         ((wire.resolved, wire.required) for wire in wires), key=lambda pair: pair[0] / pair[1]
     )
-    told = (*_step_warning(relative, results.dt), *_mesh_warning(resolved, required))
-    return Indicators(error, relative, resolved, required, told)
+    warnings = (*_step_warning(relative, results.dt), *_mesh_warning(resolved, required))
+    return Indicators(error, relative, resolved, required, warnings)
 
 
 def step_error(force: np.ndarray, dt: float, method: Method) -> float:
@@ -311,8 +311,8 @@ def as_table(indicators: Indicators) -> dict[str, Any]:
 
 
 class _ContactWire(NamedTuple):
-    """How a contact wire is stepped, what its longest element where it is evaluated resolves, and
-    what is required of it [Hz]."""
+    """Resolution of a contact wire: by its steps, by its longest element where it is evaluated, and
+    as required [Hz]."""
 
     method: Method
     resolved: float

@@ -163,8 +163,8 @@ def _one(value: float, missing: str = "") -> Observation:
 def _force(of: Callable[[PantographStatistics], float]) -> Observe:
     def observation(run: ObservedRun) -> Observation:
         pantographs = run.statistics.pantographs
-        said = {p.name: p.complaint or p.unjudged for p in pantographs}
-        unjudged = {name: why for name, why in said.items() if why}
+        reasons = {p.name: p.complaint or p.unjudged for p in pantographs}
+        unjudged = {name: why for name, why in reasons.items() if why}
         return Observation({p.name: of(p) for p in pantographs}, unjudged)
 
     return observation

@@ -153,19 +153,19 @@ def _about_droppers(results: Results) -> list[str]:
     # Not of NaN either.
     if not stiffness * dt**2 > STIFF:
         return []
-    said = f"Droppers of {stiffness_words(stiffness)} are stiff for a step of {1e3 * dt:g} ms"
+    begin = f"Droppers of {stiffness_words(stiffness)} are stiff for a step of {1e3 * dt:g} ms"
     longest = f"a numerics.dt_s of {1e3 * math.sqrt(STIFF / stiffness):.2g} ms at most"
     added = results.fact("added_dropper_damping")
     if added > 0.0:
         return [
-            f"{said}: numerical damping of alpha = {1e3 * added:.3g} ms in them "
+            f"{begin}: numerical damping of alpha = {1e3 * added:.3g} ms in them "
             "(effects.stiff_link_damping) keeps their switches from making energy, and softens the "
             f"forces of a few steps. Take {longest} to do without."
         ]
     if results.fact("dropper_stiffness_damping") >= dt:
         return []
     return [
-        f"{said}: when they slacken and tighten they give the line energy that it did not have. "
+        f"{begin}: when they slacken and tighten they give the line energy that it did not have. "
         f"Take {longest}, or leave effects.stiff_link_damping on."
     ]
 
@@ -177,7 +177,7 @@ def _about_ends(results: Results) -> list[str]:
         return []
     masts, x = results.line("support_x"), results.line("dropper_x")
     lowest, (first, last) = results.extremes("dropper_force")[0], results.evaluation
-    said = []
+    sentences = []
     for side in periodic:
         low, high = masts[:2] if side == "start" else masts[-2:]
         slack = int(np.count_nonzero((x > low) & (x < high) & (lowest <= 0.0)))
@@ -186,13 +186,13 @@ def _about_ends(results: Results) -> list[str]:
                 f"take an evaluation.to_m of {low:g} at most" if side == "end"
                 else f"take an evaluation.from_m of {high:g} at least"
             )  # fmt: skip
-            said.append(
+            sentences.append(
                 f"{counted(slack, 'dropper')} of the span at the periodic {side} of the line "
                 "slackened, which is part of the evaluated stretch; those beyond do not slacken, "
                 "and near the end the force is not that of a longer line: "
                 f"{remedy}, or a larger line.n_spans."
             )
-    return said
+    return sentences
 
 
 def _about_contact(results: Results) -> list[str]:
@@ -209,19 +209,19 @@ def _about_contact(results: Results) -> list[str]:
 
 def _about_head(head: _Contact) -> list[str]:
     contact = stiffness_words(float(f"{head.stiffness:.3g}"))
-    said = (
+    begin = (
         f"A head of {head.mass:.3g} kg on a contact of {contact} has a resonance at "
         f"{head.frequency:.3g} Hz"
     )
     result = []
     if head.frequency < _FELT_HZ:
         result.append(
-            f"{said}, inside the 20 Hz band: contact.stiffness_N_per_m is part of the "
+            f"{begin}, inside the 20 Hz band: contact.stiffness_N_per_m is part of the "
             "result. Figures of other contact stiffnesses cannot be compared with these."
         )
     if head.omega * head.dt > _RESOLVED:
         result.append(
-            f"{said}: a step of {1e3 * head.dt:g} ms does not resolve its hops. If the head loses "
+            f"{begin}: a step of {1e3 * head.dt:g} ms does not resolve its hops. If the head loses "
             "contact they feed the line, with forces several times too large, and the loss of "
             "contact counts steps, not losses. Take a smaller numerics.dt_s, a contact that damps, "
             "or numerics.newmark_gamma = 0.6 with newmark_beta = 0.3025."

@@ -113,8 +113,8 @@ class RunStatistics:
     @property
     def complaints(self) -> list[str]:
         """Sentences that say which statistics could not be formed, and why."""
-        said = (p.complaint or p.unjudged for p in self.pantographs)
-        return [sentence for sentence in said if sentence]
+        reasons = (p.complaint or p.unjudged for p in self.pantographs)
+        return [sentence for sentence in reasons if sentence]
 
 
 def evaluate(results: Results) -> RunStatistics:
@@ -272,7 +272,7 @@ def _pantograph(name: str, number: int, results: Results) -> PantographStatistic
 
 
 def _unjudged(noun: str, force: np.ndarray, results: Results) -> str:
-    """Why a force (n,) of the evaluation stretch is not judged, "" if it is."""
+    """Reason for not judging a force (n,) of the evaluation stretch, "" if it is judged."""
     if not force.any():
         return f"Nothing is judged of the {noun}: its contact force is zero all the way."
     start, end = results.evaluation

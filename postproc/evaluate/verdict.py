@@ -121,14 +121,14 @@ def verdict_sentence(criteria: Sequence[Criterion], supply: str) -> str:
     titles = list(dict.fromkeys(c.title for c in criteria))
     judged = [c for c in criteria if c.passed is not None]
     failed = sum(c.passed is False for c in judged)
-    said = f"{len(judged) - failed} of {len(judged)} criteria passed"
+    counts = f"{len(judged) - failed} of {len(judged)} criteria passed"
     left = len(criteria) - len(judged)
-    said += f", {left} not judged" if left else ""
+    counts += f", {left} not judged" if left else ""
     unseen = sum(not c.compared for c in judged)
     if unseen:
-        said += f"; {unseen} of {len(judged)} limits not compared with the text of their standard"
+        counts += f"; {unseen} of {len(judged)} limits not compared with the text of their standard"
     named = " and ".join([", ".join(titles[:-1]), titles[-1]] if titles[1:] else titles)
-    return f"{named} ({SYSTEMS[supply]}): {said}"
+    return f"{named} ({SYSTEMS[supply]}): {counts}"
 
 
 def labels(criteria: Sequence[Criterion]) -> list[str]:

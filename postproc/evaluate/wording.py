@@ -27,7 +27,7 @@ def with_minus(text: str) -> str:
 
 
 def wire_words(name: str) -> str:
-    """A wire's name as words; wires of the second section of an overlap are told from the first."""
+    """A wire's name as words; those of the second section of an overlap are marked as such."""
     words = name.replace("_", " ")
     of_first = words.removesuffix(" next")
     return words if of_first == words else f"{of_first} (next section)"

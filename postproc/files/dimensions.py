@@ -40,7 +40,7 @@ _COUNTED = {
 # The dimension of a group's rows. Groups with a clock of their own have another dimension than the
 # root's ``time``, which they would otherwise share.
 _ROWS = {"channels": "time", "line_channels": "line_row", "energy": "energy_row"}
-# How netCDF-4 names a scale that is a size and has no values.
+# Name of netCDF-4 for a scale that is a size and has no values.
 _SIZE = b"This is a netCDF dimension but not a netCDF variable. %10d"
 
 

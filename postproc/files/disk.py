@@ -26,7 +26,7 @@ _NO_LOCKS = (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP)
 # Room for HDF5's own tables and for the last words of a run that has filled the disk [bytes].
 MARGIN = 128 * 1024
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
-# Where a superblock keeps the end of what the file holds, of the versions that `FORMAT_BOUNDS` make
+# Offset at which a superblock has the end of the file's content, of the versions of `FORMAT_BOUNDS`
 # [bytes].
 _END_AT, _VERSIONS = 28, (2, 3)
 
@@ -34,7 +34,7 @@ _END_AT, _VERSIONS = 28, (2, 3)
 def plain(value: Any) -> Any:
     """``value`` in types of JSON: NumPy types converted, NaN and infinity as None, zero without a
     sign."""
-    # What tables hold most comes first.
+    # The most frequent types come first.
     if value is None or isinstance(value, (str, int)):
         return value
     if isinstance(value, float):

@@ -37,7 +37,7 @@ _KEPT = ("versions", "petsc_options", "effects_on", "effects_off")
 CHANGED = ("line/evaluation_range",)
 
 
-def let_go_on(path: Path, header: Header, n_steps: int) -> None:
+def extend_run(path: Path, header: Header, n_steps: int) -> None:
     """Turn a result file into that of a run of ``n_steps`` interrupted where it has ended.
 
     Parameters

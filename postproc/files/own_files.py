@@ -40,7 +40,7 @@ _OF_CHANNELS = tuple(
     for channel in (*CHANNELS.values(), *ENERGIES.values())
     if (channel.values or channel.energy) and not channel.own_picture
 )
-# Those of versions before.
+# Names of earlier versions.
 _EARLIER = ("worst_support",)
 # All but input.toml, which a user may have changed.
 REPORT_FILES = (
@@ -53,7 +53,7 @@ REPORT_FILES = (
         for kind in ("png", "svg")
     ),
 )
-# What a sweep leaves beside a run's files.
+# Files of a sweep beside those of a run.
 VARIANT_FILE = "variant.json"
 OWN_FILES = (RUN_FILE, *FIELD_FILES, *REPORT_FILES, VARIANT_FILE)
 

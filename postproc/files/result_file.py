@@ -489,8 +489,8 @@ def _cut(file: h5py.File, time: float) -> None:
         for path in paths:
             lost = shorten(file, path, keep)
             if lost:
-                told = "%s is damaged: its records %d to %d are lost"
-                logger.warning(told, path, keep - lost, keep - 1)
+                sentence = "%s is damaged: its records %d to %d are lost"
+                logger.warning(sentence, path, keep - lost, keep - 1)
     counted = _rows(file)
     put_array(file, COMPLETE, counted)
     drop_extremes(file, counted[0])

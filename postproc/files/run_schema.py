@@ -222,7 +222,7 @@ COLUMNS = {
     channels.WIRE_END: f"recorded_{WIRE_END}",
 }
 ALL_COLUMNS = {channels.ARM: ARM, channels.DROPPER: DROPPER, channels.WIRE_END: WIRE_END}
-# Where the places along the track of a dimension are.
+# Tables of the places along the track, by dimension.
 PLACES = {ARM: "line/arm_x", DROPPER: "line/dropper_x", WIRE_END: "line/end_x"}
 
 

@@ -15,10 +15,10 @@ from catenary.mbs.shape import Shape
 from catenary.postproc.film import drawing
 from catenary.postproc.film.chart import ForceChart, RingingChart
 from catenary.postproc.film.film_data import FilmData, film_data
+from catenary.postproc.film.options import FilmOptions
 from catenary.postproc.film.projection import Picture, Projection
 from catenary.postproc.film.scenery import COLOURS, DROPPER_FORCES, MOTIONS, SLACK, Scenery
 from catenary.postproc.film.snapshots import Snapshots
-from catenary.postproc.film.wish import Wish
 from catenary.postproc.read.records import Records
 from catenary.postproc.read.results import Results
 from catenary.solver.waves.excitation import Blow
@@ -29,7 +29,7 @@ _WIDTH = 110.0
 _LEAST_WIDTH = 5.0
 # Share of a picture that is behind the train.
 _BEHIND = 0.55
-# How far a picture may reach beyond what the snapshots have [m].
+# Distance by which a picture may reach beyond the snapshots [m].
 _NEAR = 3.0
 # Travel between two pictures, as a share of what they show.
 _TRAVEL = 0.01
@@ -63,7 +63,7 @@ class Film:
 
 def animate(
     folder: Path,
-    wish: Wish,
+    options: FilmOptions,
     records: Records | None,
     progress: bool,
     shapes: Sequence[Shape] | None = None,
@@ -74,7 +74,7 @@ def animate(
     ----------
     folder : Path
         Result folder; the films are written there.
-    wish : Wish
+    options : FilmOptions
         Times, line and size of the pictures.
     records : Records or None
         Findings of ``guard.examined`` in the result file.
@@ -97,7 +97,7 @@ def animate(
     with Results(folder, records) as results:
         data = film_data(results)
         with Snapshots(folder, len(data.points), until=float(data.time[-1])) as snapshots:
-            made = Pictures(results, Scenery(data, snapshots, shapes), snapshots, wish)
+            made = Pictures(results, Scenery(data, snapshots, shapes), snapshots, options)
             shown = tqdm(
                 made,
                 total=len(made),
@@ -108,13 +108,13 @@ def animate(
             )
             files = folder / MP4, folder / GIF
             colours = (*COLOURS[: data.n_pantographs], *MOTIONS, *DROPPER_FORCES, SLACK)
-            count = video.write(shown, drawing.SIZE, wish.rate, *files, colours)
+            count = video.write(shown, drawing.SIZE, options.rate, *files, colours)
             seconds = float(np.diff(made.times).mean())
             apart = data.speed * float(np.diff(snapshots.times).mean())
-    return Film(files, count, 1.0 / (seconds * wish.rate), apart, apart <= SMOOTH_UP_TO)
+    return Film(files, count, 1.0 / (seconds * options.rate), apart, apart <= SMOOTH_UP_TO)
 
 
-def chosen(times: np.ndarray, wish: Wish) -> np.ndarray:
+def chosen(times: np.ndarray, options: FilmOptions) -> np.ndarray:
     """Numbers of the snapshots that are shown, two at least.
 
     Raises
@@ -122,8 +122,8 @@ def chosen(times: np.ndarray, wish: Wish) -> np.ndarray:
     InputError
         If there are fewer in the time that is asked for.
     """
-    start = times[0] if wish.start is None else wish.start
-    end = times[-1] if wish.end is None else wish.end
+    start = times[0] if options.start is None else options.start
+    end = times[-1] if options.end is None else options.end
     numbers = np.flatnonzero((times >= start - _SAME) & (times <= end + _SAME))
     if numbers.size < 2:
         raise InputError(
@@ -186,25 +186,25 @@ class Pictures:
     Raises
     ------
     InputError
-        If the wish does not fit the run.
+        If the options do not fit the run.
     """
 
     def __init__(
-        self, results: Results, scenery: Scenery, snapshots: Snapshots, wish: Wish
+        self, results: Results, scenery: Scenery, snapshots: Snapshots, options: FilmOptions
     ) -> None:
         self._results, self._scenery, self._snapshots = results, scenery, snapshots
         data = scenery.data
-        self._followed = followed(data, wish.camera)
-        numbers = chosen(snapshots.times, wish)
+        self._followed = followed(data, options.camera)
+        numbers = chosen(snapshots.times, options)
         shown = snapshots.times[numbers]
-        view = wish.view or scenery.best_view
-        self._width = width = self._fitting(numbers, wish.width)
-        every = wish.every or _TRAVEL * width
+        view = options.view or scenery.best_view
+        self._width = width = self._fitting(numbers, options.width)
+        every = options.every or _TRAVEL * width
         self.times = times_of_pictures(shown, data.speed, every)
         picture = Picture.of(view, data, scenery.roof, width, drawing.ASPECT)
         extremes = snapshots.extremes(numbers, self._seen)
         projection = Projection(
-            view, picture.scale(data, extremes, wish.motion), scenery.roof + 0.5
+            view, picture.scale(data, extremes, options.motion), scenery.roof + 0.5
         )
         self._dropper_time = results.line_time if results.has("dropper_force") else np.zeros(0)
         self.drawing = drawing.Drawing(
@@ -216,7 +216,7 @@ class Pictures:
             self.chart = RingingChart(self.drawing.chart, data, blow, snapshots, numbers)
         else:
             first, last = (data.row_at(float(end)) for end in shown[[0, -1]])
-            # What the first picture shows of the force lies behind the train already.
+            # The force in the first picture lies behind the train already.
             low = self._span(first, width)[0]
             begin = min(int(x.searchsorted(low)) for x in data.position[: first + 1].T)
             rows = min(begin, first), last + 1
@@ -248,7 +248,7 @@ class Pictures:
         return middle - _BEHIND * width, middle + (1.0 - _BEHIND) * width
 
     def _seen(self, number: int) -> np.ndarray:
-        """Which nodes a picture shows at a snapshot, (n_nodes,), all where it shows none."""
+        """Mask (n_nodes,) of nodes that a picture shows at a snapshot, all where it shows none."""
         data = self._scenery.data
         row = data.row_at(float(self._snapshots.times[number]))
         low, high = self._span(row, self._width)

@@ -72,7 +72,7 @@ class ForceChart:
 
 
 class RingingChart:
-    """How the contact wire rings over time where a blow struck it. Not collective.
+    """Motion of the contact wire over time at the place of a blow. Not collective.
 
     Attributes
     ----------

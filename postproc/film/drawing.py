@@ -18,6 +18,7 @@ from matplotlib.figure import Figure
 
 from catenary.meshgen.mesh import DROPPERS
 from catenary.postproc.film import scenery as drawn
+from catenary.postproc.film.options import View
 from catenary.postproc.film.projection import EYE, Colours, Picture, Projection, room_above
 from catenary.postproc.film.scenery import (
     LOOKS,
@@ -28,7 +29,6 @@ from catenary.postproc.film.scenery import (
     Places,
     Scenery,
 )
-from catenary.postproc.film.wish import View
 from catenary.postproc.record.snapshots.blocks import ARMS, CLAMPS, MASTS
 
 SIZE = (1920, 1080)
@@ -45,7 +45,7 @@ _ARROW = 0.0035
 _BESIDE_VALUE, _ABOVE_VALUE = 0.03, 0.014
 # Length of line that is seen from behind the train, from behind the first pantograph on [m].
 _SEEN_BEHIND, _SEEN_AHEAD = 10.0, 65.0
-# What is that near to the picture is drawn [m]; half the length of lines across the track [m].
+# Distance from the picture up to which parts are drawn [m]; half the length of lines across [m].
 _NEAR, _ACROSS = 12.0, 50.0
 # Faces of a box from dark to light: left, floor, rear, front, roof, right.
 _FACES = ("#c3c8ce", "#c3c8ce", "#ccd1d7", "#ccd1d7", "#eceef1", "#dde1e6")
@@ -218,7 +218,7 @@ class Drawing:
         span : tuple of float
             Line in the picture, from and to [m].
         """
-        # What is not known is beyond the picture, or at rest.
+        # Unknown points are beyond the picture, or at rest.
         moved = np.nan_to_num(moved)
         data, view = self._scenery.data, self._picture.view
         low, high = span[0] - _NEAR, span[1] + _NEAR

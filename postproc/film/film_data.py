@@ -164,7 +164,7 @@ def _excited(data: FilmData, excitation: Excitation) -> FilmData:
 
 
 def _gone(results: Results, x: np.ndarray) -> np.ndarray:
-    """When droppers at places [m] break, those that are missing before all time [s]."""
+    """Times at which droppers at places [m] break [s]; minus infinity for missing ones."""
     gone = np.full(x.size, np.inf)
     for fact in (*results.attributes.get("defects", []), *results.attributes.get("incidents", [])):
         # Files of earlier versions do not say where a dropper breaks.

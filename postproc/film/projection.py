@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from catenary.postproc.film.film_data import FilmData
-from catenary.postproc.film.wish import View
+from catenary.postproc.film.options import View
 from catenary.postproc.record.snapshots.blocks import BESIDE
 
 # Share of the room between the wires that the largest motion fills in a drawing.

@@ -16,8 +16,8 @@ import numpy as np
 from catenary.mbs.shape import BELOW_HEAD, BODY, HEAD, SPRING, Pose, Shape, schematic
 from catenary.meshgen.mesh import DROPPERS
 from catenary.postproc.film.film_data import FilmData
+from catenary.postproc.film.options import View
 from catenary.postproc.film.snapshots import Frame, Snapshots
-from catenary.postproc.film.wish import View
 from catenary.postproc.record.snapshots.blocks import ARMS, CLAMPS, FIXED, MASTS
 
 CONTACT, WIRE = "contact", "wire"
@@ -74,7 +74,7 @@ class Stroke:
     schematic = False
 
     def pose(self, places: np.ndarray, base: float, head: float, wire: float) -> Pose:
-        """Where the points are: under the wire at rest, as what strikes is not simulated."""
+        """Places of the points: under the wire at rest, as what strikes is not simulated."""
         points = np.zeros((6, 3))
         points[0, 2] = -_STEM
         points[[2, 3], 0] = points[[4, 5], 1] = -_HALF_STROKE, _HALF_STROKE
@@ -100,7 +100,7 @@ class LinePart:
     nodes: np.ndarray
 
     def moved(self, nodes: np.ndarray) -> np.ndarray:
-        """How far its points have moved, from how far the line's nodes have, (n, 3) [m]."""
+        """Displacements of its points from those of the line's nodes, (n, 3) [m]."""
         return np.where((self.nodes == FIXED)[:, None], 0.0, nodes[self.nodes])
 
 
@@ -191,7 +191,7 @@ class Scenery:
         return View.SIDE
 
     def beside(self, time: float, frame: Frame) -> dict[str, Places]:
-        """Where the parts beside the line are at a time.
+        """Places of the parts beside the line at a time.
 
         A head that presses on a wire is drawn where the wire is, which is drawn between its nodes;
         the arms below it give way in proportion.
@@ -230,8 +230,8 @@ class Scenery:
         return found
 
     def _contacts(self, row: int, moved: np.ndarray) -> Places:
-        """Where the lowest wires above the heads rest, and how far they have moved, or how high the
-        heads are that touch none."""
+        """Places at rest of the lowest wires above the heads, and their displacements; heads that
+        touch no wire have displacements up to their own height."""
         data = self.data
         rest, by = np.zeros((2, data.n_pantographs, 3))
         for p, x in enumerate(data.position[row].tolist()):

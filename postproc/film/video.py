@@ -76,14 +76,14 @@ def _encode(
 ) -> int:
     """Number of pictures that ffmpeg has written into both files."""
     count, pipe, whole = 0, None, False
-    with tempfile.TemporaryDirectory() as place, tempfile.TemporaryFile() as said:
+    with tempfile.TemporaryDirectory() as place, tempfile.TemporaryFile() as errors:
         palette = Path(place) / "palette.png"
         try:
             for picture in pictures:
                 if pipe is None:
                     _palette(picture, colours).save(palette)
                     command = _command(size, rate, palette, parts)
-                    pipe = subprocess.Popen(command, stdin=subprocess.PIPE, stderr=said)
+                    pipe = subprocess.Popen(command, stdin=subprocess.PIPE, stderr=errors)
                 pipe.stdin.write(np.ascontiguousarray(picture).data)  # type: ignore[union-attr]
                 count += 1
             whole = True
@@ -97,8 +97,8 @@ def _encode(
                     pipe.kill()
                 pipe.wait()
         if pipe is None or pipe.returncode:
-            said.seek(0)
-            lines = said.read().decode(errors="replace").split("\n")
+            errors.seek(0)
+            lines = errors.read().decode(errors="replace").split("\n")
             raise OSError(next((line for line in lines if line.strip()), "ffmpeg ended"))
     return count
 

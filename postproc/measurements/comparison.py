@@ -275,8 +275,8 @@ class _Comparing:
             self._find("other pantograph", name, *other)
             return None
         if found is None or found.correlation < _LEAST_CORRELATION:
-            said = "" if found is None else f" (correlation {found.correlation:.2f})"
-            text = f"{name}: the forces are not those of the run{said}: nothing is aligned by them"
+            shown = "" if found is None else f" (correlation {found.correlation:.2f})"
+            text = f"{name}: the forces are not those of the run{shown}: nothing is aligned by them"
             self._find("unlike", name, text)
             return None
         return found
@@ -366,12 +366,12 @@ class _Comparing:
     def _noise_floor(self, found: Alignment, name: str, stated: float) -> None:
         """Add a remark on the residual and on the smallest errors that show beside it;
         ``stated`` is the noise [N]."""
-        told, length = np.sqrt(CERTAIN), found.length
+        factor, length = np.sqrt(CERTAIN), found.length
         self.remarks.append(
             f"{name}: noise floor {found.residual:.2f} N (correlation {found.correlation:.3f}); "
-            f"told are a shift above {max(_SHIFT, told * found.shift.deviation):.2g} m, a drift "
-            f"above {max(_DRIFTED, told * found.drift.deviation * length):.2g} m, a gain above "
-            f"{100 * max(_FORCE_SHARE, told * found.gain.deviation):.2g} %"
+            f"told are a shift above {max(_SHIFT, factor * found.shift.deviation):.2g} m, a drift "
+            f"above {max(_DRIFTED, factor * found.drift.deviation * length):.2g} m, a gain above "
+            f"{100 * max(_FORCE_SHARE, factor * found.gain.deviation):.2g} %"
         )
         self._beyond_noise(name, "noise floor", "N", found.residual, stated)
 

@@ -14,10 +14,10 @@ from catenary.base.errors import InputError
 from catenary.mbs.shape import Shape
 from catenary.postproc.files.disk import write_whole
 from catenary.postproc.film.film_data import film_data
+from catenary.postproc.film.options import View
 from catenary.postproc.film.projection import Picture, room_above
 from catenary.postproc.film.scenery import COLOURS, LOOKS, MOTIONS, THICK, Scenery
 from catenary.postproc.film.snapshots import Snapshots
-from catenary.postproc.film.wish import View
 from catenary.postproc.paraview import beside_line
 from catenary.postproc.read.records import Records
 from catenary.postproc.read.results import Results

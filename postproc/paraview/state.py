@@ -59,7 +59,7 @@ def write_state(script: Path) -> tuple[Path | None, str]:
 
 
 def _command() -> tuple[Sequence[str], str]:
-    """How ParaView's Python is started here, or why it cannot be."""
+    """Command that starts ParaView's Python here, or the reason why none can."""
     if shutil.which(PROGRAM) is None:
         return (), f"no state is written: {PROGRAM} is not on this machine"
     if not sys.platform.startswith("linux"):

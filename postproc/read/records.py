@@ -35,13 +35,13 @@ class Records(NamedTuple):
     ----------
     rows : of the steps, the energies and the line's channels
     damaged : path of a damaged table -> its rows before the damage; later ones read as NaN
-    told : the faults, as clauses
+    faults : the faults, as clauses
     last : time of the last valid step [s], NaN without one
     """
 
     rows: list[int]
     damaged: dict[str, int]
-    told: list[str]
+    faults: list[str]
     last: float
 
 
@@ -119,7 +119,7 @@ def scan(
         Counts that ``committed_rows`` found earlier, None to find them now.
     """
     n_complete, fault = committed_rows(file) if complete is None else complete
-    told = [f"{path} {clause}" for path, clause in faults.items()] + ([fault] if fault else [])
+    clauses = [f"{path} {clause}" for path, clause in faults.items()] + ([fault] if fault else [])
     damaged = dict.fromkeys(faults, 0)
     rows = [0, 0, 0]
     for number, tables in enumerate(growing_tables(record)):
@@ -131,7 +131,7 @@ def scan(
         short = min(lengths, key=lambda path: lengths[path])
         n = min(n_complete[number], lengths[short])
         if n < n_complete[number]:
-            told.append(f"{short} ends after {n} of {n_complete[number]} records")
+            clauses.append(f"{short} ends after {n} of {n_complete[number]} records")
         parted = {}
         for path, channel in usable.items():
             may_be_nan = channel.may_be_nan or (number == 2 and record.window is not None)
@@ -139,18 +139,18 @@ def scan(
             if path == CLOCKS[number]:
                 valid = min(valid, _in_order(file[path], valid, dt if number == 0 else None))
             if valid < n and (channel.essential or path == CLOCKS[number]):
-                told.append(f"{path} is damaged from record {valid} on")
+                clauses.append(f"{path} is damaged from record {valid} on")
                 n = valid
             elif valid < n:
                 parted[path] = valid
         parted = {path: valid for path, valid in parted.items() if valid < n}
         words = "{} is damaged from record {} on, and left out from there"
-        told += [words.format(path, valid) for path, valid in parted.items()]
+        clauses += [words.format(path, valid) for path, valid in parted.items()]
         damaged |= parted
         rows[number] = n
-    told += _missing_end(about, rows[0])
+    clauses += _missing_end(about, rows[0])
     last = float(file["time"][rows[0] - 1]) if rows[0] else float("nan")
-    return Records(rows, damaged, told, last)
+    return Records(rows, damaged, clauses, last)
 
 
 def valid_rows(table: h5py.Dataset, n_rows: int, most: float, may_be_nan: bool) -> int:

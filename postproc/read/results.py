@@ -219,7 +219,7 @@ class Results(TrainOfRun):
             yield part, self.rows(name, part)
 
     def recorded_columns(self, name: str) -> np.ndarray:
-        """Which columns of a channel its table has, (n,) int; all but of arms and droppers beyond
+        """Columns of a channel that its table has, (n,) int; all but of arms and droppers beyond
         the recorded stretch."""
         if name in channels.line_channels() and name not in self.line_record.names:
             return np.zeros(0, dtype=np.int64)
@@ -308,7 +308,7 @@ class Results(TrainOfRun):
         InputError
             If the file holds none.
         """
-        state, told = self._file.state()
-        for sentence in told:
+        state, sentences = self._file.state()
+        for sentence in sentences:
             logger.warning("%s", sentence)
         return state

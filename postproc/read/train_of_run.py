@@ -25,8 +25,8 @@ class TrainOfRun(LineOfRun):
 
     def n_strips(self) -> list[int]:
         """Number of strips of each pantograph, by their order."""
-        told: list[int] = self._file.attrs["n_strips"]
-        return told or [1] * self.n_pantographs
+        recorded: list[int] = self._file.attrs["n_strips"]
+        return recorded or [1] * self.n_pantographs
 
     @property
     def several_strips(self) -> bool:
@@ -65,8 +65,8 @@ class TrainOfRun(LineOfRun):
     def pantograph_words(self) -> list[dict[str, Any]]:
         """Words about each pantograph, by their order: ``kind``, ``model``, ``description``; empty
         tables in files without."""
-        told: list[dict[str, Any]] = self._file.attrs.get("pantographs", [])
-        return told or [{} for _ in range(self.n_pantographs)]
+        recorded: list[dict[str, Any]] = self._file.attrs.get("pantographs", [])
+        return recorded or [{} for _ in range(self.n_pantographs)]
 
     def pantograph_names(self) -> list[str]:
         """Names of the pantographs, by their order on the train."""

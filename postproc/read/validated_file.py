@@ -45,7 +45,7 @@ from catenary.postproc.read.validation import (
 )
 from catenary.solver.time_loop.views import channels
 
-# How often a file is opened that was written meanwhile, and the pause before [s]: an append takes
+# Trials to open a file that is written meanwhile, and the pause before each [s]: an append takes
 # some milliseconds.
 _ATTEMPTS, _PAUSE = 20, 0.02
 
@@ -327,7 +327,7 @@ class ValidatedFile:
     @property
     def damage(self) -> list[str]:
         """A sentence that names the file's damage and what is used of it, none if it is valid."""
-        damage = [*self._partial, *self.records.told]
+        damage = [*self._partial, *self.records.faults]
         if not damage:
             return []
         return [f"{self.path.name} is damaged: {listed(damage)}; {_up_to(self.records.last)}."]
@@ -368,20 +368,21 @@ class ValidatedFile:
         InputError
             If there is none.
         """
-        told: list[str] = []
+        faults: list[str] = []
         for slot in self._slots():
             try:
                 state = _state_in(self._file, slot, self.records.rows[0])
             except ValueError as error:
-                told.append(f"the state in checkpoint/{slot} is damaged, {error}")
+                faults.append(f"the state in checkpoint/{slot} is damaged, {error}")
                 continue
-            if told:
-                told = [f"{self.path}: {listed(told)}; the one of step {state['step']} is taken"]
-            return state, told
-        if not told:
+            if faults:
+                taken = f"the one of step {state['step']} is taken"
+                faults = [f"{self.path}: {listed(faults)}; {taken}"]
+            return state, faults
+        if not faults:
             raise InputError(f"{self.path} holds no state to continue from")
         raise InputError(
-            f"{self.path} holds no valid state to continue from: {listed(told)}; "
+            f"{self.path} holds no valid state to continue from: {listed(faults)}; "
             f"{_up_to(self.records.last)} and can be reported; to go on, start the run anew"
         )
 

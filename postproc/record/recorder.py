@@ -79,7 +79,7 @@ class Recorder(FileObserver[ResultFile]):
         self._kept: dict[str, tuple[slice, np.ndarray]] = {}
         self._flushed_once = False
         self._extremes: dict[str, np.ndarray] = {}
-        # Where channels stand in a row, and rows that the line's channels wait in.
+        # Columns of the channels in a row, and rows in which the line's channels wait.
         self._parts: dict[str, slice] = {}
         self._waiting = np.zeros((0, 0))
         self._n_waiting = self._n_taken = 0

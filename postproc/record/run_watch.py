@@ -14,8 +14,8 @@ T sin(phi) in place of T phi: at 0.1 rad wrong by 0.2 %, at 1 rad by 16 %, and t
 constant, by 0.5 and 46 %. A steady arm turns by its lift over its length: at 30 degrees its force
 is off by some 15 %, and its end cannot be lifted by more than its length.
 
-*Contact.* A pantograph that is raised and does not touch the wire for as long as the train takes
-for a span is told.
+*Contact.* A raised pantograph that does not touch the wire for as long as the train takes for a
+span is reported.
 """
 
 from __future__ import annotations
@@ -35,12 +35,12 @@ from catenary.solver.time_loop.views.observers import NEVER, Observer, Stage, St
 logger = logging.getLogger("catenary.watch")
 strip_logger = logging.getLogger("catenary.strips")
 
-# Energy made by the scheme is told above this share of the work of the contacts.
-TOLD_SHARE = 0.05
-# Rotation of a wire from rest [rad], and lift of a steady arm over its length [-]: what is told and
-# what ends a march.
-TOLD_ROTATION, MOST_ROTATION = 0.1, 1.0
-TOLD_ARM, MOST_ARM = 0.5, 1.0
+# Share of the work of the contacts above which energy made by the scheme is reported.
+REPORTED_SHARE = 0.05
+# Rotation of a wire from rest [rad], and lift of a steady arm over its length [-], above which the
+# watch reports it, and ends the march.
+REPORTED_ROTATION, MOST_ROTATION = 0.1, 1.0
+REPORTED_ARM, MOST_ARM = 0.5, 1.0
 _ROTATIONS = ("theta_y", "theta_z")
 # Time between two looks at energy and motion [s]. A look takes as long as twenty steps of 1 ms.
 _LOOKS = 1.0
@@ -52,7 +52,7 @@ def watch_cadence(dt: float) -> int:
 
 
 @dataclass(frozen=True)
-class Watched:
+class WatchInputs:
     """The data of a run that its watch needs.
 
     Attributes
@@ -63,7 +63,7 @@ class Watched:
         is summed
     arm_length : (n_arms,) lengths of steady arms [m], infinite where arms have none
     raised : (n_pantographs,) time from which on each is raised [s], infinite if it is lowered
-    span : how far a train may run without contact before it is told [m]
+    span : distance without contact above which a loss is reported [m]
     speed : of the train [m/s]
     """
 
@@ -75,7 +75,7 @@ class Watched:
     speed: float
 
 
-def watched(at_rest: LineAtRest, has_train: bool = True) -> Watched:
+def watch_inputs(at_rest: LineAtRest, has_train: bool = True) -> WatchInputs:
     """Inputs of the watch of a run on a line at rest; without a train contacts are none. Not
     collective."""
     problem, model = at_rest.problem, at_rest.model
@@ -86,7 +86,7 @@ def watched(at_rest: LineAtRest, has_train: bool = True) -> Watched:
     outer = any(not isinstance(load, MemoryLoad) for load in model.loads)
     steady = not outer and not model.simulated.incidents
     summed = numerics.adaptive_tolerance is None
-    return Watched(
+    return WatchInputs(
         static_energy=0.5 * static * float(np.max(at_rest.lift.lift, initial=0.0)),
         counts_energy=steady and summed,
         arm_length=lengths[model.mesh.arm_group],
@@ -104,7 +104,7 @@ def watched(at_rest: LineAtRest, has_train: bool = True) -> Watched:
 class RunWatch(Observer):
     """Observer that judges a march while it goes on. Collective.
 
-    Each fault is told once, when it is seen; ``facts`` has them at the end.
+    Each fault is reported once, when it is seen; ``facts`` has them at the end.
 
     Parameters
     ----------
@@ -117,10 +117,10 @@ class RunWatch(Observer):
     remarks : sentences on what was wrong, on rank 0
     """
 
-    def __init__(self, comm: Any, run: Watched, every: int) -> None:
+    def __init__(self, comm: Any, run: WatchInputs, every: int) -> None:
         self._comm, self._run, self._every = comm, run, every
         self.remarks: list[str] = []
-        self._told: set[str] = set()
+        self._reported: set[str] = set()
         self._start: tuple[float, float] | None = None
         self._energy = self._most_energy = self._work = self._most_work = self._made = 0.0
         self._rotation = self._turned = 0.0
@@ -154,7 +154,7 @@ class RunWatch(Observer):
     def finish(self, outcome: str) -> None:
         """Tell of contacts that are lost to the end."""
         for p in np.flatnonzero(np.isfinite(self._lost_since)):
-            if f"lost {p}" in self._told:
+            if f"lost {p}" in self._reported:
                 self._say(
                     f"lost for good {p}",
                     f"Pantograph {p + 1} touches no wire from {self._lost_since[p]:.4g} s, "
@@ -192,7 +192,7 @@ class RunWatch(Observer):
         given = self._most_work + self._run.static_energy
         made = self._energy - self._work
         self._made = max(self._made, made)
-        if not made <= TOLD_SHARE * given:
+        if not made <= REPORTED_SHARE * given:
             self._say(
                 "energy",
                 f"The time integration makes energy: at {self._where(view)} the line has "
@@ -216,7 +216,7 @@ class RunWatch(Observer):
         self._judge(
             view,
             "rotation",
-            (rotation, TOLD_ROTATION, MOST_ROTATION),
+            (rotation, REPORTED_ROTATION, MOST_ROTATION),
             f"a wire has turned by {rotation:.3g} rad from rest at {x:.4g} m",
             "the linear model of a wire",
         )
@@ -225,7 +225,7 @@ class RunWatch(Observer):
         self._judge(
             view,
             "arm",
-            (turned, TOLD_ARM, MOST_ARM),
+            (turned, REPORTED_ARM, MOST_ARM),
             f"the steady arm at {x:.4g} m is lifted by {turned:.3g} of its length",
             "the linear model of an arm",
         )
@@ -238,9 +238,9 @@ class RunWatch(Observer):
         what: str,
         model: str,
     ) -> None:
-        found, told, most = value
-        if not found <= told:
-            self._say(key, f"At {self._where(view)} {what}; {model} holds up to {told:g}.")
+        found, limit, most = value
+        if not found <= limit:
+            self._say(key, f"At {self._where(view)} {what}; {model} holds up to {limit:g}.")
         if not found <= most:
             raise RunBroken(
                 f"at {self._where(view)} {what}, and {model} ends at {most:g}: look for steady "
@@ -287,8 +287,8 @@ class RunWatch(Observer):
 
     def _say(self, key: str, sentence: str) -> None:
         """Tell a sentence once."""
-        if key not in self._told:
-            self._told.add(key)
+        if key not in self._reported:
+            self._reported.add(key)
             self.remarks.append(sentence)
             if self._comm.rank == 0:
                 logger.warning(sentence)

@@ -71,7 +71,7 @@ def _order(results: Results) -> list[int]:
 
 
 def _numbers_in_spans(span: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """How many droppers of its span stand up to each one, itself included, (n,)."""
+    """Count of the droppers of a span up to each one, itself included, (n,)."""
     order = np.lexsort((x, span))
     of_span, at = span[order], x[order]
     changes = (of_span[1:] != of_span[:-1]) | (at[1:] != at[:-1])

@@ -116,7 +116,7 @@ def pdf(html: str) -> bytes:
     fetcher = URLFetcher(allowed_protocols=["data"])  # pictures are in the page
     cache: dict[str, Any] = {}  # of pictures, which are laid out twice
     page = HTML(string=html, url_fetcher=fetcher)
-    # What a reader unfolds is not printed; without it large tables are laid out in a third.
+    # Folded parts are not printed; without them large tables are laid out in a third.
     for folded in page.etree_element.iter("details"):
         folded[:] = folded.findall("summary")
     figures = list(page.etree_element.iter("figure"))

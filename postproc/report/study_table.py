@@ -232,12 +232,12 @@ def remark_lines(runs: Iterable[tuple[str, Sequence[str]]]) -> list[str]:
     runs : iterable of tuple
         Name of each run, and its remarks.
     """
-    told = list(runs)
+    named = list(runs)
     names: dict[str, list[str]] = {}
-    for name, remarks in told:
+    for name, remarks in named:
         for text in dict.fromkeys(remarks):
             names.setdefault(text, []).append(name)
-    return [f"REMARK      {_of(own, len(told))}: {text}" for text, own in names.items()]
+    return [f"REMARK      {_of(own, len(named))}: {text}" for text, own in names.items()]
 
 
 def _of(names: Sequence[str], n_runs: int) -> str:
@@ -259,8 +259,8 @@ def _is_done(row: Row) -> bool:
 
 
 def _outcome(row: Row) -> str:
-    said = str(row["outcome"])
-    return said if said.startswith("not possible") else f"BROKE: {said}"
+    outcome = str(row["outcome"])
+    return outcome if outcome.startswith("not possible") else f"BROKE: {outcome}"
 
 
 def cell(value: Any) -> Any:

@@ -125,15 +125,15 @@ def real_time_factor(results: Results, with_records: bool = False) -> float | No
 
 def _pantograph(
     p: PantographStatistics,
-    told: Mapping[str, Any],
+    recorded: Mapping[str, Any],
     static_force: float,
     actuator_force: float,
     violation: float | None,
 ) -> dict[str, Any]:
     return {
         "name": p.name,
-        "kind": told.get("kind"),
-        "model": told.get("model"),
+        "kind": recorded.get("kind"),
+        "model": recorded.get("model"),
         "static_force_N": static_force,
         "actuator_force_N": actuator_force,
         "mean_N": p.mean,

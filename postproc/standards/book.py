@@ -125,11 +125,11 @@ class LimitRow(_Part):
 
     def when(self) -> str:
         """Its conditions in words, empty if it holds always."""
-        said = [", ".join(SYSTEMS[name] for name in self.supply)] if self.supply else []
-        said += [] if self.up_to_km_h is None else [f"up to {self.up_to_km_h:g} km/h"]
-        said += [] if self.below_km_h is None else [f"below {self.below_km_h:g} km/h"]
-        said += [] if self.stops is None else ["with stops" if self.stops else "without stops"]
-        return ", ".join(said)
+        parts = [", ".join(SYSTEMS[name] for name in self.supply)] if self.supply else []
+        parts += [] if self.up_to_km_h is None else [f"up to {self.up_to_km_h:g} km/h"]
+        parts += [] if self.below_km_h is None else [f"below {self.below_km_h:g} km/h"]
+        parts += [] if self.stops is None else ["with stops" if self.stops else "without stops"]
+        return ", ".join(parts)
 
 
 def _polynomial(coefficients: list[float]) -> str:
@@ -188,11 +188,11 @@ class Rule(_Part):
 
     def words(self) -> str:
         """The limit in words, with the conditions of its rows."""
-        said = []
+        limits = []
         for row in self.limit:
             when = row.when()
-            said.append(f"{row.words(self.unit)} ({when})" if when else row.words(self.unit))
-        return f"{self.relation} {'; '.join(said)}"
+            limits.append(f"{row.words(self.unit)} ({when})" if when else row.words(self.unit))
+        return f"{self.relation} {'; '.join(limits)}"
 
 
 class RuleBook(_Part):
@@ -303,8 +303,8 @@ def _sentence(failed: ValidationError) -> str:
     if fault["type"] == "missing":
         return f"has no {key}"
     if fault["type"] == "value_error":
-        says = _plain(str(fault["ctx"]["error"]), 400)
-        return says if not key else f"has {key}, which {says}"
+        sentence = _plain(str(fault["ctx"]["error"]), 400)
+        return sentence if not key else f"has {key}, which {sentence}"
     wanted = _plain(fault["msg"].removeprefix("Input "), 200)
     if not key:
         return "is no table"

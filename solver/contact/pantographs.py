@@ -278,7 +278,7 @@ class Pantographs:
         self._write_outputs(contact_force, reported, self._heads.affine, depth)
 
     def places(self) -> list[np.ndarray]:
-        """Where masses and bodies of each pantograph are now, see `Pantograph.places`; rank 0."""
+        """Places of masses and bodies of each pantograph now, see `Pantograph.places`; rank 0."""
         return [model.places() for model in self.models]
 
     def bases(self, time: float) -> list[float]:
@@ -413,7 +413,7 @@ def _depends_on_place(placement: Placement, simulated: Simulated) -> bool:
 def _lateral_path(
     problem: Problem, placement: Placement, base: BaseMotion | None, wires: ContactWires
 ) -> CrossingPath:
-    """Where wires that do not move sideways cross the strips."""
+    """Path on which wires that do not move sideways cross the strips."""
     train = problem.train
     paths = [
         LateralPath(

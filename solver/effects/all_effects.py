@@ -37,15 +37,15 @@ def needs_form(problem: Problem) -> bool:
 
 
 def after_cutting(problem: Problem) -> list[Effect]:
-    """The active effects that befall the line once its droppers are cut, in building order."""
+    """The active effects on a line whose droppers have been cut, in building order."""
     return [effect for effect in active(problem) if effect.after_cutting]
 
 
 def as_cut(problem: Problem, but: Set[str] = frozenset()) -> Problem:
     """A problem whose line is the sound one, for which droppers are cut, with effects ``but``
     others."""
-    befallen = {effect.name for effect in after_cutting(problem)} - but
-    return replace(problem, effects=problem.effects - befallen) if befallen else problem
+    acting = {effect.name for effect in after_cutting(problem)} - but
+    return replace(problem, effects=problem.effects - acting) if acting else problem
 
 
 def with_defects(problem: Problem) -> Problem:

@@ -63,7 +63,7 @@ class Effect:
     of_form : whether ``build`` reads the shape at rest, ``Model.form``
     lifts : limits of a scene that do not hold with the effect
     data : keys of the scene's data that it acts on; empty if it acts on any scene
-    after_cutting : True for what befalls a line whose droppers are cut: form finding leaves it out,
+    after_cutting : True for an effect on a line whose droppers are cut: form finding leaves it out,
         and the line then hangs with it (`statics.with_defects`)
     cut_for : of an effect after cutting, True where droppers are cut for it
     hangs : of an effect after cutting, what the line's wires become with it
@@ -73,7 +73,7 @@ class Effect:
     title: str
     adds: str
     source: str
-    default: bool
+    default: bool = True
     unknowns_of_wire: Callable[[NamedWire], tuple[str, ...]] | None = None
     requires: tuple[str, ...] = ()
     always: bool = False
@@ -98,20 +98,20 @@ class Effect:
 _REGISTRY: dict[str, Effect] = {}
 
 
-def register(effect: Effect) -> Effect:
-    """Add an effect to the table and return it.
+def register(*effects: Effect) -> None:
+    """Add effects to the table, in building order.
 
     Raises
     ------
     ValueError
-        If there is one of that name, or if the effect contributes nothing.
+        If there is one of that name, or if an effect contributes nothing.
     """
-    if effect.name in _REGISTRY:
-        raise ValueError(f"effect {effect.name} is registered already")
-    if not (effect.unknowns_of_wire or effect.build or effect.n_laws):
-        raise ValueError(f"effect {effect.name} has no unknowns, build, law or lifted limit")
-    _REGISTRY[effect.name] = effect
-    return effect
+    for effect in effects:
+        if effect.name in _REGISTRY:
+            raise ValueError(f"effect {effect.name} is registered already")
+        if not (effect.unknowns_of_wire or effect.build or effect.n_laws):
+            raise ValueError(f"effect {effect.name} has no unknowns, build, law or lifted limit")
+        _REGISTRY[effect.name] = effect
 
 
 def unregister(name: str) -> None:

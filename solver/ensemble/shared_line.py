@@ -90,7 +90,7 @@ class TautLines:
 def _displaced(
     taut: Model, gap: np.ndarray, form: Equilibrium, stiff: StiffLine
 ) -> tuple[np.ndarray, Equilibrium]:
-    """How far a rest (``form``) is from the taut shape, and that shape.
+    """Displacement of a rest (``form``) from the taut shape, and that shape.
 
     Droppers that lack ``gap`` [m] of being taut push the taut line up by what they release.
     """
@@ -289,7 +289,7 @@ def _same_links(one: LinkTable, other: LinkTable) -> bool:
 
 
 def why_alone(problem: Problem) -> str:
-    """Why scenes of a problem's line cannot step side by side, empty if they can."""
+    """Reason why scenes of a problem's line cannot step side by side, "" if they can."""
     numerics = problem.numerics
     if numerics.scheme != "one_solve" or numerics.coupling != "implicit":
         return "its scheme takes steps in parts"

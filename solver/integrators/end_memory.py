@@ -164,11 +164,11 @@ class EndMemories:
         comm = self._comm
         if comm.size == 1 or not self._all:
             return
-        told = comm.allgather((domain.low, domain.high, owns))
+        parts = comm.allgather((domain.low, domain.high, owns))
         for number, load in enumerate(self._all):
             low, high = int(load.unknowns.min()), int(load.unknowns.max())
             places = load.unknowns - domain.low
-            for rank, (its_low, its_high, its_own) in enumerate(told):
+            for rank, (its_low, its_high, its_own) in enumerate(parts):
                 if rank == comm.rank or not (owns[number] or its_own[number]):
                     continue
                 buffer = np.zeros(load.unknowns.size)

@@ -59,13 +59,13 @@ def slow_path_of(problem: Problem, numbering: Unknowns) -> SlowPath | None:
 
 
 def slow_method(numerics: Numerics) -> str:
-    """Why a method cannot take steps in two passes, empty if it can."""
+    """Reason why a method cannot take steps in two passes, "" if it can."""
     if numerics.coupling == "explicit":
         return 'numerics.coupling = "explicit" needs heights of the wire within a step'
     return ""
 
 
 def slow_load(model: Model) -> str:
-    """Why loads of a model take longer than they could, empty if they do not."""
+    """Reason why loads of a model take longer than they could, "" if they do not."""
     names = [load.name for load in model.loads if isinstance(load, FunctionLoad)]
     return f"the load {names[0]} is a Python function, called for each step" if names else ""

@@ -20,11 +20,11 @@ from catenary.solver.model.stations import SAME_STATION
 DECAY = 1e-16
 # The probes look at two places of the line; spans differ, so take this much more.
 _MARGIN = 1.25
-# How far to either side probes look at first [m]: twice as far whenever that is not enough.
+# First distance of probes to either side [m], doubled whenever that is not enough.
 _WINDOW = 400.0
 # Share of a window within which columns must decay, so that its ends have no part in that.
 _SEEN = 0.9
-# How far around the longest element loads are tried, about a span to either side [m].
+# Distance around the longest element in which loads are tried, about a span to either side [m].
 _NEAR = 75.0
 
 
@@ -59,7 +59,7 @@ def _in_the_middle(positions: np.ndarray) -> tuple[float, np.ndarray]:
 
 
 def _around_the_longest(positions: np.ndarray) -> tuple[float, np.ndarray]:
-    """Where the longest element is [m], and the stations near it where element lengths change."""
+    """Place of the longest element [m], and stations near it at which element lengths change."""
     stations = positions[np.append(True, np.diff(positions) > SAME_STATION)]
     lengths = np.diff(stations)
     place = float(stations[np.argmax(lengths)])

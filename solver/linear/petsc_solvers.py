@@ -60,7 +60,7 @@ class Wrapped(NamedTuple):
     def tell_petsc(self) -> None:
         """Tell PETSc that the array was written.
 
-        A vector remembers its norm until PETSc is told that its numbers are others: an iteration
+        A vector keeps its norm until PETSc is informed of a change of its numbers: an iteration
         would take the norm of an earlier right-hand side, or keep an initial guess because it
         believes that it is zero already (PETSc 3.22).
         """

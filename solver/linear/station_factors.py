@@ -22,7 +22,7 @@ from catenary.solver.linear.stations.station_layout import Layout
 from catenary.solver.linear.stations.station_products import kinds_by_type, of_pairs
 from catenary.solver.linear.stations.station_rows import StationRows, rows_of
 
-# Where elimination may end at several places, it may at every so many stations.
+# Distance in stations between the places at which elimination may end, if there are several.
 MIDDLES = native.MIDDLES
 # Sum of the eigenvalues of S^-1 A - 1 where steps of a part of the line may end.
 _SOFTENED = 1.0

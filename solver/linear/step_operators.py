@@ -236,7 +236,7 @@ class LineOperators:
         return (self._model.numbering.width,) if layout is None else layout.widths
 
     def why_not_by_stations(self) -> str:
-        """Why ``by_stations`` is None on some rank, the same on all. Collective."""
+        """Reason why ``by_stations`` is None on some rank, the same on all. Collective."""
         reasons = {
             1: "the options of PETSc choose another solver",
             2: "the nodes of the wires are too many or too few to form stations",

@@ -24,11 +24,11 @@ from catenary.solver.model.unknown_registry import Unknowns
 
 # Allowed part outside the windows, relative to the peak: round-off of one solve.
 _LEAK = 1e-13
-# How much further than windows a stretch reaches, of the reach, to see whether columns leak.
+# Margin of a stretch beyond windows, of the reach, which shows whether columns leak.
 _SEEN = 0.25
 # Length of the places that are solved for on one stretch [m]: about a span.
 STRETCH = 60.0
-# Where windows are wider to both sides [m], as along the track with much damping, some of the
+# With windows wider than this to both sides [m], as along the track with much damping, some of the
 # columns are looked at first: what forces on heights are felt at is mostly narrower.
 _LONG = 100.0
 _PROBES = 12
@@ -217,7 +217,7 @@ class UnitResponses:
     def solve(
         self, places: Places, like: LikeStations, reach: float, felt: float = _FELT
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Where the columns of ``places`` begin, and their numbers, as ``ShortColumns`` has them.
+        """Starts of the columns of ``places``, and their numbers, as ``ShortColumns`` has them.
 
         Collective; ``like`` are marks of all stations that the windows of these reach, which is
         ``reach`` [m]. Raises as ``columns``, and FeltFurther where windows are narrower than the
@@ -244,7 +244,7 @@ class UnitResponses:
     def _felt(
         self, dofs: np.ndarray, weights: np.ndarray, x: np.ndarray, half: np.ndarray
     ) -> float:
-        """How far off some of the columns are more than round-off [m], with a margin; the same on
+        """Distance at which some of the columns fall to round-off [m], with a margin; the same on
         all ranks."""
         numbering, furthest = self.windows.numbering, 0.0
         for place in np.unique(np.linspace(0, x.size - 1, _PROBES).astype(int)):

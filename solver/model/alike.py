@@ -13,7 +13,7 @@ _EQUAL_BITS = 38
 
 
 def kinds_of(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Where each kind of ``rows`` (n, k) is met first, and the kind of each row (n,).
+    """First row of each kind of ``rows`` (n, k), and the kind of each row (n,).
 
     Kinds are numbered as they are met, so that rows read theirs from memory mostly in order.
     """

@@ -67,7 +67,7 @@ def iterate_sums(
 
 
 def _free(model: Model, dofs: np.ndarray) -> np.ndarray:
-    """Which of some unknowns are not held, shape as ``dofs``; they stand close to each other."""
+    """Mask of unknowns that are not held, shape as ``dofs``; they stand close to each other."""
     low, high = int(dofs.min()), int(dofs.max()) + 1
     free = np.ones(high - low, dtype=bool)
     free[model.constrained_between(low, high) - low] = False

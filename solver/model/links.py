@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-# Which forces a link has: tension and compression, or one of both.
+# Directions in which a link has a force: tension and compression, or one of both.
 BOTH, PULLS, PUSHES = 0, 1, 2
 # Force at rest [N], of an open link that of its spring drawn on through the gap; stiffness [N/m];
 # damping [N s/m] beside that of its component; place along the track [m]; which forces it has;

@@ -77,8 +77,8 @@ class Equilibrium:
     lateral: LateralShape | None = None
 
     def leaning(self, droppers: np.ndarray) -> np.ndarray:
-        """How far the upper ends of ``droppers`` (n, 2) have moved ahead of the lower ones,
-        (n,) [m]."""
+        """Displacement of the upper ends of ``droppers`` (n, 2) along the track, ahead of that of
+        the lower ones, (n,) [m]."""
         if self.along.size == 0:
             return np.zeros(len(droppers))
         return np.asarray(self.along[droppers[:, 0]] - self.along[droppers[:, 1]])

@@ -206,7 +206,7 @@ def _droppers(model: Model, links: Links, force: np.ndarray) -> LinkArrays:
     law["rest"] = np.where(model.broken, 0.0, force)
     law["stiffness"], law["damping"] = links.law["stiffness"], model.released_damping
     law["place"], law["carried"] = links.law["place"], 1.0
-    # Where another bend is nearer at rest than that of slackness, this is a bend, too.
+    # Slackness is one more bend if another bend is nearer at rest.
     law["released"] = np.where(model.dropper_pieces.begin > 0.0, 0.0, 1.0 - kept)
     # One that is slack at rest stands open: its reserve is what it lacks to be taut.
     slack = (model.dropper_gap > 0.0) & ~model.broken

@@ -205,7 +205,7 @@ def number_unknowns(
     present, station_type = _station_types(stations)
     there = present[:, places[:, 0]]
     station_types = tuple(tuple(map(int, np.flatnonzero(row))) for row in there)
-    # Where the unknown of a slot stands among those of a station of each station type.
+    # Position of a slot's unknown among those of a station, for each station type.
     offset = np.full((len(station_types), *has_name.shape), -1)
     offset[:, places[:, 0], places[:, 1]] = np.where(there, np.cumsum(there, axis=1) - 1, -1)
     starts = np.concatenate([[0], np.cumsum(there.sum(axis=1)[station_type])])

@@ -19,7 +19,7 @@ from catenary.mbs.vehicle.irregularity import sines
 if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline
 
-# How close to a bend the slopes of its two sides are taken [m].
+# Distance from a bend at which the slopes of its two sides are taken [m].
 _BESIDE = 1e-6
 
 

@@ -83,7 +83,7 @@ class FixedPoint:
             line.solve(self.interaction.loads(force, compensation))
             line.correct()
             self.counters.rounds += 1
-            # How far a fixed number of them has come is only asked after the last.
+            # The error of a fixed number of them is found after the last only.
             if (fixed is None or number == fixed) and self._settled():
                 break
         else:

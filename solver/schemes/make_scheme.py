@@ -163,7 +163,7 @@ def _fixed_point(
     return FixedPoint(factory.comm, interaction, pantographs, problem.numerics, law)
 
 
-# What makes the scheme of each ``Numerics.scheme``.
+# Makers of schemes by ``Numerics.scheme``.
 SCHEMES: dict[str, Callable[[SchemeFactory, Problem, Model, ForcesOnLine, Pantographs], Scheme]] = {
     "one_solve": _one_solve,
     "fixed_point": _fixed_point,

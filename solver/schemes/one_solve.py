@@ -191,7 +191,7 @@ class OneSolve:
         return heads
 
     def _broken(self) -> RunBroken:
-        """Why the step has no solution, which rank 0 knows, on all ranks. Collective."""
+        """Error of a step without solution, which rank 0 knows, on all ranks. Collective."""
         why, self._why = self._why, None
         if self.comm.size > 1:
             why = self.comm.bcast(why, root=0)

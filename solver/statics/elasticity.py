@@ -17,7 +17,7 @@ from catenary.solver.model.link_directions import at_nodes, at_places
 from catenary.solver.model.matrices import part_of
 from catenary.solver.model.model import Model
 
-# How far to both sides of a stretch a line is looked at first [m], and what stands still.
+# Length of line to both sides of a stretch in the first solution [m], and motion that is none.
 _FIRST_REACH, _STILL = 1500.0, 1e-13
 # Places closer than this along the track are one [m].
 _SAME_PLACE = 1e-6
@@ -94,7 +94,7 @@ def elasticity(model: Model, x_from: float, x_to: float) -> Elasticity:
         x_from, x_to = _element_ends(model, x_from, x_to)
     first, last = model.numbering.within(x_from, x_to)
     factor = sparse_linalg.splu(_seen_from(model, x_from, x_to))
-    # Where a wire is held it does not give way; the matrix has a one there, which is no spring.
+    # A held wire does not give way; the one that the matrix has there is no spring.
     weights = [
         np.where(np.isin(place.unknowns, model.constrained), 0.0, place.weights) for place in places
     ]
@@ -142,7 +142,7 @@ def _under(height: np.ndarray, compliance: np.ndarray, force: float) -> float:
 
 
 def _places_in(model: Model, x_from: float, x_to: float) -> np.ndarray:
-    """Where contact wires have nodes in a stretch, each place once, (n,) [m]."""
+    """Places of the contact wires' nodes in a stretch, each once, (n,) [m]."""
     x = np.sort(model.mesh.x(np.concatenate(model.nodes_of(Role.CONTACT))))
     x = x[(x >= x_from - 1e-9) & (x <= x_to + 1e-9)]
     return np.asarray(x[np.diff(x, prepend=-np.inf) > _SAME_PLACE])

@@ -95,7 +95,7 @@ def refuse_lost_wire(model: Model, form: Equilibrium) -> None:
     """Refuse a line of several contact wires that all stand beside a pantograph's strips at rest,
     blown there by the wind. Not collective.
 
-    A wire that is alone is followed beside the strips, which is told.
+    A wire that is alone is followed beside the strips, which the report says.
 
     Raises
     ------

@@ -311,7 +311,7 @@ def _derivative(matrices: dict[int, sparse.csc_matrix], step: float) -> sparse.c
 
 
 def _shares(whole: sparse.csc_matrix, part: sparse.csc_matrix) -> float:
-    """How many times ``part``, if it is not empty, is what ``whole`` has in its place."""
+    """Factor with which ``whole`` contains ``part``, by least squares; 0 if ``part`` is empty."""
     square = part.multiply(part).sum()
     return float(part.multiply(whole).sum() / square) if square else 0.0
 

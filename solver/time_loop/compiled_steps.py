@@ -131,7 +131,7 @@ class CompiledSteps:
             most = min(most, _MOTION_BYTES // (8 * n_numbers))
         self.most_motions = most if shows else 0
         pantographs, interaction = scheme.pantographs, scheme.interaction
-        # Where masses of the pantographs are, which is kept with a motion.
+        # Places of the pantographs' masses, which are kept with a motion.
         self._heads, places = pantographs.heads_in_loop()
         room = min(n_numbers * self.most_motions, _MOTION_BYTES // 8)
         self._kept = KeptMotions(
@@ -192,7 +192,7 @@ class CompiledSteps:
             self._showing.follow(self._moved.now)
 
     def _prepare(self, step: int, left: int) -> None:
-        """Fill in what steps after the one of number ``step`` are told, ``left`` of them at most.
+        """Fill in the inputs of the steps after number ``step``, ``left`` of them at most.
 
         Where states are looked at often these are many blocks.
         """

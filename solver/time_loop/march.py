@@ -115,7 +115,7 @@ class March:
         self._pantographs = Pantographs(comm, problem, effects, self._wire, height)
         self._moving = MovingColumns()
         self._set_ups = SchemeFactory(comm, form, self.ownership, self._nominal_height)
-        # Those of a long line are large, so that the first parts take these.
+        # Arrays of a long line are large, so that the first parts take these.
         self._set_up(unchanged(model, form), self._wire)
         self._set_off(model)
         self._showing.cross(0.0)
@@ -206,7 +206,7 @@ class March:
 
     @property
     def slow_path(self) -> SlowPath | None:
-        """Why steps take longer than they could, None if they do not; of ranks, see the line's."""
+        """Reason why steps are slow, None if they are not; with several ranks that of the line."""
         if self._line.slow_path is not None or self._comm.size > 1:
             return self._line.slow_path
         return single_steps_of(self._problem, self._showing.layout)

@@ -1,4 +1,4 @@
-"""Why steps are not taken by compiled kernels alone, many in one loop, and what that costs.
+"""Reasons for steps outside of the loop of compiled kernels, and what these steps cost.
 
 One list of reasons: `plan` reads it for a problem, a march for what it steps.
 """
@@ -29,7 +29,7 @@ class _Stepped(NamedTuple):
 class Reason(NamedTuple):
     """A reason, the time of a step in terms of one in the loop, and whether it holds."""
 
-    says: str
+    sentence: str
     factor: float
     holds: Callable[[_Stepped], bool]
 
@@ -60,10 +60,10 @@ REASONS = (
 
 
 def single_steps_of(problem: Problem, layout: RowLayout | None = None) -> SlowPath | None:
-    """Why steps of a problem take longer on one rank than in kernels alone, None if they do not.
+    """Reason why steps of a problem leave the compiled kernels on one rank, None if they do not.
 
     Not collective. A scheme other than ``one_solve``, and a coupling that is not implicit, step in
-    their own way, which is told elsewhere.
+    their own way, which is reported elsewhere.
     """
     numerics = problem.numerics
     if numerics.scheme != "one_solve" or numerics.coupling == "explicit":
@@ -71,5 +71,5 @@ def single_steps_of(problem: Problem, layout: RowLayout | None = None) -> SlowPa
     stepped = _Stepped(problem, simulated(problem), layout)
     for reason in REASONS:
         if reason.holds(stepped):
-            return SlowPath(reason.says, reason.factor)
+            return SlowPath(reason.sentence, reason.factor)
     return None

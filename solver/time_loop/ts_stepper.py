@@ -177,13 +177,13 @@ def ts_of(comm: Any, stepper: Stepper, dt: float, steps: tuple[int, int], n_step
     ts.setExactFinalTime(PETSc.TS.ExactFinalTime.STEPOVER)
     with refused_options():
         ts.setFromOptions()
-    _refuse_what_the_scene_says(ts, dt, first * dt)
+    _refuse_options_of_the_scene(ts, dt, first * dt)
     if end < n_steps:
         ts.setMaxSteps(min(end, ts.getMaxSteps()))
     return ts
 
 
-def _refuse_what_the_scene_says(ts: PETSc.TS, dt: float, start_time: float) -> None:
+def _refuse_options_of_the_scene(ts: PETSc.TS, dt: float, start_time: float) -> None:
     found = ""
     if abs(ts.getTimeStep() - dt) > 1e-12 * dt:
         found = (

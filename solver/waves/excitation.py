@@ -48,8 +48,8 @@ class MovingForce:
         grown = 0.5 * (1.0 - np.cos(np.pi * share))
         return self.force * grown * np.cos(2.0 * np.pi * self.frequency * time)
 
-    def says(self) -> str:
-        """It in words."""
+    def in_words(self) -> str:
+        """The excitation in words."""
         varies = f" cos(2 pi {self.frequency:g} Hz t)" if self.frequency else ""
         return (
             f"a force of {self.force:g} N{varies} from {self.start:g} m on at "
@@ -98,8 +98,8 @@ class Blow:
         """Its value at times (n,) [s], shape (n,) [N]."""
         return self.peak * self.shape(time / self.duration)
 
-    def says(self) -> str:
-        """It in words."""
+    def in_words(self) -> str:
+        """The excitation in words."""
         return (
             f"a {self.kind} of {self.impulse:.4g} N s at {self.at:g} m within {self.duration:g} s, "
             f"up to {self.peak:.4g} N"
@@ -116,7 +116,7 @@ def hammer(at: float, impulse: float, duration: float) -> Blow:
 
 def as_facts(excitation: Excitation) -> dict[str, Any]:
     """All of an excitation, plain enough for JSON; `excitation_of_facts` takes it back."""
-    return {"kind": excitation.kind, **asdict(excitation), "says": excitation.says()}
+    return {"kind": excitation.kind, **asdict(excitation), "says": excitation.in_words()}
 
 
 def excitation_of_facts(facts: Mapping[str, Any]) -> Excitation:

@@ -40,7 +40,7 @@ _BEYOND_FRONT = 2.0
 
 
 class Reach(NamedTuple):
-    """How far a line with a window moves at most.
+    """Largest extent of the motion of a line with a window.
 
     Attributes
     ----------
@@ -114,7 +114,7 @@ def moving_share(problem: Problem) -> float:
 
 
 def reach_of_motion(problem: Problem) -> Reach | None:
-    """How far the line moves around the train, None if all of it may. Not collective.
+    """Extent of the line's motion around the train, None if all of it may move. Not collective.
 
     All of it may without a window, under gusts, with incidents, whose loads stay where they are,
     and where motion bounds the window and waves of the wires' stretch leave the train behind.
@@ -170,7 +170,7 @@ def _fading_rate(problem: Problem) -> float:
 
 
 def why_no_window(problem: Problem) -> str:
-    """Why the steps of a problem take on the whole line, empty if they need not. Not collective."""
+    """Reason why steps of a problem take on the whole line, "" if they need not. Not collective."""
     numerics = problem.numerics
     if numerics.scheme != "one_solve":
         return f"numerics.scheme is {numerics.scheme}"

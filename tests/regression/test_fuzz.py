@@ -35,7 +35,7 @@ from catenary.cases.scene.input.faults import SceneError
 from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.hard import runs as hard_runs
-from catenary.cases.studies.hard.runs import Watched
+from catenary.cases.studies.hard.runs import RunHistories
 from catenary.solver.problem.defects import DropperBreak
 from catenary.solver.statics.changed_line.after_incidents import dropper_at
 
@@ -179,7 +179,7 @@ def check_twins(assignments: tuple[str, ...]) -> bool:
         found.append(hard_runs.run(rest, MPI.COMM_SELF, with_work=True))
     apart, one = found
     assert apart.outcome == one.outcome == "done"
-    beside: Watched | None = None
+    beside: RunHistories | None = None
     for what in ("force", "on_wires", "energy"):
         expected, values = getattr(apart, what), getattr(one, what)
         off = np.abs(values - expected).max()
@@ -242,7 +242,7 @@ def check_wide(made: RandomScene) -> str:
     return "done"
 
 
-def check_end(scene: Scene, run: Watched) -> None:
+def check_end(scene: Scene, run: RunHistories) -> None:
     """A run that stopped was one that may, says time, place and remedy, and was counted."""
     numerics = scene.numerics
     if NO_REST_LEFT in run.outcome:
@@ -261,7 +261,7 @@ def check_end(scene: Scene, run: Watched) -> None:
     assert run.counters["unconverged_steps"] == unsolved or numerics.iterations is not None
 
 
-def switches_by_itself(rest: hard_runs.AtRest, run: Watched) -> bool:
+def switches_by_itself(rest: hard_runs.AtRest, run: RunHistories) -> bool:
     """Whether a dropper slackens or tightens, other than by breaking, or an uplift stop is met."""
     if run.stops.any():
         return True

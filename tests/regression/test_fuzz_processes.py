@@ -22,7 +22,7 @@ from program import MPIRUN, Done, Program, assert_sound, catenary, catenary_star
 from catenary.base.errors import InputError
 from catenary.cases.scene.load import load_scene
 from catenary.cases.studies.hard import runs as hard_runs
-from catenary.cases.studies.hard.runs import Watched
+from catenary.cases.studies.hard.runs import RunHistories
 from catenary.postproc.read.results import Results
 
 pytestmark = pytest.mark.study
@@ -39,7 +39,9 @@ TELLING = 1e-3
 NUMBERS = (signal.SIGKILL, signal.SIGTERM)
 
 
-def drawn(kind: str, seed: int, n_steps: int) -> tuple[random.Random, RandomScene, Watched, float]:
+def drawn(
+    kind: str, seed: int, n_steps: int
+) -> tuple[random.Random, RandomScene, RunHistories, float]:
     """A random scene that runs to its end, its run here on one rank, and what round-off does to it.
 
     The last is the largest difference of a contact force [N] if the static force differs in the
@@ -73,7 +75,7 @@ def words_for(made: RandomScene, out: Path, *more: str) -> list[str]:
     return ["run", made.base, "-o", str(out), "--set", *made.assignments, *more]
 
 
-def check_same(out: Path, run: Watched, sensitive: float) -> None:
+def check_same(out: Path, run: RunHistories, sensitive: float) -> None:
     """The force of a result file is that of a run: as well as its scene lets round-off grow.
 
     1e-6 of the largest is what 4000 steps make of some 1e-10 a step; the sensitivity is to one
@@ -143,7 +145,7 @@ def check_nothing_left(folder: Path, out: Path, words: list[str]) -> None:
 
 
 def check_what_is_left(
-    out: Path, number: signal.Signals, done: Done, flush: int, run: Watched, sensitive: float
+    out: Path, number: signal.Signals, done: Done, flush: int, run: RunHistories, sensitive: float
 ) -> None:
     """Every channel can be read, as far as the last flush, and is what it would have been."""
     with Results(out) as results:

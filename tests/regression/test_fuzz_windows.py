@@ -18,7 +18,7 @@ from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.problem import problem_of
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.hard import runs as hard_runs
-from catenary.cases.studies.hard.runs import Watched
+from catenary.cases.studies.hard.runs import RunHistories
 from catenary.solver.linear.pieces import pieces
 from catenary.solver.problem.problem import BOUNDED, EXACT, WindowChoice
 from catenary.solver.statics.line_at_rest import LineAtRest
@@ -44,7 +44,7 @@ def long_scene(seed: int) -> RandomScene:
     """A random scene whose line goes on for many spans beyond the train, without a window."""
     made = topology_scene(seed)
     kept = [word for word in made.assignments if not word.startswith("window.")]
-    if not any(made.says(word) for word in _BY_SPAN):
+    if not any(made.assigns(word) for word in _BY_SPAN):
         kept = [word for word in kept if not word.startswith(_ENDS)]
         kept.append(f"line.n_spans={SPANS}")
     return RandomScene(seed, tuple(kept), base=made.base)
@@ -122,7 +122,9 @@ def test_windows_give_what_the_whole_line_gives_or_say_why_not(
           f"two spans {off:.1e} in 20 steps and {apart(at_once, whole):.1e} at last")  # fmt: skip
 
 
-def check_same(what: str, found: Watched, expected: Watched, within: float, told: str) -> None:
+def check_same(
+    what: str, found: RunHistories, expected: RunHistories, within: float, told: str
+) -> None:
     assert found.outcome == expected.outcome, (what, found.outcome, expected.outcome, told)
     off = apart(found, expected)
     assert off <= within, (what, off, within, told)

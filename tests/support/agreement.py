@@ -18,8 +18,8 @@ from seven_bodies import HEAD, UPRIGHT, at_rest, calibrated, lively_load, presse
 from variable_steps import integrate
 
 from catenary.mbs.rigid.forces import Actuator
-from catenary.mbs.time_steps.implicit_steps import Stepper
-from catenary.mbs.time_steps.step_solvers import METHODS
+from catenary.mbs.rigid.implicit_steps import Stepper
+from catenary.mbs.rigid.step_solvers import METHODS
 
 # Heights are kept at these intervals [s].
 EVERY = 0.25

@@ -27,7 +27,7 @@ class RandomScene:
     base: str = BASE
     names: str = ""
 
-    def says(self, word: str) -> bool:
+    def assigns(self, word: str) -> bool:
         """Whether an assignment begins so."""
         return any(assignment.startswith(word) for assignment in self.assignments)
 

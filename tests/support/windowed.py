@@ -8,14 +8,14 @@ import numpy as np
 from mpi4py import MPI
 
 from catenary.cases.studies.hard import runs as hard_runs
-from catenary.cases.studies.hard.runs import Watched
+from catenary.cases.studies.hard.runs import RunHistories
 from catenary.solver.problem.problem import WindowChoice
 from catenary.solver.statics.line_at_rest import LineAtRest
 
 COMM = MPI.COMM_SELF
 
 
-def march(rest: LineAtRest, window: WindowChoice | None = None) -> Watched:
+def march(rest: LineAtRest, window: WindowChoice | None = None) -> RunHistories:
     """A march with a window, of the whole line without one."""
     problem = replace(rest.problem, window=window or WindowChoice())
     return hard_runs.run(rest._replace(problem=problem), COMM)
@@ -31,12 +31,12 @@ def nudged(rest: LineAtRest) -> LineAtRest:
     return rest._replace(problem=replace(rest.problem, train=replace(train, placements=places)))
 
 
-def apart(found: Watched, whole: Watched) -> float:
+def apart(found: RunHistories, whole: RunHistories) -> float:
     """Largest difference of a contact force, over the largest force."""
     assert found.force.shape == whole.force.shape, (found.outcome, whole.outcome)
     return float(np.abs(found.force - whole.force).max() / largest(whole))
 
 
-def largest(whole: Watched) -> float:
+def largest(whole: RunHistories) -> float:
     """Largest contact force, 1 N at least [N]."""
     return max(float(np.abs(whole.force).max()), 1.0)

@@ -19,15 +19,15 @@ from catenary.cases.run.excited_run import ExcitedRun
 from catenary.cases.run.runner import run_case
 from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.problem import problem_of
-from catenary.cases.studies.waves.excited import Asked, Watch, excitation_of, without_train
+from catenary.cases.studies.waves.excited import Settings, Watch, excitation_of, without_train
 from catenary.cases.studies.waves.seen import WavesSeen, WireMotion, course_of, waves_seen
 from catenary.postproc.files.run_schema import RunAttributes
 from catenary.postproc.film import animate
 from catenary.postproc.film.chart import RingingChart
 from catenary.postproc.film.film_data import film_data
+from catenary.postproc.film.options import FilmOptions
 from catenary.postproc.film.scenery import Scenery
 from catenary.postproc.film.snapshots import Snapshots
-from catenary.postproc.film.wish import Wish
 from catenary.postproc.paraview import open_in_paraview
 from catenary.postproc.read.results import Results
 from catenary.postproc.report.report import write_report
@@ -43,11 +43,11 @@ SHORT = ("line.n_spans=6", "train.start_m=130", "train.end_m=170", "train.raise_
          "train.pantographs=[{name='three_masses'}]")  # fmt: skip
 
 
-def excited(folder: Path, kind: str, asked: Asked, *words: str) -> WavesSeen:
+def excited(folder: Path, kind: str, settings: Settings, *words: str) -> WavesSeen:
     """Run a case under an excitation; what was seen in memory meanwhile."""
     scene = load_scene("ac_simple", (*SHORT, *words))
     problem = problem_of(scene)
-    excitation = excitation_of(kind, asked, problem, problem.numerics.dt)
+    excitation = excitation_of(kind, settings, problem, problem.numerics.dt)
     seen: list[WireMotion] = []
 
     def watching(rest: LineAtRest) -> list[Watch]:
@@ -63,7 +63,7 @@ def excited(folder: Path, kind: str, asked: Asked, *words: str) -> WavesSeen:
 @pytest.fixture(scope="module")
 def struck(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, WavesSeen]:
     folder = tmp_path_factory.mktemp("struck")
-    return folder, excited(folder, "hammer", Asked(at=AT, impulse=5.0, duration=0.05))
+    return folder, excited(folder, "hammer", Settings(at=AT, impulse=5.0, duration=0.05))
 
 
 def test_a_blow_leaves_the_files_of_a_run(struck: tuple[Path, WavesSeen]) -> None:
@@ -133,13 +133,17 @@ def test_report_and_film_of_a_blow_have_no_train(struck: tuple[Path, WavesSeen])
     with Results(folder) as results:
         data = film_data(results)
         with Snapshots(folder, len(data.points)) as snapshots:
-            made = animate.Pictures(results, Scenery(data, snapshots), snapshots, Wish(end=0.05))
+            made = animate.Pictures(
+                results, Scenery(data, snapshots), snapshots, FilmOptions(end=0.05)
+            )
             first, second = (np.array(one) for one, _ in zip(made, range(2), strict=False))
     assert (first != second).any()
 
 
 def test_a_force_that_moves_is_seen_on_its_course(tmp_path: Path) -> None:
-    seen = excited(tmp_path, "force", Asked(force=FORCE, frequency=2.0), "output.field_every_s=0.1")
+    seen = excited(
+        tmp_path, "force", Settings(force=FORCE, frequency=2.0), "output.field_every_s=0.1"
+    )
     with Results(tmp_path) as results:
         data = film_data(results)
         with Snapshots(tmp_path, len(data.points)) as snapshots:
@@ -168,4 +172,4 @@ def test_a_window_of_spans_around_a_train_is_refused_for_a_blow() -> None:
     scene = load_scene("ac_simple", (*SHORT, "window.mode=bounded"))
     problem = problem_of(scene)
     with pytest.raises(InputError, match="window.mode is bounded.*a pulse has none"):
-        excitation_of("pulse", Asked(), problem, problem.numerics.dt)
+        excitation_of("pulse", Settings(), problem, problem.numerics.dt)

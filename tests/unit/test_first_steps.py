@@ -213,7 +213,7 @@ def test_the_doctor_is_no_verb_of_several_ranks(tmp_path: Path) -> None:
 
 @pytest.mark.process
 @pytest.mark.parametrize(
-    ("program", "says", "state"),
+    ("program", "facts", "state"),
     [
         ("import no_such_module_at_all", "No module named", MISSING),
         ("raise ValueError('it is old')", "ValueError: it is old", BROKEN),
@@ -223,13 +223,13 @@ def test_the_doctor_is_no_verb_of_several_ranks(tmp_path: Path) -> None:
     ],
 )
 def test_a_part_that_fails_is_a_finding(
-    monkeypatch: pytest.MonkeyPatch, program: str, says: str, state: str
+    monkeypatch: pytest.MonkeyPatch, program: str, facts: str, state: str
 ) -> None:
     monkeypatch.setattr(installation._answer, "__defaults__", (1.0,))
     if state == OK:
         monkeypatch.setattr(installation._answer, "__defaults__", (30.0,))
     found = installation._tried("a part", program, "mend it", needed=True)
-    assert found.state == state and says in found.says
+    assert found.state == state and facts in found.facts
     assert found.prevents_runs == (state != OK)
 
 
@@ -243,7 +243,7 @@ def test_without_mpirun_one_rank_is_left(tmp_path: Path, monkeypatch: pytest.Mon
     launcher.chmod(0o755)
     # Two processes that do not know each other: mpirun is that of another library.
     found = installation._mpi()
-    assert found.state == BROKEN and "different MPI libraries" in found.says
+    assert found.state == BROKEN and "different MPI libraries" in found.facts
 
 
 def test_a_folder_that_cannot_be_written_to_is_told(tmp_path: Path) -> None:
@@ -256,7 +256,7 @@ def test_several_threads_a_rank_are_told(monkeypatch: pytest.MonkeyPatch) -> Non
     monkeypatch.setenv("OMP_NUM_THREADS", "1")
     assert installation._threads().state == OK
     monkeypatch.setenv("OMP_NUM_THREADS", "8")
-    assert "OMP_NUM_THREADS=8" in installation._threads().says
+    assert "OMP_NUM_THREADS=8" in installation._threads().facts
 
 
 @pytest.mark.parametrize(
@@ -276,4 +276,4 @@ def test_versions_are_compared_part_by_part(version: str, bounds: str, fits: boo
 
 def test_memory_is_that_of_the_system() -> None:
     assert 1e8 < installation._available() < 1e14
-    assert f"{len(os.sched_getaffinity(0))} cores" in installation._memory().says
+    assert f"{len(os.sched_getaffinity(0))} cores" in installation._memory().facts

@@ -25,12 +25,12 @@ from catenary.cases.studies.accuracy.analysis import Row
 from catenary.cases.studies.accuracy.output import table_of
 from catenary.cases.studies.effect_cost.output import write
 from catenary.cases.studies.effect_cost.study import (
+    CostOptions,
     Costs,
     Measured,
     Size,
     Switch,
     SwitchableEffects,
-    Wish,
 )
 from catenary.cases.studies.full_report import data_sheets
 from catenary.cases.studies.full_report.scene_of_run import (
@@ -333,7 +333,9 @@ def cost_study(folder: Path, case: str, on: bool) -> Path:
     size = Size(100, (4, 4), (4,))
     changed = [Measured(switch, "done", size, 0.8, [figures | {"std_N": 33.0}])]
     choice = SwitchableEffects([switch], [], {})
-    found = Costs(case, Wish(case), choice, (0.0, 50.0), 10, size, 5.0, [figures], ["p"], changed)
+    found = Costs(
+        case, CostOptions(case), choice, (0.0, 50.0), 10, size, 5.0, [figures], ["p"], changed
+    )
     write(found, folder)
     return folder
 

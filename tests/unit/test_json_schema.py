@@ -14,7 +14,7 @@ from verb_runner import CliRunner
 from catenary.cases.cli.main import app
 from catenary.cases.scene.keys.keys import known_keys
 from catenary.cases.scene.scene import Scene
-from catenary.cases.terminal.json_schema import scene_schema
+from catenary.cases.terminal.lists import scene_schema
 
 ROOT = Path(__file__).parents[2]
 SCENES = sorted([*ROOT.glob("cases/*/case.toml"), *ROOT.glob("docs/examples/*.toml")])

@@ -355,7 +355,7 @@ def test_a_validation_takes_a_comparison_as_its_line_test(
     assert deviation["verdict"] == PASSED and not deviation["compared"]
     assert rows["maximum [N]"]["verdict"] == NOT_JUDGED  # no tolerance is known
     assert any_failed(step.rows)
-    assert "m.csv beside" in step.told and "Error: pantograph: the measured force" in step.told
+    assert "m.csv beside" in step.text and "Error: pantograph: the measured force" in step.text
     (tmp_path / "measurement.json").write_text("{}")
     with pytest.raises(InputError, match="is no record of `catenary compare RUN measured.csv`"):
         line_test(tmp_path)

@@ -18,13 +18,19 @@ from catenary.cases.run.at_rest.static_table import static_table
 from catenary.cases.scene.input.case_files import find_case
 from catenary.cases.scene.load import Draft, read_draft
 from catenary.cases.scene.scene import Scene
+from catenary.cases.studies import scene_sets
 from catenary.cases.studies.optimise import output, study
-from catenary.cases.studies.optimise.checks import AS_IS, Row, change, not_improved, trap
+from catenary.cases.studies.optimise.checks import (
+    AS_IS,
+    Row,
+    change,
+    not_improved,
+    unseen_direction,
+)
 from catenary.cases.studies.optimise.droppers import dropper_table, least_forces
 from catenary.cases.studies.optimise.task import OptimiseTask, VariableTable
 from catenary.cases.studies.optimise.variables import variables_of
-from catenary.cases.studies.scene_sets import evaluation
-from catenary.cases.studies.scene_sets.evaluation import BROKE
+from catenary.cases.studies.scene_sets import BROKE
 from catenary.cases.studies.task_files import read_task
 from catenary.cases.studies.tolerance.study import make_plan
 from catenary.cases.studies.tolerance.task import ToleranceTask
@@ -79,7 +85,7 @@ def evaluated(monkeypatch: pytest.MonkeyPatch) -> Callable[[Formula], list[int]]
             asked.append(len(scenes))
             return [formula(scene) for scene in scenes]
 
-        monkeypatch.setattr(evaluation, "evaluate", evaluate)
+        monkeypatch.setattr(scene_sets, "evaluate", evaluate)
         return asked
 
     return use
@@ -144,13 +150,13 @@ def test_the_worst_of_two_directions_is_made_least(evaluated: Any) -> None:
     assert mean.values[HEAD][0] == pytest.approx(7.5, abs=0.1)
     # The trap: forward 9 kg is best, and the other way (9 - 6)^2 is paid for it.
     assert one_way.values[HEAD][0] == pytest.approx(9.0, abs=0.1)
-    assert "in the direction forward alone" in one_way.said[0]
+    assert "in the direction forward alone" in one_way.remarks[0]
     backward = [row for row in one_way.rows if row.direction == "backward"]
     assert backward and all(change(row, "std_N") > 0.3 for row in backward)
     assert not any(row.searched for row in backward)
     assert all(row.searched for row in both.rows)
     # 7.2 kg, as shipped, is better than 7.5 kg backward, which is told.
-    (told,) = both.said
+    (told,) = both.remarks
     assert told.startswith("std_N gets worse in 3 of 6 rows, most with as it is, backward")
 
 
@@ -231,7 +237,7 @@ def test_whole_units_stay_within_what_is_allowed(evaluated: Any) -> None:
         (found,) = study.optimise(study.make_plan(draft(), task_of(**tables)))
         assert found.values[HEAD][0] == pytest.approx(expected, abs=1e-3)
         assert found.is_rounded is (unit < 3.0)
-        assert any("round_to is not kept" in text for text in found.said) is not found.is_rounded
+        assert any("round_to is not kept" in text for text in found.remarks) is not found.is_rounded
 
 
 def test_a_short_search_is_checked_on_the_whole_stretch() -> None:
@@ -485,10 +491,12 @@ def row(check: str, direction: str, searched: bool, before: float, after: float)
 
 def test_what_gets_worse_is_told() -> None:
     rows = [row(AS_IS, "forward", True, 60.0, 45.0), row(AS_IS, "backward", False, 60.0, 63.0)]
-    assert trap(rows).endswith("by -25.0 % at most, and in the other direction by +5.0 %")
+    assert unseen_direction(rows).endswith(
+        "by -25.0 % at most, and in the other direction by +5.0 %"
+    )
     (worse,) = not_improved(rows)
     assert worse.startswith("std_N gets worse in 1 of 2 rows") and "60 to 63" in worse
-    assert trap(rows[:1]) == "" and not_improved(rows[:1]) == []
+    assert unseen_direction(rows[:1]) == "" and not_improved(rows[:1]) == []
 
 
 # --- the verb ------------------------------------------------------------------------------------

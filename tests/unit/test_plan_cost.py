@@ -22,12 +22,12 @@ from catenary.cases.scene.problem import problem_of
 from catenary.cases.studies.effect_cost import output
 from catenary.cases.studies.effect_cost.step_timing import RepeatedMarch, beside
 from catenary.cases.studies.effect_cost.study import (
+    CostOptions,
     Costs,
     Measured,
     Size,
     Switch,
     SwitchableEffects,
-    Wish,
     jobs_of,
     measure,
     size_of,
@@ -62,8 +62,8 @@ SIDEWAYS = Effect(
 
 @pytest.fixture(scope="module")
 def found(tmp_path_factory: pytest.TempPathFactory) -> Costs:
-    wish = Wish(CASE, SHORT, stretch=30.0, rounds=1, only=TWO)
-    costs = measure(wish, tmp_path_factory.mktemp("cost"), lambda line: None)
+    options = CostOptions(CASE, SHORT, stretch=30.0, rounds=1, only=TWO)
+    costs = measure(options, tmp_path_factory.mktemp("cost"), lambda line: None)
     assert costs is not None
     return costs
 
@@ -162,7 +162,7 @@ def test_rounds_that_a_busy_machine_slows_down_do_not_change_a_ratio() -> None:
 def costs_of(row: Measured, as_it_is: list[dict[str, float | None]]) -> Costs:
     choice = SwitchableEffects([row.switch], ["vertical"], {"pre_sag": "a pre-sag"})
     size = Size(100, (4, 4), (4,))
-    return Costs("x", Wish("x"), choice, (0.0, 50.0), 10, size, 12.5, as_it_is, ["p"], [row])
+    return Costs("x", CostOptions("x"), choice, (0.0, 50.0), 10, size, 12.5, as_it_is, ["p"], [row])
 
 
 def figures(sigma: float | None, most: float = 200.0) -> list[dict[str, float | None]]:
@@ -222,7 +222,7 @@ def test_an_effect_that_a_scene_refuses_to_leave_out_is_told() -> None:
         "train.raise_time_s=0.1",
         "evaluation.to_m=120",
     ]
-    _, jobs, refused = jobs_of(Wish(CASE, words, only=["several_pantographs"]))
+    _, jobs, refused = jobs_of(CostOptions(CASE, words, only=["several_pantographs"]))
     assert [job.variant.name for job in jobs] == ["as-it-is"]
     assert "train.pantographs has 2 entries" in refused["several_pantographs"]
 
@@ -254,4 +254,4 @@ def test_costs_that_are_there_are_not_replaced(tmp_path: Path) -> None:
 
 def test_names_are_refused_before_anything_runs() -> None:
     with pytest.raises(InputError, match="is no effect"):
-        jobs_of(Wish(CASE, SHORT, only=["nothing"]))
+        jobs_of(CostOptions(CASE, SHORT, only=["nothing"]))

@@ -296,7 +296,7 @@ def test_a_validation_finds_what_is_wrong(runs_of_validation: dict[str, Ended]) 
     rest, elasticity, ranges, reference, line_test = found.steps
     assert (len(rest.rows), len(elasticity.rows), len(ranges.rows)) == (9, 6, 16)
     assert len({row["configuration"] for row in reference.rows}) == 12
-    assert not line_test.rows and "no line test" in line_test.told
+    assert not line_test.rows and "no line test" in line_test.text
     assert {row["verdict"] for row in found.rows} == {PASSED, "not judged"}
     wrong = runs_of_validation
     wrong["ac_simple_275_one"].summary["static"]["dropper_lengths_m"][1] += 0.0049

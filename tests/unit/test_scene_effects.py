@@ -24,17 +24,16 @@ OPTIONAL = [name for name, effect in effects.registry().items() if not effect.al
 @pytest.fixture
 def wind() -> Iterator[Effect]:
     effects.registry()
-    effect = register(
-        Effect(
-            "side_wind",
-            "wind on the wires",
-            "a load",
-            "this test",
-            default=False,
-            unknowns_of_wire=lambda wire: ("v", "theta_z"),
-            requires=("gravity",),
-        )
+    effect = Effect(
+        "side_wind",
+        "wind on the wires",
+        "a load",
+        "this test",
+        default=False,
+        unknowns_of_wire=lambda wire: ("v", "theta_z"),
+        requires=("gravity",),
     )
+    register(effect)
     yield effect
     unregister("side_wind")
 

@@ -18,9 +18,8 @@ from catenary.cases.run.at_rest.static_table import static_table
 from catenary.cases.scene.load import Draft, read_draft
 from catenary.cases.scene.problem import line_of
 from catenary.cases.scene.scene import Scene
-from catenary.cases.studies.scene_sets import evaluation
-from catenary.cases.studies.scene_sets.evaluation import BROKE
-from catenary.cases.studies.scene_sets.scene_set import BoundTable
+from catenary.cases.studies import scene_sets
+from catenary.cases.studies.scene_sets import BROKE, BoundTable
 from catenary.cases.studies.task_files import read_task
 from catenary.cases.studies.tolerance.errors import Group, groups_of
 from catenary.cases.studies.tolerance.output import as_text, installer_table
@@ -139,7 +138,7 @@ def evaluated(monkeypatch: pytest.MonkeyPatch) -> Callable[[Callable[[Scene], fl
         def evaluate(scenes: Sequence[Scene], workers: Any = None) -> list[dict[str, Any]]:
             return [summary(formula(scene)) for scene in scenes]
 
-        monkeypatch.setattr(evaluation, "evaluate", evaluate)
+        monkeypatch.setattr(scene_sets, "evaluate", evaluate)
 
     return use
 
@@ -235,7 +234,7 @@ def test_a_line_that_breaks_keeps_no_criterion(evaluated: Any, monkeypatch: Any)
         fast = [scene.train.speed_km_h > 270.0 for scene in scenes]
         return [{BROKE: "it broke"} if one else summary(20.0) for one in fast]
 
-    monkeypatch.setattr(evaluation, "evaluate", breaks)
+    monkeypatch.setattr(scene_sets, "evaluate", breaks)
     samples = {"number": 20, "probability": 0.7, "resolution": 0.01}
     plan = make_plan(tiny(), task_of(SPEED, samples=samples))
     (found,) = find_tolerances(plan)
@@ -276,7 +275,7 @@ def test_an_installer_has_what_all_criteria_leave_together(
             own["pantographs"][0]["min_N"] = 2.0 + one / 6.0
         return found
 
-    monkeypatch.setattr(evaluation, "evaluate", evaluate)
+    monkeypatch.setattr(scene_sets, "evaluate", evaluate)
     bounds = [AT_MOST, {"statistic": "min_N", "at_least": 0.0}]
     samples = {"number": 120, "probability": 0.85, "resolution": 0.002, "seed": 2}
     plan = make_plan(tiny(), task_of(SPEED, criteria=bounds, samples=samples))

@@ -19,7 +19,7 @@ from small_lines import (
     train,
 )
 
-from catenary.cases.studies.waves.excited import Asked, Watch, excitation_of, without_train
+from catenary.cases.studies.waves.excited import Settings, Watch, excitation_of, without_train
 from catenary.cases.studies.waves.measured import arrived, measured_rows, transmitted
 from catenary.cases.studies.waves.seen import EnergyMotion, NodeMotion, WireMotion
 from catenary.cases.studies.waves.theory import wave_theory
@@ -69,7 +69,7 @@ def test_group_velocities_of_a_periodic_line_are_those_of_its_bloch_waves() -> N
     """
     line = en50318_line(44)
     problem = problem_of(line, WHOLE)
-    struck = excitation_of("hammer", Asked(impulse=0.2), problem, 1e-3)
+    struck = excitation_of("hammer", Settings(impulse=0.2), problem, 1e-3)
     rest = line_at_rest(without_train(problem, struck), mesh_of(line, 8))
     wire = WireMotion(rest.model.contact_nodes, rest.model.contact_x)
     march(rest, struck, 4e-3, [wire])
@@ -97,7 +97,7 @@ def test_what_passes_lies_in_the_pass_bands() -> None:
     """
     line = en50318_line(44)
     problem = problem_of(line, WHOLE - {"dropper_slackening"})
-    struck = excitation_of("hammer", Asked(impulse=0.2), problem, 1e-3)
+    struck = excitation_of("hammer", Settings(impulse=0.2), problem, 1e-3)
     rest = line_at_rest(without_train(problem, struck), mesh_of(line, 4))
     wire = WireMotion(rest.model.contact_nodes, rest.model.contact_x)
     march(rest, struck, 4e-3, [wire])

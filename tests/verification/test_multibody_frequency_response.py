@@ -25,10 +25,10 @@ from catenary.mbs.response.frequency_response import head_response
 from catenary.mbs.response.linearisation import LinearModel, apparent_mass, linearise, of_chain
 from catenary.mbs.rigid.bodies import SPACE, Body
 from catenary.mbs.rigid.forces import Gravity, PointForce, SpringDamper
+from catenary.mbs.rigid.implicit_steps import Stepper
 from catenary.mbs.rigid.joints import Prismatic, Revolute, Spherical
 from catenary.mbs.rigid.kinematics import point
 from catenary.mbs.rigid.system import System
-from catenary.mbs.time_steps.implicit_steps import Stepper
 
 G = 9.81
 FREQUENCIES = np.array([0.3, 1.0, 4.0, 11.0, 25.0])

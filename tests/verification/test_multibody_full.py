@@ -21,7 +21,7 @@ from catenary.mbs.mechanism.reduced_pantograph import RaisingPantograph
 from catenary.mbs.response.linearisation import linearise
 from catenary.mbs.rigid.joints import PrescribedAngle
 from catenary.mbs.rigid.spin_locks import without_spins
-from catenary.mbs.time_steps.step_solvers import METHODS
+from catenary.mbs.rigid.step_solvers import METHODS
 from catenary.mbs.vehicle.base_motion import BaseMotion, Table, VehicleMotion
 
 STATIC, HEIGHT, DT = 150.0, 5.08, 1e-3

@@ -10,17 +10,17 @@ from scipy.special import ellipk
 from catenary.base.errors import InputError, RunBroken
 from catenary.mbs.rigid.bodies import SPACE, Body, Motion
 from catenary.mbs.rigid.forces import BumpStop, Gravity, PointForce, SpringDamper
+from catenary.mbs.rigid.implicit_steps import Stepper
 from catenary.mbs.rigid.joints import PrescribedAngle, Prismatic, Revolute, Spherical, steady
 from catenary.mbs.rigid.kinematics import point
-from catenary.mbs.rigid.system import System
-from catenary.mbs.time_steps.implicit_steps import Stepper
-from catenary.mbs.time_steps.step_solvers import (
+from catenary.mbs.rigid.step_solvers import (
     METHODS,
     Augmented,
     Partitioned,
     WithFeedback,
     step_solver,
 )
+from catenary.mbs.rigid.system import System
 
 G = 9.81
 each_method = pytest.mark.parametrize("method", METHODS)

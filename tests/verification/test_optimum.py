@@ -16,8 +16,15 @@ from catenary.cases.scene.turned import BACKWARD
 from catenary.cases.studies.optimise import study as optimising
 from catenary.cases.studies.optimise.checks import AS_IS, FINER_MESH, SHORTER_STEP, UNSEEN, change
 from catenary.cases.studies.optimise.task import OptimiseTask
-from catenary.cases.studies.scene_sets.evaluation import BROKE, Evaluation, evaluate, workers
-from catenary.cases.studies.scene_sets.scene_set import SceneSet, SetTable, members_of
+from catenary.cases.studies.scene_sets import (
+    BROKE,
+    Evaluation,
+    SceneSet,
+    SetTable,
+    evaluate,
+    members_of,
+    workers,
+)
 from catenary.cases.studies.task_files import read_task
 from catenary.cases.studies.tolerance import study as tolerating
 from catenary.cases.studies.tolerance.task import ToleranceTask
@@ -153,7 +160,7 @@ def test_dropper_lengths_calm_the_benchmark_at_320_km_h() -> None:
         print(f"{name}: {100 * min(by):+.1f} to {100 * max(by):+.1f} %")
         assert max(by) < -0.20
         assert min(row.optimum["min_N"] for row in own) > 34.0
-    assert len(found.said) == 1 and found.said[0].startswith("max_uplift_mm gets worse")
+    assert len(found.remarks) == 1 and found.remarks[0].startswith("max_uplift_mm gets worse")
 
 
 @pytest.mark.study

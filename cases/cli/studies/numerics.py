@@ -147,7 +147,7 @@ def hard(
             f"-j is {runs.n_jobs} on {comm.size} ranks, of which each case is to take all"
         )
     found: list[Criterion] = []
-    told: dict[str, dict[str, list[str]]] = {}
+    remarks_of: dict[str, dict[str, list[str]]] = {}
     petsc = partial(start_petsc, list(options.petsc))
     with held_study(out, comm, "catenary hard", runs.force) as (kept, write):
         checked = checks.check_cases(
@@ -155,15 +155,15 @@ def hard(
         )
         for number, case in enumerate(cases, start=1):
             console.say(f"[{number}/{len(cases)}] {case.name}: {case.what}")
-            rows, told[case.name] = next(checked)
+            rows, remarks_of[case.name] = next(checked)
             console.say("\n".join(checks.line(row) for row in rows))
             found += rows
         table, page = TABLES
-        content: dict[str, Content] = {table: checks.criteria(found, told)}
-        content[page] = checks.page(cases, found, told)
+        content: dict[str, Content] = {table: checks.criteria(found, remarks_of)}
+        content[page] = checks.page(cases, found, remarks_of)
         files = write(lambda folder: write_files(folder, content))
     failed = [row for row in found if not row.passed]
-    lines = remark_lines(march for remarks in told.values() for march in remarks.items())
+    lines = remark_lines(march for remarks in remarks_of.values() for march in remarks.items())
     if lines:
         console.say("\n" + "\n".join(lines) + "\n")
     if files:

@@ -50,7 +50,7 @@ class TaskWords:
         Serial. ``table`` is one of its files, ``task`` the model of the task.
         """
         from catenary.cases.studies.records import held_study
-        from catenary.cases.studies.scene_sets.evaluation import workers
+        from catenary.cases.studies.scene_sets import workers
         from catenary.cases.studies.task_files import read_task
 
         out, command = self.out, f"catenary {verb} {self.case}"

@@ -103,13 +103,13 @@ def waves(
     """Serial."""
     from catenary.cases.process.petsc_options import start_petsc
     from catenary.cases.studies.waves import study
-    from catenary.cases.studies.waves.excited import Asked
+    from catenary.cases.studies.waves.excited import Settings
 
-    folder, asked = console.run_folder(words.case), Asked(*astuple(excited))
+    folder, settings = console.run_folder(words.case), Settings(*astuple(excited))
     if excite not in EXCITATIONS:
         raise InputError(f"--excite is {excite}, but must be one of {', '.join(EXCITATIONS)}")
     train = excite == EXCITATIONS[0]
-    if train and any(value is not None for value in asked):
+    if train and any(value is not None for value in settings):
         raise InputError(
             "--force-N, --frequency-Hz, --at-m, --duration-s and --impulse-Ns belong to another "
             "--excite than pantograph; the scene says all about that"
@@ -135,8 +135,8 @@ def waves(
             raise InputError("-o is missing; it names the folder of the run that shows the waves")
         refuse_impossible(out)
         dense = f"output.field_every_s={study.SNAPSHOT_EVERY}"
-        chosen = any(key.startswith("output.field_every") for key in words.changes)
-        scene = words.load(*([] if chosen or not train or obstacles else [dense]))
+        is_dense = any(key.startswith("output.field_every") for key in words.changes)
+        scene = words.load(*([] if is_dense or not train or obstacles else [dense]))
         start_petsc([])
         if obstacles:
             text, files = study.study_obstacles(scene, out, force)
@@ -147,7 +147,7 @@ def waves(
                 return console.BROKEN
             studied = study.study_waves(out)
         else:
-            studied = study.study_excited(scene, excite, asked, out, force)
+            studied = study.study_excited(scene, excite, settings, out, force)
     text = study.as_text(studied.theory, studied.measured, studied.remarks)
     console.say(text + "\n" + "\n".join(map(str, studied.files)))
     return console.DONE

@@ -46,12 +46,12 @@ def end_warnings(problem: Problem) -> list[str]:
     masts, n = line.support_positions, line.n_spans
     start, end = problem.ends
     rear = train.start - max(place.behind for place in train.placements)
-    said = []
+    sentences = []
     if isinstance(start, AbsorbingLayer) and rear < masts[start.n_spans]:
-        said.append(_inside("start", f"starts at {rear:g} m", float(masts[start.n_spans])))
+        sentences.append(_inside("start", f"starts at {rear:g} m", float(masts[start.n_spans])))
     if isinstance(end, AbsorbingLayer) and train.end > masts[n - end.n_spans]:
-        said.append(_inside("end", f"runs to {train.end:g} m", float(masts[n - end.n_spans])))
-    return said
+        sentences.append(_inside("end", f"runs to {train.end:g} m", float(masts[n - end.n_spans])))
+    return sentences
 
 
 def _inside(side: str, how: str, inner: float) -> str:
@@ -203,7 +203,7 @@ def _in_window(found: Arrivals, line: WaveLine, course: Course, problem: Problem
         found = found._replace(near_end=None)
     if found.far_end is None:
         return found
-    # Where this pantograph is when the window reaches the far end, and where it meets what is then
+    # Place of this pantograph when the window reaches the far end, and where it meets what is then
     # reflected there.
     leader_then = line.end - window.spans_ahead * line.span
     here = leader_then - (course.leader - course.start)
@@ -262,7 +262,7 @@ def _reflections(scene: Scene, traced: Traced) -> list[str]:
     # 1 mm for the rounding of sums.
     more = math.ceil((max(ends) - traced.line.end - 1e-3) / traced.line.span)
     wanted = scene.line.n_spans + max(more, 1)
-    said = []
+    sentences = []
     for i in felt:
         met = traced.found[i].far_end
         assert met is not None  # a stretch lies within the run
@@ -271,13 +271,13 @@ def _reflections(scene: Scene, traced: Traced) -> list[str]:
         first, last = traced.courses[i].stretch
         fits = met.at - first >= traced.line.span
         shorter = f", or evaluation.to_m = {math.floor(met.at):g} at most" if fits else ""
-        said.append(
+        sentences.append(
             f"The reflection from the end of the line reaches {_object(traced.names[i])} at "
             f"{met.at:.0f} m ({met.time:.1f} s){left}, before the evaluated stretch ends "
             f"({first:g} to {last:g} m): its force is not that of a long line. Take "
             f"line.n_spans = {wanted}{shorter}."
         )
-    return said
+    return sentences
 
 
 def _short_run_in(scene: Scene, problem: Problem, traced: Traced) -> list[str]:
@@ -288,7 +288,7 @@ def _short_run_in(scene: Scene, problem: Problem, traced: Traced) -> list[str]:
     needed = run_in_for(line, speed)
     leader = max(course.leader for course in traced.courses)
     first = problem.line.running_range[0]
-    said = []
+    sentences = []
     for i in short:
         course, found = traced.courses[i], traced.found[i]
         # To a metre, on the safe side.
@@ -296,14 +296,14 @@ def _short_run_in(scene: Scene, problem: Problem, traced: Traced) -> list[str]:
         begin = math.ceil(course.start + needed)
         fits = start - (leader - course.rear) >= first
         remedy = f"train.start_m = {start:g} at most, or " if fits else ""
-        said.append(
+        sentences.append(
             f"{_subject(traced.names[i])} starts {found.run_in:.0f} m, {found.run_in_spans:.1f} "
             f"spans, before the evaluated stretch: start-up still affects its force by about "
             f"{100 * found.start_share:.0f} % of sigma, where {100 * SHORT_RUN_IN:.0f} % is the "
             f"limit. Take {remedy}evaluation.from_m = {begin:g} "
             "at least."
         )
-    return said
+    return sentences
 
 
 def _subject(name: str) -> str:

@@ -40,14 +40,14 @@ def defect_facts(scene: Scene, problem: Problem) -> list[dict[str, Any]]:
     for name in scene.irregularities.given:
         if name in problem.effects:
             table = getattr(scene.irregularities, name)
-            says = _lengths(table) if isinstance(table, LengthsTable) else _heights(table, line)
-            found.append({"type": name, "says": f"{_WHAT[name]}: {says}"})
+            sentence = _lengths(table) if isinstance(table, LengthsTable) else _heights(table, line)
+            found.append({"type": name, "says": f"{_WHAT[name]}: {sentence}"})
     for fitting in scene.line.fittings if "fittings" in problem.effects else []:
         over = f" over {fitting.length_m:g} m" if fitting.length_m else ""
-        says = f"{fitting.kind.replace('_', ' ')} of {fitting.mass_kg:g} kg{over} on the "
-        says += f"{wire_words(fitting.wire)} at {fitting.at_m:g} m"
+        sentence = f"{fitting.kind.replace('_', ' ')} of {fitting.mass_kg:g} kg{over} on the "
+        sentence += f"{wire_words(fitting.wire)} at {fitting.at_m:g} m"
         place = {"at_m": fitting.at_m, "wire": fitting.wire}
-        found.append({"type": fitting.kind, **place, "says": says})
+        found.append({"type": fitting.kind, **place, "says": sentence})
     for defect in scene.defects:
         if defect.type in problem.effects:
             found.append({"type": defect.type, **_defect(defect, line)})
@@ -62,10 +62,10 @@ _WHAT = {
 
 
 def _heights(table: HeightTable, line: Line) -> str:
-    said = []
+    parts = []
     if table.standard_deviation_mm is not None:
         start, end = stretch_of(table, line)
-        said.append(
+        parts.append(
             f"standard deviation {table.standard_deviation_mm:g} mm, waves of {table.shortest_m:g} "
             f"to {table.longest_m:g} m, spectrum falling with the power {table.exponent:g} of the "
             f"wave number, from {start:g} to {end:g} m, seed {table.seed}"
@@ -73,20 +73,20 @@ def _heights(table: HeightTable, line: Line) -> str:
     if table.by_place is not None:
         heights = [1e3 * height for _, height in table.by_place]
         at = counted(len(heights), "place")
-        said.append(f"{min(heights):g} to {max(heights):g} mm at {at} of a table")
-    return "; ".join(said)
+        parts.append(f"{min(heights):g} to {max(heights):g} mm at {at} of a table")
+    return "; ".join(parts)
 
 
 def _lengths(table: LengthsTable) -> str:
-    said = []
+    parts = []
     if table.standard_deviation_mm:
-        said.append(
+        parts.append(
             f"standard deviation {table.standard_deviation_mm:g} mm, cut off at {table.cut_off:g} "
             f"times that, seed {table.seed}"
         )
     if table.by_dropper is not None:
-        said.append(f"given for {counted(len(table.by_dropper), 'dropper')}")
-    return "; ".join(said)
+        parts.append(f"given for {counted(len(table.by_dropper), 'dropper')}")
+    return "; ".join(parts)
 
 
 def _defect(table: Defect, line: Line) -> dict[str, Any]:

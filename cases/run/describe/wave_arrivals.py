@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 # Share of an amplitude below which a reflected wave counts as harmless [-].
 FELT = 1e-3
-# What the start of a run leaves in the contact force after a distance of D spans, on a line without
+# Part of a run's start in the contact force after a distance of D spans, on a line without
 # damping, is START_SHARE / D of the standard deviation; measured, see docs/guide/line_length.md.
 START_SHARE = 0.8
 # Above this share of the standard deviation the run-in counts as short [-].
@@ -164,7 +164,7 @@ def run_in_for(line: WaveLine, speed: float) -> float:
 
 
 def end_for(line: WaveLine, course: Course) -> float:
-    """Where the line must end for no reflected wave to be felt before the stretch ends [m]: none is
+    """Least place of the line's end for no reflected wave to be felt in the stretch [m]: none is
     met, or those that are have faded."""
     time = (course.stretch[1] - course.start) / course.speed
     unmet = 0.5 * ((line.speed + course.speed) * time + course.leader + course.start)

@@ -43,7 +43,7 @@ _STATE_ARRAYS = 5.5
 _PER_NODE, _PER_DROPPER = 6, 7
 # Rows at which the columns in a window are counted.
 _SAMPLES = 10_000
-# What gzip leaves of a number near the train, within ``THINNED_WINDOW``, and of one far from it.
+# Bytes that gzip leaves of a number near the train, within ``THINNED_WINDOW``, and far from it.
 _COMPRESSED = {"dropper_force": (0.7, 0.1), "arm_uplift": (0.95, 0.85)}
 _INCOMPRESSIBLE = (1.0, 1.0)
 # Report and pictures of any run, and what a dropper and an arm add to its tables [B].

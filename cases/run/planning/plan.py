@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from catenary.meshgen.mesh import LineMesh
 
 
-# Why an effect without data is left out; the keys that would give it some follow.
+# Reason for leaving out an effect without data; the keys that would give it some follow.
 _NO_DATA = "the scene has no data for it: "
 
 
@@ -176,7 +176,7 @@ def make_plan(scene: Scene, mesh: LineMesh | None = None) -> Plan:
         speed=train.speed,
         wave_speed=slowest_wave(problem.line),
         static_forces=tuple(place.static_force for place in train.placements),
-        kinds=tuple((name, told[0]) for name, told in kind_lines(scene, problem).items()),
+        kinds=tuple((name, text[0]) for name, text in kind_lines(scene, problem).items()),
         start=train.start,
         end=train.end,
         evaluation=problem.evaluation,
@@ -253,17 +253,17 @@ def plan_text(plan: Plan) -> str:
     pantographs = counted(plan.n_pantographs, "pantograph")
     rows = [
         ("train", f"{3.6 * plan.speed:g} km/h, {pantographs}, static force {forces} N"),
-        *(("pantograph", f"{name}, {told}") for name, told in plan.kinds),
+        *(("pantograph", f"{name}, {text}") for name, text in plan.kinds),
         (
             "speed",
             f"{ratio:.2f} of the contact wire's wave speed ({3.6 * plan.wave_speed:.1f} km/h)",
         ),
         ("runs", f"from {plan.start:g} to {plan.end:g} m (leading pantograph)"),
         ("evaluated", f"from {plan.evaluation[0]:g} to {plan.evaluation[1]:g} m"),
-        *(("defect", says) for says in plan.defects),
-        *(("incident", f"at {time:.4g} s: {says}") for time, says in plan.incidents),
+        *(("defect", sentence) for sentence in plan.defects),
+        *(("incident", f"at {time:.4g} s: {sentence}") for time, sentence in plan.incidents),
         ("ends", "; ".join(plan.ends)),
-        *(("waves", says) for says in plan.arrivals),
+        *(("waves", sentence) for sentence in plan.arrivals),
         (
             "mesh",
             f"{plan.n_nodes} nodes, {counted(plan.n_droppers, 'dropper')}, "

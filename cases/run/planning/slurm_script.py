@@ -21,10 +21,10 @@ from pathlib import Path
 from catenary.base.errors import InputError
 from catenary.cases.run.planning.needs import NeedsOfRuns
 
-# How much longer than its estimate a job may take, what a start and a report take at most, and the
+# Factor on the estimate of a job's time, the most that a start and a report take, and the
 # least that a job asks for [s].
 _SPARE, _AROUND, _LEAST = 3.0, 180.0, 600.0
-# How long before its limit a job is told to end: a step, a flush and the report [s].
+# Time before its limit at which a job gets the signal to end: a step, a flush and the report [s].
 NOTICE = 120
 _GB = 1e9
 
@@ -40,7 +40,7 @@ class Job:
     chain : jobs that may follow the first one
     directives : further options of sbatch, such as ``--account=track``
     before : lines of shell before the run, such as ``module load catenary``
-    signalled : "B:" if the shell of the script is told of the limit, "" if its programs are
+    signalled : "B:" if the shell of the script gets the signal of the limit, "" if its programs do
     """
 
     ranks: int = 1

@@ -40,8 +40,8 @@ def check_wind(scene: Scene, line: LineData) -> Iterator[Fault]:
         if after.from_m < before.to_m:
             why = f"it must be {before.to_m:g} at least, where the stretch before it ends"
             yield scene.refused(f"wind.stretches.{i}.from_m", why)
-    said = "roughness_length_m" in table.model_fields_set and not scene.origin.recorded
-    if said and table.profile == "power" and table.gusts is None:
+    is_given = "roughness_length_m" in table.model_fields_set and not scene.origin.recorded
+    if is_given and table.profile == "power" and table.gusts is None:
         why = "nothing reads it with the profile power and no gusts"
         yield scene.refused("wind.roughness_length_m", why + TAKE_AWAY)
     wind = wind_of(table)

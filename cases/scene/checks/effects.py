@@ -209,12 +209,12 @@ def _sagging(scene: Scene) -> Iterator[Fault]:
             yield scene.refused(at, why + TAKE_AWAY)
 
 
-# What says how irregularities are drawn at random.
+# Keys of random irregularities.
 _DRAWN = ("exponent", "shortest_m", "longest_m", "cut_off", "seed")
 
 
 def _random(scene: Scene) -> Iterator[Fault]:
-    """How random irregularities are drawn, where none are."""
+    """Faults of keys of random irregularities in a table without randomness."""
     for name in scene.irregularities.given:
         table = getattr(scene.irregularities, name)
         for part in _DRAWN if not table.standard_deviation_mm else ():

@@ -96,8 +96,8 @@ def _ends_of_free_wires(table: LineTable) -> list[str]:
 def _idle_tensioners(scene: Scene) -> Iterator[Fault]:
     """Keys of tensioners on a line that has none, and of a stop without a travel."""
     table = scene.line
-    said = table.tensioner.model_fields_set
-    if not said or scene.effects.get("tensioners") is False:
+    given = table.tensioner.model_fields_set
+    if not given or scene.effects.get("tensioners") is False:
         return
     ends = [table.ends.start.along, table.ends.end.along]
     ends += [] if table.overlap is None else [table.overlap.along]
@@ -105,11 +105,11 @@ def _idle_tensioners(scene: Scene) -> Iterator[Fault]:
         key = "line.tensioner"
         yield scene.fault(
             key,
-            f"has {', '.join(sorted(said))}, but no wire ends at a "
+            f"has {', '.join(sorted(given))}, but no wire ends at a "
             "tensioner: line.ends.start.along or line.ends.end.along must be tensioner"
             + (", or start or end of a wire of line.wires" if table.wires else ""),
         )
-    elif "stop_stiffness_N_per_m" in said and table.tensioner.travel_m is None:
+    elif "stop_stiffness_N_per_m" in given and table.tensioner.travel_m is None:
         why = "it acts only with line.tensioner.travel_m, where the stop stands"
         yield scene.refused("line.tensioner.stop_stiffness_N_per_m", why)
 

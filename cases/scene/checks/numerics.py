@@ -23,7 +23,7 @@ def check_contact(scene: Scene) -> Iterator[Fault]:
 def _damping(scene: Scene) -> Iterator[Fault]:
     contact, switches = scene.contact, scene.switches()
     law, on = contact.law, switches["contact_damping"]
-    said = "contact_damping" in scene.effects
+    is_given = "contact_damping" in scene.effects
     if law == "linear":
         key, value, dissipates = "damping_N_s_per_m", contact.damping_N_s_per_m, "greater than 0"
         acts = value > 0
@@ -41,7 +41,7 @@ def _damping(scene: Scene) -> Iterator[Fault]:
     key = f"contact.{key}"
     if on and not acts:
         yield scene.refused(key, f"effects.contact_damping is on and needs a value {dissipates}")
-    if acts and not on and not said:
+    if acts and not on and not is_given:
         yield scene.needs_effect(key, "contact_damping")
 
 
@@ -97,7 +97,7 @@ def _kinematic(scene: Scene) -> Iterator[Fault]:
 
 _CORRECTED = 'scheme = "fixed_point"'
 _EXCHANGED = 'coupling = "iterated"'
-# What reads each key.
+# Choices of numerics that read each key.
 _READ_BY = {
     "eps_d_m": (_CORRECTED,),
     "eps_v_m_per_s": (_CORRECTED,),

@@ -42,10 +42,10 @@ def check_vehicle(scene: Scene, line: LineData) -> Iterator[Fault]:
 
 
 def _vehicle_acts(scene: Scene) -> Iterator[Fault]:
-    on, said = scene.switches()["vehicle_motion"], "vehicle_motion" in scene.effects
+    on, is_given = scene.switches()["vehicle_motion"], "vehicle_motion" in scene.effects
     if scene.vehicle is None:
         return
-    if not on and not said:
+    if not on and not is_given:
         yield _idle(scene, "vehicle", "vehicle_motion")
     acts = any(scene.switches()[name] for name in ("head_roll", "lateral_motion"))
     if on and scene.vehicle.lateral is not None and not acts:
@@ -58,12 +58,12 @@ def _vehicle_acts(scene: Scene) -> Iterator[Fault]:
 
 
 def _roll_acts(scene: Scene) -> Iterator[Fault]:
-    on, said = scene.switches()["head_roll"], "head_roll" in scene.effects
+    on, is_given = scene.switches()["head_roll"], "head_roll" in scene.effects
     speed = scene.train.speed_km_h
     names = list(dict.fromkeys(place.name for place in scene.train.pantographs))
     for name in names:
         kind = scene.pantographs[name]
-        if isinstance(kind, LumpedTable) and kind.roll is not None and not on and not said:
+        if isinstance(kind, LumpedTable) and kind.roll is not None and not on and not is_given:
             yield _idle(scene, f"pantographs.{name}.roll", "head_roll")
     if not on:
         return
@@ -158,7 +158,7 @@ def _strip_lengths(scene: Scene, line: LineData) -> Iterator[Fault]:
 
 
 def _farthest(scene: Scene, line: LineData, number: int) -> tuple[float, float]:
-    """Where the wire is farthest from the middle of a pantograph's strips on its run, and the
+    """Farthest place of the wire from the middle of a pantograph's strips on its run, and the
     pantograph's place then [m]."""
     place, speed = scene.train.pantographs[number], scene.train.speed_km_h / 3.6
     start = scene.train.start_m - place.behind_m
@@ -295,7 +295,7 @@ def _names(scene: Scene, kind: str, table: MultibodyTable) -> Iterator[Fault]:
     if table.actuator is not None:
         yield from scene.among(f"{key}.actuator", list(table.forces))
     for place in _uses(table):
-        # What is on one body alone would be without effect on what is at rest.
+        # A force or mass on one body alone would have no effect on the space at rest.
         on_one = place.endswith(".body")
         yield from scene.among(f"{key}.{place}", bodies if on_one else [*bodies, SPACE])
     for what in ("joints", "forces"):
@@ -352,8 +352,8 @@ def _mechanism(scene: Scene, name: str, table: MultibodyTable) -> Iterator[Fault
         yield scene.fault(key, f"cannot be built: {error}")
 
 
-def _refusal(scene: Scene, key: str, says: str) -> Fault:
-    return Fault(key, f"{key} {says} {scene.origin.of(key)}")
+def _refusal(scene: Scene, key: str, sentence: str) -> Fault:
+    return Fault(key, f"{key} {sentence} {scene.origin.of(key)}")
 
 
 def check_laws(scene: Scene) -> Iterator[Fault]:

@@ -63,7 +63,7 @@ def faults_of(scene: Scene) -> list[Fault]:
     if found.collect(_pantograph_names, scene):
         found.collect(pantographs.check_pantographs, scene)
         found.collect(pantographs.check_laws, scene)
-    # What is too large is not made, and what follows from a wrong unit is not reported.
+    # A scene that is too large is not made; consequences of a wrong unit are not reported.
     sound = not whole or found.collect(mesh_size.size_faults, scene)
     sound = sound and found.collect(usual_faults, scene)
     line = _line(scene, found) if sound and whole else None
@@ -91,7 +91,7 @@ def faults_of(scene: Scene) -> list[Fault]:
         found.collect(motion.check_along, scene, line)
     if found.faults:
         return found.faults
-    # What may need multibody systems stands last: other faults are reported at once.
+    # Checks that may need multibody systems come last: other faults are reported at once.
     if found.collect(pantographs.check_mechanisms, scene, line):
         found.collect(air.check_uplift, scene)
         found.collect(effects.check_requirements_of_defaults, scene)

@@ -85,7 +85,7 @@ def absolute_names(raw: dict[str, Any], folder_of: Callable[[str], Path]) -> Non
             table[named] = str(base / name)
 
 
-# What reads a file: its path, the begin of a sentence about it, and the raw scene.
+# Reader of a file, called with its path, the begin of a sentence about it, and the raw scene.
 _Read = Callable[[Path, str, dict[str, Any]], Any]
 
 

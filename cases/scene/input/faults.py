@@ -15,7 +15,7 @@ COMMAND_LINE = "on the command line (--set)"
 
 @dataclass(frozen=True)
 class Origin:
-    """Where a scene's keys were written: its file, pairs of a key that was assigned and the place
+    """Origin of a scene's keys: its file, pairs of a key that was assigned and the place
     of that, and pairs of a key and the file that its value was read from. Of a scene that a result
     recorded every key is written, also what its author left to the defaults."""
 
@@ -94,15 +94,15 @@ class SceneError(InputError):
 
     def lines(self) -> list[str]:
         """One sentence for each fault, and one that counts the rest."""
-        told = [fault.sentence for fault in self.faults]
-        return told + ([f"there are {self.more} more faults"] if self.more else [])
+        sentences = [fault.sentence for fault in self.faults]
+        return sentences + ([f"there are {self.more} more faults"] if self.more else [])
 
 
 class UnfitScene(SceneError):
     """A scene whose values are allowed one by one, and do not fit together or are implausible."""
 
 
-# Where a text may have several lines and tabs.
+# Keys whose text may have several lines and tabs.
 _PROSE = ("description", "source", "reason")
 
 

@@ -46,7 +46,7 @@ def _toml_words(error: ValueError) -> str:
     return plain(keys.sub(lambda m: ".".join(re.findall(r"'([^']*)'", m[0])), str(error)), 300)
 
 
-# What ``key=`` stands for: the key is taken away, so that its default holds.
+# The value of ``key=``: the key is removed, so that its default holds.
 REMOVED = object()
 
 

@@ -41,7 +41,7 @@ def _or(listed: str) -> str:
     return " or ".join(listed.rsplit(", ", 1))
 
 
-# What pydantic's error types require, completed with the error's own limits.
+# Requirements by pydantic's error types, completed with the error's own limits.
 _WANTED: dict[str, Callable[[dict[str, Any]], str]] = {
     "greater_than": lambda c: f"must be greater than {c['gt']:g}",
     "greater_than_equal": lambda c: f"must be at least {c['ge']:g}",

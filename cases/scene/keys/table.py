@@ -21,7 +21,7 @@ class Table(BaseModel):
     )
 
 
-# How to get rid of a key that a case file gives, for sentences about keys that exclude others.
+# Advice on removing a key of a case file, for sentences about keys that exclude others.
 TAKE_AWAY = " (--set KEY= takes one away)"
 
 

@@ -146,7 +146,7 @@ USUAL: dict[str, Usual] = {
 }
 _SIGNED = ("stagger_m", "messenger_stagger_m", "pre_sag")
 _MARGIN = 10.0  # beyond a usual range without a question
-# What a number a thousand times too small, or too large, was probably written in.
+# Probable units of a number that is a thousand times too small, or too large.
 _LARGER = {"N": "kN", "N/m": "kN/m", "mm": "m", "N m2": "kN m2"}
 _SMALLER = {"m": "mm", "kg": "g", "kg/m": "g/m", "s": "ms"}
 

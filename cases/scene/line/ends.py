@@ -9,7 +9,7 @@ from pydantic import Field, field_validator, model_validator
 from catenary.cases.scene.keys.table import OneOrMore, Table, ascending
 from catenary.solver.problem.ends import AbsorbingLayer, EndCondition, Fixed, Periodic
 
-# How wires end along the track.
+# Ends of wires along the track.
 Along = Literal["fixed", "tensioner"]
 Mass = Annotated[float, Field(gt=0, le=1e5)]
 
@@ -154,7 +154,7 @@ class OverlapTable(Table):
 
 
 def ends_of(table: EndsTable) -> tuple[EndCondition, EndCondition]:
-    """How the line begins and how it ends."""
+    """Conditions at the line's start and at its end."""
     return _end_of(table.start), _end_of(table.end)
 
 

@@ -247,7 +247,7 @@ def _defect(table: Defect, line: Line) -> SolverDefect:
 
 
 def place_of(line: Line, span: int, dropper: int) -> float:
-    """Where a dropper stands, by the number of its span and its own there, from 1 [m]."""
+    """Place of a dropper, by the number of its span and its own there, from 1 [m]."""
     return float(line.droppers_of_span(span - 1)[dropper - 1])
 
 

@@ -20,7 +20,7 @@ Law = Literal[
 ]
 WITH_RESTITUTION = ("lankarani_nikravesh", "hunt_crossley", "flores", "gonthier")
 HERTZ = ("hertz", *WITH_RESTITUTION)
-# Which keys act with which laws; the law itself acts always.
+# Keys by the laws with which they act; the law itself acts always.
 _ACTS_WITH: dict[str, tuple[str, ...]] = {
     "stiffness_N_per_m": ("linear", *HERTZ),
     "damping_N_s_per_m": ("linear",),

@@ -209,7 +209,7 @@ class WindowTable(Table):
     mode: Literal["off", "exact", "bounded"] = Field(
         "off",
         description="off: all of the line moves; exact: whatever a wave has reached, to round-off; "
-        "bounded: what is near the train, with an error that is told",
+        "bounded: stations near the train, with an estimated error",
     )
     tolerance: float | None = Field(
         None,

@@ -10,10 +10,10 @@ from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 from catenary.cases.scene.keys.table import TAKE_AWAY, Table
 from catenary.mbs.head.strips import Flexure, Strips, Suspension, Turning
 
-# What belongs together: a strip's own suspension, a head's pitch.
+# Keys that belong together: a strip's own suspension, a head's pitch.
 _SUSPENSION = ("mass_kg", "stiffness_N_per_m")
 _PITCH = ("pitch_inertia_kg_m2", "pitch_spring_distance_m")
-# What weighs or turns less than this is none of a pantograph's parts [kg], [kg m2]; accelerations
+# Least mass and inertia of a pantograph's part [kg], [kg m2]; accelerations
 # of far less are beyond a computer's numbers.
 LEAST_MASS, LEAST_INERTIA = 1e-3, 1e-6
 

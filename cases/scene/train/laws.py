@@ -166,7 +166,7 @@ class RegulationTable(Table):
         return self
 
 
-# Where the free side of a limiter begins [m]: its force is zero from there up to its rise.
+# Begin of the free side of a limiter [m]: its force is zero from there up to its rise.
 _BELOW = -1.0
 
 

@@ -29,7 +29,7 @@ DampingValue = Annotated[float, Field(ge=0, le=1e6)]
 # Names of ready chains, and the lists that stand for one.
 Ready = Literal["en50318_2002", "en50318_2018", "dsa380", "ambrosio2012"]
 CHAIN = ("masses_kg", "stiffnesses_N_per_m", "dampings_N_s_per_m")
-# What acts only where all bodies are moved.
+# Keys that act only if all bodies are moved.
 _OF_ALL_BODIES = ("constraint_handling", "substeps")
 
 
@@ -303,7 +303,7 @@ def _number_at(table: Table, key: str) -> float:
 
 
 def _kind(raw: Any) -> Any:
-    """Which table a pantograph is: what its type says, lumped if it says nothing."""
+    """Kind of a pantograph's table: that of its type, lumped if it has none."""
     if isinstance(raw, dict):
         return raw.get("type", "lumped")
     return getattr(raw, "type", "lumped")

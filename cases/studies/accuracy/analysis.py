@@ -155,15 +155,15 @@ def uncertainties(
 
     Source: P. J. Roache, J. Fluids Eng. 116 (1994) 405-413, the grid convergence index.
     """
-    told = dict.fromkeys(QUANTITIES, 0.0)
+    errors = dict.fromkeys(QUANTITIES, 0.0)
     for fine, middle, coarse in chains:
         if reference is None or fine is None or middle is None or coarse is None:
             return dict.fromkeys(QUANTITIES, math.inf)
         near = compare(middle, fine, reference)[1]
         far = compare(coarse, middle, reference)[1]
-        for name in told:
-            told[name] += extrapolated_error(near.get(name, math.inf), far.get(name, math.inf))
-    return told
+        for name in errors:
+            errors[name] += extrapolated_error(near.get(name, math.inf), far.get(name, math.inf))
+    return errors
 
 
 _SAFETY, _HIGHEST_ORDER, _LOWEST_ORDER, _WITHOUT_ORDER = 1.25, 2.0, 0.5, 3.0

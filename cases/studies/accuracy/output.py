@@ -151,10 +151,10 @@ def page(found: Measured, sentences: Sequence[str], picture: str) -> str:
             parts.append("Differences from the case as it is: of models, not errors.")
         parts.append(table_of(rows, axis).markdown())
         parts += [f"{capital(line)}." for line in order_lines(axis, rows)]
-    told = remark_lines(runs_with_remarks(found))
-    if told:
+    remarks = remark_lines(runs_with_remarks(found))
+    if remarks:
         parts.append("## Remarks")
-        parts.append("\n".join(f"- {line.split(maxsplit=1)[1]}" for line in told))
+        parts.append("\n".join(f"- {line.split(maxsplit=1)[1]}" for line in remarks))
     return "\n\n".join(parts) + "\n"
 
 
@@ -193,8 +193,8 @@ def uncertainty_text(planned: PlannedAxis, percent: Mapping[str, float]) -> str:
     known = {what: value for what, value in percent.items() if math.isfinite(value)}
     if not known:
         return f"the uncertainty of the reference is not known from {from_runs}"
-    told = ", ".join(f"{what} {f'{value:.3g}'}" for what, value in known.items())
-    return f"uncertainty of the reference, from {from_runs} [%]: {told}"
+    values = ", ".join(f"{what} {f'{value:.3g}'}" for what, value in known.items())
+    return f"uncertainty of the reference, from {from_runs} [%]: {values}"
 
 
 def order_lines(axis: Axis, rows: Sequence[Row]) -> list[str]:
@@ -203,8 +203,8 @@ def order_lines(axis: Axis, rows: Sequence[Row]) -> list[str]:
     for quantity in _ADVISED if axis.refined else ():
         orders = observed_orders(rows, axis.refined, quantity)
         if orders:
-            told = ", ".join(f"{order:.2f}" for _, order in orders)
-            lines.append(f"observed orders of {quantity}, from the coarsest on: {told}")
+            values = ", ".join(f"{order:.2f}" for _, order in orders)
+            lines.append(f"observed orders of {quantity}, from the coarsest on: {values}")
     return lines
 
 
@@ -305,7 +305,7 @@ def _record(found: Measured, target: float) -> dict[str, Any]:
         "wall_s": found.wall,
         "axes": axes,
         "rows": table_of(found.rows).records(),
-        "remarks": {name: list(told) for name, told in found.remarks.items() if told},
+        "remarks": {name: list(texts) for name, texts in found.remarks.items() if texts},
     }
 
 

@@ -287,7 +287,7 @@ def _row(
     summary, costs = one.summary, times[one.variant.name]
     counted, estimates = summary["inner_iterations"], summary["indicators"]["time_step"]
     # The largest of the pantographs' estimated errors [N].
-    told = [value for value in estimates["force_error_N"] if value is not None]
+    known = [value for value in estimates["force_error_N"] if value is not None]
     return Row(
         *head,
         one.outcome,
@@ -296,7 +296,7 @@ def _row(
         percent,
         cost=min(costs) / summary["simulated_s"],
         timings=len(costs),
-        estimate=max(told, default=math.nan),
+        estimate=max(known, default=math.nan),
         iterations=counted["rounds"] / counted["steps"],
         by_step=by_step,
         by_mesh=by_mesh,
@@ -316,7 +316,7 @@ def _found(one: Ended) -> Found | None:
 def _cost(one: Ended) -> float:
     """Processor time of a march [s], which other work of the machine disturbs little; wall time of
     a run of a version that did not tell it."""
-    told: Any = one.summary.get("march_cpu_s")
-    if not is_number(told, 0.0):
-        told = one.summary["march_wall_s"]
-    return float(told)
+    seconds: Any = one.summary.get("march_cpu_s")
+    if not is_number(seconds, 0.0):
+        seconds = one.summary["march_wall_s"]
+    return float(seconds)

@@ -78,11 +78,11 @@ def advice(found: Costs, row: Measured) -> str:
     if change is None:
         return f"it {_price(row.cost)}; the stretch gives no figures to compare."
     what = _words(found, change, row.switch.on)
-    if abs(change.share) >= found.wish.tolerance:
+    if abs(change.share) >= found.options.tolerance:
         if row.switch.on:
             return f"it {_price(row.cost)}; without it {what}: keep it."
         return f"it {_price(row.cost)}, and with it {what}: switch it on if its data are sound."
-    within = f"{100 * found.wish.tolerance:g} %"
+    within = f"{100 * found.options.tolerance:g} %"
     if not row.switch.on:
         return f"it {_price(row.cost)}; with it {what}: leave it out for figures within {within}."
     if row.cost <= 1.0 + _SAME_COST:
@@ -119,13 +119,13 @@ def width_text(size: Size) -> str:
 
 def as_text(found: Costs) -> str:
     """The table: switched against as it is, then advice, then what is not measured."""
-    start, end = found.stretch
+    (start, end), rounds = found.stretch, found.options.rounds
     table = table_of(found)
     mine = ("", found.names[0])
     leading = replace(table, rows=[row for row in table.rows if row["pantograph"] in mine])
     lines = [
-        f"{found.case}: evaluated from {start:g} to {end:g} m; "
-        f"{counted(found.wish.rounds, 'repetition')} of {counted(found.n_steps, 'step')} in turns.",
+        f"{found.case}: evaluated from {start:g} to {end:g} m; {counted(rounds, 'repetition')} of "
+        f"{counted(found.n_steps, 'step')} in turns.",
         "Forces in N, uplift in mm; of an effect that is switched, what changes. cost: how many "
         "times as long",
         "a step takes with the effect as without, the median of the repetitions.",
@@ -135,9 +135,9 @@ def as_text(found: Costs) -> str:
     lines += ["", leading.text(), "", "Advice:"]
     width = max(len(row.switch.name) for row in found.rows) if found.rows else 0
     lines += [f"  {row.switch.name:{width}}  {sentence(found, row)}" for row in found.rows]
-    told = remark_lines([("as it is", found.remarks), *map(_told, found.rows)])
-    lines += ["", *told] if told else []
-    if found.wish.only:
+    remarks = remark_lines([("as it is", found.remarks), *map(_remarks_of, found.rows)])
+    lines += ["", *remarks] if remarks else []
+    if found.options.only:
         return "\n".join(lines)
     if found.effects.always:
         lines += ["", f"Part of every scene: {', '.join(found.effects.always)}."]
@@ -176,7 +176,7 @@ def table_of(found: Costs) -> StudyTable:
 def _rows(found: Costs, one: Measured) -> list[dict[str, Any]]:
     """The rows of a switch, or of the scene as it is, one of each pantograph."""
     switch, size, step = one.switch, one.size, found.step * one.ratio
-    run, remarks = _told(one)
+    run, remarks = _remarks_of(one)
     simulated = "as it is"
     if switch.name:
         simulated = LEFT_OUT if switch.on else "switched on"
@@ -209,7 +209,7 @@ def _rows(found: Costs, one: Measured) -> list[dict[str, Any]]:
     return rows
 
 
-def _told(row: Measured) -> tuple[str, list[str]]:
+def _remarks_of(row: Measured) -> tuple[str, list[str]]:
     """A run's name as in the table, and its remarks."""
     if not row.switch.name:
         return "as it is", row.remarks
@@ -229,9 +229,9 @@ def record_of(found: Costs) -> dict[str, Any]:
     """Record of the study, for JSON."""
     return {
         "case": found.case,
-        "assignments": list(found.wish.overrides),
+        "assignments": list(found.options.overrides),
         "evaluation_m": list(found.stretch),
-        "rounds": found.wish.rounds,
+        "rounds": found.options.rounds,
         "steps_of_a_round": found.n_steps,
         "always": found.effects.always,
         "lacking_data": found.effects.lacking,

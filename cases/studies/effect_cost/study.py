@@ -27,7 +27,7 @@ from catenary.cases.studies.sweep.variants import Variant
 from catenary.solver.effects import all_effects as effects
 from catenary.solver.problem.problem import Problem, steps_of
 
-# What an effect without data lacks, where it does not say so itself.
+# Data that an effect lacks, if it does not name them itself.
 _NO_DATA = "the scene has no data for it"
 
 
@@ -114,13 +114,13 @@ def _taken_along(name: str, among: Iterable[str], takes: Callable[[str, str], bo
 AS_IT_IS = "as-it-is"
 # Steps of a round at least, some milliseconds, and at most; a span between them.
 _FEWEST, _MOST = 200, 4000
-# What one figure is called, and where a pantograph's and the line's stand in a summary.
+# Names of the figures, and their keys in a summary, of a pantograph and of the line.
 FIGURES = ("mean_N", "std_N", "max_N", "min_N")
 UPLIFT = "max_uplift_mm"
 
 
 @dataclass(frozen=True)
-class Wish:
+class CostOptions:
     """Effects to be measured, and how long.
 
     Attributes
@@ -189,7 +189,7 @@ class Costs:
     Attributes
     ----------
     case : name of the case
-    wish, effects : the wanted effects, and those that can be switched
+    options, effects : the wanted effects, and those that can be switched
     stretch : evaluated, from and to [m]
     n_steps : of a timed round
     size, figures, remarks : of the scene as it is, as in ``Measured``
@@ -199,7 +199,7 @@ class Costs:
     """
 
     case: str
-    wish: Wish
+    options: CostOptions
     effects: SwitchableEffects
     stretch: tuple[float, float]
     n_steps: int
@@ -211,7 +211,7 @@ class Costs:
     remarks: list[str] = field(default_factory=list)
 
 
-def jobs_of(wish: Wish) -> tuple[SwitchableEffects, list[Job], dict[str, str]]:
+def jobs_of(options: CostOptions) -> tuple[SwitchableEffects, list[Job], dict[str, str]]:
     """Effects that can be switched, the runs for them, and why others cannot. Not collective.
 
     The first run is of the scene as it is; those of switches have the names of their effects.
@@ -221,16 +221,16 @@ def jobs_of(wish: Wish) -> tuple[SwitchableEffects, list[Job], dict[str, str]]:
     InputError
         If the scene is wrong, or has no such effect to switch.
     """
-    whole = load_scene(wish.case, wish.overrides, wish.shortened)
-    shorter = _shortened(whole, wish.stretch)
-    scene = _scene(wish, shorter)
+    whole = load_scene(options.case, options.overrides, options.shortened)
+    shorter = _shortened(whole, options.stretch)
+    scene = _scene(options, shorter)
     effects = switchable_effects(scene)
-    if wish.only:
-        effects = SwitchableEffects(_named(effects, wish.only), effects.always, effects.lacking)
+    if options.only:
+        effects = SwitchableEffects(_named(effects, options.only), effects.always, effects.lacking)
     jobs, refused = [_job(AS_IT_IS, scene)], {}
     for switch in effects.switches:
         try:
-            jobs.append(_job(switch.name, _scene(wish, [*shorter, *switch.assignments])))
+            jobs.append(_job(switch.name, _scene(options, [*shorter, *switch.assignments])))
         except InputError as error:
             refused[switch.name] = str(error)
     return effects, jobs, refused
@@ -263,9 +263,9 @@ def _shortened(scene: Scene, stretch: float) -> list[str]:
     return [f"evaluation.to_m={start + stretch!r}", f"train.end_m={stop!r}"]
 
 
-def _scene(wish: Wish, further: Sequence[str]) -> Scene:
+def _scene(options: CostOptions, further: Sequence[str]) -> Scene:
     varied = [Assigned(text, "--cost", "by plan --cost") for text in further]
-    return load_scene(wish.case, wish.overrides, wish.shortened, varied)
+    return load_scene(options.case, options.overrides, options.shortened, varied)
 
 
 def _job(name: str, scene: Scene) -> Job:
@@ -273,7 +273,7 @@ def _job(name: str, scene: Scene) -> Job:
 
 
 def measure(
-    wish: Wish,
+    options: CostOptions,
     folder: Path,
     say: Callable[[str], None],
     force: bool = False,
@@ -295,7 +295,7 @@ def measure(
     InputError, RunBroken
         If the scene is wrong; if it breaks as it is, or a signal comes while steps are timed.
     """
-    effects, jobs, refused = jobs_of(wish)
+    effects, jobs, refused = jobs_of(options)
     comm = MPI.COMM_SELF
     ended = run_jobs(jobs, folder, comm, RunOptions(force, (), say, n_jobs))
     if interrupted(ended):
@@ -314,7 +314,7 @@ def measure(
         Phase(comm, "steps were timed", "runs are kept where -o names a folder") as phase,
         RepeatedMarch(comm, rest_of(scene), first, n_steps) as as_it_is,
     ):
-        step = in_turns({AS_IT_IS: as_it_is}, wish.rounds)[AS_IT_IS]
+        step = in_turns({AS_IT_IS: as_it_is}, options.rounds)[AS_IT_IS]
         for number, switch in enumerate(effects.switches, start=1):
             phase.next(f"steps without or with {switch.name} were timed")
             say(f"[{number}/{len(effects.switches)}] steps: {switch.name}")
@@ -324,7 +324,7 @@ def measure(
                 rows.append(Measured(switch, outcome))
                 continue
             with RepeatedMarch(comm, rest_of(job.scene), first, n_steps) as march:
-                timed, own = beside(march, as_it_is, wish.rounds), size_of(march)
+                timed, own = beside(march, as_it_is, options.rounds), size_of(march)
             figures = figures_of(one.summary)
             rows.append(Measured(switch, "done", own, timed.ratio, figures, one.remarks))
             step = min(step, timed.least_of_other)
@@ -332,7 +332,7 @@ def measure(
     names = [one["name"] for one in whole.summary["pantographs"]]
     stretch, figures = (scene.evaluation.from_m, scene.evaluation.to_m), figures_of(whole.summary)
     return Costs(
-        scene.case.name, wish, effects, stretch, n_steps, size, step, figures, names, rows,
+        scene.case.name, options, effects, stretch, n_steps, size, step, figures, names, rows,
         whole.remarks,
     )  # fmt: skip
 

@@ -127,7 +127,7 @@ def _hardware(problem: Problem) -> Iterator[list[Any]]:
             (kind.by_radial_force, "vertical stiffness radial force over length"),
             (kind.stiffness, f"vertical stiffness {stiffness_words(kind.stiffness)}"),
         ]
-        parts = [said for value, said in known if value]
+        parts = [text for value, text in known if value]
         if kind.uplift_stop is not None:
             stop = (
                 f"stop at {1e3 * kind.uplift_stop:g} mm with {stiffness_words(kind.stop_stiffness)}"
@@ -207,8 +207,8 @@ def pantographs(scene: SceneOfRun, run: EvaluatedRun) -> Section:
     """Each kind of pantograph of the train: its data, and the pantograph drawn to scale."""
     kinds: dict[str, tuple[Placement, str]] = {}
     words = header_words(scene.scene, scene.problem)
-    for placement, said in zip(scene.problem.train.placements, words, strict=True):
-        kinds.setdefault(said["kind"], (placement, said["description"]))
+    for placement, kind in zip(scene.problem.train.placements, words, strict=True):
+        kinds.setdefault(kind["kind"], (placement, kind["description"]))
     pictures = [
         Picture(
             file,

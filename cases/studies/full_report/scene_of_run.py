@@ -69,7 +69,7 @@ class SceneOfRun:
         if not self.has_train:
             return None
         plain = self.scene.model_dump(mode="json", exclude_none=True, exclude_defaults=True)
-        # What is on by itself where its data are there is not asked for; what is off has its data.
+        # Effects that are on by default with their data need no key; those that are off have data.
         known, switched = registry(), self.scene.switches()
         plain["effects"] = {
             name: on for name, on in switched.items() if not (on and known[name].default)

@@ -29,7 +29,7 @@ from catenary.postproc.report.pictures.marks import mark_line
 from catenary.postproc.report.sections.section import EvaluatedRun, Picture, Section, Text, number
 from catenary.postproc.report.study_table import StudyTable, texts_table
 
-# What is shown beside a dropper and its extreme [m], and how many places tables have.
+# Length that is shown beside a dropper and its extreme [m], and number of places in tables.
 _BESIDE, _MOST = 30.0, 5
 
 
@@ -59,9 +59,9 @@ def _blocks(results: Results, places: WorstPlaces, causes: Causes) -> Iterator[T
         )
     for first, spots, words in _KINDS:
         for spot in spots(places)[:1]:
-            said = words.format(at=spot.place, v=spot.value, m=spot.median)
+            sentence = words.format(at=spot.place, v=spot.value, m=spot.median)
             items = candidates(causes.at(spot), spot.stands_out)
-            yield Text(f"{said}{out(spot.stands_out)}.", "note", first, items)
+            yield Text(f"{sentence}{out(spot.stands_out)}.", "note", first, items)
     everywhere = causes.of_line()
     if everywhere:
         yield Text("acts on all spans alike:", "note", "The line as a whole", everywhere)

@@ -19,7 +19,7 @@ from catenary.cases.process.workers import WorkerLost
 from catenary.cases.scene.problem import resolved
 from catenary.cases.studies.hard import runs as hard_runs
 from catenary.cases.studies.hard.cases import HardCase
-from catenary.cases.studies.hard.runs import Watched, cut_of, node_places, rest_height
+from catenary.cases.studies.hard.runs import RunHistories, cut_of, node_places, rest_height
 from catenary.cases.studies.records import KeptRows
 from catenary.postproc.report.study_table import Column, StudyTable, remark_lines
 from catenary.solver.model.beam import shape_slopes
@@ -38,7 +38,7 @@ class Left(NamedTuple):
     expected: float
 
 
-def energy_that_left(rest: LineAtRest, run: Watched) -> list[Left]:
+def energy_that_left(rest: LineAtRest, run: RunHistories) -> list[Left]:
     """Energy that left the line at each incident of a watched run. Not collective.
 
     A dropper takes along the T^2 / 2k that its tension T at that time has stored. A wire whose
@@ -171,7 +171,7 @@ class _OneCase:
         scene = self.case.scene(self.short, halvings, fixed_point)
         return hard_runs.at_rest(scene, self.alone)
 
-    def _marched(self, form: str, rest: LineAtRest, with_work: bool = False) -> Watched:
+    def _marched(self, form: str, rest: LineAtRest, with_work: bool = False) -> RunHistories:
         made = hard_runs.run(rest, self.alone, with_work, self_watched=True)
         self.remarks[f"{self.case.name} {form}".strip()] = made.remarks
         return made
@@ -217,7 +217,7 @@ class _OneCase:
             yield self._correction(base, self._marched("by fixed-point correction", corrected))
         yield from self._needs(rest, base)
 
-    def _energy(self, base: Watched, halved: Watched) -> Iterator[Criterion]:
+    def _energy(self, base: RunHistories, halved: RunHistories) -> Iterator[Criterion]:
         """Energy is not made, or, where switches of droppers make some, less with smaller steps.
 
         Contact makes none, however it switches. Of droppers the gains and losses may cancel in one
@@ -230,7 +230,7 @@ class _OneCase:
         yield self._below("energy from nothing", gain, allowed)
         yield self._below("the same at half the step", halved.energy_gain(), limit)
 
-    def _correction(self, base: Watched, other: Watched) -> Criterion:
+    def _correction(self, base: RunHistories, other: RunHistories) -> Criterion:
         """The paper's correction agrees, or breaks where the table says so."""
         if self.case.fixed_point == "breaks":
             name = "the fixed-point correction breaks"
@@ -240,7 +240,7 @@ class _OneCase:
         apart = float(np.abs(other.height - base.height).max())
         return self._below("fixed-point correction, head height [m]", apart, self.case.schemes_m)
 
-    def _needs(self, rest: LineAtRest, base: Watched) -> Iterator[Criterion]:
+    def _needs(self, rest: LineAtRest, base: RunHistories) -> Iterator[Criterion]:
         """Whether the run was the hard one that the case is named after."""
         needs = self.case.needs
         for key, (name, measure) in _REACHED.items():
@@ -271,7 +271,7 @@ class _OneCase:
         case, name = self.case, f"1 and {world.size} ranks, relative"
         rest = hard_runs.at_rest(case.scene(self.short), world)
 
-        def run(comm: Any) -> Watched:
+        def run(comm: Any) -> RunHistories:
             if case.kind == "free":
                 return hard_runs.run_free(rest, comm, case.short_steps)
             return hard_runs.run(rest, comm)
@@ -301,25 +301,25 @@ def holds_or_not(case: HardCase, name: str, holds: bool, note: str = "") -> Crit
     return Criterion(case.name, name, float(holds), 1.0, holds, "" if note == "done" else note)
 
 
-def _apart(coarse: Watched, fine: Watched) -> float:
+def _apart(coarse: RunHistories, fine: RunHistories) -> float:
     """Rms difference of head heights at the coarser run's times over their deviation."""
     n = min(coarse.time.size, (fine.time.size + 1) // 2)
     difference = coarse.height[:n] - fine.height[::2][:n]
     return float(np.sqrt((difference**2).mean()) / fine.height.std())
 
 
-def _crossing(rest: LineAtRest, base: Watched) -> float:
+def _crossing(rest: LineAtRest, base: RunHistories) -> float:
     step = int(np.argmax(base.position[:, 0] > cut_of(rest)))
     return float(base.switches()[step - 1])
 
 
-def _on_nodes(rest: LineAtRest, base: Watched) -> float:
+def _on_nodes(rest: LineAtRest, base: RunHistories) -> float:
     far = np.abs(base.position.reshape(-1, 1) - node_places(rest)).min(axis=1)
     return float((far < 1e-9).sum())
 
 
 # By key of ``Needs``, what must reach its value, or true 1: a name, and how it is measured.
-_REACHED: dict[str, tuple[str, Callable[[LineAtRest, Watched], float]]] = {
+_REACHED: dict[str, tuple[str, Callable[[LineAtRest, RunHistories], float]]] = {
     "switches": ("switches of droppers", lambda rest, base: base.switches().sum()),
     "passes": ("passes between wires", lambda rest, base: passes(base)),
     "stopped": ("steps at an uplift stop", lambda rest, base: base.stops.any(axis=1).sum()),
@@ -334,8 +334,8 @@ _REACHED: dict[str, tuple[str, Callable[[LineAtRest, Watched], float]]] = {
 }
 
 
-def passes(run: Watched) -> int:
-    """How often the contact wire with the greatest force of a pantograph changes, summed.
+def passes(run: RunHistories) -> int:
+    """Number of changes of the contact wire with the greatest force, over all pantographs.
 
     Steps without contact are left out.
     """
@@ -345,7 +345,7 @@ def passes(run: Watched) -> int:
     return int(sum(np.count_nonzero(np.diff(first)) for first in touched))
 
 
-def broken(rest: LineAtRest, run: Watched) -> np.ndarray:
+def broken(rest: LineAtRest, run: RunHistories) -> np.ndarray:
     """Places of the droppers that carry up to an incident and never after [m]."""
     found = []
     for happened in in_steps(rest.problem.incidents, rest.problem.numerics.dt):
@@ -355,14 +355,14 @@ def broken(rest: LineAtRest, run: Watched) -> np.ndarray:
     return np.asarray(mesh.x(mesh.droppers[np.unique(np.concatenate([*found, []]).astype(int)), 1]))
 
 
-def lost_way(run: Watched) -> float:
+def lost_way(run: RunHistories) -> float:
     """Longest way between two contacts of the leading pantograph [m]."""
     touched = run.position[run.force[:, 0] > 0.0, 0]
     return float(np.diff(touched).max(initial=0.0))
 
 
 # By case and run of it, sentences about what decides the run's results.
-Told = Mapping[str, Mapping[str, Sequence[str]]]
+Remarks = Mapping[str, Mapping[str, Sequence[str]]]
 # Criteria that nearly all cases have, and the heads of their columns.
 _COLUMNS = {
     "largest contact force [N]": ("force [N]", ".0f"),
@@ -376,7 +376,7 @@ _COLUMNS = {
 _PLAIN = ("runs to its end", "everything is finite", "the fixed-point correction breaks")
 
 
-def criteria(found: Sequence[Criterion], told: Told) -> StudyTable:
+def criteria(found: Sequence[Criterion], remarks_of: Remarks) -> StudyTable:
     """Table of criteria, a row each, and a row with the remarks on each case that has any."""
     names = ("case", "criterion", "value", "limit", "kept", "note")
     rows: list[tuple[str, ...]] = [
@@ -384,7 +384,7 @@ def criteria(found: Sequence[Criterion], told: Told) -> StudyTable:
          row.note)
         for row in found
     ]  # fmt: skip
-    for case, remarks in told.items():
+    for case, remarks in remarks_of.items():
         texts = [f"{run}: {text}" for run, own in remarks.items() for text in own]
         if texts:
             rows.append((case, "remarks", str(len(texts)), "", "", "; ".join(texts)))
@@ -393,7 +393,7 @@ def criteria(found: Sequence[Criterion], told: Told) -> StudyTable:
     )
 
 
-def page(cases: Sequence[HardCase], found: Sequence[Criterion], told: Told) -> str:
+def page(cases: Sequence[HardCase], found: Sequence[Criterion], remarks_of: Remarks) -> str:
     """A table of Markdown with a line for each case, and below it the remarks."""
     columns = [
         Column("case", "case"),
@@ -415,12 +415,12 @@ def page(cases: Sequence[HardCase], found: Sequence[Criterion], told: Told) -> s
                 "case": f"`{case.name}`",
                 "words": f"{case.what}; *{case.right}*",
                 "others": others,
-                "remarks": sum(map(len, told.get(case.name, {}).values())) or None,
+                "remarks": sum(map(len, remarks_of.get(case.name, {}).values())) or None,
                 "kept": "yes" if all(row.passed for row in own.values()) else "**no**",
             }
         )
     lines = [StudyTable(columns, rows).markdown()]
-    below = remark_lines(run for remarks in told.values() for run in remarks.items())
+    below = remark_lines(run for remarks in remarks_of.values() for run in remarks.items())
     if below:
         lines += ["", *(f"- {line.split(maxsplit=1)[1]}" for line in below)]
     return "\n".join(lines) + "\n"

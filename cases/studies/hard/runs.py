@@ -3,7 +3,7 @@
 The balance is `LineBalance`, in which numerical damping only takes. Contact forces and gusts are
 loads in it, whose work is summed with the method's weights. So contact that is lost or regained
 makes no energy, however the force jumps, and what rises was made by droppers that switch, at most
-`Watched.one_switch` each.
+`RunHistories.one_switch` each.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.problem import problem_of
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.hard.balance import LineBalance
-from catenary.postproc.record.run_watch import RunWatch, watch_cadence, watched
+from catenary.postproc.record.run_watch import RunWatch, watch_cadence, watch_inputs
 from catenary.solver.contact.contact_wire import ContactWires
 from catenary.solver.integrators.make_line import make_line
 from catenary.solver.model.matrices import stiffness_matrix, whole_matrix
@@ -39,7 +39,7 @@ _MOTION = ("displacement", "velocity", "acceleration")
 
 
 @dataclass
-class Watched:
+class RunHistories:
     """A march as its observer on one rank saw it, or, on several, as rank 0 did.
 
     Attributes
@@ -151,11 +151,11 @@ class Watcher(Observer):
             if len(self._states) > _BLOCK:
                 self._add_work()
 
-    def watched(self, outcome: str, counters: dict[str, int]) -> Watched:
+    def histories(self, outcome: str, counters: dict[str, int]) -> RunHistories:
         """Return the record of the march."""
         if self._states:
             self._add_work()
-        return Watched(
+        return RunHistories(
             outcome,
             time=np.concatenate(self._times),
             position=self._channel("contact_position"),
@@ -251,7 +251,7 @@ def at_rest(scene: Scene, comm: Any) -> LineAtRest:
 
 
 def cut_of(rest: LineAtRest) -> float:
-    """Where the boundary between two ranks lies [m]: the last node that the first one owns."""
+    """Place of the boundary between two ranks [m]: the last node that the first one owns."""
     nodes = rest.model.contact_nodes
     mine = distribute(rest.model, 2, 0).owned(rest.model.dofs(nodes))
     return float(rest.mesh.x(nodes[mine]).max())
@@ -270,7 +270,7 @@ def node_places(rest: LineAtRest) -> np.ndarray:
 
 def run(
     rest: LineAtRest, comm: Any, with_work: bool = False, self_watched: bool = False
-) -> Watched:
+) -> RunHistories:
     """March to the end, or to where it breaks. Collective; ``with_work`` on one rank only.
 
     ``self_watched``: judged by the watch of all runs as well, which does not end it here.
@@ -280,15 +280,15 @@ def run(
     balance = LineBalance(rest.model, rest.problem, rest.form.dropper_force) if with_work else None
     keep = [happened.step for happened in in_steps(simulated.incidents, rest.problem.numerics.dt)]
     watcher = Watcher(wire, keep, balance)
-    watch = _EndlessWatch(comm, watched(rest), watch_cadence(rest.problem.numerics.dt))
+    watch = _EndlessWatch(comm, watch_inputs(rest), watch_cadence(rest.problem.numerics.dt))
     with March(comm, *rest) as march:
         ended = march.run([watcher, watch] if self_watched else [watcher])
-    found = watcher.watched(ended.outcome, ended.counters)
+    found = watcher.histories(ended.outcome, ended.counters)
     found.remarks = watch.remarks
     return found
 
 
-def run_free(rest: LineAtRest, comm: Any, n_steps: int) -> Watched:
+def run_free(rest: LineAtRest, comm: Any, n_steps: int) -> RunHistories:
     """Energy of a line that is let go from under a force at its middle; no train. Collective.
 
     The acceleration at the start is the one that belongs to the shape: M a = -K u.
@@ -314,4 +314,6 @@ def run_free(rest: LineAtRest, comm: Any, n_steps: int) -> Watched:
     finally:
         line.destroy()
     values = np.array(energy)
-    return Watched("done", energy=values, work=np.zeros_like(values), counters={"steps": n_steps})
+    return RunHistories(
+        "done", energy=values, work=np.zeros_like(values), counters={"steps": n_steps}
+    )

@@ -101,7 +101,7 @@ def as_text(found: Identification) -> str:
     sums = ", ".join(f"{one:.1f}" for one in found.sums)
     if len(found.sums) > 1:
         lines.append(
-            f"Sums of squares of {len(found.sums)} searches, of which the first is told: {sums}"
+            f"Sums of squares of {len(found.sums)} searches, the first of which is shown: {sums}"
         )
     else:
         lines.append(
@@ -161,7 +161,7 @@ def verdict(found: Identification) -> str:
     judged = found.judged
     large = [name for name, one in judged.items() if one.is_too_large]
     small = [name for name, one in judged.items() if one.is_too_small]
-    # What lies far below the noise has the colour of round-off, or of a noise that was overstated.
+    # A residual far below the noise has the colour of round-off, or of a noise that was overstated.
     coloured = [name for name, one in judged.items() if one.is_coloured and name not in small]
     wrong = []
     if large:

@@ -10,21 +10,19 @@ from catenary.cases.scene.load import Draft
 from catenary.cases.scene.problem import line_of
 from catenary.cases.scene.turned import DIRECTIONS
 from catenary.cases.studies.optimise.task import OptimiseTask
-from catenary.cases.studies.scene_sets.evaluation import (
+from catenary.cases.studies.scene_sets import (
     BROKE,
     OF_EACH_PANTOGRAPH,
-    Evaluation,
-    Wanted,
-)
-from catenary.cases.studies.scene_sets.scene_set import (
     ErrorSamples,
+    Evaluation,
     Member,
     SceneSet,
+    Wanted,
     members_of,
 )
 
 AS_IS, FINER_MESH, SHORTER_STEP, UNSEEN = "as it is", "mesh x 2", "step / 2", "unseen errors"
-# What is compared, and the direction in which it gets worse.
+# Statistics that are compared, and the direction in which each gets worse.
 COMPARED = {"std_N": 1.0, "max_N": 1.0, "min_N": -1.0, "loss_percent": 1.0, "max_uplift_mm": 1.0}
 # Changes below this share, or this much of a percentage, are no change.
 _SAME = 0.005
@@ -171,28 +169,30 @@ def change(row: Row, statistic: str) -> float:
 
 def not_improved(rows: Sequence[Row]) -> list[str]:
     """Sentences on what gets worse somewhere, and on runs that broke; none if nothing does."""
-    said = []
+    sentences = []
     done = [row for row in rows if row.outcome == "done"]
     for name, sign in COMPARED.items():
         worse = [row for row in done if sign * change(row, name) > _SAME]
         if worse:
             most = max(worse, key=lambda row: sign * change(row, name))
-            said.append(
+            sentences.append(
                 f"{name} gets worse in {len(worse)} of {len(done)} rows, most with {most.check}, "
                 f"{most.scene}{f', {most.pantograph}' if most.pantograph else ''}: "
                 f"{most.shipped[name]:.4g} to {most.optimum[name]:.4g}"
             )
     for criterion in sorted({name for row in done for name in row.failed}):
         where = [row for row in done if criterion in row.failed]
-        said.append(
+        sentences.append(
             f"the criterion {criterion} fails in {len(where)} rows where the case as shipped "
             f"keeps it, first with {where[0].check}, {where[0].scene}"
         )
-    said += [f"{row.check}, {row.scene}: {row.outcome}" for row in rows if row.outcome != "done"]
-    return said
+    sentences += [
+        f"{row.check}, {row.scene}: {row.outcome}" for row in rows if row.outcome != "done"
+    ]
+    return sentences
 
 
-def trap(rows: Sequence[Row]) -> str:
+def unseen_direction(rows: Sequence[Row]) -> str:
     """Sentence on ``std_N`` in the direction that no search has seen; empty if all were seen."""
     own = [row for row in rows if row.check == AS_IS and row.outcome == "done"]
     seen, unseen = ([row for row in own if row.searched is side] for side in (True, False))

@@ -12,8 +12,7 @@ from catenary.base.errors import InputError
 from catenary.cases.studies.optimise.droppers import least_forces
 from catenary.cases.studies.optimise.task import ConstraintTable, ObjectiveTable
 from catenary.cases.studies.optimise.variables import Variables
-from catenary.cases.studies.scene_sets.evaluation import BROKE, Evaluation, Wanted, values_of
-from catenary.cases.studies.scene_sets.scene_set import SceneSet
+from catenary.cases.studies.scene_sets import BROKE, Evaluation, SceneSet, Wanted, values_of
 
 # A violation of a constraint smaller than this share of its scale is round-off of a search.
 SLACK = 1e-6

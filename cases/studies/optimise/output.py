@@ -19,7 +19,7 @@ from catenary.postproc.report.study_table import Column, Content, StudyTable, wr
 
 RECORD, PAGE, KEYS = "optimise.json", "optimise.md", "optimum.toml"
 DROPPERS, CHECKS, HISTORY = "droppers", "checks", "history"
-# Where a row of checks is, with heads for people.
+# Columns that say to which scene a row of checks belongs, with heads for people.
 _PLACES = {"check": "check", "scene": "scene", "pantograph": "pantograph", "searched": "",
            "outcome": ""}  # fmt: skip
 
@@ -53,7 +53,7 @@ def record(plan: Plan, found: Sequence[Optimum]) -> dict[str, Any]:
                 "violation": one.found.violation,
                 "n_runs": one.n_runs,
                 "values": dict(one.values),
-                "not_improved": one.said,
+                "not_improved": one.remarks,
                 "checks": checks_table(one.rows).records(),
                 "droppers": one.droppers.records(),
             }
@@ -195,8 +195,10 @@ def as_text(plan: Plan, found: Sequence[Optimum]) -> str:
     for one in found:
         parts.append(sentence(one, plan))
         parts += [f"\n{table.title}\n{table.text()}" for table in tables_of(plan, one)]
-        told = one.said or [f"none of {', '.join(COMPARED)} gets worse in any row of the checks"]
-        parts.append("\n" + "\n".join(f"REMARK      {text}" for text in told) + "\n")
+        worse = one.remarks or [
+            f"none of {', '.join(COMPARED)} gets worse in any row of the checks"
+        ]
+        parts.append("\n" + "\n".join(f"REMARK      {text}" for text in worse) + "\n")
     return "\n".join(parts).rstrip()
 
 
@@ -207,8 +209,10 @@ def markdown(plan: Plan, found: Sequence[Optimum]) -> str:
     for one in found:
         parts += [f"## {one.method}", sentence(one, plan)]
         parts += [f"### {table.title}\n\n{table.markdown()}" for table in tables_of(plan, one)]
-        told = one.said or [f"None of {', '.join(COMPARED)} gets worse in any row of the checks."]
-        parts.append("### Not improved\n\n" + "\n".join(f"- {text}" for text in told))
+        worse = one.remarks or [
+            f"None of {', '.join(COMPARED)} gets worse in any row of the checks."
+        ]
+        parts.append("### Not improved\n\n" + "\n".join(f"- {text}" for text in worse))
     parts.append(
         f"A row of checks is a pantograph of a scene; `{AS_IS}` is the case's whole stretch with "
         "its own mesh and step. CSV files beside this page have all rows."

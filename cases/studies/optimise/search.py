@@ -16,7 +16,7 @@ _FIRST_SPREAD = 0.15
 _MOST_ITERATIONS = 200
 # Iterations of SLSQP that must gain something together.
 _FRUITLESS = 3
-# What stands for the objective of points that violate constraints: behind all that do not.
+# Objective of points that violate constraints: they rank behind all that do not.
 _BEHIND = 1e3
 
 

@@ -20,7 +20,7 @@ from catenary.cases.studies.optimise.checks import (
     checks_of,
     compare,
     not_improved,
-    trap,
+    unseen_direction,
 )
 from catenary.cases.studies.optimise.droppers import dropper_table
 from catenary.cases.studies.optimise.objective import Point, Problem
@@ -28,8 +28,7 @@ from catenary.cases.studies.optimise.search import search
 from catenary.cases.studies.optimise.task import OptimiseTask
 from catenary.cases.studies.optimise.variables import Variables, variables_of
 from catenary.cases.studies.records import KeptRows
-from catenary.cases.studies.scene_sets.evaluation import Evaluation
-from catenary.cases.studies.scene_sets.scene_set import SceneSet, members_of
+from catenary.cases.studies.scene_sets import Evaluation, SceneSet, members_of
 from catenary.cases.studies.sweep.variants import value_at
 from catenary.postproc.report.study_table import StudyTable
 
@@ -81,12 +80,12 @@ class Optimum:
     droppers: StudyTable
 
     @property
-    def said(self) -> list[str]:
+    def remarks(self) -> list[str]:
         """Sentences on what it did not improve, the unseen direction first."""
-        said = [trap(self.rows)] if trap(self.rows) else []
+        sentences = [unseen_direction(self.rows)] if unseen_direction(self.rows) else []
         if not self.is_rounded:
-            said.append("no changes in whole units keep all constraints: round_to is not kept")
-        return said + not_improved(self.rows)
+            sentences.append("no changes in whole units keep all constraints: round_to is not kept")
+        return sentences + not_improved(self.rows)
 
 
 def make_plan(draft: Draft, task: OptimiseTask) -> Plan:

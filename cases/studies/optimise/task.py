@@ -14,7 +14,7 @@ from pydantic import (
 
 from catenary.cases.scene.keys.table import Table
 from catenary.cases.scene.line.imperfections import Seed
-from catenary.cases.studies.scene_sets.scene_set import BoundTable, SetTable, Statistic
+from catenary.cases.studies.scene_sets import BoundTable, SetTable, Statistic
 
 GRADIENT, CMA = "gradient", "cma"
 Bounds = Annotated[list[float], Field(min_length=2, max_length=2)]

@@ -76,10 +76,10 @@ def conclude(study: PaperStudy, runs: Mapping[str, StudyRun], draw: Draw) -> Stu
         elsewhere = {other["title"]: found[other["name"]][i] for other in others}
         explained.append(_explained(one, named[i], elsewhere, statements[i], ranked))
     shown = [one for one in readings if one.get("figures")]
-    told = [
+    judged = [
         Reading(one["name"], one["title"], changes_of(one), found[one["name"]]) for one in readings
     ]
-    told[0] = replace(told[0], findings=explained)
+    judged[0] = replace(judged[0], findings=explained)
     tables = [
         _side_by_side(shown, found),
         search_table(study, statements, _searched(study, runs)),
@@ -88,7 +88,7 @@ def conclude(study: PaperStudy, runs: Mapping[str, StudyRun], draw: Draw) -> Stu
         ranking_table(study, ranked),
     ]
     pictures = _drawn(study, runs, shown, rows, draw)
-    return Study(table["title"], table["lead"], told, tables, pictures)
+    return Study(table["title"], table["lead"], judged, tables, pictures)
 
 
 def _drawn(
@@ -148,7 +148,7 @@ def _side_by_side(
     """All statements under some readings, each with its figures."""
     columns = [found[one["name"]] for one in readings]
     met = [sum(one.verdict == REPRODUCED for one in column) for column in columns]
-    told = [
+    notes = [
         f"{reading['title']}: {n} of {len(column)} reproduced"
         for reading, n, column in zip(readings, met, columns, strict=True)
     ]
@@ -158,7 +158,7 @@ def _side_by_side(
         for one in zip(*columns, strict=True)
     ]
     title = "The statements beside each other"
-    return texts_table(heads, rows, title=title, note=f"{'; '.join(told)}.")
+    return texts_table(heads, rows, title=title, note=f"{'; '.join(notes)}.")
 
 
 def _table_of(reading: Mapping[str, Any], rows: Rows) -> StudyTable:
@@ -280,17 +280,19 @@ def movers(statement: Statement, ranked: Sequence[Ranked]) -> str:
     def of(one: Ranked) -> float:
         return one.rows.at(alone.figure, damping=alone.damping)[0]
 
-    def said(value: float) -> str:
+    def in_words(value: float) -> str:
         return format(value, column.format)
 
     case, *varied = ranked
     start = of(case)
     most = sorted(varied, key=lambda one: abs(of(one) - start), reverse=True)[:_NAMED]
     listed = "; ".join(
-        f"{one.title}: {said(of(one))}" for one in most if said(of(one)) != said(start)
+        f"{one.title}: {in_words(of(one))}" for one in most if in_words(of(one)) != in_words(start)
     )
     moved = f"moved most by {listed}" if listed else "moved by no variation"
-    text = f"One pantograph, {alone.damping}: {column.head} {said(start)} in the case; {moved}. "
+    text = (
+        f"One pantograph, {alone.damping}: {column.head} {in_words(start)} in the case; {moved}. "
+    )
     holds = holds_alone(statement, case.rows)
     turned = [one.title for one in varied if holds_alone(statement, one.rows) != holds]
     if holds:

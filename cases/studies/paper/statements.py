@@ -118,7 +118,7 @@ def holds_alone(statement: Statement, rows: Rows) -> bool:
 
 
 def n_met(statement: Statement, rows: Rows) -> tuple[int, int]:
-    """How many pantographs keep the bounds of a statement's conditions, and of how many."""
+    """Number of pantographs that keep the bounds of a statement's conditions, and of all."""
     kept = [
         one.met_by(row[one.figure])
         for one in statement.conditions
@@ -166,7 +166,7 @@ def _judged(condition: Condition, rows: Rows) -> _Found:
     head, spec = FIGURES[condition.figure].head, FIGURES[condition.figure].format
     head = f"{', '.join(condition.where.values())}: {head}" if condition.where else head
 
-    def said(value: float) -> str:
+    def in_words(value: float) -> str:
         return format(round(value) if spec == "d" else value, spec)
 
     for words, which, extreme in (
@@ -176,18 +176,18 @@ def _judged(condition: Condition, rows: Rows) -> _Found:
             here = condition.model_copy(update={"where": condition.where | words})
             expected = _values(here, rows)
             name = extreme(values, key=lambda one: values[one])
-            return _Found(name in expected, f"{head} {which} {said(values[name])} ({name})")
+            return _Found(name in expected, f"{head} {which} {in_words(values[name])} ({name})")
     if condition.mean_above is not None:
         other = condition.model_copy(update={"where": condition.where | condition.mean_above})
         means = [sum(own.values()) / len(own) for own in (values, _values(other, rows))]
         beside = ", ".join(condition.mean_above.values())
-        text = f"{head}, on average {said(means[0])}, {beside} {said(means[1])}"
+        text = f"{head}, on average {in_words(means[0])}, {beside} {in_words(means[1])}"
         return _Found(means[0] > means[1], text)
     low, high = (which(values, key=lambda one: values[one]) for which in (min, max))
-    text = f"{head} {said(values[low])} ({low})"
+    text = f"{head} {in_words(values[low])} ({low})"
     kept = [condition.met_by(value) for value in values.values()]
     if values[low] != values[high]:
-        text += f" to {said(values[high])} ({high})"
+        text += f" to {in_words(values[high])} ({high})"
     if len(kept) > 1:
         text += f", {sum(kept)} of {len(kept)} as stated"
     is_open = all(abs(value) <= condition.open_within for value in values.values())

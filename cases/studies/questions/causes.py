@@ -140,7 +140,7 @@ class Causes:
 
     def of_line(self) -> list[str]:
         """Sentences on what acts on all spans alike."""
-        said = [
+        candidates = [
             f"known of the line, at no single place: {defect['says']}"
             for defect in self._results.attributes.get("defects", [])
             if "at_m" not in defect
@@ -149,16 +149,16 @@ class Causes:
         wave = self._results.attributes.get("arrivals", {}).get("wave_speed_m_per_s")
         span = float(np.median(np.diff(self._masts)))
         if wave and abs(2.0 * speed / wave - 1.0) <= _NEAR:
-            said.append(
+            candidates.append(
                 f"spans are passed at {speed / span:.2f} Hz, near their lowest natural frequency "
                 f"c / 2 L = {wave / (2.0 * span):.2f} Hz"
             )
         if any(name == "gusts" for name, *_ in self._results.attributes.get("effects_on", [])):
-            said.append(
+            candidates.append(
                 "gusts blow; one run does not tell which share of sigma is theirs, catenary "
                 "what-if CASE --set effects.gusts=false does"
             )
-        return said
+        return candidates
 
     def _near(self, start: float, end: float) -> Iterator[str]:
         """Defects and ends of contact wires, up to half a stretch before and behind it."""
@@ -177,7 +177,7 @@ class Causes:
                     yield f"{wire_words(name)} begins or ends at {x:.0f} m (overlap, section)"
 
     def _defect_end(self, defect: dict[str, Any]) -> float:
-        """Where a defect ends along the track [m]: worn wires have a length."""
+        """End of a defect along the track [m]: worn wires have a length."""
         at = float(defect["at_m"])
         for table in self._results.attributes.get("config", {}).get("defects", []):
             if table.get("type") == defect["type"] and table.get("from_m") == at:
@@ -236,7 +236,7 @@ class Causes:
         x, lift = self._elasticity
         found = {}
         for span in spans_in_stretch(self._results):
-            # Where a wire is anchored it does not give way; that is no elasticity of the line.
+            # An anchored wire does not give way; that is no elasticity of the line.
             (own,) = np.nonzero(
                 (x >= self._masts[span]) & (x <= self._masts[span + 1]) & (lift > _ANCHORED)
             )

@@ -218,7 +218,7 @@ def _directions(scene: Scene, wanted: str | None) -> tuple[tuple[str, ...], bool
     return DIRECTIONS, False, ""
 
 
-# How each direction and speed ended.
+# Outcomes by direction and speed.
 _Marched = dict[tuple[str, float], Ended]
 
 
@@ -397,8 +397,8 @@ def as_text(study: SpeedStudy) -> str:
             f"{len(refused)} runs from {slowest:g} to {fastest:g} km/h could not be made and count "
             f"as failed; the first: {refused[0].outcome}"
         )
-    said = study.one_way or "Each speed was run in both directions, and counts if both hold."
-    lines.append(f"{said} Stretches narrower than {speeds.step:g} km/h may be missed.")
+    directions = study.one_way or "Each speed was run in both directions, and counts if both hold."
+    lines.append(f"{directions} Stretches narrower than {speeds.step:g} km/h may be missed.")
     return "\n".join([*lines, *remarks_of(study.ended)])
 
 

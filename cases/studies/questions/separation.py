@@ -247,10 +247,10 @@ def as_text(study: SeparationStudy, period: Period) -> str:
         return "\n".join(lines)
     alone = study.rows[0]
     if alone["outcome"] == "done":
-        told = _told(alone["std_leading_N"])
-        lines.append(f"One alone: deviation {told}{_uplift(alone)}.")
+        words = _in_words(alone["std_leading_N"])
+        lines.append(f"One alone: deviation {words}{_uplift(alone)}.")
     for word, row in (("Least", ranked[0]), ("Largest", ranked[-1])):
-        both = " and ".join(f"{place} {_told(row[f'std_{place}_N'])}" for place in PLACES)
+        both = " and ".join(f"{place} {_in_words(row[f'std_{place}_N'])}" for place in PLACES)
         lines.append(f"{word} deviation at {row[DISTANCE]:g} m: {both}{_uplift(row)}.")
     names = dict.fromkeys(name for row in study.done for name in row["failed"])
     lines += [f"FAILED      {name}: at {_stretches(study.done, name)} m" for name in names]
@@ -273,7 +273,7 @@ def as_text(study: SeparationStudy, period: Period) -> str:
     return "\n".join(lines)
 
 
-def _told(deviation: float | None) -> str:
+def _in_words(deviation: float | None) -> str:
     return "not known" if deviation is None else f"{deviation:.1f} N"
 
 
@@ -296,7 +296,7 @@ def _explained(period: Period) -> str:
 
 
 def _stretches(rows: Sequence[Row], name: str) -> str:
-    """Where a criterion fails, neighbouring distances joined: ``31-40, 75``."""
+    """Distances at which a criterion fails, neighbouring ones joined: ``31-40, 75``."""
     runs: list[list[float]] = []
     fails_before = False
     for row in rows:

@@ -240,7 +240,7 @@ def as_text(found: Differences) -> str:
             what.format(x=row["x_m"], a=row[f"{name}_{AS_IT_IS}"], b=row[f"{name}_{CHANGED}"])
             for row in sorted(places, key=lambda row: -abs(row[key]))[:_MOST_CHANGED]
         ]
-    named = [(WORDS[name], said) for name, said in found.remarks.items()]
+    named = [(WORDS[name], texts) for name, texts in found.remarks.items()]
     return "\n".join([*lines, *remark_lines(named)])
 
 
@@ -275,8 +275,8 @@ def _sections(found: Differences) -> Iterator[Section]:
         yield Section(table.title, [replace(table, title="")], pictures)
     remarks = [
         Text(text, "remark", f"{WORDS[name]}: ")
-        for name, said in found.remarks.items()
-        for text in said
+        for name, texts in found.remarks.items()
+        for text in texts
     ]
     if remarks:
         yield Section("Remarks", remarks)

@@ -70,7 +70,7 @@ class Spot(NamedTuple):
 
     @property
     def place(self) -> str:
-        """Where it is, in words."""
+        """Its place, in words."""
         return f"{self.x:.1f} m{self.wire and f', {self.wire}'}"
 
 
@@ -158,7 +158,7 @@ def _passages(results: Results) -> list[Passage]:
 
 
 def stands_out(values: np.ndarray) -> list[bool | None]:
-    """Which of some likes (n,) are far above their median; None of all where they are too few."""
+    """Mask (n,) of likes that are far above their median; None of all where they are too few."""
     if values.size < _FEWEST:
         return [None] * values.size
     median = float(np.median(values))

@@ -95,28 +95,28 @@ def _of_spans(
             f"median {one.median:.1f} N, force {one.minimum:.0f} to {one.maximum:.0f} N"
             f"{out(one.stands_out)}"
         )
-        lines += _told(causes.of_passage(one), one.stands_out)
+        lines += _cause_lines(causes.of_passage(one), one.stands_out)
     return lines
 
 
 def _of_spots(title: str, spots: Sequence[Spot], words: str, causes: Causes) -> list[str]:
     lines = ["", title] if spots else []
     for one in spots:
-        said = words.format(at=one.place, v=one.value, m=one.median)
-        lines.append(f"  {said}{out(one.stands_out)}")
-        lines += _told(causes.at(one), one.stands_out)
+        sentence = words.format(at=one.place, v=one.value, m=one.median)
+        lines.append(f"  {sentence}{out(one.stands_out)}")
+        lines += _cause_lines(causes.at(one), one.stands_out)
     return lines
 
 
-def candidates(said: Sequence[str], is_out: bool | None) -> Sequence[str]:
+def candidates(causes_found: Sequence[str], is_out: bool | None) -> Sequence[str]:
     """Candidates of a place, or that there is none for one that stands out."""
-    return said or ([NONE] if is_out else [])
+    return causes_found or ([NONE] if is_out else [])
 
 
-def _told(said: Sequence[str], is_out: bool | None) -> list[str]:
+def _cause_lines(causes_found: Sequence[str], is_out: bool | None) -> list[str]:
     """Lines for the candidates of a place."""
-    lines = [f"    {text}" for text in candidates(said, is_out)[:_MOST_CAUSES]]
-    more = len(said) - _MOST_CAUSES
+    lines = [f"    {text}" for text in candidates(causes_found, is_out)[:_MOST_CAUSES]]
+    more = len(causes_found) - _MOST_CAUSES
     return [*lines, f"    and {more} more (-o)"] if more > 0 else lines
 
 

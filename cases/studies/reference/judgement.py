@@ -133,7 +133,7 @@ def any_failed(rows: Sequence[Mapping[str, Any]]) -> bool:
 
 
 def counts(rows: Sequence[Mapping[str, Any]]) -> str:
-    """How many figures are within tolerances, error bars, and how many are not judged, in words."""
+    """Numbers of figures within tolerances, within error bars, and not judged, in words."""
     kept = sum(row["verdict"] == PASSED for row in rows)
     open_ = sum(row["verdict"] == NOT_JUDGED for row in rows)
     barred = [row for row in rows if row["error_bar"] is not None]

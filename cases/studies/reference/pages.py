@@ -80,16 +80,16 @@ def validation_text(found: Validation) -> str:
     """The statement for a terminal: each step in a line, and what fails."""
     lines = [f"{found.installation['program']}, {found.installation['machine']}", ""]
     for number, step in enumerate(found.steps, start=1):
-        lines.append(f"{number}. {step.title}: {_said(step)}")
+        lines.append(f"{number}. {step.title}: {_result_of(step)}")
         failed = [row for row in step.rows if row["verdict"] == FAILED]
         if failed:
             lines.append(read_table(failed, "").text())
     return "\n".join([*lines, "", *_closing(found)])
 
 
-def _said(step: Step) -> str:
+def _result_of(step: Step) -> str:
     return (
-        f"{counts(step.rows)} {step.told}".rstrip() if step.rows else f"{NOT_JUDGED}: {step.told}"
+        f"{counts(step.rows)} {step.text}".rstrip() if step.rows else f"{NOT_JUDGED}: {step.text}"
     )
 
 
@@ -109,7 +109,7 @@ def write_validation(folder: Path, found: Validation) -> list[Path]:
     table = table_of(found.rows, "")
     statement = {
         "installation": found.installation,
-        "steps": [{"title": step.title, "said": _said(step)} for step in found.steps],
+        "steps": [{"title": step.title, "said": _result_of(step)} for step in found.steps],
         "figures": table.records(),
         "closing": _closing(found),
     }
@@ -131,7 +131,7 @@ def _shown(step: Step) -> list[dict[str, Any]]:
 
 def _sections(found: Validation) -> Iterator[Section]:
     for number, step in enumerate(found.steps, start=1):
-        blocks: list[Text | StudyTable] = [Text(_said(step))]
+        blocks: list[Text | StudyTable] = [Text(_result_of(step))]
         if rows := _shown(step):
             blocks.append(read_table(rows, ""))
         yield Section(f"{number}. {step.title}", blocks)
@@ -140,7 +140,7 @@ def _sections(found: Validation) -> Iterator[Section]:
 def _markdown(found: Validation) -> str:
     parts = [f"{found.installation['program']}, {found.installation['machine']}"]
     for number, step in enumerate(found.steps, start=1):
-        parts.append(f"## {number}. {step.title}\n\n{_said(step)}")
+        parts.append(f"## {number}. {step.title}\n\n{_result_of(step)}")
         if rows := _shown(step):
             parts.append(read_table(rows, "").markdown())
     return "\n\n".join(["# Validation by EN 50318", *parts, *_closing(found)]) + "\n"

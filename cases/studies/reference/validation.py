@@ -50,7 +50,7 @@ class Step:
 
     title: str
     rows: Sequence[dict[str, Any]]
-    told: str = ""
+    text: str = ""
 
 
 @dataclass(frozen=True)
@@ -101,10 +101,10 @@ def line_test(folder: Path | None) -> Step:
     try:
         run, errors = record["run"], [one["text"] for one in record["errors"]]
         rows = [_measured_row(Path(run).parent.name, one) for one in record["figures"]]
-        told = f"{record['measured']} beside {run}."
+        text = f"{record['measured']} beside {run}."
     except (KeyError, TypeError) as error:
         raise InputError(f"{path} is no record of `{verb}`: it is incomplete") from error
-    return Step(rule["title"], rows, " ".join([told, *(f"Error: {text}." for text in errors)]))
+    return Step(rule["title"], rows, " ".join([text, *(f"Error: {text}." for text in errors)]))
 
 
 def _measured_row(run: str, one: Mapping[str, Any]) -> dict[str, Any]:

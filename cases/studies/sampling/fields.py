@@ -39,7 +39,7 @@ _GEOMETRY = (
 
 
 class Carrier(NamedTuple):
-    """How a key of the scene takes a field.
+    """Form in which a key of the scene takes a field.
 
     Attributes
     ----------

@@ -20,7 +20,7 @@ from catenary.solver.statics.line_at_rest import LineAtRest
 from catenary.solver.tangents.march import Tangents, march_with_tangents
 from catenary.solver.tangents.set_up import Change, SetUp, differentiate, set_up_of
 
-# What derivatives of all steps may take before the march is made again for the next parameters [B].
+# Memory for derivatives of all steps; for further parameters the march is made again [B].
 _BYTES = 2**28
 
 

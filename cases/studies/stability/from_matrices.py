@@ -147,7 +147,7 @@ def point_model(model: Model, loads: np.ndarray, n_vectors: int = N_VECTORS) -> 
     factor = splu(mass)
     most = n_vectors * loads.shape[1]
     basis, n = np.zeros((model.n_dofs, most)), 0
-    # What the loads move at once, then what each of those vectors does.
+    # The motion by the loads themselves, then that by each of those vectors.
     next_ones = [factor.solve(load) for load in loads.T]
     done = 0
     while n < most and (next_ones or done < n):

@@ -63,7 +63,7 @@ RESOLUTION = 0.02
 _THEORY_RANGE = (STEPS_RANGE[0], 4.0 * MAX_DT)
 # First change of an iterate in depths at the start: slopes of an element are some 3 / m of it.
 _START = 10.0
-# Where the implicit coupling, which has no limit to be found, is tried [s].
+# Steps with which the implicit coupling, which has no limit, is tried [s].
 _TRIED = (1e-5, 1e-4, 1e-3, 1e-2, MAX_DT)
 AVERAGE_ACCELERATION = (0.25, 0.5)
 # Differences below this are round-off of the bisections.
@@ -194,9 +194,9 @@ def make_map(
             continue
         found = [Limit(*row) for row in outcome.get()]
         limits += found
-        told = ", ".join(f"{one.coupling} {in_ms(one.marched)}" for one in found)
+        words = ", ".join(f"{one.coupling} {in_ms(one.marched)}" for one in found)
         stiffness, mass = pairs[outcome.number]
-        tell(f"[{outcome.number + 1}/{len(pairs)}] {stiffness:g} N/m, {mass:g} kg: {told} ms")
+        tell(f"[{outcome.number + 1}/{len(pairs)}] {stiffness:g} N/m, {mass:g} kg: {words} ms")
     if lost:  # the others are kept
         raise lost[0]
     linear = own.contact.law == "linear"

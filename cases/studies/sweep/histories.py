@@ -112,7 +112,7 @@ class KeptHistories(KeptRows):
         return super().get(depends_on) if there else None
 
     def file_of(self, depends_on: Any) -> Path:
-        """Where a piece of work leaves its histories, until they are joined."""
+        """File of the histories of a piece of work, until they are joined."""
         record = self.path_of(depends_on)
         assert record is not None
         return record.with_suffix(".h5")

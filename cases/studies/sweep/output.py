@@ -216,9 +216,9 @@ def key_in_words(key: str) -> str:
     """Meaning of a dotted key, with its table and unit: ``contact wire: tension [N]``."""
     parts = [part for part in key.split(".") if not part.isdigit()]
     known = _known(key)
-    told = known is not None and len(known.meaning) <= _LONGEST
-    meaning = known.meaning if known is not None and told else _plain(parts[-1])
-    tables = [_plain(part) for part in parts[1 if told or len(parts) > 2 else 0 : -1]]
+    is_short = known is not None and len(known.meaning) <= _LONGEST
+    meaning = known.meaning if known is not None and is_short else _plain(parts[-1])
+    tables = [_plain(part) for part in parts[1 if is_short or len(parts) > 2 else 0 : -1]]
     unit = unit_of(key)
     words = f"{', '.join(tables)}: {meaning}" if tables else meaning
     return f"{words} [{unit}]" if unit else words
@@ -227,8 +227,8 @@ def key_in_words(key: str) -> str:
 def value_in_words(key: str, value: Any) -> str:
     """A key's last part with its value and unit: ``speed 250 km/h``."""
     name = _plain(key.rsplit(".", 1)[-1])
-    told = str(value).lower() if isinstance(value, bool) else str(value)
-    return f"{name} {told} {unit_of(key)}".rstrip()
+    text = str(value).lower() if isinstance(value, bool) else str(value)
+    return f"{name} {text} {unit_of(key)}".rstrip()
 
 
 def _known(key: str) -> Key | None:

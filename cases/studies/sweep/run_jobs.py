@@ -52,7 +52,7 @@ def read_summary(path: Path, record: Mapping[str, Any]) -> dict[str, Any] | None
     return content if is_whole(path, same) else None
 
 
-# What is taken from an open result file beside the summary: plain values by name.
+# Function that takes plain values by name from an open result file, beside the summary.
 Measure = Callable[[Results], dict[str, Any]]
 
 
@@ -136,7 +136,7 @@ class _Work:
     measure: Measure | None
 
     def __call__(self, job: Job, comm: Any) -> tuple[Ended, set[str]]:
-        """How the run ended, and options that PETSc never looked up. Collective."""
+        """Outcome of the run, and options that PETSc never looked up. Collective."""
         folder = self.out_dir / job.variant.name
         return _run(job, folder, comm, self.options, self.measure), idle_names()
 
@@ -152,7 +152,7 @@ def _silent(line: str) -> None:
 
 
 def _ended(job: Job, outcome: Outcome) -> Ended:
-    """How a run ended; raises what is not the run's alone, such as a full disk."""
+    """Outcome of a run; raises an error that is not the run's alone, such as a full disk."""
     if isinstance(outcome.error, WorkerLost):
         return Ended(job.variant, str(outcome.error))
     ended, idle = outcome.get()
@@ -212,7 +212,7 @@ def _leave_record(job: Job, folder: Path, measure: Measure | None, wall: float) 
 
 
 def _earlier(jobs: Sequence[Job], out_dir: Path, force: bool, measured: bool) -> list[Ended | None]:
-    """How each job ended earlier, None if it is to be run."""
+    """Earlier outcome of each job, None if it is to be run."""
     refuse_impossible(out_dir)
     refuse_earlier(out_dir, force)
     if force:

@@ -79,8 +79,8 @@ class Ensemble(NamedTuple):
         pieces = pieces_of_work(self.variants, size)
         if part is not None:
             pieces = part.of(pieces)
-        told = json.dumps(self.draft.table(), sort_keys=True, default=str)
-        case = hashlib.sha256(told.encode()).hexdigest()
+        content = json.dumps(self.draft.table(), sort_keys=True, default=str)
+        case = hashlib.sha256(content.encode()).hexdigest()
 
         def depends_on(piece: Sequence[Variant]) -> list[Any]:
             assignments = [[variant.name, *variant.assignments] for variant in piece]
@@ -143,7 +143,7 @@ def _ended(
     pieces: Sequence[Sequence[Variant]],
     progress: Callable[[str], None],
 ) -> list[Ended]:
-    """How the variants of all pieces ended, as these are done; the last one tells of a signal."""
+    """Outcomes of the variants of all pieces, as these are done; the last one tells of a signal."""
     variants, ended = list(chain.from_iterable(pieces)), list[Ended]()
     begin = time.perf_counter()
     try:
@@ -198,7 +198,7 @@ class Marching:
     options: RunOptions
 
     def of(self, variants: Sequence[Variant]) -> list[Ended]:
-        """How each variant ended, in their order. Collective.
+        """Outcome of each variant, in their order. Collective.
 
         Raises
         ------

@@ -215,8 +215,8 @@ def product(
             words += [f"{labels[key]}_{value}" for key, value in chosen.items()]
             own = tuple(f"{key}={value}" for key, value in chosen.items())
             of_file = name if chosen else ""
-            told = "__".join(words), (*assignments, *own), chosen
-            variants.append(Variant(*told, named=of_file, where=where))
+            parts = "__".join(words), (*assignments, *own), chosen
+            variants.append(Variant(*parts, named=of_file, where=where))
     return _with_own_folders(variants)
 
 

@@ -108,29 +108,29 @@ def _first_to_fail(found: Sequence[Tolerance]) -> str:
 
 def remarks(plan: Plan, found: Sequence[Tolerance]) -> list[str]:
     """Sentences on what the tables cannot say."""
-    said = []
+    sentences = []
     lost = list(dict.fromkeys(one.criterion for one in found if not one.level and not one.kept))
     for name in lost:
-        said.append(f"{name} is not kept without errors, and no tolerance counts for it")
+        sentences.append(f"{name} is not kept without errors, and no tolerance counts for it")
     samples = plan.task.samples
     fail = f"at most {samples.allowed} of them fail" if samples.allowed else "none of them fails"
-    said.append(
+    sentences.append(
         f"at least {100 * samples.probability:g} % of all lines keep the criteria within their "
         f"tolerance, with {100 * samples.confidence:g} % confidence: so show {samples.n} samples "
         f"if {fail}; tolerances are found to {100 * samples.resolution:g} % of the greatest that "
         "was looked at"
     )
     if samples.worst_case:
-        said.append(
+        sentences.append(
             "`by slopes` is linear in the errors, `as run` the line with just these errors: where "
             "both differ much, slopes do not hold so far, and other lines are worse"
         )
     if any(one.lost_at is not None for one in found):
-        said.append(
+        sentences.append(
             "a line that was run, of the samples or of the worst case, fails at the tolerance of "
             "that name: the worst of all lines fails below it"
         )
-    return said
+    return sentences
 
 
 def as_text(plan: Plan, found: Sequence[Tolerance]) -> str:

@@ -12,8 +12,15 @@ from catenary.base.errors import InputError
 from catenary.cases.process.workers import Pool
 from catenary.cases.scene.load import Draft
 from catenary.cases.studies.records import KeptRows
-from catenary.cases.studies.scene_sets.evaluation import BROKE, Evaluation, Wanted, values_of
-from catenary.cases.studies.scene_sets.scene_set import BoundTable, SceneSet, members_of
+from catenary.cases.studies.scene_sets import (
+    BROKE,
+    BoundTable,
+    Evaluation,
+    SceneSet,
+    Wanted,
+    members_of,
+    values_of,
+)
 from catenary.cases.studies.tolerance.errors import Group, groups_of
 from catenary.cases.studies.tolerance.task import SamplesTable, ToleranceTask
 
@@ -34,7 +41,7 @@ def margins_of(summary: Mapping[str, Any], criteria: Sequence[BoundTable]) -> Ma
     if BROKE in summary:
         return {"": [-np.inf]}
     if criteria:
-        return {one.says: _margins(summary, one) for one in criteria}
+        return {one.text: _margins(summary, one) for one in criteria}
     found: Margins = {}
     for row in summary["acceptance"]:
         if row["passed"] is not None:

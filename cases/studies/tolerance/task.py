@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 
 from catenary.cases.scene.keys.table import Table
 from catenary.cases.scene.line.imperfections import Seed, WireName
-from catenary.cases.studies.scene_sets.scene_set import BoundTable, SetTable
+from catenary.cases.studies.scene_sets import BoundTable, SetTable
 
 Label = Annotated[str, Field(min_length=1, max_length=100)]
 
@@ -115,7 +115,7 @@ class SamplesTable(Table):
 
     @property
     def allowed(self) -> int:
-        """How many of the samples may fail: the most whose lower bound of Clopper and Pearson is
+        """Number of samples that may fail: the most whose lower bound of Clopper and Pearson is
         not below the share."""
         from scipy.stats import binom
 

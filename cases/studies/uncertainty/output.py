@@ -281,8 +281,8 @@ def as_text(found: Uncertainty) -> str:
     shown = [row for row in found.sensitivity if "with" not in row and _is_shown(row)]
     if shown:
         parts.append(capital(found.method) + "\n" + _indices(shown).text())
-    told = found.remarks[:_MOST_REMARKS]
-    lines = [f"REMARK      {one['n']} of {found.n_runs} runs: {one['remark']}" for one in told]
+    remarks = found.remarks[:_MOST_REMARKS]
+    lines = [f"REMARK      {one['n']} of {found.n_runs} runs: {one['remark']}" for one in remarks]
     lines += [f"NOTE        {note}" for note in found.notes]
     return "\n\n".join([*parts, *(["\n".join(lines)] if lines else [])])
 

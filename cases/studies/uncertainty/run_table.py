@@ -134,8 +134,8 @@ def read_run_table(path: Path) -> RunTable:
     except ImportError as error:
         raise InputError(f"{file} needs the package pyarrow: pip install 'pyarrow<22'") from error
     except Exception as error:  # what readers of foreign bytes raise is not of one kind
-        said = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise InputError(f"{file} cannot be read as a table of runs: {said}") from error
+        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise InputError(f"{file} cannot be read as a table of runs: {reason}") from error
     return run_table(frame, read_sampling_beside(folder), str(file))
 
 

@@ -39,8 +39,8 @@ IMPULSE = 10.0
 _ASIDE = LumpedData((8.0,), (0.0,), (0.0,))
 
 
-class Asked(NamedTuple):
-    """Values of an excitation beside its kind; None for that of the scene or of the kind.
+class Settings(NamedTuple):
+    """Settings of an excitation beside its kind; None for that of the scene or of the kind.
 
     Attributes
     ----------
@@ -58,7 +58,7 @@ class Asked(NamedTuple):
     impulse: float | None = None
 
 
-# Which of them belong to which kind, and the options that give them.
+# Options of the command line for these, and kinds that take them.
 _OPTIONS = {
     "force": ("--force-N", (FORCE, PULSE)),
     "frequency": ("--frequency-Hz", (FORCE,)),
@@ -68,7 +68,7 @@ _OPTIONS = {
 }
 
 
-def excitation_of(kind: str, asked: Asked, problem: Problem, dt: float) -> Excitation:
+def excitation_of(kind: str, settings: Settings, problem: Problem, dt: float) -> Excitation:
     """The excitation of a kind on the line of a problem.
 
     Parameters
@@ -82,7 +82,7 @@ def excitation_of(kind: str, asked: Asked, problem: Problem, dt: float) -> Excit
         If something asked for is none of the kind's, or out of range, or if twin wires move as one.
     """
     for name, (option, kinds) in _OPTIONS.items():
-        value = getattr(asked, name)
+        value = getattr(settings, name)
         if value is None:
             continue
         if kind not in kinds:
@@ -98,14 +98,14 @@ def excitation_of(kind: str, asked: Asked, problem: Problem, dt: float) -> Excit
         )
     ends, train = problem.line.support_positions[[0, -1]], problem.train
     if kind == FORCE:
-        frequency = asked.frequency or 0.0
+        frequency = settings.frequency or 0.0
         highest = 0.1 / dt
         if not 0.0 <= frequency <= highest:
             raise InputError(
                 f"--frequency-Hz is {frequency:g}, but must be from 0 to {highest:g}, ten time "
                 "steps a period"
             )
-        force = train.placements[0].static_force if asked.force is None else asked.force
+        force = train.placements[0].static_force if settings.force is None else settings.force
         _refuse_too_strong("--force-N", force, force)
         return MovingForce(force, frequency, train.start, train.speed, train.raise_time)
     if problem.window.mode == BOUNDED:
@@ -113,22 +113,22 @@ def excitation_of(kind: str, asked: Asked, problem: Problem, dt: float) -> Excit
             f"window.mode is bounded, which lets move what is near a train, but a {kind} has none: "
             "take exact, or off"
         )
-    duration = DURATIONS[kind] if asked.duration is None else asked.duration
+    duration = DURATIONS[kind] if settings.duration is None else settings.duration
     if not 10 * dt <= duration <= 10.0:
         raise InputError(
             f"--duration-s is {duration:g}, but must be from {10 * dt:g}, ten time steps, to 10"
         )
-    at = float(ends.mean()) if asked.at is None else asked.at
+    at = float(ends.mean()) if settings.at is None else settings.at
     if not ends[0] < at < ends[1]:
         raise InputError(
             f"--at-m is {at:g}, but must lie on the line, from {ends[0]:g} to {ends[1]:g} m"
         )
     if kind == HAMMER:
-        impulse = IMPULSE if asked.impulse is None else asked.impulse
+        impulse = IMPULSE if settings.impulse is None else settings.impulse
         blow = hammer(at, impulse, duration)
         _refuse_too_strong("--impulse-Ns", impulse, blow.peak)
         return blow
-    force = train.placements[0].static_force if asked.force is None else asked.force
+    force = train.placements[0].static_force if settings.force is None else settings.force
     _refuse_too_strong("--force-N", force, force)
     return Blow(at, duration, force, False)
 
@@ -182,7 +182,7 @@ class Watch(Observer):
         self._every, self._seen = every, seen
 
     def start(self, stage: Stage) -> None:
-        """Which rows are which nodes."""
+        """Match the rows with nodes."""
         self._nodes = stage.owned_nodes
 
     def next_state(self, step: int) -> int:

@@ -94,8 +94,8 @@ def measured_rows(
     rows = []
     if spectrum is not None:
         meaning = "share of what has come so far that lies in the pass bands of the periodic line"
-        told = f"{meaning}, {distance:.0f} m on"
-        rows.append(row_of("energy_in_pass_bands", spectrum.inside, "-", told))
+        note = f"{meaning}, {distance:.0f} m on"
+        rows.append(row_of("energy_in_pass_bands", spectrum.inside, "-", note))
     for number, highest in enumerate(_UP_TO, start=1):
         frequency, velocity = branch_of_fastest(waves, highest)
         at, wide = 0.5 * (frequency[0] + frequency[-1]), frequency[-1] - frequency[0]
@@ -143,7 +143,7 @@ def transmitted(theory: WaveTheory, seen: WavesSeen) -> Transmitted | None:
     if columns is None:
         return None
     n = seen.time.size
-    # What has not come to its end at the end of the record would spill over all frequencies.
+    # Motion that goes on at the end of the record would spill over all frequencies.
     fade = np.ones(n)
     late = max(1, int(_FADED * n))
     fade[-late:] = 0.5 * (1.0 + np.cos(np.pi * np.arange(late) / late))

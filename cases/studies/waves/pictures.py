@@ -15,7 +15,7 @@ from catenary.postproc.report.pictures import figures
 _COVERED, _DECADES = 0.995, 4.0
 # Lines of the wave speeds: of the wires, and of the fastest energy of the periodic line.
 _DASHES = ("--", "-.", ":", (0, (6, 1, 1, 1, 1, 1)))
-# How far from what moves the mean energy is drawn [m].
+# Distance from the moving load up to which the mean energy is drawn [m].
 _AROUND = 400.0
 # Wavenumbers that are drawn [rad/m]; most places and times in a picture.
 _WIDEST, _MOST = 1.2, 1600

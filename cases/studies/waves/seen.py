@@ -45,7 +45,7 @@ class WavesSeen:
 
     @property
     def source(self) -> tuple[float, float]:
-        """When [s] and where [m] the waves begin whose speeds are drawn: at a blow, or at the first
+        """Time [s] and place [m] at which the drawn waves begin: those of a blow, or of the first
         pantograph after three tenths of the run."""
         if not self.position.shape[1]:
             return float(self.time[0]), self.struck
@@ -157,7 +157,7 @@ def waves_seen(
 
 
 def course_of(excitation: Excitation) -> tuple[Callable[[np.ndarray], np.ndarray], float]:
-    """Where an excitation moves, as `WireMotion.seen` takes it: a blow stays at its place."""
+    """Course of an excitation, as `WireMotion.seen` takes it: a blow stays at its place."""
     if isinstance(excitation, MovingForce):
         return lambda times: excitation.place(times)[:, None], np.nan
     return lambda times: np.zeros((times.size, 0)), excitation.at

@@ -19,7 +19,12 @@ from catenary.cases.scene.load import scene_from
 from catenary.cases.scene.problem import problem_of
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.waves import obstacles, pictures
-from catenary.cases.studies.waves.excited import Asked, Watch, excitation_of, without_train
+from catenary.cases.studies.waves.excited import (
+    Settings,
+    Watch,
+    excitation_of,
+    without_train,
+)
 from catenary.cases.studies.waves.measured import measured_rows, transmitted
 from catenary.cases.studies.waves.seen import (
     EnergyMotion,
@@ -56,7 +61,7 @@ TABLE, OBSTACLES = "waves.csv", "obstacles.csv"
 SNAPSHOT_EVERY = 0.01
 # Of a blow, whose waves are shorter [s].
 BLOW_EVERY = 0.004
-# What is shown behind and ahead of the train [m].
+# Length of line that is shown behind and ahead of the train [m].
 _BEHIND, _AHEAD = 300.0, 200.0
 
 
@@ -95,7 +100,9 @@ def study_waves(folder: Path) -> Studied:
     return _write(folder, theory, rest, seen, energy.seen(), data.supports, what, remarks)
 
 
-def study_excited(scene: Scene, kind: str, asked: Asked, folder: Path, force: bool) -> Studied:
+def study_excited(
+    scene: Scene, kind: str, settings: Settings, folder: Path, force: bool
+) -> Studied:
     """Run a line without its train under an excitation, and write what is seen of its waves.
 
     The folder then has the files of a run. Serial.
@@ -113,7 +120,7 @@ def study_excited(scene: Scene, kind: str, asked: Asked, folder: Path, force: bo
         If the march breaks.
     """
     problem = problem_of(scene)
-    excitation = excitation_of(kind, asked, problem, problem.numerics.dt)
+    excitation = excitation_of(kind, settings, problem, problem.numerics.dt)
     refuse_earlier(folder, force)
     refuse_table(folder / TABLE, force)
     moves = isinstance(excitation, MovingForce)

@@ -22,7 +22,7 @@ from catenary.cases.scene.problem import problem_of
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.ensemble import Keeper
 from catenary.postproc.evaluate.filters import low_pass
-from catenary.postproc.record.run_watch import RunWatch, watch_cadence, watched
+from catenary.postproc.record.run_watch import RunWatch, watch_cadence, watch_inputs
 from catenary.postproc.report.pictures import figures
 from catenary.postproc.report.study_table import Column, StudyTable, remark_lines, write_files
 from catenary.solver.problem.problem import WindowChoice
@@ -168,7 +168,7 @@ def draw(curves: Sequence[Curve]) -> Figure:
 
 def as_text(curves: Sequence[Curve]) -> str:
     """The table for a terminal, and the remarks on all marches."""
-    told = [
+    remarks = [
         (f"{curve.name} {name}".strip(), remarks)
         for curve in curves
         for name, remarks in (
@@ -176,14 +176,14 @@ def as_text(curves: Sequence[Curve]) -> str:
             *((f"{one.spans:g} spans", one.remarks) for one in curve.errors),
         )
     ]
-    return "\n".join([table_of(curves).text(), *remark_lines(told)])
+    return "\n".join([table_of(curves).text(), *remark_lines(remarks)])
 
 
 def _forces(rest: LineAtRest, window: WindowChoice) -> tuple[list[np.ndarray], list[str]]:
     """Filtered force (n,) of each pantograph in the stretch [N], and what the march told."""
     problem, seen = replace(rest.problem, window=window), Keeper()
     at_rest = rest._replace(problem=problem)
-    watch = RunWatch(MPI.COMM_SELF, watched(at_rest), watch_cadence(problem.numerics.dt))
+    watch = RunWatch(MPI.COMM_SELF, watch_inputs(at_rest), watch_cadence(problem.numerics.dt))
     with March(MPI.COMM_SELF, *at_rest) as run:
         outcome = run.run([seen, watch])
     if outcome.outcome != "done":

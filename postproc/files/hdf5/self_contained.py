@@ -16,7 +16,7 @@ from h5py import h5d, h5l, h5o, h5s
 
 from catenary.base.errors import InputError
 
-# How a link or a table that leads elsewhere is described in the error.
+# Description of a link or a table that leads elsewhere, in the error.
 _LINKS = {h5l.TYPE_SOFT: "is a soft link", h5l.TYPE_EXTERNAL: "is a link into another file"}
 _OWN_KINDS = {
     stat.S_IFLNK: "is a symbolic link, and result files are not opened through links; name the "

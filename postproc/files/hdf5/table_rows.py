@@ -81,7 +81,7 @@ class DamagedClock(Exception):
 
 
 def rows_before(clock: h5py.Dataset, n: int, time: float) -> int:
-    """How many of the first ``n`` ascending times of a table are before ``time``; `DamagedClock` if
+    """Number of the first ``n`` ascending times of a table before ``time``; `DamagedClock` if
     they cannot be read."""
     try:
         return int(np.searchsorted(clock[:n], time))

@@ -16,7 +16,7 @@ from catenary.postproc.record.snapshots.field_kinds import USUAL_FIELDS, FieldKi
 
 # Format of the file, its attribute ``format``.
 FORMAT = "catenary-fields-2"
-# Where the bases, masses and bodies of the pantographs are, and how many numbers each has of it.
+# Places of the pantographs' bases, masses and bodies, and how many numbers each has.
 PLACES, SIZES = "pantograph_places", "pantograph_sizes"
 # Its attribute that is 1 where wires are at rest at all points that a snapshot does not show.
 RESTS_BEYOND = "rests_beyond"

@@ -12,7 +12,7 @@ MOST_POINTS, _BINS = 20_000, 5_000
 
 
 def thinned(y: np.ndarray) -> np.ndarray | slice:
-    """Which points of a curve are drawn, as an index for ``x`` and ``y``.
+    """Points of a curve that are drawn, as an index for ``x`` and ``y``.
 
     Parameters
     ----------
@@ -30,7 +30,7 @@ def thinned_ranges(low: np.ndarray, high: np.ndarray) -> np.ndarray | slice:
 
 
 def _extremes(y: np.ndarray) -> np.ndarray:
-    """Where the smallest and the largest value of each bin are."""
+    """Indices of the smallest and the largest value of each bin."""
     size = -(-y.size // _BINS)
     n_whole = y.size // size
     blocks = y[: n_whole * size].reshape(n_whole, size)
@@ -45,7 +45,7 @@ def _extremes(y: np.ndarray) -> np.ndarray:
 def _place(
     blocks: np.ndarray, which: Callable[[np.ndarray], np.intp], instead: float
 ) -> np.ndarray:
-    """Where in each block the extreme is; the first place where all of them are NaN."""
+    """Index of the extreme in each block; 0 if all values are NaN."""
     found = np.empty(blocks.shape[0], dtype=np.int64)
     for number, block in enumerate(blocks):
         gaps = np.isnan(block)

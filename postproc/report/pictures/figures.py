@@ -291,8 +291,8 @@ def painted(name: str, draw: Callable[[], Figure | None]) -> dict[str, bytes]:
     except CatenaryError:
         raise
     except Exception as error:
-        said = str(error) or type(error).__name__
-        logger.warning("%s was not drawn (%s); all figures are in the other files", name, said)
+        reason = str(error) or type(error).__name__
+        logger.warning("%s was not drawn (%s); all figures are in the other files", name, reason)
         return {}
 
 

@@ -40,7 +40,7 @@ class Mark(NamedTuple):
 
     x: float
     wire: str
-    says: str
+    text: str
 
 
 @own_style()
@@ -92,7 +92,7 @@ def draw_line(
     _marks(side, mesh, points, marks)
     for number, mark in enumerate(marks[:_MOST_NAMED]):
         high = (below - _LINE * (number + 0.5)) / (_HEIGHT + below)
-        figure.text(_LEFT / _WIDTH, high, f"{number + 1}  {mark.says}", fontsize=9)
+        figure.text(_LEFT / _WIDTH, high, f"{number + 1}  {mark.text}", fontsize=9)
     _plan_view(plan, line, mesh, points, stretch, half_head)
     _cross_section(cross, line, mesh, points, form, stretch, half_head)
     names: dict[Role, str] = {}

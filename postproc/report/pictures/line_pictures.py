@@ -100,8 +100,8 @@ def _passing_train(axes: Axes, results: Results, statistics: RunStatistics) -> N
     if shown.size < others.size:
         label += f", {shown.size} of {others.size}"
     for number, arm in enumerate(shown):
-        told = label if number == 0 else None
-        axes.plot(*curve(int(arm)), color=LIGHT, linewidth=0.8, label=told)
+        once = label if number == 0 else None
+        axes.plot(*curve(int(arm)), color=LIGHT, linewidth=0.8, label=once)
     if worst is not None:
         axes.plot(
             *curve(worst),

@@ -16,7 +16,7 @@ _RELATIONS = {"<=": "≤", "<": "<", ">=": "≥", ">": ">"}
 NAN = float("nan")
 # Error of a quantity over the rms error of the force history.
 _TIMES_RMS = {"mean_force": 1.0, "force_std": 1.0, "force_max": 3.0, "force_min": 3.0}
-# What errors are, estimated and measured.
+# Heads of errors, estimated and measured.
 _SOURCES = ("estimated error of the time step", "measured error of step and mesh")
 _UNCOMPARED = "not compared with the text"
 _WORDS = {None: "not judged", True: "passed", False: "failed"}
@@ -182,7 +182,7 @@ def section(run: EvaluatedRun) -> Section:
 def _criteria(run: EvaluatedRun) -> Iterator[Text | StudyTable]:
     rows, left = [], []
     errors = errors_of(run)
-    # Where no limit is compared the verdict says so, once.
+    # If no limit is compared, the verdict says so once.
     some = any(one.compared for one in run.criteria)
     for one, label in zip(run.criteria, labels(run.criteria), strict=True):
         if one.absent:

@@ -8,7 +8,7 @@ from hashlib import sha256
 
 import numpy as np
 
-from catenary.postproc.channels.line_record import says
+from catenary.postproc.channels.line_record import record_words
 from catenary.postproc.evaluate.error_indicators import Indicators
 from catenary.postproc.evaluate.remarks import all_remarks
 from catenary.postproc.evaluate.wording import counted
@@ -71,12 +71,15 @@ def effects(run: EvaluatedRun, costs: tuple[Mapping[str, str], str] = ({}, "")) 
         By names of effects a sentence on what each costs and changes, and the study that measured
         them.
     """
-    about, (told, study) = run.results.attributes, costs
-    heads = ["effect", "what it is", "why", *(["what it costs and changes"] if told else [])]
+    about, (cost_of, study) = run.results.attributes, costs
+    heads = ["effect", "what it is", "why", *(["what it costs and changes"] if cost_of else [])]
     on, off = (
         texts_table(
             heads,
-            [[name, *words, *([told.get(name, "–")] if told else [])] for name, *words in rows],
+            [
+                [name, *words, *([cost_of.get(name, "–")] if cost_of else [])]
+                for name, *words in rows
+            ],
         )
         for rows in (about["effects_on"], about["effects_off"])
     )
@@ -84,7 +87,7 @@ def effects(run: EvaluatedRun, costs: tuple[Mapping[str, str], str] = ({}, "")) 
     how = (
         "Costs are how many times as long a step takes with the effect as without; costs and "
         f"changes are those of {study}."
-        if told
+        if cost_of
         else f"`catenary plan {about['case']} --cost -o STUDY` measures what each costs and "
         "changes; `catenary report --cost STUDY` shows it here."
     )
@@ -147,9 +150,9 @@ def _facts(results: Results) -> list[tuple[str, str]]:
     arrivals, masts = about.get("arrivals", {}), results.line("support_x")
     names = results.pantograph_names()
     kinds: dict[str, list[str]] = {}
-    for name, told in zip(names, results.pantograph_words(), strict=True):
-        if told:
-            kinds.setdefault(f"{told['kind']}, {told['description']}", []).append(name)
+    for name, words in zip(names, results.pantograph_words(), strict=True):
+        if words:
+            kinds.setdefault(f"{words['kind']}, {words['description']}", []).append(name)
     met = [fact["says"].partition(": ")[2] for fact in arrivals.get("pantographs", [])]
     of = [f", {name}" if len(names) > 1 else "" for name in names]
     return [
@@ -161,7 +164,7 @@ def _facts(results: Results) -> list[tuple[str, str]]:
         ),
         *([("ends of the line", "; ".join(arrivals["ends"]))] if arrivals.get("ends") else []),
         *((", ".join(own), words) for words, own in kinds.items()),
-        *((f"waves and run-in{name}", told) for name, told in zip(of, met, strict=False)),
+        *((f"waves and run-in{name}", text) for name, text in zip(of, met, strict=False)),
         *(("defect", fact["says"]) for fact in about.get("defects", [])),
         *(
             (f"incident at {fact['time_s']:.4g} s", fact["says"])
@@ -177,7 +180,7 @@ def _facts(results: Results) -> list[tuple[str, str]]:
             f"{results.simulated:.3f} s, {results.n_steps} of {about['n_steps_planned']} steps of "
             f"{1e3 * results.dt:g} ms",
         ),
-        ("arm uplift and dropper forces", says(results.line_record, results.dt)),
+        ("arm uplift and dropper forces", record_words(results.line_record, results.dt)),
         *([("speed of steps", about["detour"])] if about.get("detour") else []),
         *([("window", about["window"])] if about.get("window") else []),
     ]

@@ -43,38 +43,31 @@ register(
         "aerodynamic forces on the pantographs",
         "uplift of head and frame by the air's speed, drag on bodies of a mechanism, tunnels",
         "uplift by speed as measured; forces with the square of the speed",
-        default=True,
         applies=lambda p: any(place.data.meets_air for place in p.train.placements),
         law=lambda laws, p: replace(laws, meets_air=True),
         data="a table [pantographs.*.aerodynamics] or a force of type aerodynamic_force",
-    )
-)
-register(
+    ),
     Effect(
         "wind",
         "mean wind on wires and pantographs",
         "drag of the wires at rest, aerodynamic damping of their motion, air at the pantographs",
         "1/2 rho d C_d |q| q, linear in the motion (Dyrbye, Hansen: Wind Loads on Structures)",
-        default=True,
         applies=lambda p: p.wind is not None,
         build=_damped,
         law=_steady,
         data="a table [wind] with a speed above 0",
         after_cutting=True,
-    )
-)
-register(
+    ),
     Effect(
         "gusts",
         "gusts on wires and pantographs",
         "loads of a random field along the line, which is coherent in space",
         "spectra of Davenport, von Karman, Panofsky, Kaimal; coherence exp(-C n d / U)",
-        default=True,
         requires=("wind",),
         applies=lambda p: p.wind is not None and p.wind.gusts is not None,
         build=_gusts,
         law=lambda laws, p: replace(laws, wind=p.wind),
         data="a table [wind.gusts] in a wind above 0",
         after_cutting=True,
-    )
+    ),
 )

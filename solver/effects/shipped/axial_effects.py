@@ -171,33 +171,27 @@ register(
         data="axial_stiffness_N, or section_mm2 and youngs_modulus_GPa, of every wire",
         build=_axial,
         of_form=True,
-    )
-)
-register(
+    ),
     Effect(
         "tensioners",
         "tensioners at the ends of wires",
         "inertia of weights and stops at their ends of travel; line.tensioner",
         "weights on a wheel with friction",
-        default=True,
         applies=_has_tensioner,
         data="line.ends or line.overlap with along = tensioner, and effects.axial_motion",
         build=_tensioners,
         components=(TENSIONERS, _LOWEST, _HIGHEST),
         law=lambda laws, p: replace(laws, tensioner=p.along.tensioner),
-    )
-)
-register(
+    ),
     Effect(
         "temperature",
         "another temperature than that of the installation",
         "growth of the wires, droppers that lean and arms that swing at rest; line.temperature",
         "potential energy of wires and droppers of given lengths",
-        default=True,
         applies=lambda p: AXIAL in p.effects and p.along.warmer != 0.0,
         data="line.temperature.difference_K other than 0, and effects.axial_motion",
         law=lambda laws, p: replace(laws, warmer=p.along.warmer),
         of_form=True,
         after_cutting=True,
-    )
+    ),
 )

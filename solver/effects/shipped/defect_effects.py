@@ -1,4 +1,4 @@
-"""Effects of irregularities and defects: what befalls a line once its droppers have been cut."""
+"""Effects of irregularities and defects, which change a line once its droppers have been cut."""
 
 from __future__ import annotations
 
@@ -31,42 +31,35 @@ register(
         "irregular heights of the contact wires at their droppers",
         "heights that droppers are cut for; [irregularities.contact_wire_height]",
         "sums of sines after Shinozuka and Jan (1972); table",
-        default=True,
         requires=("gravity",),
         data="irregularities.contact_wire_height",
         applies=lambda p: p.irregularities.heights is not None,
         law=lambda laws, p: replace(laws, irregular_heights=p.irregularities.heights),
         after_cutting=True,
         cut_for=True,
-    )
-)
-register(
+    ),
     Effect(
         "dropper_lengths",
         "droppers that are cut too long or too short",
         "errors of length, by which the line rests otherwise; [irregularities.dropper_lengths]",
         "static equilibrium with given lengths of droppers that only pull",
-        default=True,
         requires=("gravity",),
         data="irregularities.dropper_lengths",
         applies=lambda p: p.irregularities.lengths is not None,
         law=lambda laws, p: replace(laws, length_errors=p.irregularities.lengths),
         after_cutting=True,
-    )
-)
-register(
+    ),
     Effect(
         "running_surface",
         "waviness of the contact wires' running surface",
         "a height and a slope at each contact; [irregularities.running_surface]",
         "sums of sines after Shinozuka and Jan (1972); table",
-        default=True,
         data="irregularities.running_surface",
         applies=lambda p: p.irregularities.surface is not None,
         law=lambda laws, p: replace(
             laws, surface=(*laws.surface, *filter(None, [p.irregularities.surface]))
         ),
-    )
+    ),
 )
 
 
@@ -76,16 +69,16 @@ if TYPE_CHECKING:
 _Kind = TypeVar("_Kind")
 
 
-def _those(problem: Problem, kind: type[_Kind]) -> Iterator[_Kind]:
+def _of_kind(problem: Problem, kind: type[_Kind]) -> Iterator[_Kind]:
     return (defect for defect in problem.defects if isinstance(defect, kind))
 
 
 def _has(kind: type) -> Callable[[Problem], bool]:
-    return lambda problem: any(True for _ in _those(problem, kind))
+    return lambda problem: any(True for _ in _of_kind(problem, kind))
 
 
 def _worn(line: Line, problem: Problem) -> Line:
-    worn = list(_those(problem, WornWire))
+    worn = list(_of_kind(problem, WornWire))
     wires = (
         replace(wire, worn=tuple((d.start, d.end, d.lost) for d in worn if d.wire == wire.name))
         for wire in line.wires
@@ -94,7 +87,7 @@ def _worn(line: Line, problem: Problem) -> Line:
 
 
 def _hard_spots(builder: ModelBuilder) -> None:
-    for spot in _those(builder.problem, HardSpot):
+    for spot in _of_kind(builder.problem, HardSpot):
         place = at_places(builder.model, spot.wire, np.array([spot.x]))
         if spot.mass:
             builder.add_masses_at(spot.wire, place, np.array([spot.mass]))
@@ -105,7 +98,7 @@ def _hard_spots(builder: ModelBuilder) -> None:
 
 def _kinks(laws: Simulated, problem: Problem) -> Simulated:
     bent = []
-    for kink in _those(problem, Kink):
+    for kink in _of_kind(problem, Kink):
         wire = problem.line.wire(kink.wire)
         decay = float(np.sqrt(wire.bending_stiffness / wire.tension))
         bent.append(BentWire(kink.wire, kink.x, kink.angle, decay))
@@ -118,85 +111,69 @@ register(
         "droppers that are missing from the start",
         "matrices, weights and rest without the dropper and its clamps; [[defects]]",
         "static equilibrium with given lengths of droppers that only pull",
-        default=True,
         requires=("gravity",),
         data="defects of the type missing_dropper",
         applies=_has(MissingDropper),
         law=lambda laws, p: replace(
-            laws, missing=tuple(defect.x for defect in _those(p, MissingDropper))
+            laws, missing=tuple(defect.x for defect in _of_kind(p, MissingDropper))
         ),
         after_cutting=True,
-    )
-)
-register(
+    ),
     Effect(
         "loose_clamp",
         "droppers whose clamp slips from the start",
         "matrices and rest without the dropper, whose masses stay; [[defects]]",
         "static equilibrium with given lengths of droppers that only pull",
-        default=True,
         requires=("gravity",),
         data="defects of the type loose_clamp",
         applies=_has(LooseClamp),
         law=lambda laws, p: replace(
-            laws, loose=tuple(defect.x for defect in _those(p, LooseClamp))
+            laws, loose=tuple(defect.x for defect in _of_kind(p, LooseClamp))
         ),
         after_cutting=True,
-    )
-)
-register(
+    ),
     Effect(
         "worn_wire",
         "wires that are worn over a stretch",
         "less mass and bending stiffness there, under the same tension; [[defects]]",
         "section of a round wire worn flat from below",
-        default=True,
         requires=("gravity",),
         data="defects of the type worn_wire",
         applies=_has(WornWire),
         hangs=_worn,
         after_cutting=True,
-    )
-)
-register(
+    ),
     Effect(
         "wrong_tension",
         "wires that hang with a wrong tension",
         "matrices and rest with it, droppers cut for the right one; [[defects]]",
         "static equilibrium with given lengths of droppers that only pull",
-        default=True,
         requires=("gravity",),
         data="defects of the type wrong_tension",
         applies=_has(WrongTension),
         hangs=lambda line, p: line.with_shares(
-            {defect.wire: defect.factor for defect in _those(p, WrongTension)}
+            {defect.wire: defect.factor for defect in _of_kind(p, WrongTension)}
         ),
         after_cutting=True,
-    )
-)
-register(
+    ),
     Effect(
         "hard_spot",
         "hard spots of wires",
         "a lumped mass and a spring at a place, droppers cut without them; [[defects]]",
         "obstacle on a string: R = -D / (D + 2 i w Z)",
-        default=True,
         requires=("gravity",),
         data="defects of the type hard_spot",
         applies=_has(HardSpot),
         build=_hard_spots,
         after_cutting=True,
-    )
-)
-register(
+    ),
     Effect(
         "kink",
         "kinks of contact wires, as at a splice",
         "a height and a slope at each contact; [[defects]]",
         "bent beam under tension: z = -angle l exp(-|x| / l) / 2, l = sqrt(EI / F)",
-        default=True,
         data="defects of the type kink",
         applies=_has(Kink),
         law=_kinks,
-    )
+    ),
 )

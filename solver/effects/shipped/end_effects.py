@@ -110,22 +110,18 @@ register(
         "spans at the ends that absorb waves",
         "damping on mass that grows towards the end; line.ends",
         "graded absorbing layer, b (x/l)^2 M",
-        default=True,
         applies=lambda p: _has(p, AbsorbingLayer),
         build=_layers,
         data="line.ends with an end of kind absorbing_layer",
-    )
-)
-register(
+    ),
     Effect(
         "periodic_ends",
         "lines that go on beyond their ends",
         "stiffness, mass and memory of the periodic line beyond; line.ends",
         "Bloch waves of a span; convolution quadrature (Lubich 1988)",
-        default=True,
         applies=lambda p: _has(p, Periodic),
         build=_lines_beyond,
         law=_going_on,
         data="line.ends with an end of kind periodic",
-    )
+    ),
 )

@@ -45,23 +45,19 @@ register(
         "stops that end the uplift at steady arms",
         "a link for each arm that pushes its wire down beyond a lift",
         "linear complementarity with a gap, one way",
-        default=True,
         data="line.steady_arm.uplift_stop_m",
         applies=lambda p: any(arms.kind.uplift_stop is not None for arms in p.line.steady_arms),
         build=_stops,
         components=(UPLIFT_STOPS,),
         law=lambda laws, p: replace(laws, uplift_stops=True),
-    )
-)
-register(
+    ),
     Effect(
         "fittings",
         "section insulators and other fittings on the wires",
         "lumped masses at places of wires, for which droppers are cut; [[line.fittings]]",
         "consistent mass and weight at the place within its element",
-        default=True,
         data="line.fittings",
         applies=lambda p: bool(p.line.fittings),
         build=_fittings,
-    )
+    ),
 )

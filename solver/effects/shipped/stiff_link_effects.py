@@ -69,7 +69,6 @@ register(
         "numerical damping of droppers and stops that are stiff for the time step",
         "a damper alpha k in each link that acts one way, with alpha = dt",
         "amplification factor of average acceleration for omega dt >> 1; docs/theory/droppers.md",
-        default=True,
         applies=lambda p: bool(_added(p)),
         law=_damped,
         data="droppers that slacken, or stops, with k dt^2 above 0.22 N s2/m and less damping",

@@ -138,66 +138,50 @@ register(
         "vertical motion of the tensioned wires",
         "wire bending and tension, droppers, messenger supports, anchors",
         "paper eq. (2.1)",
-        default=True,
         unknowns_of_wire=lambda wire: ("w", "theta_y"),
         always=True,
         build=_vertical,
-    )
-)
-register(
+    ),
     Effect(
         "gravity",
         "gravity and form finding",
         "weights, static equilibrium, dropper pre-tension and lengths",
         "paper section 2; static equilibrium of a tensioned beam",
-        default=True,
         law=lambda laws, p: replace(laws, gravity=p.gravity),
-    )
-)
-register(
+    ),
     Effect(
         "pre_sag",
         "pre-sag of the contact wire",
         "target heights of the form finding",
         "paper section 1 (pre-sag of 1/1000)",
-        default=True,
         requires=("gravity",),
         applies=lambda p: any(any(wanted.sag) for wanted in p.line.profiles),
         law=lambda laws, p: _shaped(laws, pre_sag),
         data="line.dropper.pre_sag_mm or pre_sag_mid_mm other than 0",
-    )
-)
-register(
+    ),
     Effect(
         "transition_spans",
         "transition spans in which the contact wire rises to the tensioner",
         "target heights of the form finding at both ends",
         "paper section 5, figure 4",
-        default=True,
         applies=lambda p: any(wanted.rises for wanted in p.line.profiles),
         law=lambda laws, p: _shaped(laws, transition),
         data="line.transition with a rise_m",
-    )
-)
-register(
+    ),
     Effect(
         "dropper_mass",
         "mass of the droppers",
         "half of each dropper's mass at either end",
         "paper Table 1",
-        default=True,
         applies=lambda p: any(group.kind.mass_per_length > 0 for group in p.line.droppers),
         build=_dropper_mass,
         data="line.dropper.mass_kg_per_m above 0",
-    )
-)
-register(
+    ),
     Effect(
         "clamp_mass",
         "mass of clamps on the wires",
         "lumped masses at both ends of droppers and clamps",
         "paper section 2 and Table 1",
-        default=True,
         applies=lambda p: (
             any(group.mass > 0 for group in p.line.clamps)
             or any(
@@ -207,30 +191,24 @@ register(
         ),
         build=_clamp_mass,
         data="clamps of some mass, such as line.dropper.contact_clamp_kg",
-    )
-)
-register(
+    ),
     Effect(
         "arm_inertia",
         "inertia and weight of the steady arms",
         "a third of the hinged arm's mass and its clamp on the contact wire",
         "paper Table 1; hinged rod",
-        default=True,
         applies=lambda p: any(
             group.kind.clamp_mass + group.kind.mass_per_length * group.kind.length > 0
             for group in p.line.steady_arms
         ),
         build=_arm_inertia,
         data="line.steady_arm with a clamp_kg, or a length_m and mass_kg_per_m",
-    )
-)
-register(
+    ),
     Effect(
         "arm_stiffness",
         "vertical stiffness of the steady arms",
         "springs from the contact wire to the ground at the arms",
         "EN 50318:2002 reference model",
-        default=True,
         applies=lambda p: any(
             bool(group.vertical_stiffness(p.line.wire(group.wire)).any()) and not _is_bar(p, group)
             for group in p.line.steady_arms
@@ -238,27 +216,21 @@ register(
         instead=_bars_instead,
         build=_arm_stiffness,
         data="line.steady_arm.stiffness_N_per_m above 0, or stiffness_by_radial_force",
-    )
-)
-register(
+    ),
     Effect(
         "relative_motion",
         "motion of twin wires relative to each other",
         "unknowns of the second of two wires side by side, which has the first one's without it",
         "sum and difference of two like wires; docs/theory/line.md",
-        default=True,
         applies=lambda p: bool(p.line.twins),
         law=lambda laws, p: replace(laws, relative_motion=True),
         data="two wires side by side (line.topology twin or twin_messenger)",
-    )
-)
-register(
+    ),
     Effect(
         "structural_damping",
         "structural damping of the line",
         "C = alpha K + beta M, globally or per component",
         "paper eq. (2.2)",
-        default=True,
         applies=lambda p: (
             p.damping.alpha > 0
             or p.damping.beta > 0
@@ -267,22 +239,17 @@ register(
         ),
         law=lambda laws, p: replace(laws, damping=p.damping),
         data="line.damping with alpha_s or beta_per_s above 0",
-    )
-)
-register(
+    ),
     Effect(
         "dropper_slackening",
         "droppers that slacken",
         "compensation of the droppers that would be pushed",
         "paper eq. (2.7)",
-        default=True,
         requires=("gravity",),
         applies=lambda p: bool(p.line.droppers),
         law=lambda laws, p: replace(laws, slackening=True, kept_ratio=0.0),
         data="droppers",
-    )
-)
-register(
+    ),
     Effect(
         "residual_dropper_stiffness",
         "residual stiffness of slack droppers",
@@ -293,21 +260,16 @@ register(
         applies=lambda p: p.residual_stiffness_ratio > 0,
         law=_residual_stiffness,
         data="line.dropper.residual_stiffness_ratio above 0",
-    )
-)
-register(
+    ),
     Effect(
         "contact_loss",
         "loss and regain of contact",
         "the contact force cannot pull",
         "paper section 4",
-        default=True,
         applies=lambda p: not isinstance(p.contact, KinematicLaw),
         law=lambda laws, p: replace(laws, contact_loss=True),
         data="contact.law other than kinematic",
-    )
-)
-register(
+    ),
     Effect(
         "contact_damping",
         "damping of the contact",
@@ -317,21 +279,16 @@ register(
         applies=lambda p: p.contact.dissipates,
         law=lambda laws, p: replace(laws, contact=p.contact),
         data="contact.damping_N_s_per_m above 0 or contact.restitution below 1",
-    )
-)
-register(
+    ),
     Effect(
         "several_pantographs",
         "several pantographs on one train",
         "one contact and one pantograph each",
         "paper section 5",
-        default=True,
         applies=lambda p: len(p.train.placements) > 1,
         lifts=(Limit.ONE_PANTOGRAPH,),
         data="a second entry of train.pantographs",
-    )
-)
-register(
+    ),
     Effect(
         "head_roll",
         "roll of the pan heads under a wire that moves along their strips",
@@ -341,9 +298,7 @@ register(
         applies=lambda p: any(place.data.roll is not None for place in p.train.placements),
         law=lambda laws, p: replace(laws, head_roll=True),
         data="a head that can roll (pantographs.*.roll) under a wire with line.stagger_m",
-    )
-)
-register(
+    ),
     Effect(
         "vehicle_motion",
         "motion of the vehicle under its pantographs",
@@ -353,45 +308,34 @@ register(
         applies=lambda p: p.train.vehicle is not None,
         law=lambda laws, p: replace(laws, vehicle=p.train.vehicle),
         data="a table [vehicle]",
-    )
-)
-register(
+    ),
     Effect(
         "dropper_break",
         "droppers that break during the run",
         "matrices without the dropper and the balance that it leaves, from its time on",
         "equation of motion of the line without it; [[incidents]]",
-        default=True,
         applies=lambda p: any(isinstance(incident, DropperBreak) for incident in p.incidents),
         law=lambda laws, p: _happening(laws, p, DropperBreak),
         data="an entry of incidents of type dropper_break",
-    )
-)
-register(
+    ),
     Effect(
         "tension_loss",
         "wires that lose tension during the run",
         "matrices with what is left of the tension and the balance lost, from its time on",
         "equation of motion of the line with it; [[incidents]]",
-        default=True,
         applies=lambda p: any(isinstance(incident, TensionLoss) for incident in p.incidents),
         law=lambda laws, p: _happening(laws, p, TensionLoss),
         data="an entry of incidents of type tension_loss",
-    )
-)
-register(
+    ),
     Effect(
         "lowering",
         "pantographs that are lowered during the run",
         "a static force that goes over to a lower one, and what catches the head",
         "the course of the raising, the other way; [[incidents]]",
-        default=True,
         applies=lambda p: any(place.lowering is not None for place in p.train.placements),
         law=lambda laws, p: replace(laws, lowering=True),
         data="an entry of incidents of type lowering",
-    )
-)
-register(
+    ),
     Effect(
         "supercritical_speed",
         "train speed at or above the wave speed of the contact wire",
@@ -401,5 +345,5 @@ register(
         applies=lambda p: p.train.speed >= slowest_wave_speed(p),
         lifts=(Limit.WAVE_SPEED,),
         data="a train.speed_km_h at or above the contact wire's wave speed",
-    )
+    ),
 )

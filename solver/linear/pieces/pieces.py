@@ -17,7 +17,7 @@ from catenary.solver.model.unknown_registry import Unknowns
 
 # Stations of a piece, some twenty spans: a multiple of ``MIDDLES``.
 _SIZE = 1024
-# How many times the reach of a step a piece is worked out further than it is, so that nothing of
+# Margin of a piece beyond its ends, in reaches of a step, so that nothing of
 # where that ends is left in it.
 _BEYOND = 2.0
 

@@ -211,7 +211,7 @@ class RestNearby:
         load = self._load.copy()
         for end in self._ends:
             if end.pull is None:
-                # Where the known rest has it, along the track since the installation [m].
+                # Place of the known rest, along the track since the installation [m].
                 known = self._potential.known
                 already = float(known.along[end.end.node]) if known.along.size else 0.0
                 moved[end.unknown] = end.end.outwards * end.held_at - already

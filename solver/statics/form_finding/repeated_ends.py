@@ -37,7 +37,7 @@ class RepeatedEnds(NamedTuple):
 
 
 def repeated_ends(model: Model) -> RepeatedEnds:
-    """Where wires end with a model's line that goes on; none if it does not."""
+    """Ends of wires of a model's line that goes on; none if it does not."""
     line = model.problem.line
     places, found, rise = line.support_positions, [], []
     for goes_on, at in zip(model.simulated.goes_on, ((0, 1, 2), (-1, -2, -3)), strict=True):

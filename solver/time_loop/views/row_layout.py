@@ -69,7 +69,7 @@ class RowLayout:
 
 
 def _part_of(shown: np.ndarray, sources: Sources, array: np.ndarray) -> slice | None:
-    """Where an array is in what a step shows, None if it is not a part of it."""
+    """Place of an array in the row that a step shows, None if it is not a part of it."""
     outputs = sources.pantographs.outputs
     for whole, at in ((shown, 0), (outputs, 0)):
         begin = array.ctypes.data - whole.ctypes.data

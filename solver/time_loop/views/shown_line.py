@@ -123,7 +123,7 @@ class LineEnergy:
         in_parts = line.window is not None and self._products is not None
         self._size = _STATIONS if in_parts else max(1, columns.n_stations)
         self._links_size = _LINKS if in_parts else max(1, n_links)
-        # Where parts begin, and where the last one ends.
+        # Begins of the parts, and the end of the last one.
         self._edges = np.append(np.arange(0, columns.n_stations, self._size), columns.n_stations)
         self._starts = columns.starts[self._edges]
         # Without a window the line is one station, of which a product has many rows.

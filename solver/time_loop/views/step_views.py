@@ -124,7 +124,7 @@ class Showing:
         self._view = self._new_view()
         links = droppers, others, dropper_bends, other_bends
         window, n_local = self._line.window, self._line.ownership.n_local
-        # Which of a row's values of the line change with which stations.
+        # Values of the line in a row, and the stations with which they change.
         columns = columns_of(
             (self._arm_rows[:, None], droppers.unknowns, others.unknowns),
             n_local,

@@ -9,10 +9,10 @@ from catenary.base.errors import NotConverged, RunBroken
 from catenary.mbs.mechanism.reduction import ReducedMechanism
 from catenary.mbs.rigid.bodies import SPACE, Body
 from catenary.mbs.rigid.forces import Gravity
+from catenary.mbs.rigid.implicit_steps import Stepper
 from catenary.mbs.rigid.joints import Revolute
+from catenary.mbs.rigid.step_solvers import Augmented, Partitioned
 from catenary.mbs.rigid.system import System
-from catenary.mbs.time_steps.implicit_steps import Stepper
-from catenary.mbs.time_steps.step_solvers import Augmented, Partitioned
 
 # A pendulum of 1 m that is let go from level.
 PENDULUM = System(

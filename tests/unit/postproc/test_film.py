@@ -25,10 +25,10 @@ from catenary.postproc.files.hdf5.checked import seal_attributes, set_attribute
 from catenary.postproc.film import animate, drawing, projection, scenery, video
 from catenary.postproc.film.animate import Pictures
 from catenary.postproc.film.film_data import film_data
+from catenary.postproc.film.options import FilmOptions, View
 from catenary.postproc.film.projection import Projection
 from catenary.postproc.film.scenery import FORCES, PANTOGRAPHS, TRAIN, Scenery
 from catenary.postproc.film.snapshots import Snapshots
-from catenary.postproc.film.wish import View, Wish
 from catenary.postproc.read.guard import survives
 from catenary.postproc.read.results import Results
 from catenary.postproc.record.snapshots.field_layout import Course, FieldRecord
@@ -71,11 +71,11 @@ def folder(recorded: Callable[..., Path]) -> Path:
 
 
 @contextmanager
-def pictures_of(folder: Path, wish: Wish, shapes: Any = None) -> Iterator[Pictures]:
+def pictures_of(folder: Path, options: FilmOptions, shapes: Any = None) -> Iterator[Pictures]:
     with Results(folder) as results:
         data = film_data(results)
         with Snapshots(folder, len(data.points)) as snapshots:
-            yield Pictures(results, Scenery(data, snapshots, shapes), snapshots, wish)
+            yield Pictures(results, Scenery(data, snapshots, shapes), snapshots, options)
 
 
 @pytest.mark.parametrize(
@@ -86,7 +86,7 @@ def test_factors_are_round_and_never_larger(value: float, expected: float) -> No
 
 
 def test_the_largest_uplift_stays_between_the_wires(folder: Path) -> None:
-    with pictures_of(folder, Wish()) as made:
+    with pictures_of(folder, FilmOptions()) as made:
         scale, data = made.drawing._projection.scale, made._scenery.data
         largest = made.drawing._colours.high
     between = projection.room_between(data)
@@ -94,7 +94,7 @@ def test_the_largest_uplift_stays_between_the_wires(folder: Path) -> None:
 
 
 def test_what_does_not_move_is_not_drawn_larger(folder: Path) -> None:
-    with pictures_of(folder, Wish()) as made:
+    with pictures_of(folder, FilmOptions()) as made:
         picture, data = made.drawing._picture, made._scenery.data
     found = picture.scale(data, np.zeros((2, 3)), None)
     assert found.motion == found.size
@@ -143,7 +143,7 @@ def test_motions_sideways_are_read_and_seen_from_above(folder: Path) -> None:
             np.testing.assert_array_equal(extremes[:, :2], [[0.0, 0.0], [0.0, 0.125]])
             places = Scenery(data, snapshots).beside(0.35, snapshots.frame(0.35))
     np.testing.assert_allclose(places[FORCES].moved[:, 1], 0.125)
-    with pictures_of(folder, Wish(view=View.PLAN, motion=5.0)) as made:
+    with pictures_of(folder, FilmOptions(view=View.PLAN, motion=5.0)) as made:
         made.show(0.35)
         lines = np.array(made.drawing.wires.get_segments())
         shown = np.asarray(made.drawing.wires.get_array())
@@ -296,8 +296,8 @@ def test_a_picture_wider_than_the_snapshots_is_refused(
     march.drive(FieldRecorder(march.comm, path, march.recorded, every=50, record=record))
     record_run(tmp_path / "run.h5", march)
     with pytest.raises(InputError, match=r"--width-m, or a larger output\.field_window_m"):
-        animate.animate(tmp_path, Wish(width=150.0), None, progress=False)
-    film = animate.animate(tmp_path, Wish(0.1, 0.2, width=60.0), None, progress=False)
+        animate.animate(tmp_path, FilmOptions(width=150.0), None, progress=False)
+    film = animate.animate(tmp_path, FilmOptions(0.1, 0.2, width=60.0), None, progress=False)
     assert film.n_pictures == 3
 
 
@@ -311,7 +311,7 @@ def test_coaches_carry_all_pantographs() -> None:
 
 
 def test_pantographs_stand_on_the_roof_and_reach_the_wire(recorded: Callable[..., Path]) -> None:
-    with pictures_of(recorded(50, 0.0, 40.0), Wish()) as made:
+    with pictures_of(recorded(50, 0.0, 40.0), FilmOptions()) as made:
         found = made._scenery
         made.show(0.35)
         bodies = np.array(made.drawing.bodies.get_segments())
@@ -346,7 +346,7 @@ def test_the_camera_goes_with_either_pantograph(recorded: Callable[..., Path]) -
     place = recorded(50, 0.0, 40.0)
     seen = {}
     for camera in (None, "leading", "2"):
-        with pictures_of(place, Wish(camera=camera)) as made:
+        with pictures_of(place, FilmOptions(camera=camera)) as made:
             made.show(0.5)
             position = made._scenery.data.position[made._scenery.data.row_at(0.5)]
             low, high = made.drawing.chart.get_xlim()
@@ -362,12 +362,12 @@ def test_the_camera_goes_with_either_pantograph(recorded: Callable[..., Path]) -
 
 def test_snapshots_are_chosen_by_time() -> None:
     times = 0.05 * np.arange(21)
-    assert animate.chosen(times, Wish()).tolist() == list(range(21))
-    assert animate.chosen(times, Wish(0.2, 0.3)).tolist() == [4, 5, 6]
+    assert animate.chosen(times, FilmOptions()).tolist() == list(range(21))
+    assert animate.chosen(times, FilmOptions(0.2, 0.3)).tolist() == [4, 5, 6]
     with pytest.raises(
         InputError, match=r"not two snapshots from 2 to 3 s; they reach from 0 to 1 s"
     ):
-        animate.chosen(times, Wish(2.0, 3.0))
+        animate.chosen(times, FilmOptions(2.0, 3.0))
 
 
 def test_pictures_are_equally_far_apart_along_the_track() -> None:
@@ -383,7 +383,7 @@ def test_pictures_are_equally_far_apart_along_the_track() -> None:
 def test_the_drawing_has_forces_places_and_colours_of_the_run(
     recorded: Callable[..., Path],
 ) -> None:
-    with pictures_of(recorded(50, 0.0, 40.0), Wish(width=100.0)) as made:
+    with pictures_of(recorded(50, 0.0, 40.0), FilmOptions(width=100.0)) as made:
         made.show(0.5)
         found, data = made.drawing, made._scenery.data
         row = data.row_at(0.5)
@@ -418,7 +418,9 @@ def test_the_chart_shows_what_was_before_the_film_and_none_of_what_will_be(
 ) -> None:
     """A film from 0.5 s on: the force since the left end of its first picture, and nothing of a
     pantograph that is behind it."""
-    with pictures_of(recorded(50, 0.0, 40.0), Wish(0.5, 0.9, width=50.0, camera="1")) as made:
+    with pictures_of(
+        recorded(50, 0.0, 40.0), FilmOptions(0.5, 0.9, width=50.0, camera="1")
+    ) as made:
         made.show(0.5)
         low, high = made.drawing.chart.get_xlim()
         data = made._scenery.data
@@ -433,7 +435,7 @@ def test_the_chart_shows_what_was_before_the_film_and_none_of_what_will_be(
 def test_values_of_forces_stand_above_the_wires(folder: Path) -> None:
     """No wire, arrow or body passes through the box of a value, whose height is 17 pt."""
     for view in (View.SIDE, View.OBLIQUE, View.PLAN):
-        with pictures_of(folder, Wish(view=view)) as made:
+        with pictures_of(folder, FilmOptions(view=view)) as made:
             made.show(0.5)
             made.drawing.pixels()
             drawn = made.drawing
@@ -449,8 +451,8 @@ def test_scales_of_colours_are_of_what_pictures_show(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A wire that is lifted 0.5 m where no picture is changes no colour."""
-    wish = Wish(0.3, 0.5, width=40.0)
-    with pictures_of(folder, wish) as made:
+    options = FilmOptions(0.3, 0.5, width=40.0)
+    with pictures_of(folder, options) as made:
         before = made.drawing._colours
         unseen = ~np.any([made._seen(number) for number in range(6, 11)], axis=0)
     assert 10 < unseen.sum() < unseen.size - 10
@@ -462,13 +464,13 @@ def test_scales_of_colours_are_of_what_pictures_show(
         return moved
 
     monkeypatch.setattr(Snapshots, "displacement", lifted)
-    with pictures_of(folder, wish) as made:
+    with pictures_of(folder, options) as made:
         assert made.drawing._colours == before
         assert made._snapshots.extremes(np.arange(6, 11))[1, 2] == 0.5
 
 
 def test_slack_droppers_are_dashed_and_others_have_the_colour_of_their_force(folder: Path) -> None:
-    with pictures_of(folder, Wish()) as made:
+    with pictures_of(folder, FilmOptions()) as made:
         made.show(0.5)
         shown, slack = made.drawing.droppers, made.drawing.slack
         taut, loose = (np.array(one.get_segments())[:, 0, 0] for one in (shown, slack))
@@ -494,7 +496,7 @@ def test_titles_of_any_length_end_before_the_scales(folder: Path) -> None:
     with h5py.File(folder / "run.h5", "r+") as file:
         set_attribute(file, "title", "A line with $ and _ " * 10)
         seal_attributes(file, ["title"])
-    with pictures_of(folder, Wish()) as made:
+    with pictures_of(folder, FilmOptions()) as made:
         made.show(0.5)
         made.drawing.pixels()
         figure = made.drawing.figure
@@ -508,7 +510,7 @@ def test_titles_of_any_length_end_before_the_scales(folder: Path) -> None:
 
 def test_pixels_are_those_of_what_is_drawn(folder: Path) -> None:
     """The first picture again after others is the same, and its dot has the pantograph's colour."""
-    with pictures_of(folder, Wish(0.2, 0.4)) as made:
+    with pictures_of(folder, FilmOptions(0.2, 0.4)) as made:
         shown = iter(made)
         first, second = np.array(next(shown)), np.array(next(shown))
         made.show(float(made.times[0]))
@@ -525,7 +527,7 @@ def test_pixels_are_those_of_what_is_drawn(folder: Path) -> None:
 def test_every_view_draws_the_line(folder: Path) -> None:
     _blown(folder, 0.05)
     for view in View:
-        with pictures_of(folder, Wish(view=view)) as made:
+        with pictures_of(folder, FilmOptions(view=view)) as made:
             made.show(0.5)
             low, high = made.drawing._axes.get_xlim()
             lines = np.array(made.drawing.wires.get_segments())
@@ -544,7 +546,7 @@ def test_a_film_is_whole_or_not_there(folder: Path, monkeypatch: pytest.MonkeyPa
     with monkeypatch.context() as patch:
         patch.setattr(video, "_encode", broken)
         with pytest.raises(InputError, match="No space left"):
-            animate.animate(folder, Wish(), None, progress=False)
+            animate.animate(folder, FilmOptions(), None, progress=False)
     assert (folder / "film.mp4").read_bytes() == b"an earlier film"
     assert not list(folder.glob(".film*"))
 
@@ -552,7 +554,7 @@ def test_a_film_is_whole_or_not_there(folder: Path, monkeypatch: pytest.MonkeyPa
 def test_films_have_a_picture_for_each_snapshot_that_is_far_from_others(folder: Path) -> None:
     import imageio_ffmpeg
 
-    film = animate.animate(folder, Wish(start=0.6, rate=10.0), None, progress=False)
+    film = animate.animate(folder, FilmOptions(start=0.6, rate=10.0), None, progress=False)
     assert film.n_pictures == 9 and not film.smooth
     # Snapshots 0.05 s apart, shown 0.1 s each.
     assert film.slowed == pytest.approx(2.0)
@@ -570,8 +572,8 @@ def test_films_have_a_picture_for_each_snapshot_that_is_far_from_others(folder: 
 
 
 def test_a_film_is_smooth_where_snapshots_are_near(recorded: Callable[..., Path]) -> None:
-    wish = Wish(0.3, 0.4, every=1.0)
-    film = animate.animate(recorded(20), wish, None, progress=False)
+    options = FilmOptions(0.3, 0.4, every=1.0)
+    film = animate.animate(recorded(20), options, None, progress=False)
     assert film.smooth and film.n_pictures == 9
     # A metre a picture, 25 pictures a second: 25 m/s of 83.3 m/s.
     assert film.slowed == pytest.approx(83.333 / 25.0, rel=1e-3)
@@ -584,14 +586,14 @@ def test_without_its_library_a_film_says_what_is_missing(
     monkeypatch.delitem(animate.sys.modules, "catenary.postproc.film.video", raising=False)
     monkeypatch.delattr("catenary.postproc.film.video", raising=False)
     with pytest.raises(InputError, match=r"imageio_ffmpeg.*pip install 'catenary\[film\]'"):
-        animate.animate(folder, Wish(), None, progress=False)
+        animate.animate(folder, FilmOptions(), None, progress=False)
     assert not (folder / "film.mp4").exists()
 
 
 def _drawn_droppers(folder: Path, view: View) -> tuple[Any, int, np.ndarray]:
     """The run, the record of its fourth snapshot, and which droppers are drawn there, by their
     forces, which are set to their numbers."""
-    with pictures_of(folder, Wish(view=view, width=400.0)) as made:
+    with pictures_of(folder, FilmOptions(view=view, width=400.0)) as made:
         data, frame = made._scenery.data, made._snapshots.frame(0.15)
         row = data.row_at(0.15)
         beside = made._scenery.beside(0.15, frame)

@@ -9,7 +9,7 @@ import h5py
 import numpy as np
 import pytest
 
-from catenary.postproc.channels.line_record import GZIP, LineRecord, from_table, says
+from catenary.postproc.channels.line_record import GZIP, LineRecord, from_table, record_words
 from catenary.postproc.evaluate import statistics
 from catenary.postproc.read.results import Results
 from catenary.postproc.record.recorder import Recorder
@@ -137,12 +137,12 @@ def test_extremes_of_a_broken_run_are_those_of_its_rows(tmp_path: Path, make_mar
 def test_a_record_is_told_in_words_and_kept_in_the_file() -> None:
     both = LineRecord(every=5, window=(300.0, 200.0), compression=GZIP, by_size=True)
     assert from_table(both.as_table()) == both
-    assert says(both, 1e-3) == (
+    assert record_words(both, 1e-3) == (
         "recorded every 5 ms within 300 m behind and 200 m ahead of the train; extremes are kept "
         "of every step; compressed (chosen by size)"
     )
-    assert says(LineRecord(), 1e-3) == "recorded at every step"
-    assert says(LineRecord(names=()), 1e-3).startswith("not recorded")
+    assert record_words(LineRecord(), 1e-3) == "recorded at every step"
+    assert record_words(LineRecord(names=()), 1e-3).startswith("not recorded")
 
 
 def test_a_closed_file_has_no_room_left_behind_its_end(whole: Path) -> None:

@@ -18,9 +18,9 @@ from matplotlib.colors import to_rgb
 
 from catenary.base.errors import InputError
 from catenary.postproc.film.film_data import film_data
+from catenary.postproc.film.options import View
 from catenary.postproc.film.scenery import MOTIONS
 from catenary.postproc.film.snapshots import Snapshots
-from catenary.postproc.film.wish import View
 from catenary.postproc.paraview import open_in_paraview
 from catenary.postproc.read.results import Results
 from catenary.postproc.record.snapshots.fields import FieldRecorder

@@ -13,7 +13,7 @@ from stitched_line import stitched_line
 
 from catenary.base.errors import RunBroken
 from catenary.solver.linear import unit_responses
-from catenary.solver.linear.pieces import factor_pieces, pieces
+from catenary.solver.linear.pieces import operator_pieces, pieces
 from catenary.solver.problem.problem import BOUNDED, Damping, Problem, WindowChoice
 from catenary.solver.window import moving_window
 
@@ -109,7 +109,7 @@ def test_a_piece_where_no_window_can_end_breaks_the_run_in_words(
 ) -> None:
     problem, mesh = scene(0.1)
     monkeypatch.setattr(
-        factor_pieces, "softened", lambda whole, _: np.zeros(len(whole), dtype=bool)
+        operator_pieces, "softened", lambda whole, _: np.zeros(len(whole), dtype=bool)
     )
     march, _ = start_march(problem, mesh)
     with march:

@@ -31,8 +31,8 @@ import numpy as np
 from catenary.base.errors import InputError, NotConverged, RunBroken
 from catenary.mbs.rigid.bodies import Motion
 from catenary.mbs.rigid.kinematics import Quantity
+from catenary.mbs.rigid.step_solvers import StepSolver, step_solver
 from catenary.mbs.rigid.system import System
-from catenary.mbs.time_steps.step_solvers import StepSolver, step_solver
 
 # Generalised forces (6 n, s) of unit forces at a motion.
 Ways = Callable[[Motion], np.ndarray]

@@ -16,7 +16,7 @@ class View(StrEnum):
 
 
 @dataclass(frozen=True)
-class Wish:
+class FilmOptions:
     """Choices for a film; None leaves one to the run.
 
     Attributes

@@ -1,1 +1,0 @@
-"""Sets of scenes of one case, evaluated together: directions, speeds, trains, errors."""

@@ -1,1 +1,0 @@
-"""Time integration of rigid bodies with constraints."""
