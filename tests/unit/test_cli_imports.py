@@ -103,9 +103,10 @@ try:
 except SystemExit as end:
     print(json.dumps([end.code, begun, list(sys.modules)]))
 """
-# What only a report needs, and what nothing of a run does.
-REPORTED = {"matplotlib", "PIL", "jinja2", "scipy.signal"}
-NEVER = {"matplotlib.pyplot"}
+# What only a report needs, with SciPy's larger parts, which take long to load; what no run needs.
+LARGE = {f"scipy.{name}" for name in ("integrate", "interpolate", "optimize", "spatial", "special")}
+REPORTED = {"matplotlib", "PIL", "jinja2", "scipy.signal", "scipy.stats", *LARGE}
+NEVER = {"gmsh", "matplotlib.pyplot", "meshio", "pandas", "xarray"}
 # What a march by the usual scheme has no need of: other schemes and pantographs, results of others.
 OF_OTHERS = {
     "catenary.cases.run.excited_run",
