@@ -60,7 +60,7 @@ BESIDE_LINT = @mkdir -p build; $(MAKE) --no-print-directory lint >build/lint.log
     [ $$tested = 0 ] && [ $$linted = 0 ]
 
 check: setup ## lint, and the unit tests that start no process; under a minute
-	$(call BESIDE_LINT,$(PYTEST_SHARED) -q -m "not process" tests/unit)
+	$(call BESIDE_LINT,$(PYTEST_SHARED) -q -m "not process and not study" tests/unit)
 
 test: setup ## lint and tests, also on several ranks
 	$(call BESIDE_LINT,$(PYTEST_SHARED) -m "not study" tests/regression tests/verification tests/unit)
@@ -68,6 +68,7 @@ test: setup ## lint and tests, also on several ranks
 
 test-studies: setup ## whole studies: hard cases, stability, accuracy, waves, the paper's; random scenes
 	$(PYTEST_SHARED) -m "study and not long" tests/regression tests/verification tests/unit
+	timeout 1200 mpirun -n 3 $(MPI_SHARED) $(MPI_PYTEST) -m study --ignore=tests/mpi/test_rank_counts.py tests/mpi
 
 test-unit: setup ## tests of single parts
 	$(PYTEST_SHARED) tests/unit

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import gc
 import logging
 import os
@@ -10,7 +11,6 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 from unittest import mock
 
 import pytest
@@ -75,28 +75,36 @@ def _log_without_handlers() -> None:
     log.setLevel(logging.NOTSET)
 
 
-@pytest.fixture(scope="module")
-def quick_reports() -> Iterator[None]:
-    """What reports of this process do without in a file of tests that looks at no picture of a run
-    and damages no result: pictures of runs are drawn and not painted, those of studies are; and a
-    result is examined in this process and not in one of its own, which HDF5 may crash.
-    """
+@contextlib.contextmanager
+def _quick_reports() -> Iterator[None]:
+    """Draw pictures and paint none; examine results in this process and not in one of its own."""
     from pixels import FIGURES, PAINTERS
 
     from catenary.postproc.read import guard
-    from catenary.postproc.report import report
 
-    painted, child = report._painted, guard._child
-
-    def not_painted(*words: Any) -> dict[str, bytes]:
-        with mock.patch.multiple(FIGURES, **PAINTERS):
-            return painted(*words)
+    child = guard._child
 
     def examined_here(words: list[str], limit: float) -> subprocess.CompletedProcess[bytes]:
         if words[:2] != ["-m", guard.__name__]:
             return child(words, limit)
         return subprocess.CompletedProcess(words, 0, guard.examine(Path(words[2])).encode(), b"")
 
-    with mock.patch.object(report, "_painted", not_painted):
-        with mock.patch.object(guard, "_child", examined_here):
-            yield
+    with (
+        mock.patch.multiple(FIGURES, **PAINTERS),
+        mock.patch.object(guard, "_child", examined_here),
+    ):
+        yield
+
+
+@pytest.fixture(scope="module")
+def quick_reports() -> Iterator[None]:
+    """For a file of tests that looks at no picture and damages no result, which HDF5 may crash."""
+    with _quick_reports():
+        yield
+
+
+@pytest.fixture
+def quick_report() -> Iterator[None]:
+    """For a single test."""
+    with _quick_reports():
+        yield

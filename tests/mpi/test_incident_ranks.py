@@ -14,6 +14,7 @@ import pytest
 from mpi4py import MPI
 from rank_histories import on_one
 from small_lines import bare_wires
+from studies import few
 
 from catenary.base.parallel import on_root
 from catenary.cases.run.scene_mesh import mesh_of
@@ -118,7 +119,9 @@ def incidents(at_cut: float, share: float = 1.0) -> tuple[LineIncident, ...]:
     )
 
 
-@pytest.mark.parametrize("scheme", ["one_solve", "fixed_point"])
+@pytest.mark.parametrize(
+    "scheme", ["one_solve", pytest.param("fixed_point", marks=pytest.mark.study)]
+)
 def test_all_ranks_give_the_answer_of_one(
     case: tuple[Problem, LineMesh, float], scheme: str
 ) -> None:
@@ -171,7 +174,7 @@ def uninterrupted(case: tuple[Problem, LineMesh, float]) -> Watching:
     return on_one(lambda comm: run(comm, problem, mesh, kept=KEPT))
 
 
-@pytest.mark.parametrize("at", KEPT)
+@pytest.mark.parametrize("at", few(KEPT, 500, 800))
 def test_a_run_goes_on_with_another_number_of_ranks(
     case: tuple[Problem, LineMesh, float], uninterrupted: Watching, at: int
 ) -> None:

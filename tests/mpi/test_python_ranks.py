@@ -21,7 +21,9 @@ SAME = 1e-9
 
 @pytest.fixture(scope="module")
 def scene() -> catenary.Scene:
-    return catenary.load("en50318_2002").replace(dict(map(parse_assignment, SHORT_SCENE)))
+    """With steps of 4 ms, some five hundred."""
+    changes = dict(map(parse_assignment, (*SHORT_SCENE, "numerics.dt_s=4e-3")))
+    return catenary.load("en50318_2002").replace(changes)
 
 
 def agree(value: Any) -> bool:

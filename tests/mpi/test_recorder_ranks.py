@@ -124,7 +124,7 @@ def checkpoint(step: int) -> dict | None:
 
 
 @pytest.mark.parametrize("share", SHARES)
-@pytest.mark.parametrize("flush_every", [1, 40, 500])
+@pytest.mark.parametrize("flush_every", [pytest.param(1, marks=pytest.mark.study), 40, 500])
 def test_all_channels_reach_the_file(folder: Path, share: Share, flush_every: int) -> None:
     recorder = Recorder(
         COMM, folder / "run.h5", make_header(), flush_every=flush_every, energy_every=10

@@ -81,7 +81,9 @@ def test_dampers_of_slack_droppers_act_on_all_ranks(case: tuple[Problem, LineMes
     assert max(found.values()) < TOLERANCE
 
 
-@pytest.mark.parametrize("integrator", ["hht", "generalized_alpha"])
+@pytest.mark.parametrize(
+    "integrator", [pytest.param("hht", marks=pytest.mark.study), "generalized_alpha"]
+)
 def test_methods_with_numerical_damping_in_parallel(
     case: tuple[Problem, LineMesh], integrator: str
 ) -> None:
@@ -92,7 +94,9 @@ def test_methods_with_numerical_damping_in_parallel(
     assert max(found.values()) < TOLERANCE
 
 
-@pytest.mark.parametrize("scheme", ["one_solve", "fixed_point"])
+@pytest.mark.parametrize(
+    "scheme", ["one_solve", pytest.param("fixed_point", marks=pytest.mark.study)]
+)
 def test_steps_that_adapt_do_so_on_all_ranks(case: tuple[Problem, LineMesh], scheme: str) -> None:
     """Decisions are rank 0's. A size that round-off decides would show as an error of the order of
     the tolerance, far above what is allowed."""

@@ -56,6 +56,7 @@ def claimed() -> dict[tuple[str, int], dict[str, tuple[float, int]]]:
     return found
 
 
+@pytest.mark.study
 def test_the_windows_of_en50318_miss_what_its_readme_says(tmp_path: Path) -> None:
     """One run a mesh serves all windows; uplifts, which are of the whole run, are left to one."""
     claims = claimed()

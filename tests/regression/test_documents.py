@@ -73,8 +73,15 @@ def is_run(block: Block) -> bool:
 RUN_DOCUMENTS = [
     path for path in DOCUMENTS if path not in OWN_TEST and any(map(is_run, blocks_of(read(path))))
 ]
+# Of these pages a block of those that are run takes long.
+WITH_LONG_BLOCKS = [
+    path for path in RUN_DOCUMENTS if any(b.is_study and is_run(b) for b in blocks_of(read(path)))
+]
 STUDIES = [
-    (path, block) for path in DOCUMENTS for block in blocks_of(read(path)) if block.verb == "study"
+    (path, block)
+    for path in DOCUMENTS
+    for block in blocks_of(read(path))
+    if block.is_study and not is_run(block)
 ]
 
 
@@ -133,7 +140,7 @@ class Workshop:
         if block.verb == "after":
             for folder in block.rest.split():
                 self.make(self.makers[folder])
-        elif block.verb in ("run", "study"):
+        elif block.verb == "run" or (block.is_study and not is_run(block)):
             for command in block.commands():
                 self.make(command)
         elif block.verb in ("edit", "append"):
@@ -151,9 +158,8 @@ class Workshop:
         return wrong
 
 
-@pytest.fixture(scope="module")
-def workshop(tmp_path_factory: pytest.TempPathFactory) -> Workshop:
-    folder = tmp_path_factory.mktemp("documents")
+def workshop_in(folder: Path) -> Workshop:
+    """A folder as users have it after they have cloned the repository."""
     (folder / "cases").symlink_to(ROOT / "cases")
     (folder / ".venv").symlink_to(sys.prefix)
     program = folder / "bin" / "catenary"
@@ -162,9 +168,19 @@ def workshop(tmp_path_factory: pytest.TempPathFactory) -> Workshop:
     program.chmod(0o755)
     blocks = [block for document in DOCUMENTS for block in blocks_of(read(document))]
     shown = [one.command for block in blocks if block.has_prompt for one in block.shown()]
-    run = [one for block in blocks if block.verb in ("run", "study") for one in block.commands()]
+    run = [
+        one
+        for block in blocks
+        if block.verb == "run" or (block.is_study and not block.has_prompt)
+        for one in block.commands()
+    ]
     makers = {out_of(command): command for command in (*shown, *run)}
     return Workshop(folder, makers)
+
+
+@pytest.fixture(scope="module")
+def workshop(tmp_path_factory: pytest.TempPathFactory) -> Workshop:
+    return workshop_in(tmp_path_factory.mktemp("documents"))
 
 
 @pytest.mark.timeout(600)
@@ -177,11 +193,30 @@ def workshop(tmp_path_factory: pytest.TempPathFactory) -> Workshop:
     ids=str,
 )
 def test_what_is_shown_is_what_happens(document: Path, workshop: Workshop) -> None:
+    """Blocks that take long are left out, unless the whole page does."""
+    whole = document in LONGEST
+    run_page(
+        document, [block for block in run_blocks(document) if whole or not block.is_study], workshop
+    )
+
+
+@pytest.mark.study
+@pytest.mark.timeout(600)
+@pytest.mark.parametrize("document", WITH_LONG_BLOCKS, ids=str)
+def test_what_takes_long_is_shown_as_it_is(document: Path, tmp_path: Path) -> None:
+    """With the other blocks of the page, whose files it may need, in a folder of its own."""
+    run_page(document, run_blocks(document), workshop_in(tmp_path))
+
+
+def run_blocks(document: Path) -> list[Block]:
+    return [block for block in blocks_of(read(document)) if is_run(block)]
+
+
+def run_page(document: Path, blocks: list[Block], workshop: Workshop) -> None:
     names: dict[str, Any] = {}
     wrong = [
         f"{document}:{block.line}\n{text}"
-        for block in blocks_of(read(document))
-        if is_run(block)
+        for block in blocks
         for text in workshop.work_on(block, names)
     ]
     assert not wrong, "\n\n".join(wrong)
@@ -200,7 +235,7 @@ def test_what_takes_long_runs_too(document: Path, block: Block, workshop: Worksh
 @pytest.mark.parametrize("document", DOCUMENTS, ids=str)
 def test_every_block_is_run_or_says_why_not(document: Path) -> None:
     for block in blocks_of(read(document)):
-        said = block.verb == "study" or re.match(r"not run: .{10,}", block.note)
+        said = block.is_study or re.match(r"not run: .{10,}", block.note)
         own = document in OWN_TEST and block.kind == "python"
         assert not block.is_code or is_run(block) or said or own, f"{document}:{block.line}"
 

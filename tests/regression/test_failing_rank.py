@@ -50,7 +50,7 @@ print("went on")
     assert "went on" not in done.stdout
 
 
-@pytest.mark.parametrize("failing", [0, 1])
+@pytest.mark.parametrize("failing", [pytest.param(0, marks=pytest.mark.study), 1])
 def test_an_unforeseen_error_in_a_step_of_one_rank_ends_the_run(
     failing: int, tmp_path: Path
 ) -> None:

@@ -20,6 +20,7 @@ import numpy as np
 import pytest
 from damaging import as_json, flip, raw_ranges, spoil_chunk, unseal
 from program import catenary, short_run
+from studies import few
 from verb_runner import CliRunner
 
 from catenary.base.errors import InputError
@@ -92,7 +93,9 @@ def ends(folder: Path, before: dict[str, Any], caplog: pytest.LogCaptureFixture)
 
 
 @pytest.mark.parametrize("where", ["tables", "anywhere"])
-@pytest.mark.parametrize("which", ["finished", "interrupted"])
+@pytest.mark.parametrize(
+    "which", [pytest.param("finished", marks=pytest.mark.study), "interrupted"]
+)
 def test_a_flipped_bit_is_told_or_changes_nothing(
     which: str,
     where: str,
@@ -182,7 +185,18 @@ NOT_CONTINUED: dict[str, tuple[Callable[[h5py.File], None], str]] = {
 }
 
 
-@pytest.mark.parametrize("how", NOT_CONTINUED)
+@pytest.mark.parametrize(
+    "how",
+    few(
+        NOT_CONTINUED,
+        "a line channel gone",
+        "state of other motion",
+        "other line",
+        "state NaN",
+        "no rows",
+        "times without end",
+    ),
+)
 def test_what_cannot_be_is_not_continued(how: str, runs: dict[str, Path], tmp_path: Path) -> None:
     out = tmp_path / "out"
     shutil.copytree(runs["interrupted"], out)

@@ -56,7 +56,13 @@ def test_rows_are_whole_and_show_what_happened(uninterrupted: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("steps", "ranks", "ranks_of_restart"), [(300, 1, 1), (600, 1, 2), (1000, 2, 1), (1700, 1, 1)]
+    ("steps", "ranks", "ranks_of_restart"),
+    [
+        (300, 1, 1),
+        pytest.param(600, 1, 2, marks=pytest.mark.study),
+        pytest.param(1000, 2, 1, marks=pytest.mark.study),
+        pytest.param(1700, 1, 1, marks=pytest.mark.study),
+    ],
 )
 def test_an_interrupted_run_is_continued(
     steps: int, ranks: int, ranks_of_restart: int, tmp_path: Path, uninterrupted: Path

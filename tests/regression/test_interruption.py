@@ -48,7 +48,10 @@ def uninterrupted(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "out"
 
 
-@pytest.mark.parametrize(("number", "continued"), [(signal.SIGINT, True), (signal.SIGTERM, False)])
+@pytest.mark.parametrize(
+    ("number", "continued"),
+    [pytest.param(signal.SIGINT, True, marks=pytest.mark.study), (signal.SIGTERM, False)],
+)
 def test_a_signal_closes_the_file_and_restart_finishes_the_run(
     number: signal.Signals, continued: bool, tmp_path: Path, uninterrupted: Path
 ) -> None:
@@ -81,8 +84,8 @@ def test_a_signal_closes_the_file_and_restart_finishes_the_run(
     assert "is done; there is nothing to continue" in refused.stderr
 
 
-@needs_mpirun
-def test_a_state_of_an_earlier_version_is_refused(tmp_path: Path) -> None:
+@pytest.mark.parametrize("ranks", [1, pytest.param(2, marks=[needs_mpirun, pytest.mark.study])])
+def test_a_state_of_an_earlier_version_is_refused(ranks: int, tmp_path: Path) -> None:
     out = tmp_path / "out"
     words = [*short_run(out, FINE, SHORT_FLUSHES), "--", "-march_ts_max_steps", "150"]
     assert catenary(*words, cwd=tmp_path).code == 1
@@ -91,18 +94,18 @@ def test_a_state_of_an_earlier_version_is_refused(tmp_path: Path) -> None:
         for slot in file["checkpoint"].values():
             del slot["row_of_node"]
     before = (out / "run.h5").read_bytes()
-    for ranks in (1, 2):
-        refused = catenary("restart", str(out), cwd=tmp_path, ranks=ranks)
-        assert refused.code == 2
-        (sentence,) = refused.sentences
-        assert "earlier version" in sentence and "start the run anew" in sentence
-        assert (out / "run.h5").read_bytes() == before
+    refused = catenary("restart", str(out), cwd=tmp_path, ranks=ranks)
+    assert refused.code == 2
+    (sentence,) = refused.sentences
+    assert "earlier version" in sentence and "start the run anew" in sentence
+    assert (out / "run.h5").read_bytes() == before
 
 
 @needs_mpirun
+@pytest.mark.study
 @pytest.mark.parametrize(
     ("ranks", "ranks_of_restart", "steps"),
-    [pytest.param(1, 2, 3900, marks=pytest.mark.study), (2, 1, 150)],
+    [(1, 2, 3900), (2, 1, 150)],
 )
 def test_any_number_of_ranks_continues_a_run(
     ranks: int, ranks_of_restart: int, steps: int, tmp_path: Path, uninterrupted: Path
@@ -120,6 +123,7 @@ def test_any_number_of_ranks_continues_a_run(
     assert_same_histories(out, uninterrupted)
 
 
+@pytest.mark.study
 @needs_mpirun
 @pytest.mark.parametrize(
     "number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.study)]
@@ -178,6 +182,7 @@ def test_a_killed_run_is_readable_and_can_be_continued(
     assert_same_histories(out, uninterrupted)
 
 
+@pytest.mark.study
 def test_a_file_that_may_not_grow_ends_the_run_with_a_sentence(tmp_path: Path) -> None:
     out = tmp_path / "out"
     script = tmp_path / "limited.py"
@@ -209,7 +214,8 @@ def can_mount() -> bool:
 
 @pytest.mark.skipif(not can_mount(), reason="no small disk can be mounted")
 @pytest.mark.parametrize(
-    ("room", "ranks"), [("300k", 1), pytest.param("2500k", 2, marks=needs_mpirun), ("4600k", 1)]
+    ("room", "ranks"),
+    [("300k", 1), pytest.param("2500k", 2, marks=[needs_mpirun, pytest.mark.study]), ("4600k", 1)],
 )
 def test_a_full_disk_ends_the_run_with_a_sentence(room: str, ranks: int, tmp_path: Path) -> None:
     """A disk that is full from the start, soon, and when hardly the report finds room."""

@@ -57,6 +57,7 @@ def test_a_run_goes_on_to_a_later_end(whole: Path, begun: Path, tmp_path: Path) 
     assert_same_tables(out, whole)
 
 
+@pytest.mark.study
 def test_a_file_without_checksums_goes_on_as_well(begun: Path, tmp_path: Path) -> None:
     out = tmp_path / "run"
     shutil.copytree(begun, out)
@@ -68,6 +69,7 @@ def test_a_file_without_checksums_goes_on_as_well(begun: Path, tmp_path: Path) -
         assert results.damage == [] and results.outcome == "interrupted"
 
 
+@pytest.mark.study
 @pytest.mark.skipif(MPIRUN is None, reason="needs mpirun")
 def test_one_that_is_interrupted_after_that_goes_on_on_other_ranks(
     whole: Path, begun: Path, tmp_path: Path

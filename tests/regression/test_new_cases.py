@@ -6,11 +6,12 @@ from pathlib import Path
 
 import pytest
 from program import assert_sound, catenary
+from studies import few
 
 from catenary.cases.scene.starter import BEGINNINGS
 
 
-@pytest.mark.parametrize("kind", BEGINNINGS)
+@pytest.mark.parametrize("kind", few(BEGINNINGS, "simple", "single", "conductor_rail"))
 def test_a_new_case_runs_when_shortened(tmp_path: Path, kind: str) -> None:
     made = catenary("new", "my_line", "--topology", kind, cwd=tmp_path)
     assert made.code == 0, made.stderr

@@ -90,10 +90,13 @@ def listed(text: str) -> set[str]:
     "options",
     [
         ["-march_pc_type", "cholesky"],
-        ["-march_pc_type", "lu"],
-        ["-march_pc_type", "lu", "-march_pc_factor_mat_ordering_type", "rcm"],
+        pytest.param(["-march_pc_type", "lu"], marks=pytest.mark.study),
+        pytest.param(
+            ["-march_pc_type", "lu", "-march_pc_factor_mat_ordering_type", "rcm"],
+            marks=pytest.mark.study,
+        ),
         ["-march_ksp_type", "cg", "-march_pc_type", "jacobi"],
-        ["-march_pc_type", "ilu"],
+        pytest.param(["-march_pc_type", "ilu"], marks=pytest.mark.study),
     ],
 )
 def test_another_solver_gives_the_same_answer(
@@ -170,6 +173,7 @@ def test_an_iteration_that_is_too_short_breaks_the_run(tmp_path: Path) -> None:
     assert "the linear solver did not converge" in sentence
 
 
+@pytest.mark.study
 @pytest.mark.skipif(MPIRUN is None, reason="there is no mpirun")
 def test_several_ranks_show_the_solver_that_is_used_and_list_their_messages(tmp_path: Path) -> None:
     options = ["-march_ksp_view", "-log_view", *EARLY]
@@ -180,6 +184,7 @@ def test_several_ranks_show_the_solver_that_is_used_and_list_their_messages(tmp_
     assert listed(text) == set(EVENTS) - ONE_BY_ONE - OF_BLOCKS
 
 
+@pytest.mark.study
 @pytest.mark.skipif(MPIRUN is None, reason="there is no mpirun")
 def test_options_of_the_ranks_own_solvers_are_obeyed(plain: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 from measuring import check
 from paper_pantograph import data
 from program import catenary
@@ -22,6 +23,7 @@ def run(folder: Path, *words: str) -> dict[str, Any]:
     return dict(json.loads((folder / "summary.json").read_text()))
 
 
+@pytest.mark.study
 def test_seven_bodies_run_as_two_masses_whose_lift_falls_as_theirs_does(tmp_path: Path) -> None:
     """Mean, deviation and extremes to what the mass changes by over the heights of the run.
 

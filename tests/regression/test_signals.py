@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from program import MPIRUN, Done, assert_sound, catenary, python, short_run, started
+from studies import few
 
 # The program, which waits at a place until a file says that it may go on.
 WAITING = """
@@ -54,13 +55,17 @@ def signalled(
         return program.end()
 
 
+# Fewer steps where a march is not what is signalled.
+COARSE = "numerics.dt_s=4e-3"
 RUN = "catenary.cases.run"
 MESH = (RUN, "runner", "mesh_of")
 EQUILIBRIUM = ("catenary.solver.statics", "line_at_rest", "find_form")
 REPORT = ("catenary.postproc.report", "report", "write_report")
 
 
-@pytest.mark.parametrize("number", [signal.SIGHUP, signal.SIGXCPU])
+@pytest.mark.parametrize(
+    "number", [signal.SIGHUP, pytest.param(signal.SIGXCPU, marks=pytest.mark.study)]
+)
 def test_before_the_march(number: signal.Signals, tmp_path: Path) -> None:
     done = signalled(tmp_path, MESH, short_run(tmp_path / "out"), number)
     assert done.code == 1
@@ -72,7 +77,7 @@ def test_before_the_march(number: signal.Signals, tmp_path: Path) -> None:
 
 def test_after_the_march(tmp_path: Path) -> None:
     out = tmp_path / "out"
-    done = signalled(tmp_path, REPORT, short_run(out), signal.SIGUSR1)
+    done = signalled(tmp_path, REPORT, short_run(out, COARSE), signal.SIGUSR1)
     assert done.code == 1
     (sentence,) = done.sentences
     assert f"interrupted by SIGUSR1 while the report was written; {out / 'run.h5'} is" in sentence
@@ -91,7 +96,7 @@ VERBS = {
 }
 
 
-@pytest.mark.parametrize("verb", VERBS)
+@pytest.mark.parametrize("verb", few(VERBS, "check"))
 def test_other_verbs(verb: str, tmp_path: Path) -> None:
     place, words = VERBS[verb]
     done = signalled(tmp_path, place, words, signal.SIGTERM)
@@ -104,7 +109,11 @@ def test_other_verbs(verb: str, tmp_path: Path) -> None:
 @needs_mpirun
 @pytest.mark.parametrize(
     ("place", "to_rank"),
-    [(MESH, 1), pytest.param(EQUILIBRIUM, 0, marks=pytest.mark.study), (REPORT, 0)],
+    [
+        (MESH, 1),
+        pytest.param(EQUILIBRIUM, 0, marks=pytest.mark.study),
+        pytest.param(REPORT, 0, marks=pytest.mark.study),
+    ],
     ids=["mesh", "rest", "report"],
 )
 def test_a_signal_to_one_of_several_ranks(
@@ -124,6 +133,7 @@ def test_a_signal_to_one_of_several_ranks(
         assert not out.exists()
 
 
+@pytest.mark.study
 @needs_mpirun
 def test_a_signal_to_mpirun_before_the_march(tmp_path: Path) -> None:
     # Open MPI hands it on, and kills what still runs a second after.
@@ -138,7 +148,7 @@ def test_nohup_is_respected(tmp_path: Path) -> None:
     out = tmp_path / "out"
     script = tmp_path / "script.py"
     script.write_text(WAITING.format(package=MESH[0], module=MESH[1], name=MESH[2]))
-    with started(["nohup", *python(str(script), *short_run(out))], tmp_path) as program:
+    with started(["nohup", *python(str(script), *short_run(out, COARSE))], tmp_path) as program:
         program.wait_for((tmp_path / "waiting").exists)
         program.send(signal.SIGHUP)
         (tmp_path / "go_on").touch()

@@ -30,6 +30,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.study
 @pytest.mark.process
 @pytest.mark.timeout(280)
 def test_no_page_loads_anything_from_the_network(site: Path) -> None:

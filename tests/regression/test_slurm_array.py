@@ -96,7 +96,10 @@ def test_tasks_make_the_runs_and_the_last_job_the_table(programs: Path, tmp_path
     assert not (programs / "calls").exists()
 
 
-@pytest.mark.parametrize(("restarts", "calls"), [("0", "scontrol requeue 41_1\n"), ("3", "")])
+@pytest.mark.parametrize(
+    ("restarts", "calls"),
+    [("0", "scontrol requeue 41_1\n"), pytest.param("3", "", marks=pytest.mark.study)],
+)
 def test_a_task_that_is_told_to_end_asks_to_be_started_again(
     restarts: str, calls: str, programs: Path, tmp_path: Path
 ) -> None:

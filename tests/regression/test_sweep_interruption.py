@@ -17,7 +17,9 @@ def words(out: Path) -> list[str]:
     return ["sweep", "en50318_2002", "-o", str(out), "--vary", vary, "--set", *SHORT_SCENE]
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
+@pytest.mark.parametrize(
+    "number", [signal.SIGINT, pytest.param(signal.SIGKILL, marks=pytest.mark.study)]
+)
 def test_a_stopped_sweep_is_continued_by_the_same_command(
     number: signal.Signals, tmp_path: Path
 ) -> None:

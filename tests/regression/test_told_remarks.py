@@ -6,12 +6,14 @@ import csv
 import json
 from pathlib import Path
 
+import pytest
 from program import SHORT_SCENE, catenary
 
 STIFF = "contact.stiffness_N_per_m=1e8"
 SAYS = "does not resolve its hops"
 
 
+@pytest.mark.study
 def test_remarks_are_told_wherever_results_are(tmp_path: Path) -> None:
     run = tmp_path / "run"
     ended = catenary(
@@ -53,6 +55,7 @@ def test_a_study_of_accuracy_names_the_levels_that_a_remark_is_of(tmp_path: Path
             assert any(f"dt {level}: " in line and step in line for line in text.splitlines())
 
 
+@pytest.mark.study
 def test_hard_cases_tell_what_their_marches_tell(tmp_path: Path) -> None:
     done = catenary("hard", "lost_over_spans", "--short", "-o", "hard", cwd=tmp_path)
     assert done.code == 0, done.stdout

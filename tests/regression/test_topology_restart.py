@@ -31,7 +31,11 @@ def words(case: str, out: Path) -> list[str]:
 
 
 @pytest.mark.parametrize(
-    ("case", "ranks"), [("overlap", 2), pytest.param("dc_twin", 1, marks=pytest.mark.study)]
+    ("case", "ranks"),
+    [
+        pytest.param("overlap", 2, marks=pytest.mark.study),
+        pytest.param("dc_twin", 1, marks=pytest.mark.study),
+    ],
 )
 def test_a_run_over_several_contact_wires_is_continued(
     case: str, ranks: int, tmp_path: Path

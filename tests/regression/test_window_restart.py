@@ -33,8 +33,8 @@ BEFORE, SPAN = {"exact": 6, "tolerance": 6, "spans": 130}, 54.0
 INTERRUPTED = [
     ("exact", 1, 2, 550),
     pytest.param("tolerance", 2, 3, None, marks=pytest.mark.study),
-    ("spans", 3, 1, 850),
-    ("spans", 1, 1, None),
+    pytest.param("spans", 3, 1, 850, marks=pytest.mark.study),
+    pytest.param("spans", 1, 1, None, marks=pytest.mark.study),
 ]
 
 

@@ -13,6 +13,7 @@ import h5py
 import numpy as np
 import pytest
 from program import catenary
+from studies import few
 
 from catenary.postproc.film.snapshots import Snapshots
 from catenary.postproc.read.results import Results
@@ -50,7 +51,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
     return made
 
 
-@pytest.mark.parametrize("window", WINDOWS)
+@pytest.mark.parametrize("window", few(WINDOWS, "spans"))
 def test_snapshots_show_what_moves(window: str, run: Run) -> None:
     """No wave has come beyond the spans of a window, 324 m ahead and 270 m behind, within 0.8 s,
     122 m. Short waves are faster, and damping ends them: there they are less than single precision
@@ -94,7 +95,7 @@ def test_channels_of_the_line_are_recorded_where_it_moves(run: Run) -> None:
             np.testing.assert_array_equal(part.extremes(name), every.extremes(name))
 
 
-@pytest.mark.parametrize("window", WINDOWS)
+@pytest.mark.parametrize("window", few(WINDOWS, "spans"))
 def test_a_run_that_is_interrupted_goes_on_with_its_snapshots(
     window: str, run: Run, tmp_path: Path
 ) -> None:

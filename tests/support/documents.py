@@ -9,7 +9,8 @@ printed digit, a whole number exactly. A comment before a block tells what the t
 ``<!-- test: edit FILE -->``      put the block's TOML keys into this file, in place of those there
 ``<!-- test: append FILE -->``    append the block to this file
 ``<!-- test: words -->``          compare words but no numbers, which depend on the machine
-``<!-- test: study -->``          run the block with the studies (``make test-studies``) only
+``<!-- test: study -->``          run the block with the studies (``make test-studies``) only; one
+                                  of the notes above may follow: ``study after FOLDER``
 ``<!-- test: not run: WHY -->``   it is not run, and the site says why
 
 Blocks of Python are run too, those of a document one after the other with the same names. Commands
@@ -50,14 +51,19 @@ class Block:
     line: int
 
     @property
+    def is_study(self) -> bool:
+        """Whether it takes so long that it is run with the studies only."""
+        return self.note.partition(" ")[0] == "study"
+
+    @property
     def verb(self) -> str:
-        """First word of the note, empty if there is none."""
-        return self.note.partition(" ")[0]
+        """First word of the note behind ``study``, empty if there is none."""
+        return self.note.removeprefix("study").strip().partition(" ")[0]
 
     @property
     def rest(self) -> str:
         """The note's other words."""
-        return self.note.partition(" ")[2]
+        return self.note.removeprefix("study").strip().partition(" ")[2]
 
     @property
     def has_prompt(self) -> bool:

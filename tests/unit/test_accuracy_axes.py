@@ -98,6 +98,7 @@ def of_a_mechanism() -> Plan:
     return make_plan("ambrosio2012", parse_axes("pantograph"))
 
 
+@pytest.mark.study
 def test_a_mechanism_is_varied_as_one(of_a_mechanism: Plan) -> None:
     plan = of_a_mechanism
     (planned,) = plan.axes
@@ -125,6 +126,7 @@ def test_a_pantograph_that_is_fitted_to_itself_is_found_again(plan: Plan) -> Non
     assert scene.train.pantographs[0].name == "fitted_2"
 
 
+@pytest.mark.study
 def test_a_level_that_a_case_does_not_allow_is_told(
     of_a_mechanism: Plan, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -165,6 +165,7 @@ OF_EVALUATIONS = {
 }
 
 
+@pytest.mark.study
 def test_a_folder_is_opened_without_what_evaluates_it(ran: tuple[Path, list[Any]]) -> None:
     opened, evaluated = printed(OPENED, str(ran[0]))
     assert not (OF_EVALUATIONS | {"matplotlib", "jinja2"}) & set(opened)

@@ -99,7 +99,15 @@ def in_shell(command: str) -> subprocess.CompletedProcess[str]:
 
 
 @pytest.mark.process
-@pytest.mark.parametrize("words", ["plan en50318_2002", "list", "--help", "--version"])
+@pytest.mark.parametrize(
+    "words",
+    [
+        pytest.param("plan en50318_2002", marks=pytest.mark.study),
+        "list",
+        pytest.param("--help", marks=pytest.mark.study),
+        "--version",
+    ],
+)
 def test_an_output_that_cannot_be_written_is_told(words: str) -> None:
     done = in_shell(f"catenary {words} > /dev/full")
     assert done.returncode == 1
@@ -112,7 +120,14 @@ def test_an_error_that_nobody_can_read_keeps_its_exit_code() -> None:
 
 
 @pytest.mark.process
-@pytest.mark.parametrize("closed", ["2>&-", ">&-", "<&- >&- 2>&-"])
+@pytest.mark.parametrize(
+    "closed",
+    [
+        pytest.param("2>&-", marks=pytest.mark.study),
+        ">&-",
+        pytest.param("<&- >&- 2>&-", marks=pytest.mark.study),
+    ],
+)
 def test_streams_that_are_closed_lead_nowhere(closed: str) -> None:
     """The next file that is opened would have their numbers, and get what libraries print."""
     done = in_shell(f"catenary check en50318_2002 {closed}")

@@ -50,6 +50,16 @@ def test_blocks_and_their_notes() -> None:
     assert inline_commands(PAGE) == ["catenary run CASE -o DIR", "catenary plan"]
 
 
+def test_a_block_that_takes_long_has_its_other_note_too() -> None:
+    notes = ("study", "study after results/a results/b", "after results/a", "")
+    blocks = [
+        block for note in notes for block in blocks_of(f"<!-- test: {note} -->\n```\nx\n```\n")
+    ]
+    assert [block.is_study for block in blocks] == [True, True, False, False]
+    assert [block.verb for block in blocks] == ["", "after", "after", ""]
+    assert blocks[1].rest == "results/a results/b"
+
+
 def test_a_here_document_belongs_to_its_command() -> None:
     (block,) = blocks_of("```\n$ python - <<'EOF'\nprint(1)\nEOF\n1\n```\n")
     (shown,) = block.shown()

@@ -173,6 +173,7 @@ def test_any_name_of_a_folder_may_be_that_of_a_case(tmp_path: Path, name: str) -
     assert load_scene(write_case(tmp_path / name, "simple")).case.title == name
 
 
+@pytest.mark.study
 @pytest.mark.process
 def test_the_doctor_finds_that_runs_are_possible_here(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -203,6 +204,7 @@ def test_what_is_broken_is_told_with_a_remedy(monkeypatch: pytest.MonkeyPatch) -
     assert invoke("doctor").exit_code == 0
 
 
+@pytest.mark.study
 @pytest.mark.process
 @pytest.mark.skipif(MPIRUN is None, reason="needs mpirun")
 def test_the_doctor_is_no_verb_of_several_ranks(tmp_path: Path) -> None:

@@ -10,10 +10,12 @@ import re
 import shutil
 import tomllib
 from pathlib import Path
+from unittest import mock
 
 import html5lib
 import pypdf
 import pytest
+from pixels import FIGURES, PAINTERS
 from verb_runner import CliRunner
 
 from catenary.base.errors import InputError
@@ -58,7 +60,8 @@ def invoke(*words: str) -> str:
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("full")
     changed = (word for change in CHANGES for word in ("--set", change))
-    invoke("run", "ac_simple", "--short", "-q", "-o", str(out), *changed)
+    with mock.patch.multiple(FIGURES, **PAINTERS):  # pictures that the report replaces
+        invoke("run", "ac_simple", "--short", "-q", "-o", str(out), *changed)
     said = invoke("report", str(out), "--pdf", "--interactive").splitlines()
     assert {Path(line).name for line in said} >= {"report.html", "report.pdf", "input.toml"}
     assert all(Path(line).is_file() for line in said)
@@ -228,7 +231,7 @@ class _Recorded:
 
 
 @pytest.mark.process
-@pytest.mark.usefixtures("quick_reports")
+@pytest.mark.usefixtures("quick_report")
 def test_a_scene_of_another_version_costs_the_data_sheets_alone(
     folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -246,7 +249,7 @@ def test_a_scene_of_another_version_costs_the_data_sheets_alone(
 
 
 @pytest.mark.process
-@pytest.mark.usefixtures("quick_reports")
+@pytest.mark.usefixtures("quick_report")
 def test_the_validation_of_the_installation(folder: Path, tmp_path: Path) -> None:
     shutil.copy(folder / "run.h5", tmp_path / "run.h5")
     invoke("report", str(tmp_path))
@@ -313,7 +316,7 @@ def test_measured_errors_of_the_same_step_and_mesh(tmp_path: Path) -> None:
 
 
 @pytest.mark.process
-@pytest.mark.usefixtures("quick_reports")
+@pytest.mark.usefixtures("quick_report")
 def test_a_report_shows_measured_errors(folder: Path, tmp_path: Path) -> None:
     shutil.copy(folder / "run.h5", tmp_path / "run.h5")
     with Results(folder) as results:
@@ -341,7 +344,7 @@ def cost_study(folder: Path, case: str, on: bool) -> Path:
 
 
 @pytest.mark.process
-@pytest.mark.usefixtures("quick_reports")
+@pytest.mark.usefixtures("quick_report")
 def test_a_report_shows_measured_costs_of_effects(folder: Path, tmp_path: Path) -> None:
     shutil.copy(folder / "run.h5", tmp_path / "run.h5")
     without = words_of((folder / "report.html").read_text())

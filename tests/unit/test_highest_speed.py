@@ -198,6 +198,7 @@ def test_what_is_no_range_is_refused(words: list[str], told: str) -> None:
     assert done.exit_code == 2 and told in done.output
 
 
+@pytest.mark.study
 def test_the_command_agrees_with_runs_by_hand(tmp_path: Path) -> None:
     """The speed limit is 0.7 of the wave speed; other verdicts are those of runs."""
     words = ["speed", CASE, "--short", "--from", "300", "--to", "310", "--within", "2.5"]

@@ -206,6 +206,7 @@ def test_shifts_that_fit_as_well_are_told() -> None:
     assert 58.0 in np.round(found.other_shifts)
 
 
+@pytest.mark.study
 def test_a_long_record_is_aligned_from_its_middle_outwards() -> None:
     """20 km with a drift of 3 in 1000, which is 30 m at its ends."""
     rng, n, speed, dt = np.random.default_rng(5), 150_000, 70.0, 2e-3

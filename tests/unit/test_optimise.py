@@ -384,6 +384,7 @@ def test_a_search_knows_which_line_cannot_hang(evaluated: Any) -> None:
     assert found.found.value < found.shipped.value
 
 
+@pytest.mark.study
 def test_an_evolution_begins_with_lines_that_hang(evaluated: Any) -> None:
     """Sags that change each by itself make droppers slack: of changes of 20 mm hardly a line hangs.
     The first generation takes sums of them which leave forces at rest."""

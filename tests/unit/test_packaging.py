@@ -126,6 +126,7 @@ def installed(sources: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return target
 
 
+@pytest.mark.study
 def test_the_wheel_is_imported_from_where_it_is_installed(installed: Path, tmp_path: Path) -> None:
     modules = (
         "catenary",
@@ -167,6 +168,7 @@ def test_the_wheel_names_both_licences_and_holds_their_texts(installed: Path) ->
         assert word in (info / "licenses" / name).read_text()
 
 
+@pytest.mark.study
 def test_the_source_archive_can_build_the_wheel(sources: Path, tmp_path: Path) -> None:
     build = f"from setuptools.build_meta import build_sdist; print(build_sdist({str(tmp_path)!r}))"
     must(run(sys.executable, "-c", build, cwd=sources))
@@ -222,6 +224,7 @@ def test_the_package_itself_has_one_name(wheel: bool, installed: Path, tmp_path:
     assert last.startswith((says, "ModuleNotFoundError"))
 
 
+@pytest.mark.study
 def test_the_wheel_has_the_public_names(installed: Path, tmp_path: Path) -> None:
     """Each from its file; `py.typed` says to type checkers that they have types."""
     program = (

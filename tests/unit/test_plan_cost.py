@@ -93,6 +93,7 @@ def test_every_effect_is_switched_lacks_data_or_is_part_of_all_scenes(case: str)
             assert switch.name not in problem_of(scene).effects
 
 
+@pytest.mark.study
 def test_changes_are_those_of_two_runs(found: Costs, tmp_path: Path) -> None:
     assert found.stretch == (90.0, 120.0)
     stretch = ["evaluation.to_m=120", "train.end_m=120"]

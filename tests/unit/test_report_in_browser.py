@@ -22,6 +22,7 @@ from catenary.cases.cli.main import app
 BROWSER = shutil.which("chromium") or shutil.which("google-chrome")
 pytestmark = [
     pytest.mark.process,
+    pytest.mark.study,
     pytest.mark.skipif(BROWSER is None, reason="there is no chromium or google-chrome"),
 ]
 # Pulls a frame with the mouse over the middle of every plot; tells how many marks each has, and

@@ -90,6 +90,7 @@ def test_runs_at_the_same_time_have_the_same_figures_to_the_last_digit(
     assert figures(tmp_path) == one_by_one
 
 
+@pytest.mark.study
 @pytest.mark.process
 def test_a_sweep_whose_process_was_killed_tells_and_continues(
     one_by_one: list[dict[str, str]], tmp_path: Path
@@ -109,7 +110,9 @@ def test_a_sweep_whose_process_was_killed_tells_and_continues(
 
 
 @pytest.mark.process
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
+@pytest.mark.parametrize(
+    "number", [signal.SIGTERM, pytest.param(signal.SIGKILL, marks=pytest.mark.study)]
+)
 def test_a_signal_ends_all_runs_and_the_same_command_continues(
     number: signal.Signals, one_by_one: list[dict[str, str]], tmp_path: Path
 ) -> None:
@@ -174,6 +177,7 @@ for jobs in (1, 2):
 """
 
 
+@pytest.mark.study
 @pytest.mark.process
 def test_a_program_of_a_user_needs_no_guard_of_its_main_part(tmp_path: Path) -> None:
     """As it would for the processes of ``multiprocessing``, which load the program again."""

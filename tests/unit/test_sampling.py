@@ -294,6 +294,7 @@ def test_saltellis_blocks_change_one_input_at_a_time(scene: Scene) -> None:
             assert one == (*first[:place], last[place], *first[place + 1 :])
 
 
+@pytest.mark.study
 def test_thirty_thousand_samples_take_seconds(scene: Scene) -> None:
     begin = time.process_time()
     found = drawn(

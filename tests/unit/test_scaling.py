@@ -68,6 +68,7 @@ def test_what_cannot_be_is_refused_in_a_sentence(words: list[str], says: str) ->
     assert done.exit_code == 2 and says in done.stderr and done.stderr.count("\n") == 1
 
 
+@pytest.mark.study
 @pytest.mark.process
 @pytest.mark.skipif(MPIRUN is None, reason="there is no mpirun")
 def test_ranks_time_their_messages_and_one_tells(tmp_path: Path) -> None:

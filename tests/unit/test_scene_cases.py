@@ -57,6 +57,7 @@ def test_form_finding_meets_the_nominal_dropper_lengths_of_ac_simple() -> None:
     assert np.abs(found - nominal).max() < 0.005
 
 
+@pytest.mark.study
 def test_first_guesses_of_droppers_come_near_the_lengths_of_form_finding() -> None:
     # They leave out the supports' give (27 mm in en50318_2002: 1330 N on 5e4 N/m), the clamps,
     # that the curvature of a pre-sag d lets the contact wire carry 8 d T/L^2, by which the

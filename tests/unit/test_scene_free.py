@@ -42,11 +42,12 @@ def example() -> Raw:
         ("ambrosio2012", ["line.n_spans=8", "train.pantographs.0.name=lumped"]),
         ("re330_stitched", ["line.n_spans=6"]),
         ("dc_twin", ["line.n_spans=6"]),
-        (
+        pytest.param(
             "tensioned_section",
             ["line.n_spans=6", "line.mid_points_m=[110]"]
             + [f"line.ends.{side}.kind=fixed" for side in ("start", "end")]
             + [f"line.ends.{side}.{key}=" for side in ("start", "end") for key in LAYER],
+            marks=pytest.mark.study,
         ),
     ],
 )

@@ -32,9 +32,7 @@ VALUES = st.recursive(
     max_leaves=8,
 )
 PLENTY = settings(
-    max_examples=300,
     deadline=None,
-    derandomize=True,
     suppress_health_check=[HealthCheck.too_slow],
 )
 

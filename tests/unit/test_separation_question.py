@@ -117,6 +117,7 @@ def test_a_period_is_found_in_a_decaying_curve(period: float) -> None:
     assert f"A period of {period:.0f} m explains" in as_text(study, found)
 
 
+@pytest.mark.study
 def test_the_command_agrees_with_runs_by_hand(tmp_path: Path) -> None:
     """300 m is refused there: the leading one would start in the evaluated stretch."""
     words = ["separation", CASE, "--short", "--from", "60", "--to", "300", "--step", "120"]

@@ -69,7 +69,10 @@ def test_log_and_outcome_of_a_march_say_the_same(
         assert (str(told) if told else "") == outcome.slow_path
 
 
-@pytest.mark.parametrize(("damped", "general"), [((), False), ((BY_COMPONENT,), True)])
+@pytest.mark.parametrize(
+    ("damped", "general"),
+    [pytest.param((), False, marks=pytest.mark.study), ((BY_COMPONENT,), True)],
+)
 def test_a_march_tells_that_no_kernels_are_compiled_for_its_line(
     damped: tuple[str, ...], general: bool
 ) -> None:

@@ -24,6 +24,8 @@ from catenary.cases.studies.sweep.sweep import run_part, run_sweep, sweep_of
 from catenary.cases.studies.sweep.together import pieces_of_work
 from catenary.cases.studies.sweep.variants import Variant, parse_vary, product
 
+pytestmark = pytest.mark.usefixtures("quick_reports")
+
 VARY: dict[str, list[Any]] = {
     "train.speed_km_h": [230, 240, 250],
     "line.contact_wire.tension_N": [20000, 21000],
@@ -32,7 +34,8 @@ VARY: dict[str, list[Any]] = {
 
 @pytest.fixture(scope="module")
 def scene() -> catenary.Scene:
-    return catenary.load("en50318_2002", short=True)
+    """With half of the elements: lanes and runs agree in any mesh."""
+    return catenary.load("en50318_2002", short=True).replace(mesh={"elements_per_gap": 4})
 
 
 @pytest.fixture(scope="module")
@@ -71,6 +74,7 @@ def test_a_value_out_of_bounds_is_told_as_python_gave_it(
         catenary.sweep(scene, {"train.speed_km_h": [5000]}, only_statistics=only_statistics)
 
 
+@pytest.mark.study
 def test_the_table_is_that_of_whole_runs(scene: catenary.Scene, table: pd.DataFrame) -> None:
     same(table, catenary.sweep(scene, VARY))
 
@@ -94,6 +98,7 @@ def test_nothing_but_tables_is_left_and_the_same_call_goes_on(
     assert records[1].stat().st_mtime_ns == kept_time
 
 
+@pytest.mark.study
 @pytest.mark.process
 def test_pieces_of_work_in_processes_give_the_same(
     scene: catenary.Scene, table: pd.DataFrame
@@ -152,6 +157,7 @@ def test_histories_are_those_of_whole_runs(
                 assert np.isnan(found[own][row, n:]).all()
 
 
+@pytest.mark.study
 def test_histories_of_several_lines_are_in_the_order_of_the_variants(
     scene: catenary.Scene, table: pd.DataFrame, tmp_path: Path
 ) -> None:
@@ -191,7 +197,7 @@ def test_the_same_call_completes_histories(
 def test_histories_of_parts_are_merged(scene: catenary.Scene, tmp_path: Path) -> None:
     """Two machines make a part each; merged they are the histories of the whole sweep."""
     kept, words = tuple(HISTORIES), ("train.speed_km_h=200,240,250,260,270",)
-    draft = read_draft("en50318_2002", shortened=True)
+    draft = read_draft("en50318_2002", ["mesh.elements_per_gap=4"], shortened=True)
     variants = product([parse_vary(word) for word in words], {})
     whole = {
         name: table[...]

@@ -262,6 +262,7 @@ def test_samples_are_enough_to_show_their_share() -> None:
         task_of(SPEED, samples={"number": 298})
 
 
+@pytest.mark.study
 def test_an_installer_has_what_all_criteria_leave_together(
     evaluated: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:

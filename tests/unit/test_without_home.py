@@ -14,6 +14,7 @@ import pytest
 NOBODY = ("setpriv", "--reuid=65534", "--regid=65534", "--clear-groups")
 
 
+@pytest.mark.study
 @pytest.mark.process
 @pytest.mark.skipif(
     os.geteuid() != 0 or not shutil.which("setpriv"), reason="another user takes root and setpriv"

@@ -24,17 +24,20 @@ pytestmark = pytest.mark.process
 COMM = MPI.COMM_SELF
 
 
+@pytest.mark.study
 def test_results_come_in_order_from_several_processes() -> None:
     found = list(in_order(each(work, range(7), 3, COMM)))
     assert found == [Outcome(number, 2 * number) for number in range(7)]
 
 
+@pytest.mark.study
 def test_processes_are_others_with_one_rank_and_one_thread() -> None:
     (found,) = each(work, ["describe"], 2, COMM)
     pid, n_ranks, threads = found.get()
     assert pid != os.getpid() and n_ranks == 1 and threads == "1"
 
 
+@pytest.mark.study
 def test_a_function_keeps_what_it_made_for_the_next_item() -> None:
     counts = sorted(outcome.get() for outcome in each(Count(), range(6), 2, COMM))
     assert sum(counts) >= 1 + 1 + 2 + 2 + 3 + 3 and max(counts) >= 3
@@ -59,7 +62,7 @@ def test_processes_of_a_pool_last_from_one_series_to_the_next() -> None:
     ("item", "told"),
     [
         ("be killed", "its process was ended by SIGKILL, as where no memory is left"),
-        ("leave", "its process ended by itself with code 7"),
+        pytest.param("leave", "its process ended by itself with code 7", marks=pytest.mark.study),
     ],
 )
 def test_a_process_that_dies_costs_its_item_only(item: str, told: str) -> None:
@@ -112,7 +115,9 @@ def test_a_signal_ends_all_processes_and_begins_no_item(
     wait_for_end(numbers)
 
 
-@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM])
+@pytest.mark.parametrize(
+    "number", [pytest.param(signal.SIGKILL, marks=pytest.mark.study), signal.SIGTERM]
+)
 def test_processes_end_with_the_one_that_started_them(number: int, tmp_path: Path) -> None:
     start = f"import json, sys; sys.path[:] = json.loads({json.dumps(sys.path)!r}); "
     start += f"from work_items import sleep_in_processes; sleep_in_processes({str(tmp_path)!r})"

@@ -239,6 +239,7 @@ def test_without_gusts_none_press_and_what_is_like_the_others_needs_no_cause() -
     assert worst_output._cause_lines([], False) == worst_output._told([], None) == []
 
 
+@pytest.mark.study
 @pytest.mark.process
 def test_gusts_are_told_where_they_are_stronger_and_the_force_varies_more(tmp_path: Path) -> None:
     quiet = "-q", "--set", "output.field_every_s=0", "--set", "evaluation.from_m=440"

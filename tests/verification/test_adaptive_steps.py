@@ -67,6 +67,7 @@ def test_a_tolerance_that_is_never_met_changes_nothing(mesh: LineMesh) -> None:
     assert idle.outcome.counters["steps_of_1_ms"] == steps == plain.outcome.counters["steps"]
 
 
+@pytest.mark.study
 def test_steps_without_a_solution_are_halved(mesh: LineMesh) -> None:
     """Hertz's spring stiffens as the head lands, so that exchanges of forces do not converge at
     1 ms; with shorter steps there they do, and end where the implicit coupling of short steps ends.

@@ -56,7 +56,11 @@ def problem_and_mesh(**changes: Any) -> tuple[Problem, LineMesh]:
     return replace(problem, **changes), mesh_of(line, 2)
 
 
-@pytest.mark.parametrize("ours", [{}, ALPHA], ids=["average acceleration", "generalized alpha"])
+@pytest.mark.parametrize(
+    "ours",
+    [pytest.param({}, marks=pytest.mark.study), ALPHA],
+    ids=["average acceleration", "generalized alpha"],
+)
 def test_tsalpha2_integrates_the_same_model_to_the_same_forces(ours: dict[str, Any]) -> None:
     problem, mesh = problem_and_mesh()
     steps, every = [2e-3, 1e-3, 0.5e-3, 0.25e-3], 2e-3
@@ -104,12 +108,15 @@ def test_tsalpha2_integrates_the_same_model_to_the_same_forces(ours: dict[str, A
     "changes",
     [
         {"effects": WHOLE - {"contact_loss"}},
-        {"effects": WHOLE - {"dropper_slackening"}},
-        {
-            "effects": WHOLE | {"residual_dropper_stiffness"},
-            "residual_stiffness_ratio": 0.1,
-            "damping": Damping(1e-4, 0.0125, {"droppers": (1e-3, 0.0)}),
-        },
+        pytest.param({"effects": WHOLE - {"dropper_slackening"}}, marks=pytest.mark.study),
+        pytest.param(
+            {
+                "effects": WHOLE | {"residual_dropper_stiffness"},
+                "residual_stiffness_ratio": 0.1,
+                "damping": Damping(1e-4, 0.0125, {"droppers": (1e-3, 0.0)}),
+            },
+            marks=pytest.mark.study,
+        ),
     ],
     ids=["contact that pulls", "droppers that push", "residual stiffness, damping by component"],
 )

@@ -6,6 +6,7 @@ import functools
 
 import numpy as np
 import pytest
+from studies import few
 
 from catenary.base.errors import InputError
 from catenary.cases.run.scene_mesh import mesh_of
@@ -64,6 +65,7 @@ def test_a_string_with_masses_has_the_bands_of_the_closed_form(lumped: float) ->
     assert error.max() < 0.5 * 7e-4 * 50.0 * (1.0 + lumped * 50.0 / (2 * 100.0)) * 1.5
 
 
+@pytest.mark.study
 def test_group_velocities_are_slopes_of_the_branches(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(bloch, "N_PHASES", 401)
     waves = bloch_waves(string(10.0), 8.0)
@@ -94,7 +96,7 @@ def rest_of(case: str) -> tuple[WaveTheory, LineAtRest]:
     return wave_theory(problem, rest), rest
 
 
-@pytest.mark.parametrize("case", BANDS)
+@pytest.mark.parametrize("case", few(BANDS, "ambrosio2012"))
 def test_bands_of_the_shipped_lines_are_those_of_another_program(case: str) -> None:
     theory, _ = rest_of(case)
     found = theory.bands()

@@ -124,6 +124,7 @@ def test_a_march_is_that_of_dense_matrices_with_every_set_tried(name: str) -> No
     check("force on each wire [N]", np.array(shares)[1:], forces, within=1e-8)
 
 
+@pytest.mark.study
 def test_an_overlap_passes_the_force_without_a_jump_and_keeps_the_energy() -> None:
     """Without damping the line gains the work of the contact forces, and no more.
 

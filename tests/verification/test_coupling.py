@@ -36,6 +36,7 @@ def smooth(coupling: str, dt: float) -> Problem:
     )
 
 
+@pytest.mark.study
 def test_order_of_each_coupling() -> None:
     """Implicit and iterated are the same trapezoidal step: order 2. The extrapolation lacks
     beta dt^2 a_new of both sides' motion, k beta dt^2 times the relative acceleration in the force:

@@ -17,6 +17,7 @@ from dense_line import DenseLine
 from measuring import check, march, print_table
 from scipy import integrate, optimize
 from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of, train
+from studies import few
 
 from catenary.meshgen.hardware import DropperKind
 from catenary.meshgen.mesh import CONTACT_WIRE, LineMesh
@@ -195,7 +196,7 @@ WAYS: dict[str, dict[str, Any]] = {
 }
 
 
-@pytest.mark.parametrize("name", CURVES)
+@pytest.mark.parametrize("name", few(CURVES, "softening"))
 @pytest.mark.parametrize("way", WAYS.values(), ids=WAYS)
 def test_every_scheme_satisfies_the_law(name: str, way: dict[str, Any]) -> None:
     """Each state satisfies the equation of motion with tensions looked up in the curve."""

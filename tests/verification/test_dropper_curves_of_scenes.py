@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from mpi4py import MPI
+from studies import few
 from ts_alpha2 import TS_ALPHA2
 
 from catenary.cases.scene.load import load_scene
@@ -57,7 +58,18 @@ SCENES: dict[str, tuple[str, ...]] = {
 }
 
 
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize(
+    "name",
+    few(
+        SCENES,
+        "along",
+        "incidents",
+        "vertical",
+        "window",
+        "kept dampers",
+        "slack at rest, residual stiffness",
+    ),
+)
 def test_points_on_a_straight_line_change_nothing(name: str) -> None:
     found = []
     for law in ("line.dropper.axial_stiffness_N=1e5", STRAIGHT):

@@ -10,6 +10,7 @@ second order in the step. Were slack droppers counted as springs, it would not f
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from measuring import march
 from small_lines import HANGING, en50318_line, mesh_of, numerics, problem_of, train
 
@@ -69,6 +70,7 @@ def test_energy_is_conserved_to_second_order_when_droppers_slacken() -> None:
     assert errors[-1] < 1e-3 * largest
 
 
+@pytest.mark.study
 def test_dampers_that_are_kept_take_energy_and_give_none() -> None:
     """Of dampers in the droppers alone: what they take, slack droppers' included, closes the
     balance to second order, and without switches nothing is made.

@@ -117,7 +117,9 @@ def test_lanes_are_filled_again_with_trains_of_other_lengths() -> None:
         )
 
 
-@pytest.mark.parametrize("case", ["en50318_2002", "ambrosio2012"])
+@pytest.mark.parametrize(
+    "case", ["en50318_2002", pytest.param("ambrosio2012", marks=pytest.mark.study)]
+)
 def test_lines_with_other_errors_of_dropper_lengths_share_matrices(
     case: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -136,6 +138,7 @@ def test_lines_with_other_errors_of_dropper_lengths_share_matrices(
         assert differences(plain(found[number].summary), own_run(case, changes[number])) == []
 
 
+@pytest.mark.study
 def test_lines_with_other_slack_droppers_at_rest_share_lanes(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -157,6 +160,7 @@ def test_lines_with_other_slack_droppers_at_rest_share_lanes(
             assert differences(summary, own_run("en50318_2002", changes[number])) == []
 
 
+@pytest.mark.study
 def test_scenes_with_loads_march_one_by_one() -> None:
     speed = read_draft("windy_viaduct").shortened().scene().train.speed_km_h
     changes = [{"train.speed_km_h": speed}, {"train.speed_km_h": 0.98 * speed}]
@@ -194,6 +198,7 @@ def test_pantographs_that_python_steps_march_one_by_one(monkeypatch: pytest.Monk
     assert all(one.summary["watched"] for one in found)
 
 
+@pytest.mark.study
 def test_scenes_march_alike_on_all_processors() -> None:
     """One by one where no kernels take several of them, side by side on all others."""
     changes = [{"train.speed_km_h": 240.0}, {"train.speed_km_h": 250.0}]

@@ -58,12 +58,12 @@ def thrown(problem: Problem, mesh: LineMesh) -> History:
     ("scheme", "kept", "moves", "dt"),
     [
         ("one_solve", 0.0, RUN, 1e-3),
-        ("one_solve", 0.01, RUN, 1e-3),
+        pytest.param("one_solve", 0.01, RUN, 1e-3, marks=pytest.mark.study),
         ("one_solve", 0.0, RUN, 4e-3),
         ("one_solve", 0.0, BELOW, 4e-3),
         ("one_solve, pulling", 0.0, CLOSE, 4e-3),
         ("fixed_point", 0.0, RUN, 1e-3),
-        ("fixed_point", 0.01, RUN, 1e-3),
+        pytest.param("fixed_point", 0.01, RUN, 1e-3, marks=pytest.mark.study),
     ],
     ids=[
         "one solve",

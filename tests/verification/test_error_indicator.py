@@ -18,7 +18,14 @@ from catenary.cases.studies.sweep.run_jobs import run_jobs
 from catenary.cases.studies.sweep.variants import parse_vary, product
 
 
-@pytest.mark.parametrize("case", ["en50318_2002", "ac_simple", "ambrosio2012"])
+@pytest.mark.parametrize(
+    "case",
+    [
+        "en50318_2002",
+        pytest.param("ac_simple", marks=pytest.mark.study),
+        pytest.param("ambrosio2012", marks=pytest.mark.study),
+    ],
+)
 def test_the_estimate_is_right_within_a_factor_of_two(case: str, tmp_path: Path) -> None:
     variants = product([parse_vary("numerics.dt_s=1e-3,2.5e-4")], {})
     quiet = ("output.field_every_s=0", "output.energy_every_s=0")

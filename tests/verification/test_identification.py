@@ -137,6 +137,7 @@ def small_passage(folder: Path, rng: np.random.Generator, *words: str) -> Path:
     return file
 
 
+@pytest.mark.study
 def test_planted_errors_lie_within_their_widths(tmp_path: Path) -> None:
     """Parameters of line and train and the droppers of a span, together; by chi-square."""
     rng = np.random.default_rng(21)
@@ -251,6 +252,7 @@ def test_an_unlikely_residual_is_left_by_further_searches(tmp_path: Path) -> Non
     assert stats.chi2.sf(distance, truth.size) > 1e-3
 
 
+@pytest.mark.study
 @pytest.mark.parametrize(
     ("wrong", "by"),
     [
@@ -275,6 +277,7 @@ def test_a_wrong_model_is_told_by_its_residual(tmp_path: Path, wrong: list[str],
     assert verdict(found).startswith("The model does not fit")
 
 
+@pytest.mark.study
 def test_what_a_passage_cannot_tell_is_told(tmp_path: Path) -> None:
     """Height of the wire and sag of all droppers move it alike."""
     words = [*SMALL, "evaluation.from_m=90"]

@@ -21,6 +21,7 @@ from small_lines import (
     train,
 )
 from static_line import absolute_rest, first_rest
+from studies import few_values
 
 from catenary.cases.studies.hard import runs as hard_runs
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
@@ -60,10 +61,10 @@ def nobody(duration: float) -> Train:
 @pytest.mark.parametrize(
     "incidents",
     [
-        (BREAK,),
+        pytest.param((BREAK,), marks=pytest.mark.study),
         (BREAK, DropperBreak(0.4, 96.5), DropperBreak(0.3, 60.0 + 5.0)),
         (TensionLoss(0.2, CONTACT_WIRE, 0.6),),
-        (TensionLoss(0.2, MESSENGER_WIRE, 0.8),),
+        pytest.param((TensionLoss(0.2, MESSENGER_WIRE, 0.8),), marks=pytest.mark.study),
         (TensionLoss(0.2, CONTACT_WIRE, 0.9), BREAK, TensionLoss(0.7, CONTACT_WIRE, 0.5)),
     ],
     ids=["a dropper", "three droppers", "contact wire", "messenger wire", "all of it"],
@@ -220,7 +221,7 @@ def slope_energy(problem: Problem, model: Model, shape: np.ndarray, wire: str) -
     [DropperBreak(0.4, 96.5), TensionLoss(0.4, CONTACT_WIRE, 0.8)],
     ids=["a dropper", "contact wire"],
 )
-@pytest.mark.parametrize("method", METHODS.values(), ids=METHODS.keys())
+@pytest.mark.parametrize("method", few_values(METHODS, "average acceleration"))
 def test_the_march_stays_of_order_2(incident: LineIncident, method: dict[str, Any]) -> None:
     """Contact force of a linear line, against a fine reference, over an incident near the head.
 
@@ -260,10 +261,24 @@ def test_the_march_stays_of_order_2(incident: LineIncident, method: dict[str, An
 
 @pytest.mark.parametrize(
     "own",
-    [{}, {"scheme": "fixed_point"}, METHODS["generalized alpha"]],
+    [
+        {},
+        pytest.param({"scheme": "fixed_point"}, marks=pytest.mark.study),
+        METHODS["generalized alpha"],
+    ],
     ids=["one solve", "fixed point", "generalized alpha"],
 )
-@pytest.mark.parametrize("at", [150, 200, 201, 280, 330], ids=lambda step: f"step {step}")
+@pytest.mark.parametrize(
+    "at",
+    [
+        pytest.param(150, marks=pytest.mark.study),
+        200,
+        201,
+        pytest.param(280, marks=pytest.mark.study),
+        330,
+    ],
+    ids=lambda step: f"step {step}",
+)
 def test_a_continued_run_is_the_uninterrupted_one(own: dict[str, Any], at: int) -> None:
     """From before, between and after incidents, and from the step in which one happens (200)."""
     line = en50318_line(4)

@@ -106,6 +106,7 @@ def energy_is_kept(case: HardCase) -> bool:
     return kept["energy from nothing"]
 
 
+@pytest.mark.study
 def test_the_criterion_fails_where_energy_is_made(monkeypatch: pytest.MonkeyPatch) -> None:
     """Newmark's gamma below 1/2 feeds the line; so do undamped stiff droppers, and half a work."""
     case, stiff = hard_cases(["light_head_damped"])[0], hard_cases(["droppers_1e8"])[0]

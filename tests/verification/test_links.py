@@ -84,7 +84,7 @@ DENSE = {
 
 
 @pytest.mark.parametrize("names", [{"uplift_stop"}, {"leaning_links"}, set(DENSE)], ids=sorted)
-@pytest.mark.parametrize("slackening", [True, False])
+@pytest.mark.parametrize("slackening", [True, pytest.param(False, marks=pytest.mark.study)])
 def test_a_march_is_that_of_dense_matrices_with_every_set_tried(
     names: set[str], slackening: bool
 ) -> None:

@@ -32,6 +32,7 @@ def test_known_chains_come_back(name: str) -> None:
     check("largest error", fit.largest_error, 0.0, within=1e-6)
 
 
+@pytest.mark.study
 def test_seven_bodies_are_two_masses_above_their_raising() -> None:
     """7.8 kg on 6000 N/m and 26 N s/m over 25.7 kg on the lift's 240 N/m less a metre.
 
@@ -52,6 +53,7 @@ def test_seven_bodies_are_two_masses_above_their_raising() -> None:
     assert fit_chain(at, model.receptance(at), 1).rms_error > 0.1
 
 
+@pytest.mark.study
 def test_lift_that_grows_with_height_is_fitted_above_it_only() -> None:
     """-100 N/m at the base: no positive spring does this, and none is claimed to.
 

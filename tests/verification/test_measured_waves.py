@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from measuring import check
 from mpi4py import MPI
 from small_lines import (
@@ -62,6 +63,7 @@ def test_the_energy_of_a_band_arrives_at_its_mean_group_velocity() -> None:
         assert found.velocity > SPEED
 
 
+@pytest.mark.study
 def test_group_velocities_of_a_periodic_line_are_those_of_its_bloch_waves() -> None:
     """Within 1 % near 6 and 18 Hz.
 
@@ -115,6 +117,7 @@ def test_what_passes_lies_in_the_pass_bands() -> None:
         assert found.second[middle].max() < 2e-2
 
 
+@pytest.mark.study
 def test_a_moving_force_sends_waves_by_doppler_and_energy_by_its_factor() -> None:
     """A force F cos(p t) at v on a string: waves of p / (1 - v/c) ahead and p / (1 + v/c) behind.
 
@@ -206,6 +209,7 @@ def test_slack_droppers_hold_what_their_weights_do() -> None:
     check("energy [J]", energy.seen().total[0], held, within=1e-9 * held)
 
 
+@pytest.mark.study
 def test_a_head_of_fixed_height_amplifies_an_oncoming_wave_by_the_doppler_factor() -> None:
     """What comes back from it is (c - v) / (c + v) as long, and moves as much faster.
 

@@ -13,6 +13,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from measuring import check, march, print_table, registered
 from scipy.special import erf
 from small_lines import (
@@ -100,6 +101,7 @@ def deflection(
     return mesh.x(nodes), uplift()[np.searchsorted(history.stage.owned_nodes, nodes)]
 
 
+@pytest.mark.study
 def test_a_moving_force_raises_the_wire_ahead_more_steeply_than_behind() -> None:
     """A force F that sets in at time 0 and moves with V < c, before any reflection.
 

@@ -280,6 +280,7 @@ def test_pantograph_of_the_time_loop_answers_as_the_linearised_bodies(frequency:
     check("phase [rad]", np.angle(found / swing[0]), 0.0, within=within)
 
 
+@pytest.mark.study
 def test_verb_tells_how_the_seven_bodies_of_the_case_stand(tmp_path: Path) -> None:
     """The same figures from the scene's tables, at the command line; the fit loads as a table."""
     words = ("pantograph", "ambrosio2012", "--kind", "seven_body", "-o", str(tmp_path / "new"))

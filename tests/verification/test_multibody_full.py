@@ -62,6 +62,7 @@ def run_below(
     return forces, heights
 
 
+@pytest.mark.study
 def test_raised_below_a_still_wire_it_presses_with_its_static_force() -> None:
     """Raised from 1 mm below; a damper at the head calms the rest within some seconds.
 
@@ -76,6 +77,7 @@ def test_raised_below_a_still_wire_it_presses_with_its_static_force() -> None:
     assert pantograph.constraint_violation() < 1e-9
 
 
+@pytest.mark.study
 def test_reduced_pantograph_follows_the_bodies_below_a_lively_wire() -> None:
     """A wire that moves by 20 mm at 1 Hz and 1 mm at 8 Hz: forces of 30 N and more around 150 N.
 
@@ -177,6 +179,7 @@ def test_wire_beside_the_middle_rolls_the_head() -> None:
     assert pantograph.motion.rotation[pantograph.motion.numbers[paper.HEAD]][2, 1] < -1e-4
 
 
+@pytest.mark.study
 def test_vehicle_that_heaves_moves_it_as_the_reduced_one() -> None:
     """10 mm at 2 Hz, wire at rest: what the head feels of it, within what reduction leaves out.
 

@@ -59,6 +59,7 @@ def test_figures_are_those_of_a_run(tmp_path: Path) -> None:
     assert set(broken) == {BROKE} and "slack at rest" in broken[BROKE]
 
 
+@pytest.mark.study
 @pytest.mark.process
 def test_several_processes_find_the_same() -> None:
     scenes = [tiny(**{"train.speed_km_h": speed}).scene() for speed in (200.0, 230.0)]
@@ -88,6 +89,7 @@ def test_both_directions_of_a_lopsided_line_differ_and_turn_into_each_other() ->
     assert abs(other_way - own) > 0.1
 
 
+@pytest.mark.study
 def test_a_search_finds_what_brute_force_finds() -> None:
     draft = tiny()
     low, high = 0.0, 6000.0

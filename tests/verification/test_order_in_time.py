@@ -183,8 +183,13 @@ def test_the_march_with_a_pantograph_is_of_order_2(changes: dict[str, Any]) -> N
     "overrides",
     [
         ("numerics.integrator=newmark",),
-        ("numerics.integrator=generalized_alpha", "numerics.spectral_radius=0.8"),
-        ("numerics.integrator=hht", "numerics.spectral_radius=0.8"),
+        pytest.param(
+            ("numerics.integrator=generalized_alpha", "numerics.spectral_radius=0.8"),
+            marks=pytest.mark.study,
+        ),
+        pytest.param(
+            ("numerics.integrator=hht", "numerics.spectral_radius=0.8"), marks=pytest.mark.study
+        ),
     ],
     ids=["average acceleration", "generalized alpha", "HHT"],
 )

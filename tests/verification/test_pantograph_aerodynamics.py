@@ -91,7 +91,14 @@ def test_drag_lifts_by_virtual_work() -> None:
     assert found.on_head == 0.0 and abs(expected) > 10.0
 
 
-@pytest.mark.parametrize("forces", ["uplift", "drag", "both"])
+@pytest.mark.parametrize(
+    "forces",
+    [
+        pytest.param("uplift", marks=pytest.mark.study),
+        pytest.param("drag", marks=pytest.mark.study),
+        "both",
+    ],
+)
 def test_reduced_and_whole_mechanism_feel_the_same_air(forces: str) -> None:
     """Means over the last second on a still wire: what swings on is 2 N, as in
     `test_multibody_full`, and 1 N of the raising at 0.43 Hz after 6 s.
@@ -151,6 +158,7 @@ def test_a_tunnel_raises_the_force_of_a_march_where_it_begins() -> None:
     check("in the tunnel [N]", more[x > 135.0].mean(), 29.8, within=10.0)
 
 
+@pytest.mark.study
 def test_schemes_agree_about_the_air() -> None:
     """PETSc's stepper takes its own way through masses and springs of the head."""
     data = replace(EN_PANTOGRAPH, uplift=UPLIFT)

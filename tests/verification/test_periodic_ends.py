@@ -17,6 +17,7 @@ from going_on import EN, SPAN, heights, line_of, struck_line, with_more
 from measuring import check, march, start_march
 from scipy.sparse.linalg import spsolve
 from small_lines import WHOLE, ac_simple_line, en50318_line, mesh_of, numerics, problem_of, train
+from studies import few
 
 from catenary.base.errors import InputError
 from catenary.solver.effects.build_model import build
@@ -41,7 +42,7 @@ METHODS: dict[str, tuple[Numerics, Damping]] = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", METHODS)
+@pytest.mark.parametrize("name", few(METHODS, "generalized alpha", "damping by component"))
 def test_a_short_line_moves_as_the_middle_of_a_long_one(name: str) -> None:
     method, damping = METHODS[name]
     short = struck_line(SHORT, method, STEPS, GOES_ON, damping)

@@ -219,6 +219,7 @@ def share(run_folder: Path, folder: Path, n: int, errors: bool) -> list[str]:
     return wrong
 
 
+@pytest.mark.study
 @pytest.mark.parametrize(("errors", "run_folder"), [(True, 0), (False, 1)], indirect=["run_folder"])
 def test_planted_errors_are_found_and_none_is_invented(
     errors: bool, run_folder: Path, tmp_path: Path
@@ -226,6 +227,7 @@ def test_planted_errors_are_found_and_none_is_invented(
     assert share(run_folder, tmp_path, 10, errors) == []
 
 
+@pytest.mark.study
 def test_a_model_that_is_not_exact_has_no_errors_of_the_measurement(
     run_folders: list[Path], tmp_path: Path
 ) -> None:

@@ -203,7 +203,11 @@ def test_plain_finite_elements_reach_a_reference_solution(name: str) -> None:
 SHORT_STITCH = Stitch(18.0, 3500.0, 0.31, 28.0, 0.38)
 
 
-@pytest.mark.parametrize("stitch", [None, SHORT_STITCH], ids=["simple", "stitched"])
+@pytest.mark.parametrize(
+    "stitch",
+    [None, pytest.param(SHORT_STITCH, marks=pytest.mark.study)],
+    ids=["simple", "stitched"],
+)
 def test_plain_finite_differences_reach_a_march(stitch: Stitch | None) -> None:
     """A pantograph under a short line: its filtered force in a span, and the line at rest."""
     stretch, start = (110.0, 165.0), 83.0

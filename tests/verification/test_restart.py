@@ -14,7 +14,9 @@ from catenary.mbs.head.laws import Law
 from catenary.solver.problem.contact_laws import LinearLaw
 
 
-@pytest.mark.parametrize("integrator", ["newmark", "generalized_alpha"])
+@pytest.mark.parametrize(
+    "integrator", [pytest.param("newmark", marks=pytest.mark.study), "generalized_alpha"]
+)
 @pytest.mark.parametrize("scheme", ["one_solve", "fixed_point"])
 def test_continued_run_equals_the_uninterrupted_one(scheme: str, integrator: str) -> None:
     line = en50318_line(6)

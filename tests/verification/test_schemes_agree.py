@@ -31,8 +31,13 @@ def two_pantographs(
     ("effects", "damping", "integrator"),
     [
         (WHOLE, 0.0, "newmark"),
-        (WHOLE | {"contact_damping", "residual_dropper_stiffness"}, 50.0, "newmark"),
-        (WHOLE, 0.0, "generalized_alpha"),
+        pytest.param(
+            WHOLE | {"contact_damping", "residual_dropper_stiffness"},
+            50.0,
+            "newmark",
+            marks=pytest.mark.study,
+        ),
+        pytest.param(WHOLE, 0.0, "generalized_alpha", marks=pytest.mark.study),
     ],
     ids=["usual effects", "with contact damping and residual stiffness", "generalized alpha"],
 )

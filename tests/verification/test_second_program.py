@@ -15,6 +15,7 @@ from measuring import check, march
 from plain_line import History, PlainLine
 from plain_mesh import graded, mesh_on
 from small_lines import WHOLE, ac_simple_line, en50318_line, mesh_of, problem_of, train
+from studies import few
 
 from catenary.cases.run.scene_mesh import mesh_of as mesh_of_scene
 from catenary.cases.scene.input.case_files import shipped
@@ -57,7 +58,7 @@ RUNS = {
 }
 
 
-@pytest.mark.parametrize("run", RUNS)
+@pytest.mark.parametrize("run", few(RUNS, "en50318"))
 def test_a_run_is_that_of_a_second_program(run: str) -> None:
     """Static tensions and contact forces at each step, through slack droppers and losses."""
     line, mesh, behind = RUNS[run]()

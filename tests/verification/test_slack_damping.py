@@ -14,6 +14,7 @@ import pytest
 from dense_line import DenseLine
 from measuring import COMM, History, check, march, matrix_of, start_march
 from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of, train
+from studies import few_values
 from ts_alpha2 import TS_ALPHA2
 
 from catenary.meshgen.mesh import CONTACT_WIRE, LineMesh
@@ -60,7 +61,7 @@ def problem_on(line: LineData, **changes: Any) -> Problem:
     return replace(usual, **changes)
 
 
-@pytest.mark.parametrize("share", [0.0, 0.01])
+@pytest.mark.parametrize("share", [0.0, pytest.param(0.01, marks=pytest.mark.study)])
 @pytest.mark.parametrize("dampers_act", [True, False], ids=["kept", "released"])
 def test_a_march_is_that_of_dense_matrices_with_every_set_tried(
     dampers_act: bool, share: float
@@ -173,8 +174,12 @@ def press(residual: np.ndarray, model: Model, x: float, force: float) -> None:
     residual[model.constrained] = 0.0
 
 
-@pytest.mark.parametrize("share", [0.0, 0.05], ids=["", "residual stiffness"])
-@pytest.mark.parametrize("way", WAYS.values(), ids=WAYS)
+@pytest.mark.parametrize(
+    "share", [0.0, pytest.param(0.05, marks=pytest.mark.study)], ids=["", "residual stiffness"]
+)
+@pytest.mark.parametrize(
+    "way", few_values(WAYS, "implicit", "generalized alpha", "fixed point", "adaptive")
+)
 def test_every_scheme_satisfies_the_law(way: dict[str, Any], share: float) -> None:
     effects = WHOLE | (RESIDUAL if share else frozenset())
     problem = on_its_way(
@@ -235,6 +240,7 @@ def test_a_continued_run_is_the_uninterrupted_one(way: str) -> None:
         assert np.array_equal(history[name], whole[name][at:]), name
 
 
+@pytest.mark.study
 def test_petsc_steps_the_same_law() -> None:
     """TSALPHA2 shares the matrices alone; differences of second-order methods fall by four."""
     mesh = mesh_of(short_line(), 2)

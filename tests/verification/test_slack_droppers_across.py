@@ -14,6 +14,7 @@ from axial_lines import with_stiffness
 from dense_line import hermite
 from measuring import History, check, march, matrix_of
 from small_lines import EN_PANTOGRAPH, WHOLE, ac_simple_line, mesh_of, numerics, problem_of, train
+from studies import few
 
 from catenary.meshgen.mesh import CONTACT_WIRE
 from catenary.solver.problem.contact_laws import LinearLaw
@@ -158,7 +159,7 @@ def sideways(seen: History) -> np.ndarray:
     return np.array([state["displacement"] for state in seen.watched])
 
 
-@pytest.mark.parametrize("planes", sorted(PLANES))
+@pytest.mark.parametrize("planes", few(sorted(PLANES), "lateral"))
 def test_a_march_is_that_of_matrices_without_slack_droppers(planes: str) -> None:
     problem, seen = scene(PLANES[planes]), marched(planes)
     heads = seen.watched[0]["pantograph_0"].reshape(3, 2)

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+import pytest
 from measuring import check
 
 Law = Callable[[np.ndarray, np.ndarray], np.ndarray]
@@ -103,6 +104,7 @@ class Strings:
         return lateral, vertical, slack / near
 
 
+@pytest.mark.study
 def test_a_slack_dropper_that_keeps_n_over_l_changes_a_tenth_of_the_lateral_motion() -> None:
     """Against exact geometry, a quarter of the droppers near the force being slack: keeping N / l
     is off by 10 % of the lateral motion and 2 % of the vertical one; losing it while slack by a

@@ -46,7 +46,7 @@ def refused(model: Model) -> str:
     return ""
 
 
-@pytest.mark.parametrize("arm", [0, 1])
+@pytest.mark.parametrize("arm", [0, pytest.param(1, marks=pytest.mark.study)])
 def test_a_rest_is_refused_where_its_stiffness_has_a_negative_eigenvalue(arm: int) -> None:
     found = []
     for force in FORCES:

@@ -17,6 +17,7 @@ from dense_line import DenseLine
 from measuring import check
 from mpi4py import MPI
 from small_lines import EN_CONTACT_WIRE, WHOLE, en50318_line, mesh_of, numerics, problem_of, train
+from studies import few
 
 from catenary.base.errors import InputError
 from catenary.cases.run.scene_mesh import mesh_of as mesh_of_scene
@@ -168,6 +169,7 @@ def acting_line(rest: LineAtRest) -> ActingLine:
     return ActingLine(rest.problem, rest.mesh, rest.form, dampers_act=False)
 
 
+@pytest.mark.study
 def test_tangents_are_those_of_dense_matrices() -> None:
     """NumPy alone, with the set of slack droppers and of contact that its own search finds."""
     problem = small_problem()
@@ -350,7 +352,7 @@ def is_difference(case: str, words: list[str], steps: dict[str, float]) -> None:
             check(f"{what} by {key}", getattr(own, by)[:n, number], expected, within=limit)
 
 
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("name", few(SCENES, "two pantographs", "kinematic"))
 def test_tangents_are_differences_of_marches(name: str) -> None:
     is_difference(*SCENES[name])
 

@@ -142,7 +142,7 @@ def judged(x: np.ndarray, force: np.ndarray) -> tuple[float, float, float]:
     )
 
 
-@pytest.mark.parametrize("base_stiffness", [TIED, SOFT])
+@pytest.mark.parametrize("base_stiffness", [pytest.param(TIED, marks=pytest.mark.study), SOFT])
 def test_the_force_under_a_rail_is_that_of_a_plain_model(
     base_stiffness: float, tmp_path: Path
 ) -> None:
@@ -168,6 +168,7 @@ def test_the_force_under_a_rail_is_that_of_a_plain_model(
     check("mean [N]", found[inside].mean(), expected[inside].mean(), within=0.01)
 
 
+@pytest.mark.study
 def test_what_a_chain_pressed_against_its_base_does_is_no_property_of_the_line() -> None:
     """Of a base that stands from the start the chain, 18 mm below it, gets 745 N at once, and
     nothing damps it: six times the deviation, and losses. Without the depth of the contact in its
@@ -190,6 +191,7 @@ def test_what_a_chain_pressed_against_its_base_does_is_no_property_of_the_line()
     check("means of both bases [N]", raised[0], soft[0], within=2.0)
 
 
+@pytest.mark.study
 def test_the_second_opinion_raises_the_base_as_well() -> None:
     """TSALPHA2 on line and chain as one system, which has its own equations of the chain.
 

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from measuring import History, march
 from mpi4py import MPI
+from studies import few
 from windowed import apart
 from windowed import march as march_in_window
 
@@ -112,7 +113,18 @@ def table(history: History) -> dict[str, np.ndarray]:
     return {name: np.array([row[name] for row in history.watched]) for name in history.watched[0]}
 
 
-@pytest.mark.parametrize("name", LINES)
+@pytest.mark.parametrize(
+    "name",
+    few(
+        LINES,
+        "as shipped",
+        "overlap",
+        "stops",
+        "two messenger wires",
+        "slack droppers, contact lost",
+        "Hertz's law",
+    ),
+)
 def test_they_do_what_wires_with_unknowns_of_their_own_do(name: str) -> None:
     """Forces, droppers, arms, every node's motion and energies, each by its own largest value."""
     apart_, one = (table(history_of(name, relative)) for relative in (True, False))

@@ -64,7 +64,14 @@ def test_bounds_of_a_probability_are_those_of_the_beta_distribution() -> None:
         assert found == pytest.approx((k / n, low, high), abs=1e-9)
 
 
-@pytest.mark.parametrize(("p", "n"), [(0.5, 30), (0.95, 100), (0.05, 200)])
+@pytest.mark.parametrize(
+    ("p", "n"),
+    [
+        (0.5, 30),
+        pytest.param(0.95, 100, marks=pytest.mark.study),
+        pytest.param(0.05, 200, marks=pytest.mark.study),
+    ],
+)
 def test_bounds_of_a_quantile_cover_it(p: float, n: int) -> None:
     rng = np.random.default_rng(5)
     known = stats.gumbel_r(20.0, 3.0)
@@ -84,7 +91,9 @@ def test_a_quantile_that_few_values_leave_open_has_no_bound() -> None:
     assert quantile(x, 0.95).high == x.max()
 
 
-@pytest.mark.parametrize(("n", "short"), [(60, 0.02), (1200, 0.0)])
+@pytest.mark.parametrize(
+    ("n", "short"), [pytest.param(60, 0.02, marks=pytest.mark.study), (1200, 0.0)]
+)
 def test_bounds_of_mean_and_deviation_cover_them(n: int, short: float) -> None:
     """Of normal values: bootstrap up to 1000 values, Student's and the normal limit beyond."""
     rng = np.random.default_rng(6)

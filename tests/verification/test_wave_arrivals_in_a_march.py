@@ -43,7 +43,11 @@ def history(results: Results) -> dict[str, Any]:
 
 @pytest.mark.parametrize(
     ("case", "speed", "short", "long"),
-    [("en50318_2002", 250, 12, 16), ("en50318_2002", 300, 11, 15), ("ac_simple", 275, 22, 27)],
+    [
+        pytest.param("en50318_2002", 250, 12, 16, marks=pytest.mark.study),
+        ("en50318_2002", 300, 11, 15),
+        pytest.param("ac_simple", 275, 22, 27, marks=pytest.mark.study),
+    ],
 )
 def test_the_force_changes_where_the_wave_is_met(
     case: str, speed: int, short: int, long: int, tmp_path: Path

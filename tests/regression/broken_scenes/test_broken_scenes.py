@@ -360,10 +360,15 @@ def test_a_mesh_without_a_group_is_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "words",
     [
-        ["run", "en50318_2002", "-o", "out", "--set", "train.speed_km_h=-1"],
-        ["run", "no_such_case", "-o", "out"],
-        ["run", "en50318_2002"],
-        ["run", "en50318_2002", "-o", "out", "--no-such-option"],
+        pytest.param(
+            ["run", "en50318_2002", "-o", "out", "--set", "train.speed_km_h=-1"],
+            marks=pytest.mark.study,
+        ),
+        pytest.param(["run", "no_such_case", "-o", "out"], marks=pytest.mark.study),
+        pytest.param(["run", "en50318_2002"], marks=pytest.mark.study),
+        pytest.param(
+            ["run", "en50318_2002", "-o", "out", "--no-such-option"], marks=pytest.mark.study
+        ),
         ["plan", "en50318_2002", "--set", "line.contact_wire.tension_N=20 kN"],
         ["nonsense"],
     ],

@@ -15,6 +15,7 @@ import pytest
 from acting_scenes import SCENES, acting_scene
 from documents import blocks_of
 from mpi4py import MPI
+from studies import few
 
 from catenary.base.errors import InputError, RunBroken
 from catenary.cases.run.prepared import HEADER, LIBRARY, prepare_line
@@ -75,7 +76,7 @@ def compiled(source: Path, program: Path) -> Path:
     return program
 
 
-@pytest.mark.parametrize("name", FEW)
+@pytest.mark.parametrize("name", few(FEW, "ac_simple_3d", "overlap"))
 def test_steps_from_outside_are_those_of_a_run(name: str, tmp_path: Path) -> None:
     scene = acting_scene(name)
     n_steps = prepare_line(scene, tmp_path / "a.line")

@@ -65,6 +65,7 @@ def check_notebook(told: list[str], names: dict[str, Any], n_speeds: int, n_tens
     assert len(sigmas) == 4 and sigmas[0] < sigmas[2]  # more at 250 km/h
 
 
+@pytest.mark.study
 @pytest.mark.timeout(280)
 def test_the_notebook_with_few_variants(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]

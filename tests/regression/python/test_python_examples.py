@@ -16,6 +16,8 @@ import catenary
 # What is no function and no class of its own: errors say what they are for.
 WITHOUT_EXAMPLE = {"__version__", "CatenaryError", "Fault", "InputError", "RunBroken"}
 PUBLIC = [name for name in catenary.__all__ if name not in WITHOUT_EXAMPLE]
+# Examples of more than a second, whose subjects have tests of their own.
+LONG = {"Identified", "identify", "optimise", "Optimum", "uncertainty"}
 FLAGS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
 
 
@@ -52,7 +54,10 @@ def names(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     return {"catenary": catenary, "scene": scene, "run": run, "folder": folder, "sim": sim}
 
 
-@pytest.mark.parametrize("name", DESCRIBED)
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=pytest.mark.study if name in LONG else ()) for name in DESCRIBED],
+)
 def test_the_example_is_true(name: str, names: dict[str, Any]) -> None:
     text = pydoc.getdoc(DESCRIBED[name])
     parser, told = doctest.DocTestParser(), []

@@ -300,6 +300,7 @@ def swept(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out / "here"
 
 
+@pytest.mark.study
 def test_a_sweep_is_the_table_of_the_program(scene: catenary.Scene, swept: Path) -> None:
     table = catenary.sweep(scene, VARIED)
     expected = pd.DataFrame(json.loads((swept / "sweep.json").read_text())["rows"])

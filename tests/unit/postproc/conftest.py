@@ -164,6 +164,11 @@ class March:
         self.dropper_x = self.mesh.x(self.mesh.droppers[:, 1])
         self.recorded = RecordedLine.of(self.line, self.mesh, np.zeros(self.mesh.n_nodes))
         self.tension = 1000.0 * np.arange(self.mesh.n_nodes)
+        own_arms = self.arm_x[self.own(self.arm_x.size)]
+        own_droppers = self.dropper_x[self.own(self.dropper_x.size)]
+        self._own_x = np.concatenate([own_droppers, own_arms])
+        self._at_rest = 65.0 + 8.0 * np.cos(own_droppers)
+        self._own_nodes = self.mesh.points[self.own(self.mesh.n_nodes), 0]
 
     def header(self, **attributes: Any) -> Header:
         problem = make_problem(self.line, len(self.separations), dt=self.dt, speed=self.speed)
@@ -204,13 +209,10 @@ class March:
 
     def wave(self, t: float, x: np.ndarray) -> np.ndarray:
         """Uplift of the line at positions x: a hump around each pantograph with a wake [m]."""
-        total = np.zeros(x.size)
-        for position in self.position(t):
-            ahead = x - position
-            hump = 0.06 * np.exp(-((ahead / 9.0) ** 2))
-            wake = 0.02 * np.exp(np.minimum(ahead, 0.0) / 60.0) * np.sin(0.35 * ahead)
-            total += hump + np.where(ahead < 0, wake, 0.0)
-        return total
+        ahead = x - self.position(t)[:, None]
+        wake = 0.02 * np.exp(np.minimum(ahead, 0.0) / 60.0) * np.sin(0.35 * ahead)
+        hump = 0.06 * np.exp(-((ahead / 9.0) ** 2))
+        return np.asarray((hump + np.where(ahead < 0, wake, 0.0)).sum(axis=0))
 
     def places(self, t: float) -> np.ndarray:
         """Bases at rest, heights of a head and of the frame below it for each pantograph [m]."""
@@ -230,18 +232,17 @@ class March:
     def view(self, step: int) -> StepView:
         t = step * self.dt
         position = self.position(t)
-        arms = self.arm_x[self.own(self.arm_x.size)]
-        droppers = self.dropper_x[self.own(self.dropper_x.size)]
-        nodes = self.mesh.points[self.own(self.mesh.n_nodes), 0]
+        nodes, n_droppers = self._own_nodes, self._at_rest.size
+        uplift = self.wave(t, self._own_x)
         wire = 5.3 - 0.02 + 0.015 * np.sin(2 * np.pi * position / SPAN)
-        slack = 90.0 / 0.06 * np.maximum(self.wave(t, droppers), 0.0)
+        slack = 90.0 / 0.06 * np.maximum(uplift[:n_droppers], 0.0)
         values = {
             "contact_position": position,
             "contact_force": self.force(t),
             "head_height": wire - 0.002,
             "wire_height": wire,
-            "dropper_force": np.maximum(65.0 + 8.0 * np.cos(droppers) - slack, -0.5),
-            "arm_uplift": self.wave(t, arms),
+            "dropper_force": np.maximum(self._at_rest - slack, -0.5),
+            "arm_uplift": uplift[n_droppers:],
         }
         row, columns = row_of(values | self.more(step))
         return StepView(

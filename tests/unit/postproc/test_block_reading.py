@@ -118,6 +118,7 @@ def make_long(path: Path, make_march: Any, record_run: Any) -> None:
         file[COMPLETE][...] = [rows, 0, rows]
 
 
+@pytest.mark.study
 @pytest.mark.process
 def test_a_report_on_a_long_run_takes_bounded_memory(
     tmp_path: Path, make_march: Any, record_run: Any

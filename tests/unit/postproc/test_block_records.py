@@ -68,13 +68,13 @@ def contents(path: Path) -> dict[str, bytes]:
     [
         (64, None, None),
         (50, 7, None),
-        (1, 3, None),
+        pytest.param(1, 3, None, marks=pytest.mark.study),
         (1000, 10, LineRecord(every=3)),
         (60, 25, LineRecord(every=4, window=(60.0, 40.0), compression=GZIP)),
         (77, None, LineRecord(stretch=(100.0, 300.0), names=("arm_uplift",))),
     ],
 )
-@pytest.mark.parametrize("first", [0, 31])
+@pytest.mark.parametrize("first", [pytest.param(0, marks=pytest.mark.study), 31])
 def test_a_file_written_by_blocks_is_the_same(
     tmp_path: Path,
     make_march: Any,

@@ -96,7 +96,10 @@ def test_resumed_fields_replace_what_follows(tmp_path: Path, make_march: Any) ->
 
 
 @pytest.mark.process
-@pytest.mark.parametrize("last", [0, 1, 401, 405])
+@pytest.mark.parametrize(
+    "last",
+    [pytest.param(0, marks=pytest.mark.study), 1, pytest.param(401, marks=pytest.mark.study), 405],
+)
 def test_no_snapshot_before_the_state_is_lost(
     last: int, tmp_path: Path, make_march: Any, caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -151,7 +154,15 @@ def broken_tables(path: Path) -> None:
 
 
 @pytest.mark.process
-@pytest.mark.parametrize("damage", [other_times, other_mesh, no_snapshots, broken_tables])
+@pytest.mark.parametrize(
+    "damage",
+    [
+        other_times,
+        pytest.param(other_mesh, marks=pytest.mark.study),
+        pytest.param(no_snapshots, marks=pytest.mark.study),
+        broken_tables,
+    ],
+)
 def test_damaged_snapshots_are_begun_anew(
     damage: Any, tmp_path: Path, make_march: Any, caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -197,7 +208,7 @@ def test_times_tell_how_far_a_run_came(tmp_path: Path, make_march: Any) -> None:
 
 
 @pytest.mark.process
-@pytest.mark.parametrize("share", [0.0, 0.6])
+@pytest.mark.parametrize("share", [pytest.param(0.0, marks=pytest.mark.study), 0.6])
 def test_a_file_that_a_kill_has_spoilt_is_begun_anew(
     share: float, tmp_path: Path, make_march: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -11,6 +11,7 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
+from studies import few
 
 from catenary.base.errors import InputError
 from catenary.postproc.film.snapshots import Snapshots
@@ -112,7 +113,21 @@ DAMAGE: dict[str, tuple[Callable[[h5py.File], None], str]] = {
 }
 
 
-@pytest.mark.parametrize("how", DAMAGE)
+@pytest.mark.parametrize(
+    "how",
+    few(
+        DAMAGE,
+        "first below 0",
+        "one point of a wire",
+        "node beyond",
+        "cells in disorder",
+        "point NaN",
+        "a block twice",
+        "no parts",
+        "times back",
+        "no field",
+    ),
+)
 def test_damage_is_told_in_a_sentence(how: str, made: Path, tmp_path: Path) -> None:
     damage, words = DAMAGE[how]
     path = Path(shutil.copy(made / "fields.h5", tmp_path))

@@ -654,6 +654,7 @@ def test_what_ffmpeg_says_is_told(tmp_path: Path) -> None:
         video.write([picture] * 3, (160, 90), 10.0, *files)
 
 
+@pytest.mark.study
 def test_memory_does_not_grow_with_a_film(tmp_path: Path) -> None:
     """300 pictures are 69 MB, and those of the GIF, 800 pixels wide, 108 MB."""
     ground = np.zeros((180, 320, 4), dtype=np.uint8)

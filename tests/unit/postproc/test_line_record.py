@@ -8,6 +8,7 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
+from studies import few
 
 from catenary.postproc.channels.line_record import GZIP, LineRecord, from_table, record_words
 from catenary.postproc.evaluate import statistics
@@ -56,7 +57,7 @@ RECORDS = {
 }
 
 
-@pytest.mark.parametrize("name", RECORDS)
+@pytest.mark.parametrize("name", few(RECORDS, "all of them", "window", "thinned"))
 def test_a_part_of_the_record_is_that_of_the_whole_one(
     tmp_path: Path, make_march: Any, record_run: Any, whole: Path, name: str
 ) -> None:
@@ -101,7 +102,14 @@ def test_a_window_takes_room_near_the_train_only(
     assert few < 0.7 * all_of_them
 
 
-@pytest.mark.parametrize("name", ["both", "all of them", "stretch"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param("both", marks=pytest.mark.study),
+        "all of them",
+        pytest.param("stretch", marks=pytest.mark.study),
+    ],
+)
 def test_a_restarted_run_has_the_same_content(
     tmp_path: Path, make_march: Any, record_run: Any, name: str
 ) -> None:

@@ -138,6 +138,7 @@ def test_the_sweep_of_a_zigzag() -> None:
         assert observed(name, at_rest(wire)).absent == "no contact wire moves sideways in this run"
 
 
+@pytest.mark.study
 def test_bending_strain_is_that_of_a_beam_in_finite_differences() -> None:
     """EI w'''' - (F - m v^2) w'' = P delta on 8 m between hinges, far beyond sqrt(EI / F).
 

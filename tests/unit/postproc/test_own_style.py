@@ -119,11 +119,14 @@ BROKEN = {
 @pytest.mark.parametrize(
     ("of_the_user", "what"),
     [
-        (True, "no text"),
         (False, "no text"),
         *(
-            pytest.param(False, what, marks=pytest.mark.study)
-            for what in ("other words", "a folder")
+            pytest.param(of_the_user, what, marks=pytest.mark.study)
+            for of_the_user, what in (
+                (True, "no text"),
+                (False, "other words"),
+                (False, "a folder"),
+            )
         ),
     ],
 )

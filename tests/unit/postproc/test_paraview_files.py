@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 import pyvista
 from matplotlib.colors import to_rgb
+from studies import few
 
 from catenary.base.errors import InputError
 from catenary.postproc.film.film_data import film_data
@@ -98,10 +99,10 @@ def test_the_script_is_python_and_keeps_strangers_words_as_text(
 @pytest.mark.parametrize(
     ("view", "aside", "component", "coloured"),
     [
-        (View.SIDE, 0.0, "", "uplift [m]"),
-        (View.PLAN, 0.0, "", "uplift [m]"),
+        pytest.param(View.SIDE, 0.0, "", "uplift [m]", marks=pytest.mark.study),
+        pytest.param(View.PLAN, 0.0, "", "uplift [m]", marks=pytest.mark.study),
         (View.PLAN, 0.0123, "Y", "to the left [m]"),
-        (View.OBLIQUE, 0.0, "", "uplift [m]"),
+        pytest.param(View.OBLIQUE, 0.0, "", "uplift [m]", marks=pytest.mark.study),
         (View.ALONG, 0.0123, "", "uplift [m]"),
     ],
 )
@@ -136,7 +137,7 @@ class _AnyParaView(types.ModuleType):
         return made
 
 
-@pytest.mark.parametrize("view", list(View))
+@pytest.mark.parametrize("view", few(list(View), View.ALONG, View.OBLIQUE))
 def test_the_script_runs_from_end_to_end(
     folder: Path, view: View, monkeypatch: pytest.MonkeyPatch
 ) -> None:

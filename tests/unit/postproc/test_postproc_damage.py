@@ -183,7 +183,9 @@ def test_what_is_valid_is_used_and_the_rest_told(how: str, copy: Path, sound: Pa
     assert words in compare(sound, copy)
 
 
-@pytest.mark.parametrize("how", ["no arms", "force of 1e156 N"])
+@pytest.mark.parametrize(
+    "how", ["no arms", pytest.param("force of 1e156 N", marks=pytest.mark.study)]
+)
 def test_a_report_is_drawn_around_the_damage(how: str, copy: Path) -> None:
     with h5py.File(copy, "r+") as file:
         USED[how][0](file)
@@ -306,7 +308,7 @@ def test_an_outcome_that_is_no_text_is_left_out(copy: Path, tmp_path: Path) -> N
         assert "outcome" in results.damage[0]
 
 
-@pytest.mark.parametrize("sealed", [True, False])
+@pytest.mark.parametrize("sealed", [True, pytest.param(False, marks=pytest.mark.study)])
 @pytest.mark.parametrize("mutations", [attribute_mutations, dataset_mutations])
 def test_random_damage_is_told_in_a_sentence(
     mutations: Any, sealed: bool, sound: Path, tmp_path: Path

@@ -171,6 +171,7 @@ def test_what_is_stale_goes_and_what_is_a_users_stays(tmp_path: Path) -> None:
     assert {path.name for path in tmp_path.iterdir()} == {"run.h5", *mine}
 
 
+@pytest.mark.usefixtures("quick_report")
 def test_a_reports_files_are_all_declared(tmp_path: Path, make_march: Any, record_run: Any) -> None:
     from catenary.postproc.report.report import write_report
 

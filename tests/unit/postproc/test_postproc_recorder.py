@@ -63,7 +63,9 @@ def test_channels_carry_unit_and_meaning(run_folder: Path) -> None:
         assert file["channels/contact_force"].shape == (8001, 2)
 
 
-@pytest.mark.parametrize("flush_every", [1, 7, 100, 101, 5000])
+@pytest.mark.parametrize(
+    "flush_every", [pytest.param(1, marks=pytest.mark.study), 7, 100, 101, 5000]
+)
 def test_every_flush_length_records_every_step(
     tmp_path: Path, make_march: Any, record_run: Any, flush_every: int
 ) -> None:
@@ -226,7 +228,14 @@ watcher.start""",
 
 
 @pytest.mark.process
-@pytest.mark.parametrize("room", [700_000, 1_000_000, 1_234_567])
+@pytest.mark.parametrize(
+    "room",
+    [
+        pytest.param(700_000, marks=pytest.mark.study),
+        1_000_000,
+        pytest.param(1_234_567, marks=pytest.mark.study),
+    ],
+)
 @pytest.mark.parametrize("claim", ["system", "zeros"])
 def test_a_full_disk_ends_the_run_with_a_sentence_and_keeps_the_record(
     tmp_path: Path, make_march: Any, room: int, claim: str

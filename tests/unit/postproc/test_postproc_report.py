@@ -209,7 +209,10 @@ def test_a_failed_criterion_is_named(tmp_path: Path, make_march: Any, record_run
     assert failed == ["mean contact force"]
 
 
-@pytest.mark.parametrize("steps", [0, 1, 30, 3000])
+@pytest.mark.parametrize(
+    "steps",
+    [0, pytest.param(1, marks=pytest.mark.study), 30, pytest.param(3000, marks=pytest.mark.study)],
+)
 def test_an_interrupted_run_is_reported_as_far_as_it_went(
     tmp_path: Path, make_march: Any, steps: int
 ) -> None:
@@ -236,7 +239,9 @@ def test_an_interrupted_run_is_reported_as_far_as_it_went(
     assert judged["train speed against 0.7 of the wave speed"] is True
 
 
-@pytest.mark.parametrize("separations", [(0.0,), (0.0, 31.0, 62.0, 93.0)])
+@pytest.mark.parametrize(
+    "separations", [pytest.param((0.0,), marks=pytest.mark.study), (0.0, 31.0, 62.0, 93.0)]
+)
 def test_one_and_four_pantographs_are_reported(
     tmp_path: Path, make_march: Any, record_run: Any, separations: tuple[float, ...]
 ) -> None:

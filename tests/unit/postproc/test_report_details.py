@@ -136,6 +136,7 @@ def names_in(folder: Path) -> set[str]:
     return {one.get("id") for one in page.iter("h2")} - {None}
 
 
+@pytest.mark.usefixtures("quick_report")
 def test_sections_are_there_where_they_apply(
     run_folder: Path, tmp_path: Path, make_march: Any
 ) -> None:

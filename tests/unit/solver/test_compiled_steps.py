@@ -11,6 +11,7 @@ import paper_pantograph as paper
 import pytest
 from measuring import registered, start_march
 from small_lines import WHOLE, ac_simple_line, mesh_of, numerics, problem_of, train
+from studies import few
 
 from catenary.base.errors import RunBroken
 from catenary.mbs.air import Polynomial, Tunnel, Uplift
@@ -203,7 +204,10 @@ def from_python(monkeypatch: pytest.MonkeyPatch) -> Callable[..., tuple[Rows, Ou
     return run_so
 
 
-@pytest.mark.parametrize("scene", SCENES)
+@pytest.mark.parametrize(
+    "scene",
+    few(SCENES, "all bodies", "one", "laws and controllers", "two strips that roll, on a track"),
+)
 def test_a_loop_gives_the_bits_of_steps_from_python(
     scene: str, mesh: LineMesh, from_python: Any
 ) -> None:

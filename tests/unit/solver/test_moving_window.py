@@ -137,7 +137,7 @@ def rows_of(problem: Problem, mesh: LineMesh, window: WindowChoice) -> np.ndarra
     return np.array(seen.rows)
 
 
-@pytest.mark.parametrize("n_rows", [1, 7, 64])
+@pytest.mark.parametrize("n_rows", [pytest.param(1, marks=pytest.mark.study), 7, 64])
 def test_rows_of_blocks_show_what_moves_and_what_rests(
     n_rows: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:

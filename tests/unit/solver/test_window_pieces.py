@@ -52,7 +52,7 @@ def small(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize(
     ("seconds", "changes"),
     [
-        (5.0, {}),
+        pytest.param(5.0, {}, marks=pytest.mark.study),
         (1.0, {"numerics": numerics(1e-3, integrator="hht", spectral_radius=0.8)}),
         (1.0, {"damping": Damping(2e-3, 0.0, {"droppers": (1e-4, 0.0)})}),
         (1.0, {"line": stitched_line(SPANS)}),
@@ -118,7 +118,9 @@ def test_a_piece_where_no_window_can_end_breaks_the_run_in_words(
 
 
 @pytest.mark.usefixtures("small")
-@pytest.mark.parametrize(("margin", "goes_on"), [(0.85, True), (0.5, False)])
+@pytest.mark.parametrize(
+    ("margin", "goes_on"), [(0.85, True), pytest.param(0.5, False, marks=pytest.mark.study)]
+)
 def test_columns_that_reach_further_than_those_tried_are_borne_or_told(
     margin: float, goes_on: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
