@@ -293,7 +293,7 @@ def differentiate(set_up: Callable[[float], SetUp], now: SetUp, step: float, wha
 def _matrices(found: Sequence[dict[int, sparse.csc_matrix]], step: float) -> list[MatrixTerm]:
     """Derivatives of K, C and M from each of them at several steps of the parameter."""
     stiffness, damping, mass = (_derivative(matrices, step) for matrices in found)
-    by_stiffness, by_mass = _shares(damping, stiffness), _shares(damping, mass)
+    by_stiffness, by_mass = _shares(damping, stiffness, mass)
     left = damping - by_stiffness * stiffness - by_mass * mass
     terms = [(stiffness, 1.0, by_stiffness, 0.0), (mass, 0.0, by_mass, 1.0)]
     if abs(left).max() > _PROPORTIONAL * abs(damping).max():
@@ -310,10 +310,19 @@ def _derivative(matrices: dict[int, sparse.csc_matrix], step: float) -> sparse.c
     return derivative
 
 
-def _shares(whole: sparse.csc_matrix, part: sparse.csc_matrix) -> float:
-    """Factor with which ``whole`` contains ``part``, by least squares; 0 if ``part`` is empty."""
-    square = part.multiply(part).sum()
-    return float(part.multiply(whole).sum() / square) if square else 0.0
+def _shares(whole: sparse.csc_matrix, *parts: sparse.csc_matrix) -> list[float]:
+    """Factors of ``parts`` whose sum is nearest to ``whole``, zero of a part without influence.
+
+    They are rounded within ``_PROPORTIONAL``, so that parameters have the same factors and tangents
+    share the sums of motions that these make.
+    """
+    sizes = [float(np.sqrt(part.multiply(part).sum())) or 1.0 for part in parts]
+    scaled = [part / size for part, size in zip(parts, sizes, strict=True)]
+    products = np.array([[float(one.multiply(two).sum()) for two in scaled] for one in scaled])
+    right = np.array([float(one.multiply(whole).sum()) for one in scaled])
+    found = np.linalg.lstsq(products, right, rcond=None)[0]
+    found[np.abs(found) <= _PROPORTIONAL * np.linalg.norm(found)] = 0.0
+    return [float(f"{share / size:.9e}") for share, size in zip(found, sizes, strict=True)]
 
 
 def _term(matrix: sparse.csr_matrix, *by: float) -> MatrixTerm:

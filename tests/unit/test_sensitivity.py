@@ -16,12 +16,13 @@ from verb_runner import CliRunner
 
 from catenary.base.errors import InputError
 from catenary.cases.cli.main import app
+from catenary.cases.run.prepared import sound_rest
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.problem import problem_of
 from catenary.cases.studies.sensitivity.output import as_text, table_of
 from catenary.cases.studies.sensitivity.parameters import ChangedScenes, Parameter
-from catenary.cases.studies.sensitivity.study import Sensitivity, sensitivity_of
+from catenary.cases.studies.sensitivity.study import Sensitivity, change_by, sensitivity_of
 from catenary.postproc.evaluate.statistics import contact_statistics
 from catenary.solver.statics.line_at_rest import line_at_rest
 from catenary.solver.tangents.march import march_with_tangents
@@ -262,6 +263,19 @@ def test_the_geometry_of_the_mesh_is_no_parameter() -> None:
     for key in ("line.dropper.positions_m.2", "numerics.dt_s", "line.n_spans"):
         with pytest.raises(InputError, match="by which a march has no derivative"):
             sensitivity_of(load_scene(CASE, TINY), [key], MPI.COMM_SELF)
+
+
+def test_proportional_damping_needs_no_term_of_its_own() -> None:
+    """With the mass of the contact wire its mass and the droppers' stiffness across their tension
+    change, in part at the same nodes: damping by 0.02 s and 0.1 1/s is found in both at once."""
+    damping = ("line.damping.alpha_s=0.02", "line.damping.beta_per_s=0.1")
+    own = scenes("line.n_spans=20", "mesh.elements_per_gap=2", *damping, case="ambrosio2012")
+    at_rest, parameter = sound_rest(own.scene), own.parameter("line.contact_wire.mass_kg_per_m")
+    now = set_up_of(MPI.COMM_SELF, at_rest)
+    change = change_by(parameter, own, at_rest, now, MPI.COMM_SELF)
+    by = [one[-3:] for one in change.matrices]
+    # Differences of set-ups are off by 1e-10 of themselves.
+    assert by == [(1.0, pytest.approx(0.02, rel=1e-9), 0.0), (0.0, pytest.approx(0.1, rel=1e-9), 1)]
 
 
 def test_the_verb_writes_its_table_once(tmp_path: Path) -> None:

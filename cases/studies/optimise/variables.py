@@ -178,7 +178,7 @@ def _component(
     if table.round_to is not None and table.round_to > max(-low, high):
         raise InputError(
             f"variables.{number}.round_to is {table.round_to:g}, but {table.key} may change by "
-            f"{max(-low, high):g} at most, so that no whole multiple is left but none"
+            f"{max(-low, high):g} at most, so that 0 is its only multiple left"
         )
     step = table.step or _USUAL_STEP * (high - low)
     return Component(table.key, entries, signs, low, high, step, table.round_to or 0.0)

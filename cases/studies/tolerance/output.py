@@ -34,6 +34,7 @@ def table_of(found: Sequence[Tolerance]) -> StudyTable:
             "samples": f"{one.kept} of {one.n_samples}" if one.level else "",
             "least_share": one.least_share if one.level else None,
             "linear": one.linear if np.isfinite(one.linear or 0.0) else None,
+            "as_run": None if one.checked is None else _at_least(one.checked, one.most),
         }
         for one in found
     ]
@@ -49,7 +50,8 @@ def table_of(found: Sequence[Tolerance]) -> StudyTable:
         Column("samples", "samples keep it", ">", in_files=False),
         Column("least_share", "share at least", ".3f"),
         Column("linear", "worst case by slopes +-", ".3g"),
-        Column("checked", "as run +-", ".3g"),
+        Column("checked"),
+        Column("as_run", "as run +-", ">", in_files=False),
         Column("lost_at", "a line loses it at +-", ".3g"),
     )
     return StudyTable(columns, rows, "Tolerances by criterion")
@@ -58,7 +60,12 @@ def table_of(found: Sequence[Tolerance]) -> StudyTable:
 def _level(one: Tolerance) -> str:
     if not one.level:
         return "not kept without errors" if not one.kept else "none"
-    return f"{'at least ' if one.at_most else ''}{one.level:.3g}"
+    return _at_least(one.level, one.most)
+
+
+def _at_least(level: float, most: float) -> str:
+    """A tolerance in words, which may be larger than the greatest that was looked at."""
+    return f"{'at least ' if level >= most else ''}{level:.3g}"
 
 
 def installer_table(plan: Plan, found: Sequence[Tolerance]) -> StudyTable:

@@ -110,6 +110,7 @@ class Tolerance:
     checked : largest tolerance at which the line with that worst case keeps the criterion
     lost_at : least tolerance at which a line that was run, of the samples or of the worst case, is
         known to lose it, below which the true worst case lies; None if none does
+    most : greatest tolerance that was looked at
     """
 
     criterion: str
@@ -123,6 +124,7 @@ class Tolerance:
     linear: float | None = None
     checked: float | None = None
     lost_at: float | None = None
+    most: float = np.inf
 
 
 @dataclass(frozen=True)
@@ -270,7 +272,7 @@ class _Search:
     def _tolerance(self, varied: _Varied, criterion: str) -> Tolerance:
         if least(self.nominal, criterion) < 0.0:
             head = criterion, varied.name, varied.unit
-            return Tolerance(*head, 0.0, False, 0, self.samples.n, 0.0)
+            return Tolerance(*head, 0.0, False, 0, self.samples.n, 0.0, most=varied.most)
         found = self._by_samples(varied, criterion, criterion)
         if not self.samples.worst_case:
             return found
@@ -302,7 +304,7 @@ class _Search:
         share = float(beta.ppf(1.0 - self.samples.confidence, kept, n - kept + 1))
         lost_at = min(lost, default=None)
         head = name, varied.name, varied.unit
-        return Tolerance(*head, level, at_most, kept, n, share, lost_at=lost_at)
+        return Tolerance(*head, level, at_most, kept, n, share, lost_at=lost_at, most=varied.most)
 
     def _bisect(self, most: float, holds: Callable[[float], bool]) -> tuple[float, bool]:
         """The largest level that holds, 0 always does; whether that is the greatest of all."""

@@ -28,12 +28,12 @@ Moved moved_at(int64_t unknown, const Motion& motion) {
     return {displacement_at(unknown, motion), velocity_at(unknown, motion)};
 }
 
-/// Fill `result` with the operand of a term.
+/// Fill `result` with a sum of displacements, velocities and accelerations.
 CATENARY_FOR_TARGETS
-void add_up(const MatrixTerm& term, std::span<const double> displacement,
+void add_up(std::array<double, 3> weights, std::span<const double> displacement,
             std::span<const double> velocity, std::span<const double> acceleration,
             std::span<double> result) {
-    const double by_d = term.by_displacement, by_v = term.by_velocity, by_a = term.by_acceleration;
+    const auto [by_d, by_v, by_a] = weights;
     for (size_t i = 0; i < result.size(); ++i)
         result[i] = by_d * displacement[i] + by_v * velocity[i] + by_a * acceleration[i];
 }
@@ -78,10 +78,10 @@ TangentSteps::TangentSteps(StepParts parts, Block block, MarchTangents tangents)
             throw std::invalid_argument("a tangent has other heads than the steps");
         contacts_.push_back(own.contacts);
         contacts_.back().motion = tangent.free->parts().arrays.motion;
-        reads_motion_ = reads_motion_ || !tangent.matrices.empty();
+        for (const MatrixTerm& term : tangent.matrices) sum_of(term);
     }
-    if (reads_motion_)
-        for (auto* numbers : {&displacement_, &velocity_, &sum_})
+    if (!sums_.empty())
+        for (auto* numbers : {&displacement_, &velocity_})
             numbers->resize(own.contacts.motion.x.size());
     const int64_t n = n_contacts(), most = size(own.problem.unknowns.right);
     for (auto* numbers : {&place_, &rate_, &forces_}) numbers->resize(n);
@@ -111,9 +111,20 @@ Taken TangentSteps::take(int64_t first, int64_t end) {
 }
 
 void TangentSteps::read_motion() {
-    if (!reads_motion_) return;
-    displacements(parts().contacts.motion, 0, displacement_);
-    velocities(parts().contacts.motion, 0, velocity_);
+    if (sums_.empty()) return;
+    const Motion& motion = parts().contacts.motion;
+    displacements(motion, 0, displacement_);
+    velocities(motion, 0, velocity_);
+    for (Sum& sum : sums_) add_up(sum.weights, displacement_, velocity_, motion.z, sum.numbers);
+}
+
+/// The sum of motions that a term multiplies, made with the first term that does.
+std::span<const double> TangentSteps::sum_of(const MatrixTerm& term) {
+    const std::array weights{term.by_displacement, term.by_velocity, term.by_acceleration};
+    for (const Sum& sum : sums_)
+        if (sum.weights == weights) return sum.numbers;
+    sums_.push_back({weights, std::vector<double>(parts().contacts.motion.x.size())});
+    return sums_.back().numbers;
 }
 
 /// Find the contacts and links that act in the step that was taken.
@@ -218,14 +229,13 @@ void TangentSteps::follow(int64_t number) {
 /// Put the loads of a tangent's line: by the changes of its matrices, links and places of contacts.
 void TangentSteps::load(const Tangent& tangent, double way) {
     const auto loads = tangent.loads;
-    const auto acceleration = parts().contacts.motion.z;
     std::ranges::fill(loads, 0.0);
     for (const MatrixTerm& term : tangent.matrices) {
-        add_up(term, displacement_, velocity_, acceleration, sum_);
-        for (int64_t i = 0; i < size(term.rows); ++i) {
+        const auto sum = sum_of(term);
+        for (int64_t i = 0, k = 0; i < size(term.rows); ++i) {
             double value = 0.0;
-            for (int64_t k = term.begin[i]; k < term.begin[i + 1]; ++k)
-                value += term.values[k] * sum_[term.columns[k]];
+            for (const int64_t end = term.begin[i + 1]; k < end; ++k)
+                value += term.values[k] * sum[term.columns[k]];
             loads[term.rows[i]] -= value;
         }
     }

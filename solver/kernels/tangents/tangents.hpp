@@ -102,7 +102,15 @@ class TangentSteps : public Steps {
         int64_t n() const { return static_cast<int64_t>(contacts.size() + rows.size()); }
     };
 
+    /// A sum of the line's displacements, velocities and accelerations, which several tangents
+    /// read.
+    struct Sum {
+        std::array<double, 3> weights;
+        std::vector<double> numbers;
+    };
+
     void read_motion();
+    std::span<const double> sum_of(const MatrixTerm& term);
     void find_acting();
     void count();
     void fill_matrix();
@@ -130,15 +138,14 @@ class TangentSteps : public Steps {
     int64_t n_contacts() const { return size(parts().problem.found.depth); }
 
     MarchTangents tangents_;
-    std::vector<Contacts> contacts_;            ///< of each tangent, with its motion
-    std::vector<const LinearChain*> chains_;    ///< of heads that are linear chains, else null
-    std::vector<std::vector<double>> before_;   ///< states of the heads before the step
-    std::vector<std::vector<double>> pressed_;  ///< contact forces that their laws read then
-    std::vector<double> row_;                   ///< room for the drive of a head
-    std::vector<std::vector<double>> free_;     ///< derivatives of heads without contact
-    /// Displacements and velocities of the line, and sums of these and of accelerations.
-    std::vector<double> displacement_, velocity_, sum_;
-    bool reads_motion_ = false;          ///< whether any tangent does
+    std::vector<Contacts> contacts_;               ///< of each tangent, with its motion
+    std::vector<const LinearChain*> chains_;       ///< of heads that are linear chains, else null
+    std::vector<std::vector<double>> before_;      ///< states of the heads before the step
+    std::vector<std::vector<double>> pressed_;     ///< contact forces that their laws read then
+    std::vector<double> row_;                      ///< room for the drive of a head
+    std::vector<std::vector<double>> free_;        ///< derivatives of heads without contact
+    std::vector<double> displacement_, velocity_;  ///< of the line
+    std::vector<Sum> sums_;
     std::vector<double> place_, rate_;   ///< derivatives of gaps without forces
     std::vector<double> forces_;         ///< of contacts
     std::vector<double> compensations_;  ///< of acting links
