@@ -193,7 +193,8 @@ def test_an_index_of_what_happens_once_has_no_bounds() -> None:
     values[1] = 0.1
     table.frame["std_N"] = values
     widths = [row[name] for row in evaluate(table).sensitivity for name in ("S1_conf", "ST_conf")]
-    assert any(map(math.isnan, widths)) and not any(width > 10 for width in widths)
+    # SALib 1.6 gives such indices as zero.
+    assert all(math.isnan(width) or width == 0.0 for width in widths)
 
 
 @pytest.mark.parametrize("method", ["sobol", "latin_hypercube", "random"])

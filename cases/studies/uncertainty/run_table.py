@@ -21,6 +21,9 @@ DONE = "done"
 _LISTS = ("failed", "judged", "remarks")
 _JOINT = "; "
 _MOST_BYTES = 2_000_000_000
+# Pandas reads the numbers that were written from version 3.1 on, before only if asked.
+_OLD = tuple(map(int, pd.__version__.split(".")[:2])) < (3, 1)
+_EXACT: dict[str, Any] = {"float_precision": "round_trip"} if _OLD else {}
 # Columns of a sweep's table that are neither inputs nor statistics.
 _OTHERS = ("variant", "outcome", "pantograph", "passed", *_LISTS, "wall_s")
 
@@ -126,9 +129,7 @@ def read_run_table(path: Path) -> RunTable:
         if file.suffix == ".parquet":
             frame = pd.read_parquet(file)
         else:
-            frame = pd.read_csv(
-                file, keep_default_na=False, na_values=[""], float_precision="round_trip"
-            )
+            frame = pd.read_csv(file, keep_default_na=False, na_values=[""], **_EXACT)
     except InputError:
         raise
     except ImportError as error:
