@@ -164,10 +164,8 @@ class Drawing:
         if self._picture.view is View.PLAN:
             self._still[MASTS].set_linewidth(_USUAL * LOOKS[CLAMPS].thick)
         width = _USUAL * LOOKS[DROPPERS].thick
-        self.droppers = lines(
-            linewidths=width, cmap=ramp(drawn.DROPPER_FORCES), norm=Normalize(0.0, strongest or 1.0)
-        )
-        self.droppers.get_cmap().set_bad(drawn.UNKNOWN)
+        forces = ramp(drawn.DROPPER_FORCES).with_extremes(bad=drawn.UNKNOWN)
+        self.droppers = lines(linewidths=width, cmap=forces, norm=Normalize(0.0, strongest or 1.0))
         self.slack = lines(linewidths=1.3 * width, colors=drawn.SLACK, linestyles=(0, (2.5, 2.0)))
         self.slack.set_capstyle("butt")
         limits = Normalize(1e3 * self._colours.low, 1e3 * self._colours.high)
