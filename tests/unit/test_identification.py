@@ -21,14 +21,21 @@ import catenary
 from catenary.base.errors import InputError
 from catenary.cases.cli.main import app
 from catenary.cases.scene.load import load_scene
-from catenary.cases.studies.identification.measurement import Measurement, Whitening, correlation
+from catenary.cases.studies.identification.measurement import (
+    Measurement,
+    Signal,
+    Whitening,
+    correlation,
+)
 from catenary.cases.studies.identification.output import verdict
+from catenary.cases.studies.identification.pictures import draw_parameters, draw_passage
 from catenary.cases.studies.identification.posterior import (
     innovations_of,
     is_doubtful,
     judge,
     posterior_of,
 )
+from catenary.cases.studies.identification.study import Identification, Unknown
 from catenary.cases.studies.identification.task import Task
 from catenary.cases.studies.measured.description import Measured
 from catenary.cases.studies.measured.passages import read_table
@@ -368,7 +375,7 @@ def test_the_verb_finds_a_force_and_writes_its_tables_once(files: Path) -> None:
     assert abs(table.loc["bias of head height"].found) < 4.0 * 0.002
     names = {path.name for path in out.iterdir()}
     assert names == {"parameters.csv", "correlation.csv", "directions.csv", "residuals.csv",
-                     "identification.json"}  # fmt: skip
+                     "identification.json", "passage.png", "parameters.png"}  # fmt: skip
     summary = json.loads((out / "identification.json").read_text())
     assert summary["converged"] and set(summary["residuals"]) == {"force", "head height", "all"}
     residuals = pd.read_csv(out / "residuals.csv")
@@ -377,6 +384,48 @@ def test_the_verb_finds_a_force_and_writes_its_tables_once(files: Path) -> None:
     assert left.std() == pytest.approx(5.0, rel=0.3)
     again = invoke(files, "-o", str(out))
     assert again.exit_code == 2 and "is there already" in again.output
+
+
+def test_pictures_show_signals_residuals_and_distances_from_priors() -> None:
+    place = np.linspace(100.0, 120.0, 5)
+    force, height = (
+        Signal("force", place, None, 2.0, 0.0),
+        Signal("head height", 5.0 + 0.0 * place, None, 0.003, 0.01),
+    )  # type: ignore[arg-type]
+    found = Identification(
+        [Unknown("tension", "N", 20e3, 1e3), Unknown("bias of head height", "m", 0.0, 0.01)],
+        np.array([21.5e3, 0.002]),
+        posterior_of(np.array([[3.0, 0.0], [0.0, 0.0]])),
+        place,
+        [force, height],
+        [place - 3.0, 4.9 + 0.0 * place],
+        [place - 1.0, 4.99 + 0.0 * place],
+        {},
+        1,
+        1,
+        [1.0],
+        True,
+    )
+    panels = draw_passage(found).axes
+    assert [line.get_label() for line in panels[0].lines] == ["measured", "priors' means", "found"]
+    # Residuals: of force 1 N, of heights 5 - (4.99 + 0.002) m in millimetres.
+    assert np.allclose(panels[1].lines[0].get_ydata(), 1.0)
+    assert np.allclose(panels[3].lines[0].get_ydata(), 8.0)
+    shaded = [
+        panel.patches[0].get_extents().transformed(panel.transData.inverted())
+        for panel in panels[1::2]
+    ]
+    assert [one.ymax for one in shaded] == pytest.approx([2.0, 3.0])
+    (axes,) = draw_parameters(found).axes
+    assert axes.lines[0].get_xdata() == pytest.approx([1.5, 0.2])
+    assert [text.get_text() for text in axes.get_yticklabels()] == [
+        "tension",
+        "bias of head height",
+    ]
+    # Three times as much information as the prior's leaves 1 / sqrt(1 + 9) of its deviation.
+    (bars,) = axes.collections
+    ends = bars.get_segments()[0][:, 0]
+    assert ends == pytest.approx([1.5 - 0.1**0.5, 1.5 + 0.1**0.5])
 
 
 def test_python_gives_the_same(files: Path) -> None:

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from catenary.cases.studies.identification.measurement import UNITS
+from catenary.cases.studies.identification.pictures import draw_parameters, draw_passage
 from catenary.cases.studies.identification.posterior import RARE, Judged, is_doubtful
 from catenary.cases.studies.identification.study import Identification
 from catenary.postproc.report.study_table import Column, Content, StudyTable
 
 PARAMETERS, CORRELATION = "parameters.csv", "correlation.csv"
 DIRECTIONS, RESIDUALS, SUMMARY = "directions.csv", "residuals.csv", "identification.json"
+PASSAGE, PRIORS = "passage.png", "parameters.png"
 _MOST_DIRECTIONS, _MOST_PAIRS, _MOST_PARTS = 5, 5, 4
 _CORRELATED, _LEAST_PART = 0.5, 0.2
 
@@ -78,11 +81,10 @@ def residuals_table(found: Identification) -> StudyTable:
     """Places, and of each signal what was measured and what the found parameters give, with the
     bias that was found."""
     heads, values = ["place_m"], [found.place]
-    biases = {one.name: value for one, value in zip(found.unknowns, found.values, strict=True)}
-    for signal, modelled in zip(found.signals, found.modelled, strict=True):
+    for signal, modelled, bias in zip(found.signals, found.modelled, found.biases, strict=True):
         name = f"{signal.name.replace(' ', '_')}_{UNITS[signal.name]}"
         heads += [f"measured_{name}", f"modelled_{name}"]
-        values += [signal.values, modelled + biases.get(f"bias of {signal.name}", 0.0)]
+        values += [signal.values, modelled + bias]
     return _table(heads, np.column_stack(values).tolist())
 
 
@@ -217,4 +219,6 @@ def files_of(found: Identification) -> dict[str, Content]:
         DIRECTIONS: directions_table(found),
         RESIDUALS: residuals_table(found),
         SUMMARY: summary_of(found),
+        PASSAGE: partial(draw_passage, found),
+        PRIORS: partial(draw_parameters, found),
     }

@@ -73,6 +73,7 @@ class Identification:
     posterior : their uncertainty, in deviations of the priors
     place : (n,) of the samples of each signal [m]
     signals : that were measured
+    expected : of each signal the samples (n,) of the march with the means of the priors
     modelled : of each signal the samples (n,) of the march that was found, without biases
     judged : the residuals of each signal and of "all"
     n_marches, n_jacobians : how many were made
@@ -85,6 +86,7 @@ class Identification:
     posterior: Posterior
     place: np.ndarray
     signals: list[Signal]
+    expected: list[np.ndarray]
     modelled: list[np.ndarray]
     judged: dict[str, Judged]
     n_marches: int
@@ -96,6 +98,12 @@ class Identification:
     def widths(self) -> np.ndarray:
         """Posterior standard deviations (m,) in the units of the unknowns."""
         return self.posterior.widths * np.array([one.deviation for one in self.unknowns])
+
+    @property
+    def biases(self) -> list[float]:
+        """Constant that was found in each signal, zero where none was looked for."""
+        by_name = dict(zip((one.name for one in self.unknowns), self.values, strict=True))
+        return [float(by_name.get(_bias_of(one.name), 0.0)) for one in self.signals]
 
 
 class _Compared:
@@ -113,12 +121,14 @@ class _Compared:
         self._n = len(unknowns)
         self.n_marches, self.n_jacobians = 0, 0
         self._latest: tuple[bytes, np.ndarray] | None = None
+        self.expected: list[np.ndarray] = []  # the first march, with the priors' means
         self.modelled: list[np.ndarray] = []
 
     def residual(self, at: np.ndarray) -> np.ndarray:
         """Measured less modelled samples of all signals, made independent."""
         self.n_marches += 1
         self.modelled = self._march.values(self._by(at))
+        self.expected = self.expected or self.modelled
         biases = iter(at[self._offsets.size :])
         return np.concatenate(
             [
@@ -194,7 +204,7 @@ def identify(
         [one.mean - _origin(own) for own, one in zip(parameters, unknowns, strict=True)]
     )
     biases = [
-        Unknown(f"bias of {one.name}", UNITS[one.name], 0.0, one.bias)
+        Unknown(_bias_of(one.name), UNITS[one.name], 0.0, one.bias)
         for one in measurement.signals
         if one.bias
     ]
@@ -211,6 +221,7 @@ def identify(
         posterior_of(compared.jacobian(found.x)),
         measurement.place,
         measurement.signals,
+        compared.expected,
         compared.modelled,
         compared.judged(found),
         compared.n_marches,
@@ -269,6 +280,10 @@ def _measurement(scene: Scene, measured: Path | pd.DataFrame, task: Task) -> Mea
     if isinstance(measured, Path):
         table, name = read_table(measured), str(measured)
     return Measurement(table, name, task.measured, train.speed, start, problem.evaluation)
+
+
+def _bias_of(signal: str) -> str:
+    return f"bias of {signal}"
 
 
 def _origin(parameter: Parameter) -> float:
