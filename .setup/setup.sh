@@ -12,13 +12,13 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 # a|b: either will do, a is installed if none is there. The module h5py that chooses between the
 # serial and the MPI build lies in python3-h5py since Debian 13, in python3-h5py-serial before.
 # gmsh's wheel links to these libraries of OpenGL and X (ldd libgmsh.so), though no window is opened.
-# WeasyPrint, which writes reports as PDF, loads Pango.
+# WeasyPrint, which writes reports as PDF, loads Pango and HarfBuzz.
 DEBIAN_PACKAGES=(
     python3-petsc4py-real python3-mpi4py python3-h5py-mpi "python3-h5py|python3-h5py-serial"
     python3-scipy python3-numpy openmpi-bin python3-venv make
     libglu1-mesa libgl1 libegl1 libxrender1 libxcursor1 libxfixes3 libxext6 libxft2 libfontconfig1
     libxinerama1 libx11-6 libgomp1
-    libpango-1.0-0 libpangoft2-1.0-0 fonts-dejavu-core
+    libpango-1.0-0 libpangoft2-1.0-0 libharfbuzz-subset0 fonts-dejavu-core
     g++ python3-dev
 )
 STAMP=.venv/catenary-setup
