@@ -238,7 +238,12 @@ def check_wide(made: RandomScene) -> str:
         # In other planes matrices are about the rest that the changed line comes to, so that an
         # incident may add to the energy of a line that has not come to the rest before.
         planes = any(scene.switches()[name] for name in PLANES)
-        assert run.energy_gain(run.kept if planes else ()) < 1e-9
+        if "periodic" in (scene.line.ends.start.kind, scene.line.ends.end.kind):
+            # The spans beyond an end store energy and return some of it, but never make any.
+            balance = run.energy - run.work + (run.terms if run.terms.size else 0.0)
+            assert balance.max() - balance[0] < 1e-9 * run.energy_scale()
+        else:
+            assert run.energy_gain(run.kept if planes else ()) < 1e-9
     return "done"
 
 

@@ -17,8 +17,9 @@ from catenary.base.errors import InputError
 from catenary.solver.model.model import Model
 from catenary.solver.model.stations import SAME_STATION
 
-# Change from turn to turn that is round-off [m], and the most turns.
-_SETTLED, _MOST_TURNS = 1e-14, 40
+# Change from turn to turn of a line that is settled [m]; one that is round-off of its rest if it
+# falls no more, as of slack lines whose rest is found less exactly; and the most turns.
+_SETTLED, _ROUND_OFF, _MOST_TURNS = 1e-14, 1e-11, 40
 
 
 class RepeatedEnds(NamedTuple):
@@ -66,13 +67,15 @@ def settled(turn: Callable[[np.ndarray], np.ndarray], first: np.ndarray) -> np.n
     InputError
         If they do not settle.
     """
-    values = first
+    values, before = first, np.inf
     for _ in range(_MOST_TURNS):
         found = turn(values)
         change = np.abs(found - values).max(initial=0.0)
         values = found
-        if change < _SETTLED * max(1.0, float(np.abs(values).max(initial=0.0))):
+        scale = max(1.0, float(np.abs(values).max(initial=0.0)))
+        if change < _SETTLED * scale or before <= change < _ROUND_OFF * scale:
             return values
+        before = change
     raise InputError(
         "the line at rest does not settle where line.ends says that it is periodic: its end still "
         f"moves by {1e3 * change:.2g} mm when it hangs as the span before does; end it otherwise"
