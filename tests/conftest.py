@@ -20,13 +20,15 @@ from hypothesis import settings
 # core at the end.
 FIRST = (
     "regression/test_documents.py",
+    "regression/test_petsc_options.py",
     "regression/test_interruption.py",
-    "unit/test_runs_side_by_side.py",
-    "regression/test_fuzz_damage.py",
+    "regression/test_hostile_results.py",
+    "regression/test_signals.py",
     "unit/test_full_report.py",
-    "verification/test_dropper_curves.py",
+    "unit/test_optimise.py",
+    "regression/test_sampled_sweeps.py",
+    "regression/test_fuzz_damage.py",
     "unit/postproc/test_film.py",
-    "verification/test_ensembles.py",
 )
 
 # Hypothesis draws the same examples for everybody: what fails in one place fails in all. Others are

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import base64
+import functools
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from catenary.base.errors import InputError
 from catenary.postproc.evaluate.wording import with_minus
 from catenary.postproc.report.sections.section import Section
+
+if TYPE_CHECKING:
+    from jinja2 import Template
 
 _TEMPLATES = Path(__file__).parent / "templates"
 _BEFORE_UNIT = re.compile(r"(?<=\d) (?=%|(?:N|mm|m|km/h|Hz|s)\b)")
@@ -47,6 +51,23 @@ def page(
     script : str, optional
         Program of Plotly.
     """
+    made = list(sections)
+    uris = {name: _data_uri(data) for name, data in pictures.items()}
+    return _template().render(
+        title=title,
+        lead=lead,
+        sections=list(zip(made, names or [""] * len(made), strict=True)),
+        uris=uris,
+        marks=_MARKS,
+        # A text of a picture must not end the element that it stands in.
+        plots={name: text.replace("</", "<\\/") for name, text in (plots or {}).items() if text},
+        script=script,
+    )
+
+
+@functools.cache
+def _template() -> Template:
+    """The template of all pages, compiled once."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
     environment = Environment(
@@ -58,18 +79,7 @@ def page(
     )
     environment.filters["minus"] = lambda value: with_minus(str(value))
     environment.filters["commands"] = _with_commands
-    made = list(sections)
-    uris = {name: _data_uri(data) for name, data in pictures.items()}
-    return environment.get_template("page.html.j2").render(
-        title=title,
-        lead=lead,
-        sections=list(zip(made, names or [""] * len(made), strict=True)),
-        uris=uris,
-        marks=_MARKS,
-        # A text of a picture must not end the element that it stands in.
-        plots={name: text.replace("</", "<\\/") for name, text in (plots or {}).items() if text},
-        script=script,
-    )
+    return environment.get_template("page.html.j2")
 
 
 def _with_commands(text: str) -> Any:

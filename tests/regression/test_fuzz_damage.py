@@ -92,7 +92,7 @@ def ends(folder: Path, before: dict[str, Any], caplog: pytest.LogCaptureFixture)
     return "same" if as_json(found) == as_json(before) else "SILENT"
 
 
-@pytest.mark.parametrize("where", ["tables", "anywhere"])
+@pytest.mark.parametrize("where", ["tables", pytest.param("anywhere", marks=pytest.mark.study)])
 @pytest.mark.parametrize(
     "which", [pytest.param("finished", marks=pytest.mark.study), "interrupted"]
 )

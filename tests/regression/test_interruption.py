@@ -215,7 +215,11 @@ def can_mount() -> bool:
 @pytest.mark.skipif(not can_mount(), reason="no small disk can be mounted")
 @pytest.mark.parametrize(
     ("room", "ranks"),
-    [("300k", 1), pytest.param("2500k", 2, marks=[needs_mpirun, pytest.mark.study]), ("4600k", 1)],
+    [
+        ("300k", 1),
+        pytest.param("2500k", 2, marks=[needs_mpirun, pytest.mark.study]),
+        pytest.param("4600k", 1, marks=pytest.mark.study),
+    ],
 )
 def test_a_full_disk_ends_the_run_with_a_sentence(room: str, ranks: int, tmp_path: Path) -> None:
     """A disk that is full from the start, soon, and when hardly the report finds room."""

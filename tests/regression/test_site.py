@@ -40,6 +40,7 @@ def test_no_page_loads_anything_from_the_network(site: Path) -> None:
     assert {name: found for name, found in loaded.items() if found} == {}
 
 
+@pytest.mark.study
 @pytest.mark.process
 @pytest.mark.timeout(280)
 def test_equations_keys_verbs_and_names_are_on_it(site: Path) -> None:

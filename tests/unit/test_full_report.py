@@ -164,6 +164,7 @@ def test_the_input_makes_the_same_run(folder: Path) -> None:
     assert f"input.toml, SHA-256 {mark}" in words_of((folder / "report.html").read_text())
 
 
+@pytest.mark.study
 @pytest.mark.process
 def test_a_rail_has_neither_droppers_nor_a_view_from_above(tmp_path: Path) -> None:
     quiet = "-q", "--set", "output.field_every_s=0"

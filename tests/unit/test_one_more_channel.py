@@ -113,6 +113,7 @@ def test_a_channel_of_pantographs_is_recorded_read_drawn_and_checked(
     assert "Place of the strip." in (tmp_path / "report.html").read_text()
 
 
+@pytest.mark.study
 def test_a_channel_of_droppers_may_be_a_function_of_the_step(
     tmp_path: Path, plain: Path, monkeypatch: pytest.MonkeyPatch, blocks: list[bool]
 ) -> None:
@@ -130,6 +131,7 @@ def test_a_channel_of_droppers_may_be_a_function_of_the_step(
     assert (tmp_path / "channel_slackness.png").stat().st_size > 5000
 
 
+@pytest.mark.study
 def test_an_energy_is_recorded_read_and_drawn(
     tmp_path: Path, plain: Path, monkeypatch: pytest.MonkeyPatch, blocks: list[bool]
 ) -> None:

@@ -148,6 +148,7 @@ def test_the_wheel_is_imported_from_where_it_is_installed(installed: Path, tmp_p
         assert Path(file).is_relative_to(installed), f"{name} came from {file}"
 
 
+@pytest.mark.study
 def test_the_wheel_holds_all_modules_and_data_and_no_tests(installed: Path) -> None:
     there = {str(path.relative_to(installed)) for path in installed.rglob("*") if path.is_file()}
     ours = {name for name in there if name.startswith("catenary/") and "__pycache__" not in name}
@@ -158,6 +159,7 @@ def test_the_wheel_holds_all_modules_and_data_and_no_tests(installed: Path) -> N
     assert (installed / "bin" / "catenary").is_file()
 
 
+@pytest.mark.study
 def test_the_wheel_names_both_licences_and_holds_their_texts(installed: Path) -> None:
     """The program is BSD-3-Clause, the reference solutions that it brings are CC BY 4.0."""
     (info,) = installed.glob("catenary-*.dist-info")
@@ -180,6 +182,7 @@ def test_the_source_archive_can_build_the_wheel(sources: Path, tmp_path: Path) -
     assert not [name for name in names if name.endswith(".so")]
 
 
+@pytest.mark.study
 def test_a_source_is_compiled_again_when_a_header_changes(sources: Path, tmp_path: Path) -> None:
     """Told by a compiler of the usual one's name, which writes down how it is called."""
     (made,) = sources.glob(f"{OBJECTS}/*/solver/kernels/python/module.o")
@@ -213,9 +216,11 @@ def test_a_bare_name_is_refused_with_a_hint(part: str) -> None:
     assert last.startswith(f"ImportError: import catenary.{part}, not {part}: ")
 
 
-@pytest.mark.parametrize("wheel", [False, True])
-def test_the_package_itself_has_one_name(wheel: bool, installed: Path, tmp_path: Path) -> None:
-    place = {"PYTHONPATH": str(installed)} if wheel else {}
+@pytest.mark.parametrize("wheel", [False, pytest.param(True, marks=pytest.mark.study)])
+def test_the_package_itself_has_one_name(
+    wheel: bool, request: pytest.FixtureRequest, tmp_path: Path
+) -> None:
+    place = {"PYTHONPATH": str(request.getfixturevalue("installed"))} if wheel else {}
     done = run(sys.executable, "-P", "-c", "import catenary.cases.api", cwd=tmp_path, **place)
     assert done.returncode == 1
     last = done.stderr.strip().splitlines()[-1]

@@ -190,6 +190,7 @@ def test_unfiltered_forces_are_filtered(tmp_path: Path) -> None:
     assert "goes on only 0.0 m beyond the stretch" in found.remarks[0]
 
 
+@pytest.mark.study
 def test_a_table_of_statistics_is_judged(tmp_path: Path) -> None:
     out = tmp_path / "out"
     statistics_file = DATA / "statistics.csv"

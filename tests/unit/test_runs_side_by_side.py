@@ -109,10 +109,9 @@ def test_a_sweep_whose_process_was_killed_tells_and_continues(
     assert [row["std_N"] for row in rows] == [float(row["std_N"]) for row in one_by_one]
 
 
+@pytest.mark.study
 @pytest.mark.process
-@pytest.mark.parametrize(
-    "number", [signal.SIGTERM, pytest.param(signal.SIGKILL, marks=pytest.mark.study)]
-)
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
 def test_a_signal_ends_all_runs_and_the_same_command_continues(
     number: signal.Signals, one_by_one: list[dict[str, str]], tmp_path: Path
 ) -> None:

@@ -158,6 +158,7 @@ def by_speed(scene: Scene) -> float:
     return 26.0 + 0.2 * (scene.train.speed_km_h - 250.0)
 
 
+@pytest.mark.study
 def test_a_tolerance_is_that_of_the_samples_themselves(evaluated: Any) -> None:
     """Errors e of +-L fail above 20 km/h. Of the same random numbers those fail that are above
     20/L: the tolerance is 20 over the fourth largest of 153, of which three may fail."""

@@ -104,6 +104,7 @@ def test_tsalpha2_integrates_the_same_model_to_the_same_forces(ours: dict[str, A
         check(f"{title}: at {names[-1]}", differences[-1], 0.0, within=limit)
 
 
+@pytest.mark.study
 @pytest.mark.parametrize(
     "changes",
     [

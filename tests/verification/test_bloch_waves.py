@@ -107,6 +107,7 @@ def test_bands_of_the_shipped_lines_are_those_of_another_program(case: str) -> N
     assert theory.reflection == pytest.approx(REFLECTION[case], abs=5e-4)
 
 
+@pytest.mark.study
 def test_the_fastest_waves_of_en50318_2002() -> None:
     """114 m/s near 6 Hz and 116 m/s near 18 Hz by the same program; and what outruns 250 km/h."""
     theory, _ = rest_of("en50318_2002")

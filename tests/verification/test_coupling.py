@@ -9,6 +9,7 @@ import pytest
 from measuring import History, check, march, print_table, start_march
 from scipy import signal
 from small_lines import HANGING, WHOLE, en50318_line, mesh_of, numerics, problem_of, train
+from studies import few
 
 from catenary.base.errors import RunBroken
 from catenary.mbs.lumped import LumpedPantograph
@@ -123,7 +124,7 @@ def explicit_limit() -> float:
     return float(grid[np.argmin(stable)])
 
 
-@pytest.mark.parametrize("coupling", COUPLINGS)
+@pytest.mark.parametrize("coupling", few(COUPLINGS, "implicit", "explicit"))
 def test_where_a_mass_on_a_stiff_contact_becomes_unstable(coupling: str) -> None:
     """Implicit: nowhere. Explicit: at the limit of its step matrix. Iterated: the exchange
     multiplies errors by k beta dt^2 / m, so that it ends at omega dt = 2."""

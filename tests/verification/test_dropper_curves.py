@@ -304,6 +304,7 @@ def test_a_run_is_that_of_an_integrator_of_others(name: str, kept: float) -> Non
     assert errors[-1] < 1e-4 * np.abs(expected - rest).max()
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("name", [pytest.param("stiffening", marks=pytest.mark.study), "softening"])
 def test_energy_is_that_of_the_curve_and_balanced_by_work(name: str) -> None:
     """Without damping, what the line holds is the integral of its curves, and what it gains the

@@ -157,6 +157,7 @@ def test_planted_errors_lie_within_their_widths(tmp_path: Path) -> None:
     assert found.posterior.widths[:3].max() < 0.4  # of the priors
 
 
+@pytest.mark.study
 def test_widths_are_right_in_repeated_linear_trials(tmp_path: Path) -> None:
     """Four hundred passages by the tangents of a march, with noise that the filter itself made.
 

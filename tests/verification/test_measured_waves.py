@@ -92,6 +92,7 @@ def test_group_velocities_of_a_periodic_line_are_those_of_its_bloch_waves() -> N
     assert left == {"energy_in_pass_bands"}
 
 
+@pytest.mark.study
 def test_what_passes_lies_in_the_pass_bands() -> None:
     """Within 0.1 Hz, the resolution of 12 s: the second station is 9 spans beyond the first one.
 

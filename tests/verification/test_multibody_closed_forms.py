@@ -251,6 +251,7 @@ def test_sprung_slider_swings_like_the_damped_oscillator(handling: ConstraintHan
     check("height [m]", heights, exact, within=1e-8)
 
 
+@pytest.mark.study
 def test_methods_keep_the_joints_without_corrections() -> None:
     """Uncorrected, a pendulum's joint opens by integration errors only, by any method.
 

@@ -179,6 +179,7 @@ def test_the_march_with_a_pantograph_is_of_order_2(changes: dict[str, Any]) -> N
     check("order of the march", observed[-1], expected, within=np.log2(1 + following))
 
 
+@pytest.mark.study
 @pytest.mark.parametrize(
     "overrides",
     [

@@ -125,6 +125,7 @@ def test_the_force_is_that_of_a_long_line_to_the_very_end() -> None:
     check("contact force over sigma", short / sigma, of_long / sigma, within=1e-8)
 
 
+@pytest.mark.study
 def test_a_march_that_is_continued_is_the_same_to_the_last_bit() -> None:
     problem = running(6, 0.0, ends=GOES_ON)
     mesh, at = mesh_of(problem.line, 2), 700

@@ -27,6 +27,7 @@ def two_pantographs(
     )
 
 
+@pytest.mark.study
 @pytest.mark.parametrize(
     ("effects", "damping", "integrator"),
     [

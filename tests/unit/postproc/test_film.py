@@ -286,6 +286,7 @@ def test_a_head_that_touches_nothing_is_where_it_is(folder: Path) -> None:
     assert rest[0, 2] + moved[0, 2] == pytest.approx(data.head_height[row, 0])
 
 
+@pytest.mark.study
 def test_a_picture_wider_than_the_snapshots_is_refused(
     tmp_path: Path, make_march: Any, record_run: Any
 ) -> None:
@@ -571,6 +572,7 @@ def test_films_have_a_picture_for_each_snapshot_that_is_far_from_others(folder: 
         assert (off < 30).sum() > 20
 
 
+@pytest.mark.study
 def test_a_film_is_smooth_where_snapshots_are_near(recorded: Callable[..., Path]) -> None:
     options = FilmOptions(0.3, 0.4, every=1.0)
     film = animate.animate(recorded(20), options, None, progress=False)

@@ -42,6 +42,7 @@ def speed_section(run: EvaluatedRun) -> Section:
     )
 
 
+@pytest.mark.study
 def test_a_section_is_one_function(
     run_folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

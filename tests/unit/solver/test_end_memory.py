@@ -29,7 +29,9 @@ def loads_of(n: int, rng: np.random.Generator) -> tuple[list[MemoryLoad], list[n
     return loads, all_numbers
 
 
-@pytest.mark.parametrize("n", [3, NEAR - 1, NEAR, NEAR + 1, 5 * NEAR + 7])
+@pytest.mark.parametrize(
+    "n", [3, NEAR - 1, NEAR, NEAR + 1, pytest.param(5 * NEAR + 7, marks=pytest.mark.study)]
+)
 def test_sums_are_those_over_all_the_past(n: int) -> None:
     rng = np.random.default_rng(n)
     memory, numbers = loads_of(n, rng)
