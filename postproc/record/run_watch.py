@@ -65,6 +65,7 @@ class WatchInputs:
     raised : (n_pantographs,) time from which on each is raised [s], infinite if it is lowered
     span : distance without contact above which a loss is reported [m]
     speed : of the train [m/s]
+    coupling : of line and pantographs, which is not stable at any step unless it is ``implicit``
     """
 
     static_energy: float
@@ -73,6 +74,7 @@ class WatchInputs:
     raised: np.ndarray
     span: float
     speed: float
+    coupling: str
 
 
 def watch_inputs(at_rest: LineAtRest, has_train: bool = True) -> WatchInputs:
@@ -98,6 +100,7 @@ def watch_inputs(at_rest: LineAtRest, has_train: bool = True) -> WatchInputs:
         ),
         span=float(np.diff(problem.line.support_positions).max()),
         speed=train.speed,
+        coupling=numerics.coupling if has_train else "implicit",
     )
 
 
@@ -242,9 +245,12 @@ class RunWatch(Observer):
         if not found <= limit:
             self._say(key, f"At {self._where(view)} {what}; {model} holds up to {limit:g}.")
         if not found <= most:
+            suspects = "arms that are pushed at rest, too long a numerics.dt_s, "
+            if self._run.coupling != "implicit":
+                suspects += f'the {self._run.coupling} coupling (numerics.coupling = "implicit"), '
             raise RunBroken(
                 f"at {self._where(view)} {what}, and {model} ends at {most:g}: look for steady "
-                "arms that are pushed at rest, too long a numerics.dt_s, or loads beyond any line's"
+                f"{suspects}or loads beyond any line's"
             )
 
     def _largest(self, values: np.ndarray, x: np.ndarray) -> tuple[float, float]:

@@ -138,3 +138,8 @@ def test_motion_beyond_linear_theory_is_told_and_ends_a_march(force: float, ends
     assert (outcome != "done") == ends
     if ends:
         assert outcome.startswith("at ") and "ends at 1:" in outcome
+        assert "coupling" not in outcome
+        # One that is not stable at any step may be the reason.
+        steps = replace(problem.numerics, coupling="explicit")
+        _, outcome = watch_of(replace(problem, numerics=steps))
+        assert 'the explicit coupling (numerics.coupling = "implicit")' in outcome
