@@ -59,7 +59,7 @@ BESIDE_LINT = @mkdir -p build; $(MAKE) --no-print-directory lint >build/lint.log
     trap 'kill $$lint' INT TERM; $(1); tested=$$?; wait $$lint; linted=$$?; cat build/lint.log; \
     [ $$tested = 0 ] && [ $$linted = 0 ]
 
-check: setup ## lint, and the unit tests that start no process; under a minute
+check: setup ## lint, and the unit tests that start no process; a good minute
 	$(call BESIDE_LINT,$(PYTEST_SHARED) -q -m "not process and not study" tests/unit)
 
 test: setup ## lint and tests, also on several ranks
