@@ -72,7 +72,7 @@ def test_energy_falls_by_what_damping_takes_and_nothing_else(
     watcher = States(wire, (), balance)
     with March(MPI.COMM_SELF, rest.problem, model, rest.form, rest.lift) as march:
         assert march.run([watcher]).outcome == "done"
-    run = watcher.watched("done", {})
+    run = watcher.histories("done", {})
 
     u, v, a = (np.array(part) for part in zip(*watcher.states, strict=True))
     mass, stiffness, viscous = (
