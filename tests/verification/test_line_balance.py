@@ -118,7 +118,7 @@ def test_the_criterion_fails_where_energy_is_made(monkeypatch: pytest.MonkeyPatc
 
     sound = hard_runs.at_rest
 
-    def fed(scene: Any, comm: Any) -> hard_runs.AtRest:
+    def fed(scene: Any, comm: Any) -> hard_runs.LineAtRest:
         rest = sound(scene, comm)
         numerics = replace(rest.problem.numerics, gamma=0.3, beta=0.25)
         return rest._replace(problem=replace(rest.problem, numerics=numerics))
