@@ -251,7 +251,8 @@ def as_text(study: SeparationStudy, period: Period) -> str:
         lines.append(f"One alone: deviation {words}{_uplift(alone)}.")
     for word, row in (("Least", ranked[0]), ("Largest", ranked[-1])):
         both = " and ".join(f"{place} {_in_words(row[f'std_{place}_N'])}" for place in PLACES)
-        lines.append(f"{word} deviation at {row[DISTANCE]:g} m: {both}{_uplift(row)}.")
+        where = f"at {row[DISTANCE]:g} m"
+        lines.append(f"{word} deviation of the worse pantograph {where}: {both}{_uplift(row)}.")
     names = dict.fromkeys(name for row in study.done for name in row["failed"])
     lines += [f"FAILED      {name}: at {_stretches(study.done, name)} m" for name in names]
     if not names:
