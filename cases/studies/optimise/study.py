@@ -82,7 +82,8 @@ class Optimum:
     @property
     def remarks(self) -> list[str]:
         """Sentences on what it did not improve, the unseen direction first."""
-        sentences = [unseen_direction(self.rows)] if unseen_direction(self.rows) else []
+        unseen = unseen_direction(self.rows)
+        sentences = [unseen] if unseen else []
         if not self.is_rounded:
             sentences.append("no changes in whole units keep all constraints: round_to is not kept")
         return sentences + not_improved(self.rows)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -19,16 +20,20 @@ def write(out_dir: Path, plan: Plan, found: Sequence[Tolerance]) -> list[Path]:
     record = {
         "case": plan.name,
         "task": plan.task.model_dump(exclude_none=True),
-        "tolerances": [asdict(one) for one in found],
+        "tolerances": [_fields(one) for one in found],
     }
     content: dict[str, Content] = {TABLE: table_of(found), RECORD: record}
     return write_files(out_dir, content | {PAGE: markdown(plan, found)})
 
 
+def _fields(one: Tolerance) -> dict[str, Any]:
+    return asdict(one) | {"at_most": one.at_most}
+
+
 def table_of(found: Sequence[Tolerance]) -> StudyTable:
     """A row for each error and criterion."""
     rows = [
-        asdict(one)
+        _fields(one)
         | {
             "shown": _level(one),
             "samples": f"{one.kept} of {one.n_samples}" if one.level else "",

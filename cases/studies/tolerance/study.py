@@ -102,7 +102,7 @@ class Tolerance:
         errors
     level : largest tolerance at which enough samples keep the criterion, in the error's unit, or
         of all together in tolerances of the task; 0 if the line without errors does not keep it
-    at_most : whether that is the greatest that was looked at
+    most : greatest tolerance that was looked at
     kept, n_samples : samples that keep it at that level, of how many
     least_share : lower bound of the share of all lines that keep it there (C. Clopper, E. Pearson,
         Biometrika 26, 1934)
@@ -110,21 +110,24 @@ class Tolerance:
     checked : largest tolerance at which the line with that worst case keeps the criterion
     lost_at : least tolerance at which a line that was run, of the samples or of the worst case, is
         known to lose it, below which the true worst case lies; None if none does
-    most : greatest tolerance that was looked at
     """
 
     criterion: str
     error: str
     unit: str
     level: float
-    at_most: bool
+    most: float
     kept: int
     n_samples: int
     least_share: float
     linear: float | None = None
     checked: float | None = None
     lost_at: float | None = None
-    most: float = np.inf
+
+    @property
+    def at_most(self) -> bool:
+        """Whether the level is the greatest that was looked at."""
+        return self.level >= self.most
 
 
 @dataclass(frozen=True)
@@ -272,7 +275,7 @@ class _Search:
     def _tolerance(self, varied: _Varied, criterion: str) -> Tolerance:
         if least(self.nominal, criterion) < 0.0:
             head = criterion, varied.name, varied.unit
-            return Tolerance(*head, 0.0, False, 0, self.samples.n, 0.0, most=varied.most)
+            return Tolerance(*head, 0.0, varied.most, 0, self.samples.n, 0.0)
         found = self._by_samples(varied, criterion, criterion)
         if not self.samples.worst_case:
             return found
@@ -299,22 +302,22 @@ class _Search:
             )
             return does
 
-        level, at_most = self._bisect(varied.most, holds)
+        level = self._bisect(varied.most, holds)
         kept = n - self._failures(varied, level, criteria, n) if level else n
         share = float(beta.ppf(1.0 - self.samples.confidence, kept, n - kept + 1))
         lost_at = min(lost, default=None)
         head = name, varied.name, varied.unit
-        return Tolerance(*head, level, at_most, kept, n, share, lost_at=lost_at, most=varied.most)
+        return Tolerance(*head, level, varied.most, kept, n, share, lost_at=lost_at)
 
-    def _bisect(self, most: float, holds: Callable[[float], bool]) -> tuple[float, bool]:
-        """The largest level that holds, 0 always does; whether that is the greatest of all."""
+    def _bisect(self, most: float, holds: Callable[[float], bool]) -> float:
+        """The largest level that holds, up to ``most``; 0 always does."""
         if holds(most):
-            return most, True
+            return most
         low, high = 0.0, most
         while high - low > self.samples.resolution * most:
             middle = 0.5 * (low + high)
             low, high = (middle, high) if holds(middle) else (low, middle)
-        return low, False
+        return low
 
     def _failures(self, varied: _Varied, level: float, criteria: Sequence[str], enough: int) -> int:
         """Samples that do not keep criteria at a level; counting ends above ``enough``.
@@ -375,7 +378,7 @@ class _Search:
                 lost.append(level)
             return does
 
-        checked = self._bisect(varied.most, holds)[0]
+        checked = self._bisect(varied.most, holds)
         return float(levels[first]), checked, min(lost, default=None)
 
     def _slopes(self, varied: _Varied, criterion: str) -> tuple[np.ndarray, np.ndarray]:
