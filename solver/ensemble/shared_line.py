@@ -13,7 +13,6 @@ matrices hold without compensations, and the line starts displaced from there.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -26,10 +25,9 @@ from catenary.solver.contact.followed_links import FollowedLinks
 from catenary.solver.contact.forces_on_line import ForceColumns
 from catenary.solver.effects.all_effects import needs_form
 from catenary.solver.effects.build_model import build
-from catenary.solver.integrators.line_state import LineState, Motion
+from catenary.solver.integrators.line_state import LineState
 from catenary.solver.integrators.make_line import make_line
-from catenary.solver.integrators.two_pass_step import PassArrays, StationPasses
-from catenary.solver.kernels import aligned_arrays, native
+from catenary.solver.kernels import native
 from catenary.solver.model.model import Model, same_matrices
 from catenary.solver.model.partition import distribute
 from catenary.solver.model.rest_shape import Equilibrium
@@ -189,22 +187,25 @@ class SharedLine:
         if passes is None or not self.steps_together:
             return
         self._wires = ContactWires(model, form, self.ownership)
-        links = [FollowedLinks(self._table, self.line) for _ in range(N_LANES)]
+        lanes = range(N_LANES)
+        links = [FollowedLinks(self._table, self.line) for _ in lanes]
         self.columns = ForceColumns(
             self.comm, model, self._wires, self.line, links[0], range_of_run
         )
-        arrays, motions = _in_lanes(passes, self.line.motion)
-        parts = passes.parts._replace(arrays=arrays)
-        self.lanes = [Lane(*own) for own in zip(range(N_LANES), motions, links, strict=True)]
+        arrays = passes.arrays_in_lanes(N_LANES)
+        motions = [LineState.of(arrays.motion.at(k), self.line.motion.gains) for k in lanes]
+        self.lanes = [Lane(*own) for own in zip(lanes, motions, links, strict=True)]
         _, droppers, _ = links[0].shown(DROPPERS)
         n, arms = droppers.law.size, model.dofs(model.mesh.steady_arms).astype(np.int64)
         self._rest = np.zeros((links[0].numbers.size, N_LANES))
         forces = np.zeros((3, n, N_LANES))
         self.extremes = LineExtremes(arms, droppers, forces[0], np.zeros((arms.size, N_LANES)),
                                      *forces[1:])  # fmt: skip
-        self.native = native.Ensemble(passes.rows, passes.columns, parts, self.extremes)
         followed = passes.tracked(links[0].links, links[0].reserve)
-        self.native.track(followed, self._rest, [own.reserve for own in links])
+        parts = passes.parts._replace(arrays=arrays)
+        self._passes = native.ScenePasses(passes.rows, passes.columns, parts)
+        self._passes.track(followed, self._rest, [own.reserve for own in links])
+        self.native = native.Ensemble(self._passes, self.extremes)
         for lane in self.lanes:
             self.hang(lane, at_rest)
 
@@ -215,7 +216,7 @@ class SharedLine:
 
     def hang(self, lane: Lane, at_rest: LineAtRest) -> None:
         """Put the line of a lane at rest: that of a scene whose matrices are these."""
-        self.native.rest(lane.number)
+        self._passes.rest(lane.number)
         links, extremes, number, taut = lane.links, self.extremes, lane.number, lane.taut
         if taut is None or taut.rest is not at_rest.model:
             lane.taut = taut = self._taut.of(at_rest)
@@ -243,31 +244,6 @@ class SharedLine:
     def destroy(self) -> None:
         """Free all PETSc objects."""
         self.line.destroy()
-
-
-def _in_lanes(passes: StationPasses, motion: LineState) -> tuple[PassArrays, Sequence[LineState]]:
-    """Arrays of passes over all lanes, and the motion in each of them."""
-    given = passes.parts.arrays
-    n = given.motion.x.size
-    pad = (given.factor.size - n) // 2
-    own = slice(pad * N_LANES, (pad + n) * N_LANES)
-    factor = aligned_arrays.zeros(given.factor.size * N_LANES, 0)
-    answer = aligned_arrays.zeros(n * N_LANES, 1)
-    rates = np.shares_memory(given.velocity, given.motion.y)
-    velocity = aligned_arrays.zeros(given.factor.size * N_LANES, 2)
-    assert np.shares_memory(given.motion.x, given.factor) and np.shares_memory(
-        given.answer, given.motion.z
-    )
-    whole = Motion(factor[own], velocity[own], answer, given.motion.shares, N_LANES)
-    arrays = given._replace(
-        factor=factor, velocity=velocity if rates else factor, answer=answer, motion=whole
-    )
-    motions = []
-    for lane in range(N_LANES):
-        x, y, z = (array[lane:] for array in whole[:3])
-        read = Motion(x, y, z, given.motion.shares, N_LANES)
-        motions.append(LineState.of(read, motion.gains))
-    return arrays, motions
 
 
 def _same_links(one: LinkTable, other: LinkTable) -> bool:

@@ -10,7 +10,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -24,7 +24,7 @@ from catenary.solver.integrators.two_pass_step import StationPasses
 from catenary.solver.kernels import aligned_arrays, native
 from catenary.solver.linear.decay_length import reach
 from catenary.solver.linear.pieces.operator_pieces import WantedPieces
-from catenary.solver.linear.step_operators import ByStations, LineOperators, Loads
+from catenary.solver.linear.step_operators import LineOperators, Loads
 from catenary.solver.linear.unit_responses import UnitResponses, Windows
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import Ownership
@@ -33,15 +33,6 @@ from catenary.solver.window.moving_window import MovingWindow
 
 # Arrays of every state of a line.
 MOTION = ("displacement", "velocity", "acceleration")
-
-
-class FurtherMotion(NamedTuple):
-    """Another motion of a line: what takes its free steps, the loads (n_local,) that these read
-    [N], and its state."""
-
-    free: native.TwoPasses
-    loads: np.ndarray
-    state: PredictedLineState
 
 
 class LineIntegrator(ABC):
@@ -144,7 +135,6 @@ class LineIntegrator(ABC):
         motion, steps = ahead
         loads = np.zeros(0) if self.loads is None else self.loads.values
         parts, passes = self.operators.by_stations(not self._proportional, self._shares), None
-        self._steps_ahead = parts, steps
         if parts is not None:
             passes = StationPasses(parts, loads, motion, steps)
         # A rank without stations has no passes; it keeps its state like the others.
@@ -165,28 +155,6 @@ class LineIntegrator(ABC):
         self.motion = motion
         if self.loads is not None:
             self.loads.read(motion)
-
-    def further_motions(self, n: int) -> list[FurtherMotion]:
-        """N further motions at rest that step by the same factors. On one rank, by Newmark's method
-        in two passes."""
-        parts, steps = self._steps_ahead
-        assert parts is not None and isinstance(steps, Steps)
-        return [self._further_motion(parts, steps) for _ in range(n)]
-
-    def _further_motion(self, parts: ByStations, steps: Steps) -> FurtherMotion:
-        _, _, read, velocity, answer, _ = parts
-        domain, n = self.operators.domain, self.ownership.n_local
-        pad = (read.size - (domain.read_high - domain.read_low)) // 2
-        begin = pad + domain.owned_of_read.start
-        own = [aligned_arrays.zeros(array.size, at) for at, array in enumerate((read, answer))]
-        ahead, solved, loads = *own, aligned_arrays.zeros(domain.size, 4)
-        rates = ahead if velocity is read else aligned_arrays.zeros(velocity.size, 6)
-        mine = aligned_arrays.zeros(n, 3) if velocity is read else rates[begin : begin + n]
-        motion = PredictedLineState(
-            ahead[begin : begin + n], mine, solved[domain.owned], np.zeros(n), steps
-        )
-        own_parts = parts._replace(read=ahead, rates=rates, answer=solved)
-        return FurtherMotion(StationPasses(own_parts, loads, motion, steps).native, loads, motion)
 
     def _ahead(self) -> tuple[PredictedLineState, Steps | AlphaSteps] | None:
         """A motion to keep ahead, in the arrays of this one, and the steps it is kept for.

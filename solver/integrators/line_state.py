@@ -30,6 +30,10 @@ class Motion(NamedTuple):
     shares: np.ndarray
     spacing: int = 1
 
+    def at(self, lane: int) -> Motion:
+        """The motion in one lane."""
+        return self._replace(x=self.x[lane:], y=self.y[lane:], z=self.z[lane:])
+
 
 class Steps(NamedTuple):
     """Factors of a step of Newmark's method: dt [s]; what an acceleration before the step adds
@@ -152,12 +156,17 @@ class PredictedLineState(LineState):
 
     def put(self, displacement: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray) -> None:
         """Take a state, (n_local,) each."""
-        dt, c_position, c_velocity, c_work = self._steps[:4]
         x, y, z = self.read[:3]
+        x[:], y[:], z[:] = self.ahead(displacement, velocity, acceleration)
+
+    def ahead(
+        self, displacement: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """x, y and z of a state, (n_local,) each."""
+        dt, c_position, c_velocity, c_work = self._steps[:4]
         predicted = displacement + dt * velocity + c_position * acceleration
-        z[:] = acceleration
-        y[:] = velocity + c_velocity * acceleration
-        x[:] = -(predicted + c_work * y)
+        y = velocity + c_velocity * acceleration
+        return -(predicted + c_work * y), y, acceleration
 
     def carried(self) -> Mapping[str, np.ndarray]:
         """The predictions, by name: the arrays themselves."""

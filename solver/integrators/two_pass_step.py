@@ -20,7 +20,7 @@ from catenary.solver.integrators.line_state import (
     PredictedLineState,
     Steps,
 )
-from catenary.solver.kernels import native
+from catenary.solver.kernels import aligned_arrays, native
 from catenary.solver.linear.station_factors import FactorArrays
 from catenary.solver.linear.stations.station_products import ProductArrays
 from catenary.solver.linear.step_operators import ByStations
@@ -30,6 +30,7 @@ from catenary.solver.window.moving_window import WindowArrays
 # Unknowns of a stretch of the pass back, after which its droppers are looked at: large enough for
 # memory to be read ahead, 64 kB of each array, which a cache next to a processor holds.
 _STRETCH = 8192
+_NO_LOADS = np.zeros(0)
 
 
 class PassArrays(NamedTuple):
@@ -152,6 +153,29 @@ class StationPasses:
         ranges = np.zeros((1 + max(1, n_stretches), 2), dtype=np.int64)
         native.left_behind(self._starts, self._stretch, links.unknowns, ranges)
         return TrackedLinks(links, reserve, ranges, self._stretch)
+
+    def arrays_in_lanes(self, n_lanes: int, loads: np.ndarray = _NO_LOADS) -> PassArrays:
+        """Arrays like these for so many further motions at rest, whose numbers of an unknown follow
+        each other, and their loads. On one rank, by Newmark's method."""
+        given = self.parts.arrays
+        n = given.motion.x.size
+        pad = (given.factor.size - n) // 2
+        own = slice(pad * n_lanes, (pad + n) * n_lanes)
+        assert np.shares_memory(given.motion.x, given.factor)
+        assert np.shares_memory(given.answer, given.motion.z)
+        factor, answer, velocity = (
+            aligned_arrays.zeros(size * n_lanes, place)
+            for place, size in enumerate((given.factor.size, n, given.factor.size))
+        )
+        reads_rates = np.shares_memory(given.velocity, given.motion.y)
+        motion = Motion(factor[own], velocity[own], answer, given.motion.shares, n_lanes)
+        return given._replace(
+            factor=factor,
+            velocity=velocity if reads_rates else factor,
+            loads=loads,
+            answer=answer,
+            motion=motion,
+        )
 
     def open(self, window: WindowArrays, links: LinkArrays, reserve: np.ndarray) -> None:
         """Take steps of the stations in a window only from now on; links as in ``track_links``."""

@@ -279,17 +279,17 @@ class Steps(BlockSteps):
 
 SCENES: int
 
-class Ensemble:
-    """Marches of ``SCENES`` scenes side by side, each in a lane of vectors.
+class SceneSteps:
+    """Free steps of a line in ``SCENES`` scenes side by side."""
 
-    Parameters
-    ----------
-    rows, factors, parts : as of ``TwoPasses``, with arrays of all scenes
-    extremes : ``LineExtremes``
-    """
+    def step(self) -> None:
+        """Take a step in all scenes."""
+
+class ScenePasses(SceneSteps):
+    """``TwoPasses`` in ``SCENES`` scenes, with arrays of all scenes in ``parts``."""
 
     def __init__(
-        self, rows: Sequence[Layout], factors: Sequence[Layout], parts: object, extremes: object
+        self, rows: Sequence[Layout], factors: Sequence[Layout], parts: object
     ) -> None: ...
     def track(self, links: object, rest: np.ndarray, reserves: Sequence[np.ndarray]) -> None:
         """Fill ``reserves`` (n,) of links in each lane; at rest ``rest`` (n, SCENES) [N]."""
@@ -297,6 +297,16 @@ class Ensemble:
     def rest(self, lane: int) -> None:
         """Put the line of a lane at rest."""
 
+class Ensemble:
+    """Marches of ``SCENES`` scenes side by side, each in a lane of vectors.
+
+    Parameters
+    ----------
+    passes : free steps of their lines
+    extremes : ``LineExtremes``
+    """
+
+    def __init__(self, passes: ScenePasses, extremes: object) -> None: ...
     def begin(self, lane: int, steps: Steps, n: int) -> None:
         """Let a scene begin in a lane, with n steps of its block."""
 

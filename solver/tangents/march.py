@@ -16,7 +16,6 @@ from catenary.base.errors import RunBroken
 from catenary.mbs.head.head_arrays import LinearStep
 from catenary.mbs.head.newmark_head import SteppedHead
 from catenary.solver.contact.pantographs import Pantographs
-from catenary.solver.integrators.line_integrator import FurtherMotion
 from catenary.solver.kernels import native
 from catenary.solver.kernels.flush_to_zero import flushed
 from catenary.solver.model.partition import Ownership
@@ -24,7 +23,8 @@ from catenary.solver.model.switching_links import LinkArrays
 from catenary.solver.schemes.one_solve import OneSolve
 from catenary.solver.statics.changed_line.after_incidents import divided_by_mass
 from catenary.solver.statics.line_at_rest import LineAtRest
-from catenary.solver.tangents.set_up import Change, MatrixTerm, set_up_of
+from catenary.solver.tangents.lanes import TangentLanes, groups_of, lanes_of
+from catenary.solver.tangents.set_up import Change, set_up_of
 from catenary.solver.time_loop.compiled_steps import Block, CompiledSteps, StepParts
 from catenary.solver.time_loop.march import March
 from catenary.solver.time_loop.prepared_line import make_room
@@ -62,9 +62,6 @@ class LawChange(NamedTuple):
 class Tangent(NamedTuple):
     """A march differentiated by one parameter."""
 
-    free: native.TwoPasses
-    loads: np.ndarray
-    matrices: Sequence[MatrixTerm]
     rest: np.ndarray
     links: LinkChange
     heads: Sequence[HeadChange]
@@ -75,11 +72,18 @@ class Tangent(NamedTuple):
     results: np.ndarray
 
 
+class TangentGroup(NamedTuple):
+    """Tangents whose motions of the line stand side by side."""
+
+    lanes: TangentLanes
+    tangents: Sequence[Tangent]
+
+
 class MarchTangents(NamedTuple):
     """All tangents of a march; ``switches`` (3,) counts steps in which a contact was open, in which
     contacts opened or closed, and in which links switched."""
 
-    all: Sequence[Tangent]
+    groups: Sequence[TangentGroup]
     pairs: Sequence[Sequence[native.Head]]
     links: LinkArrays
     first: np.ndarray
@@ -119,13 +123,17 @@ class TangentSteps(CompiledSteps):
         self._by_tangent = np.zeros((len(changes), self.most, n_results))
         n, first = pantographs.n_contacts, np.zeros(1, dtype=np.int64)
         self.switches = np.zeros(3, dtype=np.int64)
-        motions = line.further_motions(len(changes))
-        for motion, start in zip(motions, starts, strict=True):
-            motion.state.put(np.zeros_like(start), np.zeros_like(start), start)
+
+        groups = groups_of(line, changes)
+        lanes = lanes_of(
+            line,
+            [[changes[k] for k in group] for group in groups],
+            [[starts[k] for k in group] for group in groups],
+        )
         self._tangents = MarchTangents(
             [
-                _tangent(change, motion, n, results)
-                for change, motion, results in zip(changes, motions, self._by_tangent, strict=True)
+                TangentGroup(own, [_tangent(changes[k], n, self._by_tangent[k]) for k in group])
+                for own, group in zip(lanes, groups, strict=True)
             ],
             [
                 # A linear chain has none.
@@ -159,14 +167,11 @@ class TangentSteps(CompiledSteps):
         return native.TangentSteps(parts, block, self._tangents)
 
 
-def _tangent(change: Change, motion: FurtherMotion, n: int, results: np.ndarray) -> Tangent:
+def _tangent(change: Change, n: int, results: np.ndarray) -> Tangent:
     """A tangent at the start of a march with n contacts."""
     # Derivatives of the speeds of impact that a Hertzian law starts with [m/s].
     least_speeds = np.full(n, change.hertz[3] if change.hertz.size else 0.0)
     return Tangent(
-        motion.free,
-        motion.loads,
-        change.matrices,
         change.rest,
         LinkChange(change.links, change.weights),
         [
@@ -306,6 +311,6 @@ def _start_of(
     if not acceleration.any():
         return force
     for term in change.matrices:
-        products = term.by_acceleration * term.values * acceleration[term.columns]
+        products = term.weights[2] * term.values * acceleration[term.columns]
         force[term.rows] -= np.add.reduceat(products, term.begin[:-1])
     return divided_by_mass(comm, ownership, at_rest.model, force)

@@ -88,15 +88,21 @@ class StepChange(NamedTuple):
 
 
 class MatrixTerm(NamedTuple):
-    """A derivative of matrices times a sum of motions; see `kernels/tangents/tangents.hpp`."""
+    """A derivative of matrices, which is multiplied with a sum of the line's motion.
+
+    Attributes
+    ----------
+    rows : (m,) numbers of the rows that have any
+    begin : (m + 1,) where each begins
+    columns, values : of all
+    weights : of displacements, velocities and accelerations in the sum
+    """
 
     rows: np.ndarray
     begin: np.ndarray
     columns: np.ndarray
     values: np.ndarray
-    by_displacement: float
-    by_velocity: float
-    by_acceleration: float
+    weights: tuple[float, float, float]
 
 
 @dataclass(frozen=True)
@@ -115,6 +121,12 @@ class Change:
     hertz: np.ndarray
     start: np.ndarray
     speed: float
+
+    @property
+    def loads_line(self) -> bool:
+        """Whether the march's motion or forces load the tangent's line."""
+        parts = len(self.matrices), self.weights.size, self.start.size, self.speed
+        return any(parts)
 
 
 def set_up_of(
@@ -273,7 +285,9 @@ def differentiate(set_up: Callable[[float], SetUp], now: SetUp, step: float, wha
     terms: list[MatrixTerm] = []
     if any(other.matrices is not now.matrices for other in found.values()):
         terms = _matrices(
-            [{n: one.matrices[i] for n, one in found.items()} for i in range(3)], step
+            [{n: one.matrices[i] for n, one in found.items()} for i in range(3)],
+            now.matrices,
+            step,
         )
     return Change(
         matrices=terms,
@@ -290,15 +304,25 @@ def differentiate(set_up: Callable[[float], SetUp], now: SetUp, step: float, wha
     )
 
 
-def _matrices(found: Sequence[dict[int, sparse.csc_matrix]], step: float) -> list[MatrixTerm]:
-    """Derivatives of K, C and M from each of them at several steps of the parameter."""
+def _matrices(
+    found: Sequence[dict[int, sparse.csc_matrix]], now: Sequence[sparse.csc_matrix], step: float
+) -> list[MatrixTerm]:
+    """Derivatives of K, C and M from each of them at several steps of the parameter, and from what
+    they are now."""
     stiffness, damping, mass = (_derivative(matrices, step) for matrices in found)
-    by_stiffness, by_mass = _shares(damping, stiffness, mass)
-    left = damping - by_stiffness * stiffness - by_mass * mass
-    terms = [(stiffness, 1.0, by_stiffness, 0.0), (mass, 0.0, by_mass, 1.0)]
-    if abs(left).max() > _PROPORTIONAL * abs(damping).max():
+
+    def left_by(shares: Sequence[float]) -> sparse.csc_matrix:
+        return damping - shares[0] * stiffness - shares[1] * mass
+
+    # Most parameters leave the factors of damping as they are.
+    for matrices in (now, (stiffness, damping, mass)):
+        shares = _shares(matrices[1], matrices[0], matrices[2])
+        if abs(left_by(shares)).max() <= _PROPORTIONAL * abs(damping).max():
+            terms = [(stiffness, 1.0, shares[0], 0.0), (mass, 0.0, shares[1], 1.0)]
+            break
+    else:
         terms = [(stiffness, 1.0, 0.0, 0.0), (mass, 0.0, 0.0, 1.0), (damping, 0.0, 1.0, 0.0)]
-    return [_term(matrix.tocsr(), *by) for matrix, *by in terms if matrix.nnz]
+    return [_term(matrix.tocsr(), by) for matrix, *by in terms if matrix.nnz]
 
 
 def _derivative(matrices: dict[int, sparse.csc_matrix], step: float) -> sparse.csc_matrix:
@@ -325,11 +349,12 @@ def _shares(whole: sparse.csc_matrix, *parts: sparse.csc_matrix) -> list[float]:
     return [float(f"{share / size:.9e}") for share, size in zip(found, sizes, strict=True)]
 
 
-def _term(matrix: sparse.csr_matrix, *by: float) -> MatrixTerm:
+def _term(matrix: sparse.csr_matrix, by: Sequence[float]) -> MatrixTerm:
     matrix.sort_indices()
     rows = np.flatnonzero(np.diff(matrix.indptr)).astype(np.int64)
     begin = np.append(matrix.indptr[rows], matrix.nnz).astype(np.int64)
-    return MatrixTerm(rows, begin, matrix.indices.astype(np.int32), matrix.data, *by)
+    columns, weights = matrix.indices.astype(np.int64), (by[0], by[1], by[2])
+    return MatrixTerm(rows, begin, columns, matrix.data, weights)
 
 
 def _stepped(model: Any) -> SteppedHead:

@@ -25,11 +25,12 @@ from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.problem import problem_of as problem_of_scene
 from catenary.cases.studies.sensitivity.parameters import ChangedScenes
 from catenary.mbs.lumped_data import LumpedData
+from catenary.solver.kernels import native
 from catenary.solver.problem.contact_laws import LinearLaw
 from catenary.solver.problem.problem import Damping, Problem
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest
 from catenary.solver.tangents.march import Tangents, march_with_tangents
-from catenary.solver.tangents.set_up import Change, differentiate, set_up_of
+from catenary.solver.tangents.set_up import Change, SetUp, differentiate, set_up_of
 
 COMM = MPI.COMM_SELF
 DT = 1e-3
@@ -219,6 +220,30 @@ def test_a_march_is_the_same_with_and_without_tangents() -> None:
     assert np.array_equal(alone.uplift, beside.uplift)
     assert np.array_equal(beside.by_force[:, 0], beside.by_force[:, 1])
     assert alone.by_force.shape == (len(alone.force), 0, 1)
+
+
+def test_tangents_side_by_side_are_those_of_each_alone() -> None:
+    """Heads and the law load no line, the others do: by matrices, or by contacts that move."""
+    problem = small_problem()
+    rest = at_rest(problem)
+    now = set_up_of(COMM, rest)
+
+    def faster(by: float) -> SetUp:
+        run = replace(problem.train, speed=problem.train.speed + by)
+        return set_up_of(COMM, at_rest(replace(problem, train=run)), len(now.drives))
+
+    names = ["tension", "static force", "damping", "contact stiffness"]
+    changes = [change_of(problem, name) for name in names]
+    changes += [differentiate(faster, now, 1e-3, "speed"), changes[0], changes[2]]
+    assert sum(change.loads_line for change in changes) == 5 > native.SCENES
+    together = march_with_tangents(COMM, rest, changes)
+    for number, change in enumerate(changes):
+        alone = march_with_tangents(COMM, rest, [change])
+        for name in ("by_force", "by_uplift", "by_head_height"):
+            found, expected = getattr(together, name)[:, number], getattr(alone, name)[:, 0]
+            # Sums in another order, over 1000 steps.
+            within = 1e-10 * np.abs(expected).max()
+            check(f"{name} of {number}", found, expected, within=within)
 
 
 SHORT = ["line.n_spans=6", "evaluation.from_m=140", "evaluation.to_m=240"]

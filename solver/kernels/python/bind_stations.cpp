@@ -9,6 +9,7 @@
 
 #include "motion/two_passes.hpp"
 #include "python/from_python.hpp"
+#include "python/pass_parts.hpp"
 #include "stations/elimination.hpp"
 #include "stations/known_layouts.hpp"
 #include "stations/records.hpp"
@@ -145,16 +146,7 @@ class HeldPasses : public TwoPasses {
     static std::unique_ptr<HeldPasses> made(const Layouts& rows, const Layouts& factors,
                                             const py::object& parts) {
         Kept kept;
-        auto convert = [&]<class Record>(const char* name, Record& record) {
-            record = From<Record>::convert(parts.attr(name), name, kept);
-        };
-        PassParts found;
-        for (size_t k = 0; k < rows.size(); ++k) found.layouts.emplace_back(rows[k], factors.at(k));
-        convert("station_types", found.station_types);
-        convert("rows", found.rows);
-        convert("factors", found.factors);
-        convert("arrays", found.arrays);
-        convert("changes", found.changes);
+        PassParts found = pass_parts(rows, factors, parts, kept);
         return std::make_unique<HeldPasses>(std::move(found), std::move(kept));
     }
     void track(const py::object& tracked) {

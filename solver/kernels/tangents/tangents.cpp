@@ -28,16 +28,6 @@ Moved moved_at(int64_t unknown, const Motion& motion) {
     return {displacement_at(unknown, motion), velocity_at(unknown, motion)};
 }
 
-/// Fill `result` with a sum of displacements, velocities and accelerations.
-CATENARY_FOR_TARGETS
-void add_up(std::array<double, 3> weights, std::span<const double> displacement,
-            std::span<const double> velocity, std::span<const double> acceleration,
-            std::span<double> result) {
-    const auto [by_d, by_v, by_a] = weights;
-    for (size_t i = 0; i < result.size(); ++i)
-        result[i] = by_d * displacement[i] + by_v * velocity[i] + by_a * acceleration[i];
-}
-
 /// Contact forces that a head's laws read; empty without laws.
 std::span<double> laws_of(const Head& head) {
     const auto* sprung = dynamic_cast<const SprungHead*>(&head);
@@ -73,22 +63,25 @@ TangentSteps::TangentSteps(StepParts parts, Block block, MarchTangents tangents)
         before_.emplace_back(3 * head->n());
         free_.emplace_back(3 * head->n());
     }
-    for (const Tangent& tangent : tangents_.all) {
-        if (tangent.heads.size() != chains_.size())
-            throw std::invalid_argument("a tangent has other heads than the steps");
-        contacts_.push_back(own.contacts);
-        contacts_.back().motion = tangent.free->parts().arrays.motion;
-        for (const MatrixTerm& term : tangent.matrices) sum_of(term);
+    const size_t n_unknowns = own.contacts.motion.x.size();
+    for (const TangentGroup& group : tangents_.groups) {
+        if (!group.lanes.loads.empty())
+            for (auto* numbers : {&displacement_, &velocity_}) numbers->resize(n_unknowns);
+        if (static_cast<int64_t>(group.tangents.size()) > group.lanes.n())
+            throw std::invalid_argument("a group of tangents has more than lanes");
+        for (const Tangent& tangent : group.tangents)
+            if (tangent.heads.size() != chains_.size())
+                throw std::invalid_argument("a tangent has other heads than the steps");
     }
-    if (!sums_.empty())
-        for (auto* numbers : {&displacement_, &velocity_})
-            numbers->resize(own.contacts.motion.x.size());
     const int64_t n = n_contacts(), most = size(own.problem.unknowns.right);
     for (auto* numbers : {&place_, &rate_, &forces_}) numbers->resize(n);
     for (auto* numbers : {&right_, &solution_, &left_, &change_, &compensations_})
         numbers->resize(most);
     for (auto* numbers : {&matrix_, &factors_}) numbers->resize(most * most);
+    side_by_side_.resize(most * kScenes);
     for (auto* numbers : {&index_, &order_}) numbers->resize(most);
+    acts_ = std::make_unique<bool[]>(most);
+    std::fill_n(acts_.get(), most, true);
 }
 
 Taken TangentSteps::take(int64_t first, int64_t end) {
@@ -104,27 +97,17 @@ Taken TangentSteps::take(int64_t first, int64_t end) {
         find_acting();
         count();
         fill_matrix();
-        follow(number);
+        for (const TangentGroup& group : tangents_.groups) follow(group, number);
         if (taken.is_full) return {number + 1 - first, false, true};
     }
     return {end - first, false, false};
 }
 
 void TangentSteps::read_motion() {
-    if (sums_.empty()) return;
+    if (displacement_.empty()) return;
     const Motion& motion = parts().contacts.motion;
     displacements(motion, 0, displacement_);
     velocities(motion, 0, velocity_);
-    for (Sum& sum : sums_) add_up(sum.weights, displacement_, velocity_, motion.z, sum.numbers);
-}
-
-/// The sum of motions that a term multiplies, made with the first term that does.
-std::span<const double> TangentSteps::sum_of(const MatrixTerm& term) {
-    const std::array weights{term.by_displacement, term.by_velocity, term.by_acceleration};
-    for (const Sum& sum : sums_)
-        if (sum.weights == weights) return sum.numbers;
-    sums_.push_back({weights, std::vector<double>(parts().contacts.motion.x.size())});
-    return sums_.back().numbers;
 }
 
 /// Find the contacts and links that act in the step that was taken.
@@ -188,69 +171,79 @@ void TangentSteps::fill_matrix() {
     }
 }
 
-/// Take all tangents through the step that was taken.
-void TangentSteps::follow(int64_t number) {
-    const SmallProblem& problem = parts().problem;
-    const int64_t m = acting_.n(), n = static_cast<int64_t>(acting_.contacts.size());
+/// Take a group of tangents through the step that was taken.
+void TangentSteps::follow(const TangentGroup& group, int64_t number) {
+    const TangentLanes& lanes = group.lanes;
+    const int64_t L = lanes.n(), m = acting_.n(), n = size(acting_.contacts);
+    const double time = block().times[number] - course().since;
+    const int64_t n_tangents = size(group.tangents);
+    if (!lanes.loads.empty()) {
+        catenary::load(lanes, {displacement_, velocity_, parts().contacts.motion.z});
+        for (int64_t s = 0; s < n_tangents; ++s)
+            load(group.tangents[s], lanes, s, group.tangents[s].speed * time);
+    }
+    take_free_step(lanes);
+    // Of all contacts, and of acting links.
+    const Array2<double> forces{side_by_side_.data(), n_contacts(), L},
+        of_links{side_by_side_.data() + n_contacts() * L, m - n, L};
+    std::ranges::fill(side_by_side_, 0.0);
+    for (int64_t s = 0; s < n_tangents; ++s) {
+        const Tangent& tangent = group.tangents[s];
+        const Motion own = lanes.at(s);
+        for (auto* numbers : {&place_, &rate_}) std::ranges::fill(*numbers, 0.0);
+        predict_heads(tangent, number);
+        find_places(tangent, own, tangent.speed * time);
+        solve(tangent, own);
+        for (int64_t i : acting_.contacts) forces(i, s) = forces_[i];
+        for (int64_t k = 0; n + k < m; ++k) of_links(k, s) = -compensations_[k];
+        move_heads(tangent);
+        remember(tangent);
+        show(tangent, number);
+    }
+    superpose(parts().contacts, forces, lanes);
+    compensate(parts().contacts, acting_.numbers, of_links, lanes);
+    show_arms(group, number);
+}
+
+/// Solve the small problem of a tangent.
+void TangentSteps::solve(const Tangent& tangent, const Motion& own) {
+    const int64_t m = acting_.n(), n = size(acting_.contacts);
+    for (int64_t i = 0; i < n; ++i) right_[i] = of_law(tangent, acting_.contacts[i]);
+    for (int64_t k = 0; n + k < m; ++k)
+        right_[n + k] = -parts().problem.coupled.released[acting_.numbers[k]] *
+                        of_reserve(tangent, own, acting_.numbers[k]);
     Room room{};
     room.factors = {factors_.data(), m, m};
     room.acting = index_;
     room.order = order_;
     room.left = left_;
     room.change = change_;
-    const std::unique_ptr<bool[]> acts(new bool[m]);
-    std::fill_n(acts.get(), m, true);
-    const double time = block().times[number] - course().since;
-    for (size_t t = 0; t < tangents_.all.size(); ++t) {
-        const Tangent& tangent = tangents_.all[t];
-        const double way = tangent.speed * time;
-        load(tangent, way);
-        tangent.free->step();
-        std::ranges::fill(place_, 0.0);
-        std::ranges::fill(rate_, 0.0);
-        predict_heads(tangent, number);
-        find_places(tangent, way);
-        for (int64_t i = 0; i < n; ++i) right_[i] = of_law(tangent, acting_.contacts[i]);
-        for (int64_t k = 0; n + k < m; ++k)
-            right_[n + k] = -problem.coupled.released[acting_.numbers[k]] *
-                            of_reserve(tangent, acting_.numbers[k], static_cast<int64_t>(t));
-        const System system{
-            {matrix_.data(), m, m}, std::span(right_).first(m), std::span(solution_).first(m)};
-        solve_on(system, {acts.get(), static_cast<size_t>(m)}, room);
-        std::ranges::fill(forces_, 0.0);
-        for (int64_t i = 0; i < n; ++i) forces_[acting_.contacts[i]] = solution_[i];
-        std::copy_n(solution_.begin() + n, m - n, compensations_.begin());
-        move(tangent, contacts_[t]);
-        remember(tangent);
-        show(tangent, number);
-    }
+    const System system{
+        {matrix_.data(), m, m}, std::span(right_).first(m), std::span(solution_).first(m)};
+    solve_on(system, {acts_.get(), static_cast<size_t>(m)}, room);
+    std::ranges::fill(forces_, 0.0);
+    for (int64_t i = 0; i < n; ++i) forces_[acting_.contacts[i]] = solution_[i];
+    std::copy_n(solution_.begin() + n, m - n, compensations_.begin());
 }
 
-/// Put the loads of a tangent's line: by the changes of its matrices, links and places of contacts.
-void TangentSteps::load(const Tangent& tangent, double way) {
-    const auto loads = tangent.loads;
-    std::ranges::fill(loads, 0.0);
-    for (const MatrixTerm& term : tangent.matrices) {
-        const auto sum = sum_of(term);
-        for (int64_t i = 0, k = 0; i < size(term.rows); ++i) {
-            double value = 0.0;
-            for (const int64_t end = term.begin[i + 1]; k < end; ++k)
-                value += term.values[k] * sum[term.columns[k]];
-            loads[term.rows[i]] -= value;
-        }
-    }
+/// Add the loads of a tangent by the march's forces, whose links or places change.
+void TangentSteps::load(const Tangent& tangent, const TangentLanes& lanes, int64_t lane,
+                        double way) const {
+    auto add = [&](int64_t unknown, double force) {
+        lanes.loads[unknown * lanes.n() + lane] += force;
+    };
     for (size_t k = 0; tangent.links.weights.rows > 0 && k < acting_.rows.size(); ++k) {
         const int64_t link = acting_.numbers[k];
         const double compensation = force()[n_contacts() + acting_.rows[k]];
         const auto unknowns = tangents_.links.unknowns[link];
         for (size_t j = 0; j < unknowns.size(); ++j)
-            loads[unknowns[j]] -= tangent.links.weights(link, j) * compensation;
+            add(unknowns[j], -tangent.links.weights(link, j) * compensation);
     }
     for (int64_t i : acting_.contacts) {
         const Touch& touch = parts().contacts.touches[i];
         const double moved = at(tangent.start, i) + way;
         if (moved == 0.0) continue;
-        for (int j = 0; j < 4; ++j) loads[touch.local[j]] += force()[i] * touch.slope[j] * moved;
+        for (int j = 0; j < 4; ++j) add(touch.local[j], force()[i] * touch.slope[j] * moved);
     }
 }
 
@@ -386,9 +379,8 @@ void TangentSteps::add_end(const Head& head, size_t h, double weight) {
 }
 
 /// Subtract the changes of the wires' heights from gaps.
-void TangentSteps::find_places(const Tangent& tangent, double way) {
+void TangentSteps::find_places(const Tangent& tangent, const Motion& own, double way) {
     const Contacts& contacts = parts().contacts;
-    const Motion& own = tangent.free->parts().arrays.motion;
     const double speed = contacts.gains.train_speed;
     for (int64_t i = 0; i < n_contacts(); ++i) {
         const Touch& touch = contacts.touches[i];
@@ -437,27 +429,24 @@ double TangentSteps::of_law(const Tangent& tangent, int64_t i) const {
 }
 
 /// Derivative of a link's reserve without changes of forces.
-double TangentSteps::of_reserve(const Tangent& tangent, int64_t link, int64_t number) const {
+double TangentSteps::of_reserve(const Tangent& tangent, const Motion& own, int64_t link) const {
     const Motion& motion = parts().contacts.motion;
     const Links& links = tangents_.links;
     const auto& [law, weights] = tangent.links;
-    double value = reserve_of(link, links, contacts_[number].motion) - links.law[link].rest;
+    double value = reserve_of(link, links, own) - links.law[link].rest;
     if (law.rows == 0 && weights.rows == 0) return value;
-    const Reserve& own = links.law[link];
+    const Reserve& rule = links.law[link];
     if (law.rows > 0) value += law(link, 0);
     for (int64_t k = 0; k < links.unknowns.columns; ++k) {
         const auto [d, v] = moved_at(links.unknowns(link, k), motion);
         if (law.rows > 0) value += links.weights(link, k) * (law(link, 1) * d + law(link, 2) * v);
-        if (weights.rows > 0) value += weights(link, k) * (own.stiffness * d + own.damping * v);
+        if (weights.rows > 0) value += weights(link, k) * (rule.stiffness * d + rule.damping * v);
     }
     return value;
 }
 
-/// Move line and heads by the changes of forces.
-void TangentSteps::move(const Tangent& tangent, const Contacts& contacts) {
-    superpose(contacts, forces_);
-    compensate(contacts, acting_.numbers,
-               std::span<const double>(compensations_).first(acting_.numbers.size()));
+/// Move the heads by the changes of forces.
+void TangentSteps::move_heads(const Tangent& tangent) const {
     for (size_t h = 0; h < chains_.size(); ++h) {
         const Head& head = *parts().heads[h];
         const auto state = tangent.heads[h].state;
@@ -490,7 +479,7 @@ void TangentSteps::remember(const Tangent& tangent) const {
     }
 }
 
-/// Fill in a tangent's row.
+/// Fill in a tangent's row but for the displacements at arms.
 void TangentSteps::show(const Tangent& tangent, int64_t number) const {
     const auto& [of_strip, of_pantograph] = parts().train_outputs.ends;
     const double gamma = parts().law.reported.gamma;
@@ -504,12 +493,20 @@ void TangentSteps::show(const Tangent& tangent, int64_t number) const {
             tangent.law.latest[i] = forces_[i];
         }
     }
-    const auto arms = parts().shown.arms;
-    for (int64_t i = 0; i < size(arms); ++i)
-        row[n_pantographs + i] = displacement_at(arms[i], tangent.free->parts().arrays.motion);
+    const auto heights = row.subspan(n_pantographs + size(parts().shown.arms));
     for (int64_t p = 0; p < n_pantographs; ++p)
-        row[n_pantographs + size(arms) + p] =
-            head_height(*parts().heads[p], tangent.heads[p].state);
+        heights[p] = head_height(*parts().heads[p], tangent.heads[p].state);
+}
+
+/// Fill in the displacements at arms in the rows of a group.
+void TangentSteps::show_arms(const TangentGroup& group, int64_t number) const {
+    const auto arms = parts().shown.arms;
+    const int64_t n_pantographs = size(parts().train_outputs.ends.of_pantograph) - 1;
+    for (size_t s = 0; s < group.tangents.size(); ++s) {
+        const auto row = group.tangents[s].results[number].subspan(n_pantographs);
+        const Motion own = group.lanes.at(s);
+        for (int64_t i = 0; i < size(arms); ++i) row[i] = displacement_at(arms[i], own);
+    }
 }
 
 /// Mean height of the strips by a head's state, or by a derivative of it.

@@ -13,18 +13,9 @@
 #include "contact_problem/active_set.hpp"
 #include "heads/linear_chain.hpp"
 #include "steps/steps.hpp"
+#include "tangents/tangent_lanes.hpp"
 
 namespace catenary {
-
-/// A derivative of the line's matrices times a sum of displacements, velocities and accelerations:
-/// of the rows (m,) that have any, row i from begin[i] to begin[i + 1].
-struct MatrixTerm {
-    std::span<const int64_t> rows, begin;
-    std::span<const int32_t> columns;
-    std::span<const double> values;
-    double by_displacement, by_velocity, by_acceleration;
-    CATENARY_RECORD(rows, begin, columns, values, by_displacement, by_velocity, by_acceleration)
-};
 
 /// Derivatives of all links of the line by their numbers: rest, stiffness and damping of their laws
 /// (n, 3), and weights of their directions (n, m); no rows if nothing changes.
@@ -59,9 +50,6 @@ struct LawChange {
 
 /// A march differentiated by one parameter.
 struct Tangent {
-    TwoPasses* free;          ///< a step of its motion, without forces
-    std::span<double> loads;  ///< that this reads
-    std::vector<MatrixTerm> matrices;
     Array2<const double> rest;  ///< of the wires' nodes at rest (n_nodes, 2), or no rows
     LinkChange links;
     std::vector<HeadChange> heads;
@@ -71,19 +59,26 @@ struct Tangent {
     double speed;                   ///< of the train's speed
     Array2<double> results;         ///< (n, 2 n_pantographs + n_arms) of each step of a block:
                                     ///< contact forces, displacements at arms, heights of heads
-    CATENARY_RECORD(free, loads, matrices, rest, links, heads, drives, law, start, speed, results)
+    CATENARY_RECORD(rest, links, heads, drives, law, start, speed, results)
+};
+
+/// Tangents with a motion of the line in each lane; the last lanes may have none.
+struct TangentGroup {
+    TangentLanes lanes;
+    std::vector<Tangent> tangents;
+    CATENARY_RECORD(lanes, tangents)
 };
 
 /// Tangents of a march, the parts of it that they read, and the counts that they fill in.
 struct MarchTangents {
-    std::vector<Tangent> all;
+    std::vector<TangentGroup> groups;
     /// Two copies of each head that is no linear chain, for changed states.
     std::vector<std::vector<Head*>> pairs;
     Links links;                     ///< of the line, by their numbers
     std::span<const int64_t> first;  ///< (1,) steps of the march before the block
     std::span<int64_t> switches;     ///< (3,) steps in which a contact is open, in which a contact
                                      ///< opened or closed, and in which links switched
-    CATENARY_RECORD(all, pairs, links, first, switches)
+    CATENARY_RECORD(groups, pairs, links, first, switches)
 };
 
 /// Steps with tangents.
@@ -102,20 +97,13 @@ class TangentSteps : public Steps {
         int64_t n() const { return static_cast<int64_t>(contacts.size() + rows.size()); }
     };
 
-    /// A sum of the line's displacements, velocities and accelerations, which several tangents
-    /// read.
-    struct Sum {
-        std::array<double, 3> weights;
-        std::vector<double> numbers;
-    };
-
     void read_motion();
-    std::span<const double> sum_of(const MatrixTerm& term);
     void find_acting();
     void count();
     void fill_matrix();
-    void follow(int64_t number);
-    void load(const Tangent& tangent, double way);
+    void follow(const TangentGroup& group, int64_t number);
+    void solve(const Tangent& tangent, const Motion& own);
+    void load(const Tangent& tangent, const TangentLanes& lanes, int64_t lane, double way) const;
     void predict_heads(const Tangent& tangent, int64_t number);
     void step_chain(const LinearChain& chain, const HeadChange& change, const Drive& drive,
                     const Drive& changed, size_t h);
@@ -126,33 +114,34 @@ class TangentSteps : public Steps {
     bool is_straight(size_t h) const;
     void add_end(const Head& head, size_t h, double weight);
     void put_state(Head& head, size_t h) const;
-    void find_places(const Tangent& tangent, double way);
+    void find_places(const Tangent& tangent, const Motion& own, double way);
     double of_law(const Tangent& tangent, int64_t contact) const;
-    double of_reserve(const Tangent& tangent, int64_t link, int64_t number) const;
-    void move(const Tangent& tangent, const Contacts& contacts);
+    double of_reserve(const Tangent& tangent, const Motion& own, int64_t link) const;
+    void move_heads(const Tangent& tangent) const;
     void remember(const Tangent& tangent) const;
     void show(const Tangent& tangent, int64_t number) const;
+    void show_arms(const TangentGroup& group, int64_t number) const;
     double head_height(const Head& head, std::span<const double> state) const;
 
     std::span<const double> force() const { return parts().problem.unknowns.solution; }
     int64_t n_contacts() const { return size(parts().problem.found.depth); }
 
     MarchTangents tangents_;
-    std::vector<Contacts> contacts_;               ///< of each tangent, with its motion
     std::vector<const LinearChain*> chains_;       ///< of heads that are linear chains, else null
     std::vector<std::vector<double>> before_;      ///< states of the heads before the step
     std::vector<std::vector<double>> pressed_;     ///< contact forces that their laws read then
     std::vector<double> row_;                      ///< room for the drive of a head
     std::vector<std::vector<double>> free_;        ///< derivatives of heads without contact
     std::vector<double> displacement_, velocity_;  ///< of the line
-    std::vector<Sum> sums_;
-    std::vector<double> place_, rate_;   ///< derivatives of gaps without forces
-    std::vector<double> forces_;         ///< of contacts
-    std::vector<double> compensations_;  ///< of acting links
+    std::vector<double> place_, rate_;             ///< derivatives of gaps without forces
+    std::vector<double> forces_;                   ///< of contacts
+    std::vector<double> compensations_;            ///< of acting links
+    std::vector<double> side_by_side_;  ///< forces of contacts, and of acting links, in all lanes
     Acting acting_, was_;
     bool has_begun_ = false;
     std::vector<double> matrix_, right_, solution_, factors_, left_, change_;
     std::vector<int64_t> index_, order_;
+    std::unique_ptr<bool[]> acts_;
 };
 
 }  // namespace catenary

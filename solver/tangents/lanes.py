@@ -1,0 +1,196 @@
+"""Motions of the line in several tangents, whose numbers stand side by side in lanes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from catenary.solver.integrators.line_integrator import LineIntegrator
+from catenary.solver.integrators.line_state import Motion, PredictedLineState
+from catenary.solver.kernels import aligned_arrays, native
+from catenary.solver.model.switching_links import NO_LINKS
+from catenary.solver.tangents.set_up import Change
+
+# Numbers of matrices are kept to so many bits, far more than differences of set-ups know: rows of
+# equal elements are equal then.
+_BITS = 40
+_NO_NUMBERS = np.zeros(0, dtype=np.int64)
+
+
+class LaneSums(NamedTuple):
+    """Sums of the march's motion with weights of the lanes; see
+    `kernels/tangents/tangent_lanes.hpp`, as for the next two."""
+
+    weights: np.ndarray
+    begin: np.ndarray
+    unknowns: np.ndarray
+    numbers: np.ndarray
+
+
+class ChangedRows(NamedTuple):
+    """Changes of matrices by pairs of rows."""
+
+    sums: LaneSums
+    kinds: np.ndarray
+    begin: np.ndarray
+    offsets: np.ndarray
+    values: np.ndarray
+    ahead: int
+
+
+class TangentLanes(NamedTuple):
+    """Motions of the line in lanes, and what steps them."""
+
+    alone: native.TwoPasses | None
+    together: native.ScenePasses | None
+    motion: Motion
+    loads: np.ndarray
+    rows: ChangedRows
+
+
+def groups_of(line: LineIntegrator, changes: Sequence[Change]) -> list[list[int]]:
+    """Numbers of the changes whose motions stand side by side.
+
+    Changes that load the line stand by themselves, next to those of the same rows: all of a group
+    take the products that one of them needs. Lines without kernels for several scenes have groups
+    of one.
+    """
+    passes = line.passes
+    assert passes is not None
+    can = all(map(native.are_compiled_for_scenes, passes.rows, passes.columns))
+    most = native.SCENES if can else 1
+    rows = {
+        k: {int(row) for term in change.matrices for row in term.rows}
+        for k, change in enumerate(changes)
+        if change.loads_line
+    }
+    without = [k for k in range(len(changes)) if k not in rows]
+    # Each next to one whose rows are nearest to its own, from that with most on.
+    loaded, latest = [], set().union(*rows.values())
+    while rows:
+        loaded.append(min(rows, key=lambda k: len(rows[k] ^ latest)))
+        latest = rows.pop(loaded[-1])
+    return [
+        part[first : first + most]
+        for part in (without, loaded)
+        for first in range(0, len(part), most)
+    ]
+
+
+def lanes_of(
+    line: LineIntegrator, groups: Sequence[Sequence[Change]], starts: Sequence[Sequence[np.ndarray]]
+) -> list[TangentLanes]:
+    """Motions of groups of tangents at their start. One rank, Newmark's method in two passes.
+
+    Parameters
+    ----------
+    line : LineIntegrator
+        Line of a march.
+    groups : sequence of sequence of Change
+        Changes of set-ups by the parameters of each group.
+    starts : sequence of sequence of array (n_local,)
+        Derivatives of the line's acceleration at the start [m/s2 per unit] of each of these.
+    """
+    n = line.acceleration.size
+    sizes = [1 if len(group) == 1 else native.SCENES for group in groups]
+    rows = [_rows(group, size, n) for group, size in zip(groups, sizes, strict=True)]
+    # Groups step one after the other, so that they share room that they fill anew.
+    sums = max((of.sums.numbers for of in rows), key=len, default=np.zeros(0))
+    loads = aligned_arrays.zeros((n + n % 2) * max(sizes, default=1), 3)
+    return [
+        _lanes(
+            line,
+            own,
+            loads if any(change.loads_line for change in group) else loads[:0],
+            of._replace(sums=of.sums._replace(numbers=sums)),
+        )
+        for group, own, of in zip(groups, starts, rows, strict=True)
+    ]
+
+
+def _lanes(
+    line: LineIntegrator, starts: Sequence[np.ndarray], loads: np.ndarray, rows: ChangedRows
+) -> TangentLanes:
+    """Motions that start with these accelerations, as many as there are or can be."""
+    passes, state = line.passes, line.motion
+    assert passes is not None and isinstance(state, PredictedLineState)
+    n_lanes = 1 if len(starts) == 1 else native.SCENES
+    arrays = passes.arrays_in_lanes(n_lanes, loads)
+    for lane, start in enumerate(starts):
+        still = np.zeros_like(start)
+        ahead = state.ahead(still, still, start)
+        for numbers, values in zip(arrays.motion[:3], ahead, strict=True):
+            numbers[lane::n_lanes] = values
+    parts = passes.parts._replace(arrays=arrays)
+    nothing, no_links = np.zeros(0), passes.tracked(NO_LINKS, np.zeros(0))
+    if n_lanes == 1:
+        alone = native.TwoPasses(passes.rows, passes.columns, parts)
+        alone.track(no_links)
+        return TangentLanes(alone, None, arrays.motion, loads, rows)
+    together = native.ScenePasses(passes.rows, passes.columns, parts)
+    together.track(no_links, np.zeros((0, n_lanes)), [nothing] * n_lanes)
+    return TangentLanes(None, together, arrays.motion, loads, rows)
+
+
+def _rows(changes: Sequence[Change], n_lanes: int, n: int) -> ChangedRows:
+    """Changes of matrices over all lanes, with a kind for pairs of rows that are equal.
+
+    The largest term of each lane is multiplied with sums at all n unknowns. Others, which have few
+    rows mostly, read their sums behind these.
+    """
+    terms = [sorted(change.matrices, key=lambda term: -term.values.size) for change in changes]
+    most = max(map(len, terms))
+    weights, unknowns = np.zeros((max(1, most), 3, n_lanes)), [_NO_NUMBERS]
+    rows, places, lanes, values = [_NO_NUMBERS], [_NO_NUMBERS], [_NO_NUMBERS], [np.zeros(0)]
+    for rank in range(most):
+        own = [(lane, of_lane[rank]) for lane, of_lane in enumerate(terms) if rank < len(of_lane)]
+        read, behind = np.arange(n), 0
+        if rank:
+            read = np.unique(np.concatenate([term.columns for _, term in own]))
+            behind = n + sum(map(len, unknowns))
+            unknowns.append(read)
+        for lane, term in own:
+            weights[rank, :, lane] = term.weights
+            rows.append(np.repeat(term.rows, np.diff(term.begin)))
+            places.append(behind + np.searchsorted(read, term.columns))
+            lanes.append(np.full(term.values.size, lane))
+            values.append(_rounded(term.values))
+    listed = np.concatenate(unknowns)
+    row, width = np.concatenate(rows), n + listed.size
+    entries, entry = np.unique(row // 2 * width + np.concatenate(places), return_inverse=True)
+    numbers = np.zeros((entries.size, 2, n_lanes))
+    numbers[entry, row % 2, np.concatenate(lanes)] = np.concatenate(values)
+    pair, place = np.divmod(entries, width)
+    offsets = (place - 2 * pair).astype(np.int32)
+    ends = np.searchsorted(pair, np.arange((n + 1) // 2 + 1))
+    kinds: dict[bytes, int] = {}
+    kept: list[np.ndarray] = []
+    kind_of = np.zeros(ends.size - 1, dtype=np.int32)
+    for i, (begin, end) in enumerate(zip(ends[:-1], ends[1:], strict=True)):
+        key = offsets[begin:end].tobytes() + numbers[begin:end].tobytes()
+        if key not in kinds:
+            kinds[key] = len(kept)
+            kept.append(np.arange(begin, end))
+        kind_of[i] = kinds[key]
+    which = np.concatenate(kept)
+    return ChangedRows(
+        sums=LaneSums(
+            weights.reshape(-1, 3 * n_lanes),
+            np.cumsum([len(read) for read in unknowns], dtype=np.int64),
+            listed,
+            aligned_arrays.zeros(width * n_lanes, 4),
+        ),
+        kinds=kind_of,
+        begin=np.cumsum([0, *map(len, kept)], dtype=np.int64),
+        offsets=offsets[which],
+        values=aligned_arrays.copy(numbers[which]).reshape(-1, 2 * n_lanes),
+        ahead=int(offsets[place < n].max(initial=0)),
+    )
+
+
+def _rounded(values: np.ndarray) -> np.ndarray:
+    """Numbers with ``_BITS`` bits."""
+    mantissa, exponent = np.frexp(values)
+    return np.ldexp(np.round(np.ldexp(mantissa, _BITS)), exponent - _BITS)
