@@ -42,7 +42,8 @@ class Merged(NamedTuple):
 def merge(folders: Sequence[Path]) -> Merged:
     """Several sweeps as one.
 
-    Variants may be disjoint or in several folders. A variant that broke in one folder and was run
+    In place of a folder that has parts of a sweep alone these are taken. Variants may be disjoint or
+    in several folders. A variant that broke in one folder and was run
     to its end in another is taken as done. Not collective.
 
     Raises
@@ -51,6 +52,7 @@ def merge(folders: Sequence[Path]) -> Merged:
         If a folder holds no sweep, or if two contradict each other: other cases, other samplings,
         or a variant with other assignments or other figures.
     """
+    folders = [part for folder in folders for part in _parts(folder)]
     records = [_record(folder) for folder in folders]
     samplings = [read_sampling_beside(folder) for folder in folders]
     first, sampling = records[0], max(samplings, key=lambda one: 0 if one is None else one.n)
@@ -136,6 +138,12 @@ def _endless(sampling: SamplingTable | None) -> SamplingTable | None:
     """A sampling without its number of samples, where that does not change the first ones."""
     extends = sampling is not None and sampling.method in ("sobol", "random")
     return sampling.model_copy(update={"n": 2}) if sampling is not None and extends else sampling
+
+
+def _parts(folder: Path) -> list[Path]:
+    """A folder with a sweep, or the folders in it that have parts of one."""
+    parts = [] if (folder / RECORD).exists() else sorted(folder.glob("part_*_of_*"))
+    return parts or [folder]
 
 
 def _record(folder: Path) -> dict[str, Any]:

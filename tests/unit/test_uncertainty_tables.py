@@ -231,6 +231,10 @@ def test_disjoint_and_common_samples_merge_into_the_table_of_all(tmp_path: Path)
     assert found == evaluate(read_run_table(whole))
     assert (tmp_path / "all" / "sweep.csv").read_text() == (whole / "sweep.csv").read_text()
     assert {path.name for path in files} >= {"sweep.csv", "sweep.json", "uncertainty.json"}
+    # In place of parts their folder can be named.
+    folder(tmp_path / "parts" / "part_1_of_2", runs[::2], SAMPLE)
+    folder(tmp_path / "parts" / "part_2_of_2", runs[1::2], SAMPLE)
+    assert merged(tmp_path / "parts")["rows"] == record["rows"]
     # The merged folder is a sweep's folder again.
     assert merged(tmp_path / "all", odd)["rows"] == record["rows"]
 
