@@ -174,7 +174,7 @@ void TangentSteps::fill_matrix() {
 /// Take a group of tangents through the step that was taken.
 void TangentSteps::follow(const TangentGroup& group, int64_t number) {
     const TangentLanes& lanes = group.lanes;
-    const int64_t L = lanes.n(), m = acting_.n(), n = size(acting_.contacts);
+    const int64_t n_lanes = lanes.n(), m = acting_.n(), n = size(acting_.contacts);
     const double time = block().times[number] - course().since;
     const int64_t n_tangents = size(group.tangents);
     if (!lanes.loads.empty()) {
@@ -184,8 +184,8 @@ void TangentSteps::follow(const TangentGroup& group, int64_t number) {
     }
     take_free_step(lanes);
     // Of all contacts, and of acting links.
-    const Array2<double> forces{side_by_side_.data(), n_contacts(), L},
-        of_links{side_by_side_.data() + n_contacts() * L, m - n, L};
+    const Array2<double> forces{side_by_side_.data(), n_contacts(), n_lanes},
+        of_links{side_by_side_.data() + n_contacts() * n_lanes, m - n, n_lanes};
     std::ranges::fill(side_by_side_, 0.0);
     for (int64_t s = 0; s < n_tangents; ++s) {
         const Tangent& tangent = group.tangents[s];
