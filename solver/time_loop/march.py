@@ -31,7 +31,7 @@ from catenary.solver.kernels.flush_to_zero import flushed
 from catenary.solver.linear.petsc_solvers import wants_single_steps, wants_solution
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import distribute
-from catenary.solver.problem.defects import Happened, LineIncident, in_steps
+from catenary.solver.problem.incidents import Happened, LineIncident, in_steps
 from catenary.solver.problem.problem import Problem, steps_of
 from catenary.solver.schemes.make_scheme import Parts, SchemeFactory
 from catenary.solver.schemes.one_solve import OneSolve

@@ -23,7 +23,7 @@ from catenary.cases.studies.hard.runs import RunHistories, cut_of, node_places, 
 from catenary.cases.studies.records import KeptRows
 from catenary.postproc.report.study_table import Column, StudyTable, remark_lines
 from catenary.solver.model.beam import shape_slopes
-from catenary.solver.problem.defects import DropperBreak, LineIncident, in_steps
+from catenary.solver.problem.incidents import DropperBreak, LineIncident, in_steps
 from catenary.solver.statics.line_at_rest import LineAtRest
 
 # Gauss's rule of three points is exact for the square of a cubic's slope.

@@ -31,7 +31,7 @@ from catenary.solver.effects.build_model import build
 from catenary.solver.effects.effect import Limit
 from catenary.solver.model.model import Model
 from catenary.solver.problem.contact_laws import LinearLaw
-from catenary.solver.problem.defects import TensionLoss
+from catenary.solver.problem.incidents import TensionLoss
 from catenary.solver.problem.irregularities import Irregularities
 from catenary.solver.problem.problem import Damping
 
