@@ -72,6 +72,3 @@ class Pantograph(Protocol):
     def base(self, time: float) -> float:
         """Height at ``time`` [s] of the base that a mechanism's points count from [m]; how far a
         vehicle has lifted it for lumped masses."""
-
-    def energy(self) -> float:
-        """Kinetic and elastic energy relative to the springs at rest [J]."""

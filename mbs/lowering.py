@@ -152,10 +152,6 @@ class LoweredPantograph:
         """Height of the model's base [m]."""
         return self.model.base(time)
 
-    def energy(self) -> float:
-        """Energy of the model [J]; zero once it is caught."""
-        return 0.0 if self.is_caught else self.model.energy()
-
     def _base_at(self, time: float) -> tuple[float, float]:
         """Height [m] and velocity [m/s] of the base."""
         if self._base is None:

@@ -183,15 +183,6 @@ class LumpedPantograph(SteppedHead):
         """Lift of the base by the vehicle [m]."""
         return 0.0 if self._base is None else float(self._base.vertical(time).place)
 
-    def energy(self) -> float:
-        """Kinetic energy, and elastic energy of all springs, the base spring included [J].
-
-        The base counts as at rest.
-        """
-        stretch = self.position - self._base_height * self._level
-        own = 0.5 * self._masses @ self.velocity**2 + 0.5 * stretch @ self._stiffness @ stretch
-        return float(own) + self._laws.energy(self.position, 0.0)
-
     def _in_place(self, data: LumpedData, static_force: float, nominal: float) -> LawsInPlace:
         """The laws of a chain whose head is at its nominal height under the static force."""
         head = int(np.flatnonzero(self._level[: self._n - data.n_masses + 1])[-1])

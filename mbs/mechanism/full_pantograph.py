@@ -21,7 +21,7 @@ from catenary.mbs.interface import HeadState
 from catenary.mbs.mechanism.pantograph_data import MultibodyData, stand
 from catenary.mbs.rigid.arrays import ORIGIN, body_products
 from catenary.mbs.rigid.bodies import SPACE, Motion
-from catenary.mbs.rigid.forces import Force, Gravity, OffLine, PointForce
+from catenary.mbs.rigid.forces import Force, OffLine, PointForce
 from catenary.mbs.rigid.implicit_steps import Stepper
 from catenary.mbs.rigid.joints import Constant, PrescribedPoint, steady
 from catenary.mbs.rigid.kinematics import point
@@ -302,15 +302,6 @@ class FullPantograph:
         """Height of the base at ``time`` [s], in the line's heights [m]."""
         moved = 0.0 if self._base is None else float(self._base.vertical(time).place)
         return self._zero + moved
-
-    def energy(self) -> float:
-        """Kinetic energy in the base's axes and elastic energy of springs and stops [J].
-
-        Weights and actuators store none here, as with the other models.
-        """
-        system, motion = self.system, self.motion
-        elastic = sum(f.energy(motion) for f in system.forces if not isinstance(f, Gravity))
-        return 0.5 * float(system.mass @ motion.velocities**2) + elastic
 
     @contextmanager
     def _named(self) -> Iterator[None]:

@@ -130,15 +130,6 @@ class RaisingPantograph(SteppedHead):
             rows["head_air"], rows["arm_air"], rows["bodies_air"] = blown.T
         self._fill_lateral(times, drives)
 
-    def energy(self) -> float:
-        """Kinetic energy in the line's frame, and elastic energy of the head's springs beyond its
-        weight's, for a base at rest [J]."""
-        masses = self._masses.copy()
-        masses[-1] = self._frame_at(self.position[-1])[0][0]
-        stretch = self.position - self.position[-1] * self._level
-        own = 0.5 * masses @ self.velocity**2 + 0.5 * stretch @ self._stiffness @ stretch
-        return float(own) + self._laws.energy(self.position, 0.0)
-
     def static_force(self, head_height: float, time: float = np.inf) -> float:
         """Force on a wire that holds the strips at this height at rest, fully raised [N].
 

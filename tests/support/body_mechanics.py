@@ -1,17 +1,18 @@
-"""What tests ask of multibody systems besides: reactions, masses, states as vectors, tables."""
+"""Mechanics of multibody systems for tests: reactions, energies, masses, states, tables."""
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
 import numpy as np
-from scipy import linalg
+from scipy import integrate, linalg
 from scipy.interpolate import CubicSpline
 
 from catenary.base.errors import InputError
 from catenary.mbs.mechanism.reduction import ReducedMechanism
 from catenary.mbs.rigid.arrays import ORIGIN, TimeLaw
 from catenary.mbs.rigid.bodies import Motion, Vector, normalised, quaternion_product
+from catenary.mbs.rigid.forces import BumpStop, Force, Gravity, SpringDamper
 from catenary.mbs.rigid.joints import unit
 from catenary.mbs.rigid.kinematics import Law, point
 from catenary.mbs.rigid.least_squares import null_space
@@ -34,6 +35,30 @@ def reaction(
     jacobian = system.constraints(motion, 0.0).jacobian[rows]
     force = -(jacobian.T @ multipliers[rows]).reshape(-1, 6)[motion.numbers[body]]
     return Reaction(force[:3], force[3:])
+
+
+def stored_energy(force: Force, motion: Motion) -> float:
+    """Elastic or potential energy of a force [J], weights counting from height zero; zero for a
+    force that works from outside."""
+    if isinstance(force, Gravity):
+        return float(force.acceleration * np.dot(force.masses, motion.position[:-1, 2]))
+    if isinstance(force, BumpStop):
+        length = force.line(motion).length
+        depth = max(force.shortest - length, length - force.longest, 0.0)
+        return 0.5 * force.stiffness * depth**2
+    if not isinstance(force, SpringDamper):
+        return 0.0
+    extension = force.line(motion).length - force.free_length
+    if callable(force.stiffness):
+        closely = {"epsabs": 1e-12, "epsrel": 1e-12, "limit": 200}
+        return float(integrate.quad(force.stiffness, 0.0, extension, **closely)[0])
+    return 0.5 * force.stiffness * extension**2
+
+
+def energy(system: System, motion: Motion) -> float:
+    """Kinetic energy, and the energy that all forces store [J]."""
+    kinetic = 0.5 * float(system.mass @ motion.velocities**2)
+    return kinetic + sum(stored_energy(force, motion) for force in system.forces)
 
 
 def equivalent_mass(

@@ -50,7 +50,8 @@ def test_mechanism_that_is_the_same_at_all_heights_is_two_lumped_masses() -> Non
     check("velocity [m/s]", mine.velocity, other.velocity, within=100 * within)
     check("height compliance", mine.height_compliance, other.height_compliance, within=1e-20)
     check("velocity compliance", mine.velocity_compliance, other.velocity_compliance, within=1e-17)
-    check("energy [J]", found.energy(), expected.energy(), within=1e-8)
+    check("all heights [m]", found.position, expected.position, within=within)
+    check("all velocities [m/s]", found.velocity, expected.velocity, within=100 * within)
     check("static force [N]", found.static_force(5.0), 120.0, within=1e-10)
     assert abs(found.position[0] - 5.0) > 0.01
 
@@ -137,7 +138,6 @@ def test_state_is_all_that_is_needed_to_continue() -> None:
     data = RaisingData(tables, 7.8, STIFFNESS, 26.0, WEIGHT, OFFSET, base_height=3.6)
     one, other = (RaisingPantograph(data, raise_time=0.05, dt=1e-3) for _ in range(2))
     one.place(5.1)
-    assert one.energy() == 0.0
     for number in range(50):
         one.predict(1e-3 * (number + 1))
         one.advance(np.array([20.0]))
