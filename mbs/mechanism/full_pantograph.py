@@ -16,7 +16,7 @@ import numpy as np
 from catenary.base.errors import InputError, RunBroken
 from catenary.mbs.air import ON_FRAME, ON_HEAD, SQUARE, AirForces
 from catenary.mbs.head.newmark_head import Raising
-from catenary.mbs.head.wire_crossing import CrossingPath
+from catenary.mbs.head.stepping import Stepping
 from catenary.mbs.interface import HeadState
 from catenary.mbs.mechanism.pantograph_data import MultibodyData, stand
 from catenary.mbs.rigid.arrays import ORIGIN, body_products
@@ -108,10 +108,7 @@ class FullPantograph:
     data : MultibodyData
     pressing : force [N] of the head on its arm, whose working height is that of a head at
         ``nominal_height`` [m]: the static force, and what the air lifts the arm with
-    raise_time : time over which the static force grows from zero [s]
-    dt, beta, gamma : Newmark step [s] and parameters, those of the line
-    lateral : where the wire crosses the strips; without it, in their middle
-    base : how the vehicle moves; without it the base stays
+    stepping : Stepping; without a ``lateral`` the wire crosses the strips in their middle
     air : forces of the air; without it there are none
     handling : way of keeping constraints, or its name in `step_solvers.METHODS`
     substeps : into how many a step is cut
@@ -127,12 +124,7 @@ class FullPantograph:
         data: MultibodyData,
         pressing: float,
         nominal_height: float,
-        raise_time: float,
-        dt: float,
-        beta: float = 0.25,
-        gamma: float = 0.5,
-        lateral: CrossingPath | None = None,
-        base: BaseMotion | None = None,
+        stepping: Stepping,
         air: AirForces | None = None,
         handling: StepSolver | str = "coordinate_partitioning",
         substeps: int = 1,
@@ -143,8 +135,8 @@ class FullPantograph:
                 "leave it out to have all bodies in the loop."
             )
         standing = stand(data)
-        self._data, self._dt = data, dt
-        self._lateral, self._base = lateral, base
+        raise_time, dt, beta, gamma, self._lateral, base = stepping
+        self._data, self._dt, self._base = data, dt, base
         part = Raising(raise_time)
         self._hold_down = _HoldDown("held down until raised", data.arm, part)
         system = without_spins(standing.system, standing.motion)

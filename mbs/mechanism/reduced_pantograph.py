@@ -25,11 +25,10 @@ from catenary.mbs.air import SQUARE, AirForces
 from catenary.mbs.head.head_arrays import MechanismArrays, SprungMasses, named
 from catenary.mbs.head.laws import Law, in_place
 from catenary.mbs.head.newmark_head import SteppedHead, parts_of
+from catenary.mbs.head.stepping import Stepping
 from catenary.mbs.head.strips import ONE_STRIP, Strips, Turning, head_parts
-from catenary.mbs.head.wire_crossing import CrossingPath
 from catenary.mbs.interface import HeadState
 from catenary.mbs.mechanism.reduction import ReducedMechanism
-from catenary.mbs.vehicle.base_motion import BaseMotion
 from catenary.solver.kernels import native
 
 
@@ -69,33 +68,20 @@ class RaisingPantograph(SteppedHead):
     Parameters
     ----------
     data : RaisingData
-    raise_time : time over which the static force grows from zero [s]
-    dt, beta, gamma : Newmark step [s] and parameters, those of the line
-    lateral : where the wire crosses the strips; without it the head does not roll
-    base : how the vehicle moves; without it the base stays
+    stepping : Stepping
     air : forces of the air; without it there are none
     """
 
-    def __init__(
-        self,
-        data: RaisingData,
-        raise_time: float,
-        dt: float,
-        beta: float = 0.25,
-        gamma: float = 0.5,
-        lateral: CrossingPath | None = None,
-        base: BaseMotion | None = None,
-        air: AirForces | None = None,
-    ) -> None:
+    def __init__(self, data: RaisingData, stepping: Stepping, air: AirForces | None = None) -> None:
         values = data.head_mass, data.head_stiffness, data.head_damping
-        head = head_parts(*values, data.strips, data.roll if lateral is not None else None)
-        super().__init__(head, head.n + 1, raise_time, dt, beta, gamma, lateral)
+        head = head_parts(*values, data.strips, data.roll if stepping.lateral is not None else None)
+        super().__init__(head, head.n + 1, stepping)
         self._data = data
-        self._base, self._air = base, air
+        self._air = air
         self._zero = data.head_offset + data.base_height
         self._masses = np.append(head.masses, 0.0)
         self._stiffness, self._damping = head.stiffness, head.damping
-        self._tables = data.frame.tables(carried=base is not None)
+        self._tables = data.frame.tables(carried=stepping.base is not None)
         head_number = int(np.flatnonzero(head.level)[-1])
         self._put_laws(in_place(data.laws, (head_number, head.n), self._n, data.rest))
         sprung = SprungMasses(self._masses, self._stiffness, self._damping, self._push)

@@ -15,6 +15,7 @@ import pytest
 from body_mechanics import energy
 from long_runs import DT, HEIGHT, STATIC, check_balance, check_no_drift, contact_forces, mean
 
+from catenary.mbs.head.stepping import Stepping
 from catenary.mbs.mechanism.full_pantograph import FullPantograph
 from catenary.mbs.rigid.forces import Actuator, SpringDamper
 
@@ -30,7 +31,7 @@ def test_all_bodies_keep_their_joints_and_energy(seconds: int) -> None:
     n_steps = round(seconds / DT)
     forces = contact_forces(n_steps)
     forces[0] = 0.0  # it is placed without contact
-    pantograph = FullPantograph(paper.data(), STATIC, HEIGHT, 0.0, DT)
+    pantograph = FullPantograph(paper.data(), STATIC, HEIGHT, Stepping(0.0, DT))
     pantograph.place(HEIGHT + STATIC / 6000.0)
     system, head = pantograph.system, pantograph.motion.numbers[paper.HEAD]
     heights, lengths = np.empty(n_steps + 1), np.empty((n_steps + 1, len(system.lines)))

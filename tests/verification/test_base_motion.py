@@ -15,6 +15,7 @@ from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of, trai
 from variable_steps import integrate
 
 from catenary.mbs.build import raising_data
+from catenary.mbs.head.stepping import Stepping
 from catenary.mbs.head.wire_crossing import LateralPath
 from catenary.mbs.lumped import LumpedPantograph
 from catenary.mbs.lumped_data import LumpedData
@@ -44,7 +45,9 @@ def test_a_mass_on_a_base_that_swings_has_the_textbook_s_transmissibility(freque
     """
     m, k, c, dt, amplitude, phase = 20.0, 1600.0, 90.0, 1e-3, 0.02, 0.4
     base = harmonic_base(amplitude, frequency, phase)
-    pantograph = LumpedPantograph(LumpedData((m,), (k,), (c,)), 0.0, 5.0, 0.0, dt, base=base)
+    pantograph = LumpedPantograph(
+        LumpedData((m,), (k,), (c,)), 0.0, 5.0, Stepping(0.0, dt, base=base)
+    )
     pantograph.place(5.0)
     settled, n = round(8.0 / dt), round(4.0 / dt)  # 8 s of decay with c / 2 m: exp(-18)
     heights = np.empty(settled + n)
@@ -106,7 +109,7 @@ def test_the_paper_s_pantograph_on_a_base_that_swings_moves_like_all_its_bodies(
     found = []
     for motion in (BaseMotion(vehicle, 0.0, 70.0), None):
         reduced = raising_data(data, force, head_height)
-        pantograph = RaisingPantograph(reduced, 0.0, dt, base=motion)
+        pantograph = RaisingPantograph(reduced, Stepping(0.0, dt, base=motion))
         z = head_height + force / reduced.head_stiffness
         pantograph.restore(np.array([head_height, z, 0.0, 0.0, 0.0, 0.0]))
         for step in range(round(end / dt)):

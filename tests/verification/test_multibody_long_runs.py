@@ -15,6 +15,7 @@ from scipy.interpolate import CubicSpline
 from seven_bodies import HEAD, at_rest, calibrated, pressed
 
 from catenary.mbs.build import raising_data
+from catenary.mbs.head.stepping import Stepping
 from catenary.mbs.mechanism.reduced_pantograph import RaisingData, RaisingPantograph
 
 pytestmark = pytest.mark.study
@@ -66,7 +67,7 @@ def test_ten_minutes_of_the_pantograph_of_the_time_loop() -> None:
     n_steps = 600_000
     forces = contact_forces(n_steps)
     data = raising_data(paper.data(), STATIC, HEIGHT)
-    pantograph = RaisingPantograph(data, 0.0, DT)
+    pantograph = RaisingPantograph(data, Stepping(0.0, DT))
     still = np.array([HEIGHT, HEIGHT + STATIC / data.head_stiffness])
     pantograph.restore(np.concatenate([still, np.zeros(4)]))
     places, before = np.empty((n_steps + 1, 2)), energy(data, pantograph)

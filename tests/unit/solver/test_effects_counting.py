@@ -23,6 +23,7 @@ from counted_effects import (
 from small_lines import BARE, EN_PANTOGRAPH, mesh_of, train
 
 from catenary.mbs.build import Operation, make_pantograph
+from catenary.mbs.head.stepping import Stepping
 from catenary.mbs.head.strips import Turning
 from catenary.mbs.head.wire_crossing import LateralPath
 from catenary.meshgen.mesh import LineMesh
@@ -320,7 +321,7 @@ def test_point_masses_are_those_of_the_parts(mesh: LineMesh) -> None:
 def test_a_head_has_a_roll_only_if_asked() -> None:
     """As `Pantographs` asks: with where the wire crosses the strips, or without."""
     data = replace(EN_PANTOGRAPH, roll=Turning(2.0, 470.0, 1.0))
-    operation = Operation(120.0, 5.5, 0.5, 1e-3, 0.25, 0.5)
     path = LateralPath(np.array([0.0, 100.0]), (0.2, 0.2), 0.0, (0.0,), 70.0)
-    assert make_pantograph(data, operation).state().size == 6
-    assert make_pantograph(data, operation._replace(lateral=path)).state().size == 9
+    for lateral, size in ((None, 6), (path, 9)):
+        operation = Operation(120.0, 5.5, Stepping(0.5, 1e-3, lateral=lateral))
+        assert make_pantograph(data, operation).state().size == size
