@@ -142,11 +142,6 @@ class Standing(NamedTuple):
     n_freedoms: int
     head: Head
 
-    @property
-    def worst(self) -> Miss:
-        """The joint that missed most."""
-        return max(self.missed, key=lambda miss: miss.gap)
-
 
 @lru_cache(maxsize=64)
 def stand(data: MultibodyData) -> Standing:

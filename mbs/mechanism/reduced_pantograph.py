@@ -20,7 +20,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from catenary.base.errors import RunBroken
 from catenary.mbs.air import SQUARE, AirForces
 from catenary.mbs.head.head_arrays import MechanismArrays, SprungMasses, named
 from catenary.mbs.head.laws import Law, in_place
@@ -116,42 +115,10 @@ class RaisingPantograph(SteppedHead):
             rows["head_air"], rows["arm_air"], rows["bodies_air"] = blown.T
         self._fill_lateral(times, drives)
 
-    def static_force(self, head_height: float, time: float = np.inf) -> float:
-        """Force on a wire that holds the strips at this height at rest, fully raised [N].
-
-        The head's springs give way under it. The air acts as it does at a ``time`` [s].
-
-        Raises
-        ------
-        RunBroken
-            There is none: they give way faster than the lift falls.
-        """
-        data, force = self._data, 0.0
-        on_head, on_arm, on_bodies = np.zeros(3)
-        if self._air is not None:
-            on_head, on_arm, on_bodies = self._blowing(self._air.now(time))
-        for _ in range(50):
-            previous, below = force, force - on_head
-            pressed = below / data.head_stiffness + data.strips.compression(below)
-            height = head_height + pressed
-            (_, lift, _), _ = self._frame_at(height)
-            force = float(lift) - data.head_weight + on_head + on_arm
-            force += on_bodies * data.frame.blown_at(height - self._zero)
-            if abs(force - previous) <= 1e-10 * abs(force):
-                return force
-        raise RunBroken(
-            f"The force of the pantograph on a wire at {head_height:g} m is not found: its head's "
-            "springs give way faster than its lift falls; make them stiffer."
-        )
-
     def base(self, time: float) -> float:
         """Height of the base at ``time`` [s], in the line's heights [m]."""
         moved = 0.0 if self._base is None else float(self._base.vertical(time).place)
         return self._data.base_height + moved
-
-    def _frame_at(self, z: float) -> tuple[np.ndarray, np.ndarray]:
-        """Mass, lift, damping and their slopes for a height z [m] over a base at rest."""
-        return self._data.frame.at(z - self._zero)
 
     def _move_base(self, time: float) -> None:
         """Put lift and base to ``time`` [s]."""

@@ -282,7 +282,7 @@ class _Raised:
 
     def _found(self, height: float, near: Motion) -> _Place:
         system, self._height = self._system, height
-        motion, _ = at_rest(self._held, near)
+        motion = at_rest(self._held, near)
         jacobian = self._held.constraints(motion, 0.0).jacobian
         # Of all velocities with unit speed of the point those of least kinetic energy.
         root = np.sqrt(system.inverse_mass)

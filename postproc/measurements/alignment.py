@@ -72,7 +72,6 @@ class Alignment:
     residual : root mean square of what remains [N]
     correlation : of measured and modelled force
     n_independent : samples, as far as what remains is independent
-    likeness : twice the logarithm of the likelihood, up to a constant of the record
     other_shifts : further shifts that fit as well [m]
     """
 
@@ -92,7 +91,6 @@ class Alignment:
     residual: float
     correlation: float
     n_independent: float
-    likeness: float
     other_shifts: tuple[float, ...]
 
     def placed(self, place: np.ndarray) -> np.ndarray:
@@ -358,7 +356,6 @@ class _Fit:
             float(np.sqrt(np.mean(own.rest**2))),
             float(np.corrcoef(force, modelled)[0, 1]) if force.std() > 0.0 else 0.0,
             n,
-            -n * own.cost,
             others,
         )
 

@@ -149,10 +149,6 @@ class Results(TrainOfRun):
         """Times of the records, shape (n,) [s], read anew at each call."""
         return np.asarray(self._file["time"][: self._length])
 
-    def times(self, part: slice) -> np.ndarray:
-        """Times of some records [s]."""
-        return np.asarray(self._file["time"][part])
-
     def time_at(self, row: int) -> float:
         """Time of a record [s]."""
         return float(self._file["time"][row])

@@ -64,7 +64,6 @@ class WatchInputs:
     arm_length : (n_arms,) lengths of steady arms [m], infinite where arms have none
     raised : (n_pantographs,) time from which on each is raised [s], infinite if it is lowered
     span : distance without contact above which a loss is reported [m]
-    speed : of the train [m/s]
     coupling : of line and pantographs, which is not stable at any step unless it is ``implicit``
     """
 
@@ -73,7 +72,6 @@ class WatchInputs:
     arm_length: np.ndarray
     raised: np.ndarray
     span: float
-    speed: float
     coupling: str
 
 
@@ -99,7 +97,6 @@ def watch_inputs(at_rest: LineAtRest, has_train: bool = True) -> WatchInputs:
             ]
         ),
         span=float(np.diff(problem.line.support_positions).max()),
-        speed=train.speed,
         coupling=numerics.coupling if has_train else "implicit",
     )
 

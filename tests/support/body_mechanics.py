@@ -9,6 +9,7 @@ from scipy import integrate, linalg
 from scipy.interpolate import CubicSpline
 
 from catenary.base.errors import InputError
+from catenary.mbs.mechanism.reduced_pantograph import RaisingPantograph
 from catenary.mbs.mechanism.reduction import ReducedMechanism
 from catenary.mbs.rigid.arrays import ORIGIN, TimeLaw
 from catenary.mbs.rigid.bodies import Motion, Vector, normalised, quaternion_product
@@ -59,6 +60,26 @@ def energy(system: System, motion: Motion) -> float:
     """Kinetic energy, and the energy that all forces store [J]."""
     kinetic = 0.5 * float(system.mass @ motion.velocities**2)
     return kinetic + sum(stored_energy(force, motion) for force in system.forces)
+
+
+def static_force(pantograph: RaisingPantograph, head_height: float, time: float = np.inf) -> float:
+    """Force on a wire that holds the strips at this height at rest, fully raised [N].
+
+    The head's springs give way under it. The air acts as it does at a ``time`` [s].
+    """
+    data, force = pantograph._data, 0.0
+    frame, zero = data.frame, data.head_offset + data.base_height
+    on_head, on_arm, on_bodies = np.zeros(3)
+    if pantograph._air is not None:
+        on_head, on_arm, on_bodies = pantograph._blowing(pantograph._air.now(time))
+    for _ in range(50):
+        previous, below = force, force - on_head
+        arm = head_height + below / data.head_stiffness + data.strips.compression(below) - zero
+        (_, lift, _), _ = frame.at(arm)
+        force = lift - data.head_weight + on_head + on_arm + on_bodies * frame.blown_at(arm)
+        if abs(force - previous) <= 1e-10 * abs(force):
+            return float(force)
+    raise AssertionError("the head's springs give way faster than the lift falls")
 
 
 def equivalent_mass(

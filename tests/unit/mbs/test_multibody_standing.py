@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from body_mechanics import static_force
 from measuring import check
 
 from catenary.base.errors import InputError, RunBroken
@@ -100,7 +101,7 @@ def test_vehicle_stands_where_the_head_meets_the_wire_at_the_working_height() ->
     check("base [m]", data.base_height, height - arm, within=1e-9)
     running = make_pantograph(DATA, Operation(FORCE, height, Stepping(0.0, 1e-3)))
     assert isinstance(running, RaisingPantograph)
-    check("static force there [N]", running.static_force(height), FORCE, within=1e-6)
+    check("static force there [N]", static_force(running, height), FORCE, within=1e-6)
 
 
 def test_wind_adds_to_the_force_under_way_and_not_to_the_static_one() -> None:
@@ -114,10 +115,10 @@ def test_wind_adds_to_the_force_under_way_and_not_to_the_static_one() -> None:
     operation = Operation(FORCE, 5.0, Stepping(0.0, 1e-3))
     running = make_pantograph(data, operation)
     assert isinstance(running, RaisingPantograph)
-    check("without the effect [N]", running.static_force(5.0), FORCE, within=1e-6)
+    check("without the effect [N]", static_force(running, 5.0), FORCE, within=1e-6)
     running = make_pantograph(data, operation._replace(air=Airflow(70.0)))
     assert isinstance(running, RaisingPantograph)
-    check("under way [N]", running.static_force(5.0), FORCE + 20.0, within=1e-6)
+    check("under way [N]", static_force(running, 5.0), FORCE + 20.0, within=1e-6)
 
 
 def test_without_calibration_the_force_follows_from_the_actuator() -> None:

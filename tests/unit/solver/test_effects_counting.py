@@ -232,7 +232,6 @@ def test_a_scene_without_an_effect_has_no_trace_of_it(name: str, mesh: LineMesh)
     blocks, _ = BLOCKS[name]
     n = counts(mesh)
     assert name not in model.terms_of
-    assert name not in model.active
     assert {k: v for k, v in everything.terms_of.items() if k != name} == model.terms_of
     missing = contents(everything) - contents(model)
     assert missing == {(part, n[size], *has): many for (part, size, *has), many in blocks.items()}
