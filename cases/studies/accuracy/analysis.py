@@ -208,13 +208,13 @@ def observed_orders(rows: Sequence[Row], size: str, quantity: str) -> list[tuple
     return result
 
 
-def pareto(rows: Sequence[Row], quantity: str = HISTORY) -> list[Row]:
-    """The rows that no other beats in both cost and error, cheapest first."""
-    known = [row for row in rows if row.done and quantity in row.percent and row.cost > 0.0]
-    known.sort(key=lambda row: (row.cost, row.percent[quantity]))
+def pareto(rows: Sequence[Row]) -> list[Row]:
+    """The rows that no other beats in both cost and error of the force history, cheapest first."""
+    known = [row for row in rows if row.done and HISTORY in row.percent and row.cost > 0.0]
+    known.sort(key=lambda row: (row.cost, row.percent[HISTORY]))
     front: list[Row] = []
     for row in known:
-        if not front or row.percent[quantity] < front[-1].percent[quantity]:
+        if not front or row.percent[HISTORY] < front[-1].percent[HISTORY]:
             front.append(row)
     return front
 

@@ -215,8 +215,6 @@ def make_jobs(
     variants: Sequence[Variant],
     overrides: Sequence[str] = (),
     shortened: bool = False,
-    *,
-    full_report: bool = False,
 ) -> list[Job]:
     """The variants' checked scenes. Not collective.
 
@@ -228,7 +226,7 @@ def make_jobs(
         If a scene is wrong, with the variant's name if there are several.
     """
     draft = read_draft(case, overrides, shortened)
-    jobs, refused = jobs_and_refused(draft, variants, full_report)
+    jobs, refused = jobs_and_refused(draft, variants)
     if refused:
         raise InputError(f"variant {refused[0].variant.name}: {refused[0].outcome}")
     return jobs
