@@ -38,7 +38,8 @@ class Law:
     from_rest: bool = False
 
     def force(self, x: float) -> float:
-        """At an extension [m] or a rate [m/s]."""
+        """Force at ``x``, an extension [m] or a rate [m/s], that pulls together where it is
+        positive [N]."""
         i = int(np.searchsorted(self.points, x, side="right")) - 1
         i = min(max(i, 0), len(self.points) - 2)
         slope = (self.forces[i + 1] - self.forces[i]) / (self.points[i + 1] - self.points[i])
@@ -95,7 +96,17 @@ class LawsInPlace:
     def pull(
         self, position: np.ndarray, velocity: np.ndarray, base: tuple[float, float]
     ) -> np.ndarray:
-        """Forces on the coordinates (n,), upward, in a motion over a base with height and speed."""
+        """Forces on the coordinates (n,), upward [N].
+
+        Parameters
+        ----------
+        position : ndarray, shape (n,)
+            Coordinates [m].
+        velocity : ndarray, shape (n,)
+            Their velocities [m/s].
+        base : tuple of float
+            Height [m] and velocity [m/s] of the base.
+        """
         total = np.zeros(self.ways.shape[1])
         heights, rates = self.ways @ position, self.ways @ velocity
         extensions = heights + self.by_base * base[0] - self.zero

@@ -74,7 +74,7 @@ class ReducedMechanism:
 
     def tables(self, carried: bool) -> SplineTables:
         """Splines of mass, lift, damping, carried mass (zero without ``carried``) and, of a
-        mechanism that meets the air, what that lifts."""
+        mechanism that meets the air, the upward force of the air on its bodies."""
         last = np.zeros_like(self.masses)
         if carried:
             if self.carried is None:
@@ -204,7 +204,10 @@ class Places:
         self._raised: _Raised | None = None
 
     def of(self, system: System, body: str, at: Vector) -> tuple[_Raised, float]:
-        """The mechanism with the places found before, and what its actuator pushes more [N]."""
+        """The mechanism with the places found before, and the additional push of its actuator [N].
+
+        Its point is ``at`` in the axes of ``body`` [m].
+        """
         actuator = None if self._actuator is None else system.force(self._actuator)
         assert actuator is None or isinstance(actuator, Actuator)
         if self._raised is None:

@@ -62,7 +62,7 @@ def equilibrium(system: System, start: Motion, tolerance: float = 1e-9) -> Rest:
 
 
 def at_rest(system: System, start: Motion, tolerance: float = 1e-9) -> Motion:
-    """The place of ``equilibrium``, without the multipliers."""
+    """The place of ``equilibrium``, without the multipliers; arguments and errors as there."""
     resting = start.with_velocities(np.zeros(6 * start.n_bodies))
     motion = system.assemble(resting)
     force = system.generalised_forces(motion, 0.0)
@@ -111,10 +111,11 @@ def unheld_force(system: System, motion: Motion) -> float:
 
 
 def held_force(system: System, holder: Joint, start: Motion) -> float:
-    """Force with which a system at rest presses on what holds it by one row [N].
+    """Force with which a system at rest near ``start`` presses on a joint that holds it by one row
+    [N].
 
-    ``holder``, for instance a `PrescribedPoint`, is added to the joints; the force is positive
-    in the direction in which the held coordinate grows.
+    ``holder``, for instance a `PrescribedPoint`, is added to the joints; the force is positive in
+    the direction in which the held coordinate grows.
     """
     return _pressed(system, holder, start)[0]
 

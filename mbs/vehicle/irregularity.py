@@ -36,8 +36,8 @@ class Spectrum(NamedTuple):
     low: float
 
     def variance(self, direction: str, lowest: np.ndarray, highest: np.ndarray) -> np.ndarray:
-        """Integral of the density between wave numbers [rad/m] of a direction, "vertical" or
-        "lateral", in closed form [m^2]."""
+        """Integral of the density from wave number ``lowest`` to ``highest`` [rad/m] of a
+        ``direction``, "vertical" or "lateral", in closed form [m^2]."""
         roughness = self.vertical if direction == "vertical" else self.lateral
         oc, low = self.corner, self.low
 

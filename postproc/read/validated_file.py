@@ -403,8 +403,8 @@ class ValidatedFile:
 
 
 def _state_in(file: h5py.File, slot: str, n_rows: int) -> dict[str, Any]:
-    """The state in a slot, which ``n_rows`` valid steps precede; ValueError with a clause that
-    says what is wrong with it."""
+    """The state in a slot, which ``n_rows`` valid steps precede; ValueError with a clause on its
+    fault."""
     try:
         group = file[f"checkpoint/{slot}"]
         state = {name: text_of(dataset[()]) for name, dataset in group.items()}

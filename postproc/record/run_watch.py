@@ -76,8 +76,8 @@ class WatchInputs:
 
 
 def watch_inputs(at_rest: LineAtRest, has_train: bool = True) -> WatchInputs:
-    """Inputs of the watch of a run on a line at rest; without a train contacts are none. Not
-    collective."""
+    """Inputs of the watch of a run on a line ``at_rest``; ``has_train`` is whether there is a
+    train, without which there are no contacts. Not collective."""
     problem, model = at_rest.problem, at_rest.model
     numerics, train = problem.numerics, problem.train
     lengths = np.array([*(arms.kind.length for arms in problem.line.steady_arms), 0.0])

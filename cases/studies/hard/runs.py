@@ -289,7 +289,8 @@ def run(
 
 
 def run_free(rest: LineAtRest, comm: Any, n_steps: int) -> RunHistories:
-    """Energy of a line that is let go from under a force at its middle; no train. Collective.
+    """Energy of a line that is let go from under a force at its middle, over ``n_steps``; no train.
+    Collective.
 
     The acceleration at the start is the one that belongs to the shape: M a = -K u.
     """

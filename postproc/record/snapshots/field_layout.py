@@ -168,7 +168,8 @@ class Slots(BlockTables):
 
 
 def layout_of(record: FieldRecord, blocks: list[Block], times: np.ndarray) -> list[Slots]:
-    """Places of all blocks that are recorded at snapshots of ``times`` [s]. Not collective."""
+    """Places of all blocks that the ``record`` chooses, at snapshots of ``times`` [s]. Not
+    collective."""
     return [_slots(record, block, times) for block in record.chosen(blocks)]
 
 
