@@ -8,9 +8,9 @@ import h5py
 import numpy as np
 
 from catenary.postproc.channels.line_record import LineRecord
+from catenary.postproc.files.committed_rows import committed_rows
 from catenary.postproc.files.hdf5.checked import HDF5_ERRORS
 from catenary.postproc.files.hdf5.table_rows import row_blocks
-from catenary.postproc.files.result_file import committed_rows
 from catenary.postproc.files.run_schema import (
     ALL_COLUMNS,
     CLOCKS,
