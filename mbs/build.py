@@ -14,12 +14,11 @@ from catenary.base.errors import InputError
 from catenary.mbs.air import Airflow, AirForces, SteadyForces
 from catenary.mbs.control import Regulator
 from catenary.mbs.head.newmark_head import SteppedHead
-from catenary.mbs.head.wire_crossing import CrossingPath
+from catenary.mbs.head.stepping import Stepping
 from catenary.mbs.interface import Pantograph
 from catenary.mbs.lowering import LoweredPantograph, Lowering
 from catenary.mbs.lumped import LumpedPantograph
 from catenary.mbs.lumped_data import LumpedData
-from catenary.mbs.vehicle.base_motion import BaseMotion
 
 if TYPE_CHECKING:
     from catenary.mbs.mechanism.full_pantograph import FullPantograph
@@ -33,22 +32,20 @@ PantographData: TypeAlias = "LumpedData | MultibodyData"
 class Operation(NamedTuple):
     """Operation of a pantograph, whatever its model.
 
-    ``static_force`` [N] on a wire at rest at ``nominal_height`` [m] of the head, raised from zero
-    over ``raise_time`` [s]; ``dt`` [s], ``beta`` and ``gamma`` of the line's Newmark step.
-    ``lateral`` is where the wire crosses the strips, without which the head does not roll, and
-    ``base`` how the vehicle moves, without which it does not. ``air`` is the air that it meets,
-    without which there is none. ``lowering`` is how the pantograph is lowered on the way,
-    ``regulator`` what regulates its lift. ``rolls`` is whether a head may roll that can.
+    Attributes
+    ----------
+    static_force : force on a wire at rest at the nominal height, fully raised [N]
+    nominal_height : height of the head [m]
+    stepping : Stepping
+    air : the air that it meets; without it there is none
+    lowering : how it is lowered on the way, None if it is not
+    regulator : what regulates its lift, None if nothing does
+    rolls : whether a head may roll that can
     """
 
     static_force: float
     nominal_height: float
-    raise_time: float
-    dt: float
-    beta: float
-    gamma: float
-    lateral: CrossingPath | None = None
-    base: BaseMotion | None = None
+    stepping: Stepping
     air: Airflow | None = None
     lowering: Lowering | None = None
     regulator: Regulator | None = None
@@ -73,34 +70,33 @@ def make_pantograph(data: PantographData, operation: Operation) -> Pantograph:
         )
     if operation.lowering is None:
         return model
-    model.follow(operation.lowering.course(operation.static_force, operation.raise_time))
-    return LoweredPantograph(model, operation.lowering, operation.base)
+    model.follow(operation.lowering.course(operation.static_force, operation.stepping.raise_time))
+    return LoweredPantograph(model, operation.lowering, operation.stepping.base)
 
 
 def _model(
     data: PantographData, operation: Operation
 ) -> FullPantograph | RaisingPantograph | LumpedPantograph:
+    force, height, stepping = operation[:3]
     air, on_frame = None, 0.0
     if operation.air is not None and data.meets_air:
-        air = AirForces(operation.air, data.uplift, operation.raise_time)
+        air = AirForces(operation.air, data.uplift, stepping.raise_time)
         on_frame = steady_forces(data, operation.air.speed).on_frame
-    force, height = operation[:2]
-    moved = *operation[2:-4], air
     if isinstance(data, LumpedData):
         data = data if operation.rolls else replace(data, roll=None)
-        return LumpedPantograph(data, force, height, *moved, steady_air=on_frame)
+        return LumpedPantograph(data, force, height, stepping, air, on_frame)
     pressing = force + on_frame
     if data.all_bodies is not None:
         # Its methods are imported for pantographs that are simulated with it.
         from catenary.mbs.mechanism.full_pantograph import FullPantograph
 
         way = data.all_bodies
-        return FullPantograph(data, pressing, height, *moved, way.handling, way.substeps)
+        return FullPantograph(data, pressing, height, stepping, air, way.handling, way.substeps)
     from catenary.mbs.mechanism.reduced_pantograph import RaisingPantograph
 
     raising = raising_data(data, pressing, height)
     raising = raising if operation.rolls else replace(raising, roll=None)
-    return RaisingPantograph(raising, *moved)
+    return RaisingPantograph(raising, stepping, air)
 
 
 def steady_forces(data: PantographData, speed: float) -> SteadyForces:

@@ -19,7 +19,7 @@ _N_MEMORY = native.REGULATION_MEMORY.itemsize // 8
 
 
 class ControlArrays(NamedTuple):
-    """A controller; `solver/kernels/heads/regulation.hpp` says what the names stand for.
+    """Arrays of a controller; `solver/kernels/heads/regulation.hpp` explains the names.
 
     Attributes
     ----------
@@ -49,7 +49,19 @@ def control_arrays(
     n_delayed: int,
     from_time: float,
 ) -> ControlArrays:
-    """A controller before its first step, with a delay in samples and the first of these [s]."""
+    """A controller before its first step.
+
+    Parameters
+    ----------
+    settings : dict of str to float
+        Values by the names of ``native.REGULATION``.
+    gains : tuple of rows
+        Rows of ``native.CONTROL_GAINS``.
+    n_delayed : int
+        Delay in samples.
+    from_time : float
+        Time of the first sample [s].
+    """
     made = np.zeros(1, dtype=native.REGULATION)
     for name, value in settings.items():
         made[name] = value

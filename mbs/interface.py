@@ -27,7 +27,7 @@ class HeadState:
         self.take(np.zeros(2 * n_strips * (1 + n_strips)), n_strips)
 
     def take(self, numbers: np.ndarray, n_strips: int) -> None:
-        """Stand for these numbers."""
+        """Take ``numbers`` (2 s + 2 s^2,) of ``n_strips`` strips, s, in place of its own."""
         s, self.numbers = n_strips, numbers
         self.height, self.velocity = numbers[:s], numbers[s : 2 * s]
         self.height_compliance = numbers[2 * s : s * (2 + s)].reshape(s, s)
@@ -42,7 +42,7 @@ class Pantograph(Protocol):
         """Places of the strips ahead of the pantograph's own place along the track [m], (s,)."""
 
     def place(self, head_height: float, velocity: float = 0.0) -> None:
-        """Put the pantograph without contact to where its head is at this height [m], all of it
+        """Put the pantograph without contact to where its head is at ``head_height`` [m], all of it
         moving upward with ``velocity`` [m/s]."""
 
     def extrapolate(self, time: float) -> tuple[np.ndarray, np.ndarray]:
@@ -54,7 +54,7 @@ class Pantograph(Protocol):
         overwritten by the next call."""
 
     def advance(self, contact_force: np.ndarray) -> None:
-        """Take the step predicted last with these contact forces (s,) [N]."""
+        """Take the step predicted last with the contact forces ``contact_force`` (s,) [N]."""
 
     def state(self) -> np.ndarray:
         """State to continue from, as one array."""
@@ -72,6 +72,3 @@ class Pantograph(Protocol):
     def base(self, time: float) -> float:
         """Height at ``time`` [s] of the base that a mechanism's points count from [m]; how far a
         vehicle has lifted it for lumped masses."""
-
-    def energy(self) -> float:
-        """Kinetic and elastic energy relative to the springs at rest [J]."""

@@ -36,7 +36,8 @@ class Lowering:
     drop: float
 
     def course(self, static_force: float, raise_time: float) -> Callable[[float], float]:
-        """Part of the lift that acts, as a function of time, after a raising."""
+        """Part of the lift that acts as a function of time [s], after a raising over ``raise_time``
+        [s] to ``static_force`` [N]."""
         before = raised(self.time, raise_time)
         last = self.force / static_force
 
@@ -94,7 +95,8 @@ class LoweredPantograph:
         return bool(self._memory["phase"][0] == 2.0)
 
     def place(self, head_height: float, velocity: float = 0.0) -> None:
-        """Put the model without contact to where its head is at this height [m]."""
+        """Put the model without contact to where its head is at ``head_height`` [m], moving upward
+        with ``velocity`` [m/s]."""
         self.model.place(head_height, velocity)
         self._memory["height"] = head_height - self._base_at(0.0)[0]
 
@@ -151,10 +153,6 @@ class LoweredPantograph:
     def base(self, time: float) -> float:
         """Height of the model's base [m]."""
         return self.model.base(time)
-
-    def energy(self) -> float:
-        """Energy of the model [J]; zero once it is caught."""
-        return 0.0 if self.is_caught else self.model.energy()
 
     def _base_at(self, time: float) -> tuple[float, float]:
         """Height [m] and velocity [m/s] of the base."""

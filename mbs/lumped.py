@@ -14,10 +14,9 @@ from catenary.mbs.air import ON_FRAME, ON_HEAD, AirForces
 from catenary.mbs.head.head_arrays import LinearStep, SprungMasses, named
 from catenary.mbs.head.laws import LawsInPlace, in_place
 from catenary.mbs.head.newmark_head import SteppedHead, parts_of
-from catenary.mbs.head.wire_crossing import CrossingPath
+from catenary.mbs.head.stepping import Stepping
 from catenary.mbs.interface import HeadState
 from catenary.mbs.lumped_data import LumpedData, chain_matrix
-from catenary.mbs.vehicle.base_motion import BaseMotion
 from catenary.solver.kernels import native
 
 # Half of the time over which the speed of a base that rises is found [s]: a half cosine of 0.1 s is
@@ -30,20 +29,17 @@ class LumpedPantograph(SteppedHead):
 
     Coordinates are the masses' heights with the springs relaxed when all are equal, and angles of
     a head that turns; see `strips`. Weights are balanced by the lifting mechanism, whose net lift
-    on the last mass is ``static_force`` at the nominal head height, raised smoothly from zero over
-    ``raise_time``. Of a chain that its base spring holds at a height the base rises in the same
-    way, from where the chain stands with its springs relaxed: pressed against a base that stands
-    already, its masses would start with the force of that spring, and few chains damp what follows.
+    on the last mass is ``static_force`` at the nominal head height, raised smoothly from zero. Of
+    a chain that its base spring holds at a height the base rises in the same way, from where the
+    chain stands with its springs relaxed: pressed against a base that stands already, its masses
+    would start with the force of that spring, and few chains damp what follows.
 
     Parameters
     ----------
     data : LumpedData
     static_force : force on the wire at rest [N]
     nominal_height : head height at which the contact force at rest is ``static_force`` [m]
-    raise_time : time over which the lift grows from zero [s]
-    dt, beta, gamma : Newmark step [s] and parameters, those of the line
-    lateral : where the wire crosses the strips; without it the head does not roll
-    base : how the vehicle moves; without it the base stays
+    stepping : Stepping
     air : forces of the air on head and last mass; without it there are none
     steady_air : force of the air on the last mass where the nominal height holds [N]
     """
@@ -53,20 +49,15 @@ class LumpedPantograph(SteppedHead):
         data: LumpedData,
         static_force: float,
         nominal_height: float,
-        raise_time: float,
-        dt: float,
-        beta: float = 0.25,
-        gamma: float = 0.5,
-        lateral: CrossingPath | None = None,
-        base: BaseMotion | None = None,
+        stepping: Stepping,
         air: AirForces | None = None,
         steady_air: float = 0.0,
     ) -> None:
-        head = data.head(rolls=lateral is not None)
+        head = data.head(rolls=stepping.lateral is not None)
         n = head.n + data.n_masses - 1
-        super().__init__(head, n, raise_time, dt, beta, gamma, lateral)
+        super().__init__(head, n, stepping)
         self._lift_full = static_force
-        self._base, self._air = base, air
+        self._air = air
         # The lift acts on the last mass, which is the head itself if there is no other.
         self._carrier = n - 1 if data.n_masses > 1 else int(np.flatnonzero(head.level)[-1])
         self._masses = np.concatenate([head.masses, data.masses[1:]])
@@ -182,15 +173,6 @@ class LumpedPantograph(SteppedHead):
     def base(self, time: float) -> float:
         """Lift of the base by the vehicle [m]."""
         return 0.0 if self._base is None else float(self._base.vertical(time).place)
-
-    def energy(self) -> float:
-        """Kinetic energy, and elastic energy of all springs, the base spring included [J].
-
-        The base counts as at rest.
-        """
-        stretch = self.position - self._base_height * self._level
-        own = 0.5 * self._masses @ self.velocity**2 + 0.5 * stretch @ self._stiffness @ stretch
-        return float(own) + self._laws.energy(self.position, 0.0)
 
     def _in_place(self, data: LumpedData, static_force: float, nominal: float) -> LawsInPlace:
         """The laws of a chain whose head is at its nominal height under the static force."""

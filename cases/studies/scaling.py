@@ -196,7 +196,8 @@ def work_of(scene: Scene) -> Work:
 
 
 def predict(work: Work, wire: Wire, ranks: int) -> Predicted:
-    """A step on so many ranks, each with a core of its own."""
+    """A step of the ``work`` of a march on so many ``ranks``, each with a core of its own, with
+    messages by ``wire``."""
     each = (work.step - work.fixed) / work.unknowns
     if ranks == 1:
         return Predicted(1, each * work.unknowns, 0.0, 0.0, work.fixed)
@@ -221,6 +222,9 @@ def as_text(
 
     Parameters
     ----------
+    work : of a step
+    wire : latency and bandwidth of messages
+    ranks : numbers of ranks
     measured_wire : whether latency and bandwidth are measured between ranks 0 and 1
     exchange : number of ranks that there are, and times of a step's messages on them as
         `messages.time_of_exchange` gives them [s]; None on one rank

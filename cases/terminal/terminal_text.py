@@ -148,11 +148,29 @@ def static_text(table: Mapping[str, Any], line: Line, half_head: float | None = 
     table : arrays in SI units named as in ``/static`` and ``/line`` of a result file:
         ``dropper_span``, ``dropper_x``, ``dropper_length``, ``dropper_force``, ``contact_x``,
         ``contact_height``, ``elasticity_x``, ``elasticity``, ``wires/NAME``, and what
-        `cases.run.installed` adds
+        `cases.run.at_rest.static_table` adds
     line : for supports and contact wires
     half_head : half of the length of the shortest strip, None if no scene says it [m]
     """
     data = {name: np.asarray(value) for name, value in table.items()}
+    lift, place = 1e3 * data["elasticity"], data["elasticity_x"]
+    lines = [
+        *_dropper_table(data, line),
+        "",
+        *(_wire_text(wire, data.get(f"lengths/{wire.name}")) for wire in line.wires),
+        *_contact_wires_text(data, line, half_head),
+    ]
+    lines += _registration_text(data, [wire.name for wire in line.wires])
+    lines += [
+        f"Elasticity from {place.min():g} to {place.max():g} m: {lift.min():.3f} to "
+        f"{lift.max():.3f} mm/N, mean {lift.mean():.3f} mm/N, unevenness "
+        f"{100 * (lift.max() - lift.min()) / (lift.max() + lift.min()):.1f} %",
+    ]
+    return "\n".join(lines)
+
+
+def _dropper_table(data: Mapping[str, np.ndarray], line: Line) -> list[str]:
+    """Lines of the table of droppers, span by span."""
     masts = line.support_positions
     several = len(line.droppers) > 1
     hung = [
@@ -179,9 +197,15 @@ def static_text(table: Mapping[str, Any], line: Line, half_head: float | None = 
             f"{span + 1:5d} {x[i]:12.3f} {length[i]:11.4f} {fixed(force[i], 1):>10}{names[i]}"
             for i in range(x.size)
         ]
-    lift, place = 1e3 * data["elasticity"], data["elasticity_x"]
+    return lines
+
+
+def _contact_wires_text(
+    data: Mapping[str, np.ndarray], line: Line, half_head: float | None
+) -> list[str]:
+    """Sentences on height, sag and stagger of the contact wires in the running spans."""
+    lines: list[str] = []
     first, last = line.running_range
-    lines += ["", *(_wire_text(wire, data.get(f"lengths/{wire.name}")) for wire in line.wires)]
     wires = [wire.name for wire in line.wires_of(Role.CONTACT)]
     ends = np.cumsum([data[f"wires/{name}"].size for name in wires])[:-1]
     chains_x, heights = (np.split(data[f"contact_{own}"], ends) for own in ("x", "height"))
@@ -201,13 +225,7 @@ def static_text(table: Mapping[str, Any], line: Line, half_head: float | None = 
                 within = "within" if np.abs(own).max() <= half_head else "BEYOND"
                 text += f", {within} the {half_head:g} m of the shortest strip to either side"
             lines.append(text)
-    lines += _registration_text(data, [wire.name for wire in line.wires])
-    lines += [
-        f"Elasticity from {place.min():g} to {place.max():g} m: {lift.min():.3f} to "
-        f"{lift.max():.3f} mm/N, mean {lift.mean():.3f} mm/N, unevenness "
-        f"{100 * (lift.max() - lift.min()) / (lift.max() + lift.min()):.1f} %",
-    ]
-    return "\n".join(lines)
+    return lines
 
 
 def _registration_text(data: Mapping[str, np.ndarray], wires: Sequence[str]) -> list[str]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -38,18 +38,12 @@ class Law:
     from_rest: bool = False
 
     def force(self, x: float) -> float:
-        """At an extension [m] or a rate [m/s]."""
+        """Force at ``x``, an extension [m] or a rate [m/s], that pulls together where it is
+        positive [N]."""
         i = int(np.searchsorted(self.points, x, side="right")) - 1
         i = min(max(i, 0), len(self.points) - 2)
         slope = (self.forces[i + 1] - self.forces[i]) / (self.points[i + 1] - self.points[i])
         return self.forces[i] + slope * (x - self.points[i])
-
-    def work(self, x: float) -> float:
-        """Energy that a spring stores from an extension of zero to one of ``x`` [J]."""
-        inner = [p for p in self.points if min(0.0, x) < p < max(0.0, x)]
-        ends = np.array(sorted([0.0, x, *inner]))
-        forces = np.array([self.force(float(end)) for end in ends])
-        return float(np.sign(x) * np.sum(0.5 * (forces[1:] + forces[:-1]) * np.diff(ends)))
 
 
 class LawArrays(NamedTuple):
@@ -102,26 +96,24 @@ class LawsInPlace:
     def pull(
         self, position: np.ndarray, velocity: np.ndarray, base: tuple[float, float]
     ) -> np.ndarray:
-        """Forces on the coordinates (n,), upward, in a motion over a base with height and speed."""
+        """Forces on the coordinates (n,), upward [N].
+
+        Parameters
+        ----------
+        position : ndarray, shape (n,)
+            Coordinates [m].
+        velocity : ndarray, shape (n,)
+            Their velocities [m/s].
+        base : tuple of float
+            Height [m] and velocity [m/s] of the base.
+        """
         total = np.zeros(self.ways.shape[1])
-        for law, way, part, zero in self._each:
-            x = way @ velocity + part * base[1] if law.of_rate else _extension(
-                way, position, part, base[0], zero
-            )  # fmt: skip
-            total -= law.force(float(x)) * way
+        heights, rates = self.ways @ position, self.ways @ velocity
+        extensions = heights + self.by_base * base[0] - self.zero
+        rates += self.by_base * base[1]
+        for law, way, x, rate in zip(self.laws, self.ways, extensions, rates, strict=True):
+            total -= law.force(float(rate if law.of_rate else x)) * way
         return total
-
-    def energy(self, position: np.ndarray, base: float) -> float:
-        """Energy that the laws over extensions store [J]."""
-        return sum(
-            law.work(_extension(way, position, part, base, zero))
-            for law, way, part, zero in self._each
-            if not law.of_rate
-        )
-
-    @property
-    def _each(self) -> Any:
-        return zip(self.laws, self.ways, self.by_base, self.zero, strict=True)
 
 
 def in_place(
@@ -151,9 +143,3 @@ def in_place(
         if law.from_rest:
             zero[j] = heights[law.mass] - heights[law.below]
     return LawsInPlace(tuple(laws), ways, by_base, zero)
-
-
-def _extension(
-    way: np.ndarray, position: np.ndarray, part: float, base: float, zero: float
-) -> float:
-    return float(way @ position + part * base - zero)

@@ -12,8 +12,8 @@ import numpy as np
 from catenary.mbs.control import ControlArrays, Controller, Regulation, Regulator
 from catenary.mbs.head.head_arrays import N_DRIVE, HeadArrays, NewmarkFactors, drive_width, named
 from catenary.mbs.head.laws import LawsInPlace, in_place
+from catenary.mbs.head.stepping import Stepping
 from catenary.mbs.head.strips import HeadParts
-from catenary.mbs.head.wire_crossing import CrossingPath
 from catenary.mbs.interface import HeadState
 from catenary.solver.kernels import native
 
@@ -31,23 +31,13 @@ class SteppedHead(ABC):
     ----------
     head : HeadParts
     n : number of all coordinates; those that are not the head's are heights
-    raise_time : time over which the lift grows from zero [s]
-    dt, beta, gamma : Newmark step [s] and parameters, those of the line
-    lateral : where the wire crosses the strips, None if the head is not to roll
+    stepping : Stepping
     """
 
     stepped: native.Head
 
-    def __init__(
-        self,
-        head: HeadParts,
-        n: int,
-        raise_time: float,
-        dt: float,
-        beta: float,
-        gamma: float,
-        lateral: CrossingPath | None,
-    ) -> None:
+    def __init__(self, head: HeadParts, n: int, stepping: Stepping) -> None:
+        raise_time, dt, beta, gamma, lateral, self._base = stepping
         s = len(head.offsets)
         self.strip_offsets = head.offsets
         # The place of the wire on strips of a head that cannot roll makes no difference.

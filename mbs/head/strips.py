@@ -53,13 +53,15 @@ class Flexure:
     damping_ratio: float = 0.0
 
     def rates(self, mass: float, length: float) -> np.ndarray:
-        """Natural frequencies of a free strip [rad/s], (n_modes,)."""
+        """Natural frequencies of a free strip with a ``mass`` [kg] and a ``length`` [m], (n_modes,)
+        [rad/s]."""
         roots = np.array([_root(number) for number in range(self.n_modes)])
         return np.asarray(roots**2 * np.sqrt(self.stiffness / (mass * length**3)))
 
 
 def shapes(n_modes: int, length: float, places: np.ndarray) -> np.ndarray:
-    """Shapes of the modes at places from the strip's middle [m], (n_modes, len(places))."""
+    """Shapes of the first ``n_modes`` modes of a free strip of a ``length`` [m] at ``places`` from
+    its middle [m], (n_modes, len(places))."""
     x = places / length + 0.5
     found = []
     for number in range(n_modes):
@@ -73,7 +75,7 @@ def shapes(n_modes: int, length: float, places: np.ndarray) -> np.ndarray:
 
 
 def mode_tables(n_modes: int, length: float) -> SplineTables:
-    """The shapes as tables over the whole strip."""
+    """The shapes of ``shapes`` as tables over the whole strip."""
     from scipy.interpolate import CubicSpline  # not loaded for strips that are rigid
 
     places = np.linspace(-0.5 * length, 0.5 * length, _POINTS_A_WAVE * (n_modes + 1) + 1)
@@ -200,7 +202,20 @@ def head_parts(
     strips: Strips = ONE_STRIP,
     roll: Turning | None = None,
 ) -> HeadParts:
-    """A head of a whole ``mass`` [kg], its strips included, on a spring [N/m] and damper [N s/m].
+    """A head on strips, with its coordinates.
+
+    Parameters
+    ----------
+    mass : float
+        Mass of the whole head, its strips included [kg].
+    stiffness : float
+        Stiffness of its spring [N/m].
+    damping : float
+        Damping of its damper [N s/m].
+    strips : Strips, optional
+        Collector strips, a single one by default.
+    roll : Turning, optional
+        Inertia, spring and damper of its roll; without it the head does not roll.
 
     Raises
     ------

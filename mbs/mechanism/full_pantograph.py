@@ -16,12 +16,12 @@ import numpy as np
 from catenary.base.errors import InputError, RunBroken
 from catenary.mbs.air import ON_FRAME, ON_HEAD, SQUARE, AirForces
 from catenary.mbs.head.newmark_head import Raising
-from catenary.mbs.head.wire_crossing import CrossingPath
+from catenary.mbs.head.stepping import Stepping
 from catenary.mbs.interface import HeadState
 from catenary.mbs.mechanism.pantograph_data import MultibodyData, stand
 from catenary.mbs.rigid.arrays import ORIGIN, body_products
 from catenary.mbs.rigid.bodies import SPACE, Motion
-from catenary.mbs.rigid.forces import Force, Gravity, OffLine, PointForce
+from catenary.mbs.rigid.forces import Force, OffLine, PointForce
 from catenary.mbs.rigid.implicit_steps import Stepper
 from catenary.mbs.rigid.joints import Constant, PrescribedPoint, steady
 from catenary.mbs.rigid.kinematics import point
@@ -108,10 +108,7 @@ class FullPantograph:
     data : MultibodyData
     pressing : force [N] of the head on its arm, whose working height is that of a head at
         ``nominal_height`` [m]: the static force, and what the air lifts the arm with
-    raise_time : time over which the static force grows from zero [s]
-    dt, beta, gamma : Newmark step [s] and parameters, those of the line
-    lateral : where the wire crosses the strips; without it, in their middle
-    base : how the vehicle moves; without it the base stays
+    stepping : Stepping; without a ``lateral`` the wire crosses the strips in their middle
     air : forces of the air; without it there are none
     handling : way of keeping constraints, or its name in `step_solvers.METHODS`
     substeps : into how many a step is cut
@@ -127,12 +124,7 @@ class FullPantograph:
         data: MultibodyData,
         pressing: float,
         nominal_height: float,
-        raise_time: float,
-        dt: float,
-        beta: float = 0.25,
-        gamma: float = 0.5,
-        lateral: CrossingPath | None = None,
-        base: BaseMotion | None = None,
+        stepping: Stepping,
         air: AirForces | None = None,
         handling: StepSolver | str = "coordinate_partitioning",
         substeps: int = 1,
@@ -143,8 +135,8 @@ class FullPantograph:
                 "leave it out to have all bodies in the loop."
             )
         standing = stand(data)
-        self._data, self._dt = data, dt
-        self._lateral, self._base = lateral, base
+        raise_time, dt, beta, gamma, self._lateral, base = stepping
+        self._data, self._dt, self._base = data, dt, base
         part = Raising(raise_time)
         self._hold_down = _HoldDown("held down until raised", data.arm, part)
         system = without_spins(standing.system, standing.motion)
@@ -302,15 +294,6 @@ class FullPantograph:
         """Height of the base at ``time`` [s], in the line's heights [m]."""
         moved = 0.0 if self._base is None else float(self._base.vertical(time).place)
         return self._zero + moved
-
-    def energy(self) -> float:
-        """Kinetic energy in the base's axes and elastic energy of springs and stops [J].
-
-        Weights and actuators store none here, as with the other models.
-        """
-        system, motion = self.system, self.motion
-        elastic = sum(f.energy(motion) for f in system.forces if not isinstance(f, Gravity))
-        return 0.5 * float(system.mass @ motion.velocities**2) + elastic
 
     @contextmanager
     def _named(self) -> Iterator[None]:

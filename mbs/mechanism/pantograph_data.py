@@ -142,11 +142,6 @@ class Standing(NamedTuple):
     n_freedoms: int
     head: Head
 
-    @property
-    def worst(self) -> Miss:
-        """The joint that missed most."""
-        return max(self.missed, key=lambda miss: miss.gap)
-
 
 @lru_cache(maxsize=64)
 def stand(data: MultibodyData) -> Standing:
@@ -475,10 +470,11 @@ def _log(data: MultibodyData, standing: Standing) -> None:
 
 @lru_cache(maxsize=64)
 def head_turning(data: MultibodyData, about: int) -> Turning | None:
-    """The head's roll or pitch, None if its joints do not allow it. Not collective.
+    """The head's roll or pitch, ``about`` its axis ``ROLL`` or ``PITCH``; None if its joints do not
+    allow it. Not collective.
 
-    Of all motions of the head with a unit turn that with the least kinetic energy is taken.
-    Springs are linear; what weight and tension in them do to the turn is left out.
+    Of all motions of the head with a unit turn that with the least kinetic energy is taken. Springs
+    are linear; the effect of weight and of tension in them on the turn is left out.
     """
     standing = stand(data)
     system, motion = standing.system, standing.motion

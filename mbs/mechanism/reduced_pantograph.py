@@ -20,16 +20,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from catenary.base.errors import RunBroken
 from catenary.mbs.air import SQUARE, AirForces
 from catenary.mbs.head.head_arrays import MechanismArrays, SprungMasses, named
 from catenary.mbs.head.laws import Law, in_place
 from catenary.mbs.head.newmark_head import SteppedHead, parts_of
+from catenary.mbs.head.stepping import Stepping
 from catenary.mbs.head.strips import ONE_STRIP, Strips, Turning, head_parts
-from catenary.mbs.head.wire_crossing import CrossingPath
 from catenary.mbs.interface import HeadState
 from catenary.mbs.mechanism.reduction import ReducedMechanism
-from catenary.mbs.vehicle.base_motion import BaseMotion
 from catenary.solver.kernels import native
 
 
@@ -69,33 +67,20 @@ class RaisingPantograph(SteppedHead):
     Parameters
     ----------
     data : RaisingData
-    raise_time : time over which the static force grows from zero [s]
-    dt, beta, gamma : Newmark step [s] and parameters, those of the line
-    lateral : where the wire crosses the strips; without it the head does not roll
-    base : how the vehicle moves; without it the base stays
+    stepping : Stepping
     air : forces of the air; without it there are none
     """
 
-    def __init__(
-        self,
-        data: RaisingData,
-        raise_time: float,
-        dt: float,
-        beta: float = 0.25,
-        gamma: float = 0.5,
-        lateral: CrossingPath | None = None,
-        base: BaseMotion | None = None,
-        air: AirForces | None = None,
-    ) -> None:
+    def __init__(self, data: RaisingData, stepping: Stepping, air: AirForces | None = None) -> None:
         values = data.head_mass, data.head_stiffness, data.head_damping
-        head = head_parts(*values, data.strips, data.roll if lateral is not None else None)
-        super().__init__(head, head.n + 1, raise_time, dt, beta, gamma, lateral)
+        head = head_parts(*values, data.strips, data.roll if stepping.lateral is not None else None)
+        super().__init__(head, head.n + 1, stepping)
         self._data = data
-        self._base, self._air = base, air
+        self._air = air
         self._zero = data.head_offset + data.base_height
         self._masses = np.append(head.masses, 0.0)
         self._stiffness, self._damping = head.stiffness, head.damping
-        self._tables = data.frame.tables(carried=base is not None)
+        self._tables = data.frame.tables(carried=stepping.base is not None)
         head_number = int(np.flatnonzero(head.level)[-1])
         self._put_laws(in_place(data.laws, (head_number, head.n), self._n, data.rest))
         sprung = SprungMasses(self._masses, self._stiffness, self._damping, self._push)
@@ -130,51 +115,10 @@ class RaisingPantograph(SteppedHead):
             rows["head_air"], rows["arm_air"], rows["bodies_air"] = blown.T
         self._fill_lateral(times, drives)
 
-    def energy(self) -> float:
-        """Kinetic energy in the line's frame, and elastic energy of the head's springs beyond its
-        weight's, for a base at rest [J]."""
-        masses = self._masses.copy()
-        masses[-1] = self._frame_at(self.position[-1])[0][0]
-        stretch = self.position - self.position[-1] * self._level
-        own = 0.5 * masses @ self.velocity**2 + 0.5 * stretch @ self._stiffness @ stretch
-        return float(own) + self._laws.energy(self.position, 0.0)
-
-    def static_force(self, head_height: float, time: float = np.inf) -> float:
-        """Force on a wire that holds the strips at this height at rest, fully raised [N].
-
-        The head's springs give way under it. The air acts as it does at a ``time`` [s].
-
-        Raises
-        ------
-        RunBroken
-            There is none: they give way faster than the lift falls.
-        """
-        data, force = self._data, 0.0
-        on_head, on_arm, on_bodies = np.zeros(3)
-        if self._air is not None:
-            on_head, on_arm, on_bodies = self._blowing(self._air.now(time))
-        for _ in range(50):
-            previous, below = force, force - on_head
-            pressed = below / data.head_stiffness + data.strips.compression(below)
-            height = head_height + pressed
-            (_, lift, _), _ = self._frame_at(height)
-            force = float(lift) - data.head_weight + on_head + on_arm
-            force += on_bodies * data.frame.blown_at(height - self._zero)
-            if abs(force - previous) <= 1e-10 * abs(force):
-                return force
-        raise RunBroken(
-            f"The force of the pantograph on a wire at {head_height:g} m is not found: its head's "
-            "springs give way faster than its lift falls; make them stiffer."
-        )
-
     def base(self, time: float) -> float:
         """Height of the base at ``time`` [s], in the line's heights [m]."""
         moved = 0.0 if self._base is None else float(self._base.vertical(time).place)
         return self._data.base_height + moved
-
-    def _frame_at(self, z: float) -> tuple[np.ndarray, np.ndarray]:
-        """Mass, lift, damping and their slopes for a height z [m] over a base at rest."""
-        return self._data.frame.at(z - self._zero)
 
     def _move_base(self, time: float) -> None:
         """Put lift and base to ``time`` [s]."""

@@ -74,7 +74,7 @@ class ReducedMechanism:
 
     def tables(self, carried: bool) -> SplineTables:
         """Splines of mass, lift, damping, carried mass (zero without ``carried``) and, of a
-        mechanism that meets the air, what that lifts."""
+        mechanism that meets the air, the upward force of the air on its bodies."""
         last = np.zeros_like(self.masses)
         if carried:
             if self.carried is None:
@@ -204,7 +204,10 @@ class Places:
         self._raised: _Raised | None = None
 
     def of(self, system: System, body: str, at: Vector) -> tuple[_Raised, float]:
-        """The mechanism with the places found before, and what its actuator pushes more [N]."""
+        """The mechanism with the places found before, and the additional push of its actuator [N].
+
+        Its point is ``at`` in the axes of ``body`` [m].
+        """
         actuator = None if self._actuator is None else system.force(self._actuator)
         assert actuator is None or isinstance(actuator, Actuator)
         if self._raised is None:
@@ -282,7 +285,7 @@ class _Raised:
 
     def _found(self, height: float, near: Motion) -> _Place:
         system, self._height = self._system, height
-        motion, _ = at_rest(self._held, near)
+        motion = at_rest(self._held, near)
         jacobian = self._held.constraints(motion, 0.0).jacobian
         # Of all velocities with unit speed of the point those of least kinetic energy.
         root = np.sqrt(system.inverse_mass)

@@ -44,7 +44,7 @@ class ChainFit(NamedTuple):
 
 
 def fit_chain(frequencies: Vector, receptance: np.ndarray, n_masses: int) -> ChainFit:
-    """The chain of ``n_masses`` masses whose head moves most like the receptance says.
+    """The chain of ``n_masses`` masses whose head's receptance is nearest to the given one.
 
     A receptance that is not that of springs to the ground at its low end (a lift that pulls harder
     the higher it gets) cannot be met by positive springs there: fit above such frequencies.

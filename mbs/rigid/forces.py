@@ -1,7 +1,7 @@
 """Forces on bodies: springs and dampers with tables, actuators, gravity, bump stops, point forces.
 
 Each force gives its generalised forces (6 n,): three forces [N] in space axes and three moments
-[N m] in body axes a body, and the energy that it stores.
+[N m] in body axes a body.
 
 Source: P. E. Nikravesh, Computer-aided analysis of mechanical systems, 1988, chapters 10 and 11.
 """
@@ -31,9 +31,6 @@ class Force(Protocol):
     def generalised(self, motion: Motion, time: float) -> np.ndarray:
         """Generalised forces at ``time`` [s], shape (6 n,) [N, N m]."""
 
-    def energy(self, motion: Motion) -> float:
-        """Energy stored [J], zero for a force that stores none."""
-
     def on_line(self) -> Line | None:
         """The line along which it acts; None for a force that acts otherwise."""
 
@@ -55,7 +52,6 @@ class Table:
             )
         self._points = tuple(zip(map(float, x), map(float, y), strict=True))
         self._line: BSpline = make_interp_spline(x, y, k=1)
-        self._work: BSpline = self._line.antiderivative()
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Table) and self._points == other._points
@@ -65,11 +61,6 @@ class Table:
 
     def __call__(self, x: float) -> float:
         return float(self._line(x))
-
-    def integral(self, start: float, end: float) -> float:
-        """The integral from ``start`` to ``end``."""
-        # Beyond the ends it goes on as the last parabola: right, because the line is straight.
-        return float(self._work(end) - self._work(start))
 
 
 # A characteristic: a constant slope, or a force as a function (a `Table`, for instance).
@@ -145,17 +136,6 @@ class SpringDamper(_BetweenPoints):
             stiffness=self.stiffness, free_length=self.free_length, damping=self.damping
         )
 
-    def energy(self, motion: Motion) -> float:
-        """Elastic energy [J]; of a function that is not a `Table` by quadrature."""
-        extension = self.line(motion).length - self.free_length
-        if not callable(self.stiffness):
-            return 0.5 * self.stiffness * extension**2
-        if isinstance(self.stiffness, Table):
-            return self.stiffness.integral(0.0, extension)
-        from scipy.integrate import quad  # of which few runs have need
-
-        return float(quad(self.stiffness, 0.0, extension)[0])
-
 
 @dataclass(frozen=True)
 class Actuator(_BetweenPoints):
@@ -175,10 +155,6 @@ class Actuator(_BetweenPoints):
         if callable(self.force):
             return self._line(pull=self.pull_at)
         return self._line(preload=-self.force)
-
-    def energy(self, motion: Motion) -> float:
-        """Stores none."""
-        return 0.0
 
 
 @dataclass(frozen=True)
@@ -211,20 +187,12 @@ class BumpStop(_BetweenPoints):
         """Its pull."""
         return self._line(pull=self.pull_at)
 
-    def energy(self, motion: Motion) -> float:
-        """Elastic energy [J]."""
-        return 0.5 * self.stiffness * self._depth(self.line(motion).length)[0] ** 2
-
 
 class OffLine:
-    """A force that does not act along a line between two points, and stores no energy."""
+    """A force that does not act along a line between two points."""
 
     def on_line(self) -> None:
         """None."""
-
-    def energy(self, motion: Motion) -> float:
-        """Zero [J]: it does work from outside."""
-        return 0.0
 
 
 @dataclass(frozen=True)
@@ -265,7 +233,3 @@ class Gravity(OffLine):
     def generalised(self, motion: Motion, time: float) -> np.ndarray:
         """Generalised forces (6 n,)."""
         return self._forces.copy()
-
-    def energy(self, motion: Motion) -> float:
-        """Potential energy [J], zero at height zero."""
-        return float(self.acceleration * np.dot(self.masses, motion.position[:-1, 2]))

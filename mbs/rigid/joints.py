@@ -74,24 +74,26 @@ class Constant:
 
 
 def steady(start: float, speed: float) -> TimeLaw:
-    """A prescribed number that grows with constant speed from its value at time zero."""
+    """A prescribed number that grows with a constant ``speed`` from ``start`` at time zero."""
     return lambda time: Law(start + speed * time, speed, 0.0)
 
 
 def same_point(i: str, at_i: Vector, j: str, at_j: Vector) -> list[Product]:
-    """Three rows: a point of body i is at a point of body j."""
+    """Three rows: the point ``at_i`` of body ``i`` is at the point ``at_j`` of body ``j`` [m]."""
     return [Product(SPACE, axis, i, at_i, j, at_j) for axis in AXES]
 
 
 def across_gap(
     i: str, normals: Sequence[Vector], end: str, at_end: Vector, start: str, at_start: Vector
 ) -> list[Product]:
-    """A row for each vector of body i that a way between points must be perpendicular to."""
+    """A row for each of ``normals`` of body i, to which the way between two points must be
+    perpendicular: from ``at_start`` of body ``start`` to ``at_end`` of body ``end`` [m]."""
     return [Product(i, normal, end, at_end, start, at_start) for normal in normals]
 
 
 def across_axis(i: str, normals: Sequence[Vector], j: str, axis: Vector) -> list[Product]:
-    """A row for each vector of body i that an axis of body j must be perpendicular to."""
+    """A row for each of ``normals`` of body i, to which an ``axis`` of body j must be
+    perpendicular."""
     return [Product(i, normal, j, axis) for normal in normals]
 
 

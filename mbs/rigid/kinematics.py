@@ -55,7 +55,7 @@ def number_of(motion: Motion, body: str) -> int:
 
 
 def point(motion: Motion, body: str, local: Vector) -> Quantity:
-    """A point fixed on a body, given in its axes [m], in space."""
+    """A point of a ``body``, at ``local`` in its axes [m], in space."""
     i = number_of(motion, body)
     fixed = np.asarray(local, dtype=float)
     rotation, spin = motion.rotation[i], motion.spin[i]
@@ -82,7 +82,7 @@ def total(a: Quantity, b: Quantity) -> Quantity:
 
 
 def scaled(a: Quantity, by: Law) -> Quantity:
-    """c(t) a for a given number c with its time derivatives."""
+    """c(t) a for a given number c, ``by``, with its time derivatives."""
     return Quantity(
         by.value * a.value,
         by.value * a.jacobian,

@@ -27,11 +27,10 @@ _MOST_ITERATIONS = 60
 
 
 class Rest(NamedTuple):
-    """A system at rest: its place, the multipliers (m,) of its joints, and N^T g left over [N]."""
+    """A system at rest: its place, and the multipliers (m,) of its joints."""
 
     motion: Motion
     multipliers: np.ndarray
-    unbalanced: float
 
 
 def equilibrium(system: System, start: Motion, tolerance: float = 1e-9) -> Rest:
@@ -55,15 +54,15 @@ def equilibrium(system: System, start: Motion, tolerance: float = 1e-9) -> Rest:
     RunBroken
         There is no equilibrium near by.
     """
-    motion, left = at_rest(system, start, tolerance)
+    motion = at_rest(system, start, tolerance)
     # Of redundant rows the smallest multipliers.
     jacobian = system.constraints(motion, 0.0).jacobian
     force = system.generalised_forces(motion, 0.0)
-    return Rest(motion, least_squares(jacobian.T, force, 1e-8), left)
+    return Rest(motion, least_squares(jacobian.T, force, 1e-8))
 
 
-def at_rest(system: System, start: Motion, tolerance: float = 1e-9) -> tuple[Motion, float]:
-    """Place and N^T g of ``equilibrium``, without the multipliers."""
+def at_rest(system: System, start: Motion, tolerance: float = 1e-9) -> Motion:
+    """The place of ``equilibrium``, without the multipliers; arguments and errors as there."""
     resting = start.with_velocities(np.zeros(6 * start.n_bodies))
     motion = system.assemble(resting)
     force = system.generalised_forces(motion, 0.0)
@@ -74,7 +73,7 @@ def at_rest(system: System, start: Motion, tolerance: float = 1e-9) -> tuple[Mot
         unbalanced = free.T @ force
         left = float(np.abs(unbalanced).max(initial=0.0))
         if left <= tolerance * size:
-            return motion, left
+            return motion
         tangent = np.empty((free.shape[1],) * 2)
         for k in range(free.shape[1]):
             ahead, behind = (
@@ -112,10 +111,11 @@ def unheld_force(system: System, motion: Motion) -> float:
 
 
 def held_force(system: System, holder: Joint, start: Motion) -> float:
-    """Force with which a system at rest presses on what holds it by one row [N].
+    """Force with which a system at rest near ``start`` presses on a joint that holds it by one row
+    [N].
 
-    ``holder``, for instance a `PrescribedPoint`, is added to the joints; the force is positive
-    in the direction in which the held coordinate grows.
+    ``holder``, for instance a `PrescribedPoint`, is added to the joints; the force is positive in
+    the direction in which the held coordinate grows.
     """
     return _pressed(system, holder, start)[0]
 

@@ -146,11 +146,6 @@ class System:
         native.add_gyroscopic_moments(result, self._inertia, motion.spin)
         return result
 
-    def energy(self, motion: Motion) -> float:
-        """Kinetic energy and all energy stored in forces [J]."""
-        kinetic = 0.5 * float(self.mass @ motion.velocities**2)
-        return kinetic + sum(force.energy(motion) for force in self.forces)
-
     def accelerations(
         self, motion: Motion, time: float, more_forces: np.ndarray | float = 0.0
     ) -> Accelerations:

@@ -24,23 +24,20 @@ N_WAVES = 120
 
 
 class Spectrum(NamedTuple):
-    """``roughness`` [m rad] of vertical and lateral irregularities (k A), ``corner`` Oc and
-    ``low`` Or [rad/m]."""
+    """Spectrum of a track: one-sided density A Oc^2 / ((O^2 + Or^2) (O^2 + Oc^2)) [m^3/rad].
+
+    ``vertical`` and ``lateral`` are the roughness A of either direction [m rad] (k A), ``corner``
+    is Oc and ``low`` Or [rad/m].
+    """
 
     vertical: float
     lateral: float
     corner: float
     low: float
 
-    def density(self, direction: str, wave_number: np.ndarray) -> np.ndarray:
-        """One-sided density [m^3/rad] over wave numbers [rad/m]; ``direction`` is "vertical" or
-        "lateral"."""
-        square = wave_number**2
-        roughness = self.vertical if direction == "vertical" else self.lateral
-        return roughness * self.corner**2 / ((square + self.low**2) * (square + self.corner**2))
-
     def variance(self, direction: str, lowest: np.ndarray, highest: np.ndarray) -> np.ndarray:
-        """Integral of the density between wave numbers [m^2], in closed form."""
+        """Integral of the density from wave number ``lowest`` to ``highest`` [rad/m] of a
+        ``direction``, "vertical" or "lateral", in closed form [m^2]."""
         roughness = self.vertical if direction == "vertical" else self.lateral
         oc, low = self.corner, self.low
 

@@ -92,10 +92,8 @@ class Matrices(NamedTuple):
 
 
 def matrices(vehicle: Vehicle, direction: str) -> Matrices | None:
-    """Equations of motion upward ("vertical") or sideways ("lateral"), None if there are none.
-
-    Not collective.
-    """
+    """Equations of motion of a vehicle in a ``direction``, upward ("vertical") or sideways
+    ("lateral"); None if there are none. Not collective."""
     if direction == "vertical":
         return _upward(vehicle)
     return None if vehicle.sideways is None else _sideways(vehicle, vehicle.sideways)

@@ -189,7 +189,7 @@ def memory(omega: np.ndarray, alpha: float, beta: float) -> np.ndarray:
 
 
 def required_frequency(felt: float, speed: float, alpha: float) -> float:
-    """Frequency of the undamped wave of equal length to those that run ahead of the train [Hz].
+    """Frequency of the undamped wave that is as long as the waves ahead of the train [Hz].
 
     A pantograph that moves with v and feels w_0 excites, ahead of itself, w = w_0 + v Re k; on a
     string with C = alpha K the wave number is k = (w / c) / sqrt(1 + i alpha w). Without damping

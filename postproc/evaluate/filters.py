@@ -92,19 +92,21 @@ def contact_force(results: Results, index: int) -> np.ndarray:
 
 
 def band_0_5(values: np.ndarray, dt: float) -> np.ndarray:
-    """Part of ``values`` up to 5 Hz, the mean included: a 5 Hz low-pass."""
+    """Part of ``values``, ``dt`` [s] apart, up to 5 Hz, the mean included: a 5 Hz low-pass."""
     return low_pass(values, dt, BAND_LIMIT)
 
 
 def band_5_20(values: np.ndarray, dt: float) -> np.ndarray:
-    """Part of ``values`` between 5 and 20 Hz, free of the mean: a band-pass of 6th-order edges."""
+    """Part of ``values``, ``dt`` [s] apart, between 5 and 20 Hz, free of the mean: a band-pass of
+    6th-order edges."""
     check_sampling(dt, CUT_OFF)
     sections = _sections("bandpass", (BAND_LIMIT, CUT_OFF), dt)
     return _both_ways(sections, values, dt, BAND_LIMIT)
 
 
 def kept_variance(cut_off: float, dt: float) -> float:
-    """Part of the variance of independent samples, ``dt`` [s] apart, that the filter leaves."""
+    """Part of the variance of independent samples, ``dt`` [s] apart, that the low-pass at
+    ``cut_off`` [Hz] leaves."""
     frequency, gain_squared = power_kept(cut_off, dt)
     return float(2.0 * dt * trapezoid(gain_squared, frequency))
 

@@ -150,7 +150,8 @@ Observe = Callable[[ObservedRun], Observation]
 def observe(
     names: Iterable[str], results: Results, statistics: RunStatistics
 ) -> dict[str, Observation]:
-    """The named quantities of a run. Not collective."""
+    """The quantities of ``names`` of a run, from its ``results`` and ``statistics``. Not
+    collective."""
     run = ObservedRun(results, statistics)
     return {name: OBSERVED[name](run) for name in dict.fromkeys(names)}
 

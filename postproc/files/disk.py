@@ -64,7 +64,8 @@ class NoRoom(OSError):
 
 
 class Elsewhere(OSError):
-    """The path no longer names the file that is being written; says where the file is."""
+    """The path no longer names the file that is being written; the message names the place of the
+    file."""
 
 
 def reserve(handle: int, start: int, n_bytes: int) -> None:
@@ -203,7 +204,8 @@ def _end(head: bytes) -> int | None:
 
 @contextlib.contextmanager
 def opened(path: Path, mode: str) -> Iterator[h5py.File]:
-    """An HDF5 file for writing, cut to what it holds at the end. A context manager.
+    """An HDF5 file opened in a ``mode`` for writing, cut to its contents at the end. A context
+    manager.
 
     It is abandoned if something fails.
 
@@ -256,14 +258,15 @@ def appears_whole(path: Path) -> Iterator[Path]:
 
 
 def write_whole(path: Path, content: bytes | str) -> None:
-    """Write a file so that it appears whole or not at all."""
+    """Write ``content`` to a file so that it appears whole or not at all."""
     data = content.encode() if isinstance(content, str) else content
     with appears_whole(path) as partial:
         partial.write_bytes(data)
 
 
 def write_at(handle: int, offset: int, numbers: np.ndarray) -> None:
-    """Write a contiguous array into a place of an open file, ``offset`` [bytes] from its beginning.
+    """Write contiguous ``numbers`` into an open file, ``offset`` [bytes] from its beginning;
+    ``handle`` is its descriptor.
 
     Raises
     ------

@@ -175,8 +175,8 @@ def followed(data: FilmData, camera: str | None) -> list[int]:
 
 
 class Pictures:
-    """The pictures of a film, drawn as they are asked for; (height, width, 4) uint8 each, valid
-    until the next one. Not collective.
+    """The pictures of a film, each drawn on request; (height, width, 4) uint8 each, valid until the
+    next one. Not collective.
 
     Attributes
     ----------

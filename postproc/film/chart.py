@@ -55,7 +55,8 @@ class ForceChart:
         self.moving: list[Artist] = [axes.xaxis, *(one for both in self.curves for one in both)]
 
     def update(self, row: int, low: float, high: float) -> None:
-        """Show the force from ``low`` to ``high`` along the track [m], up to a record."""
+        """Show the force from ``low`` to ``high`` along the track [m], up to the record number
+        ``row``."""
         data = self._data
         self._axes.set_xlim(low, high)
         for p, (raw, bold) in enumerate(self.curves):
@@ -110,6 +111,6 @@ class RingingChart:
         self.moving: list[Artist] = [self.curve]
 
     def update(self, row: int, low: float, high: float) -> None:
-        """Show the motion up to a record, wherever the line is shown from and to [m]."""
+        """Show the motion up to the record number ``row``, whatever part of the line is shown."""
         n = int(self._time.searchsorted(self._data.time[row], side="right"))
         self.curve.set_data(self._time[:n], self._uplift[:n])

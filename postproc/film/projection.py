@@ -111,6 +111,19 @@ class Picture:
         """Frame of a run, from the train's roof to above the wires; from above, from side to side.
 
         From behind lengths are not seen: one metre of height is one metre of the picture.
+
+        Parameters
+        ----------
+        view : View
+            Direction from which the run is seen.
+        data : FilmData
+            Line and motion of the run.
+        roof : float
+            Height of the train's roof [m].
+        width : float
+            Length of line in the picture [m].
+        aspect : float
+            Width of the picture over its height.
         """
         low, high = roof - 1.0, float(data.points[:, 2].max()) + 0.6
         if view is View.PLAN:

@@ -168,7 +168,7 @@ class Snapshots:
         return self._blocks[name]
 
     def shown(self, number: int) -> tuple[float, float]:
-        """From and to of the wires whose motion a snapshot tells, as far as each reaches [m]."""
+        """From and to of the wires that move in snapshot ``number``, as far as each reaches [m]."""
         ends = []
         for wire in self._wires.values():
             first, count = (0, len(wire.block.points)) if wire.rests else wire.shown(number)

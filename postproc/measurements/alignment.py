@@ -72,7 +72,6 @@ class Alignment:
     residual : root mean square of what remains [N]
     correlation : of measured and modelled force
     n_independent : samples, as far as what remains is independent
-    likeness : twice the logarithm of the likelihood, up to a constant of the record
     other_shifts : further shifts that fit as well [m]
     """
 
@@ -92,7 +91,6 @@ class Alignment:
     residual: float
     correlation: float
     n_independent: float
-    likeness: float
     other_shifts: tuple[float, ...]
 
     def placed(self, place: np.ndarray) -> np.ndarray:
@@ -235,7 +233,10 @@ class _Fit:
     def chosen(
         self, starts: list[tuple[float, float]], passed: float | None
     ) -> tuple[_Refined | None, tuple[float, ...]]:
-        """The equally good fit nearest to the file's places, and the shifts of the others."""
+        """The equally good fit nearest to the file's places, and the shifts of the others [m].
+
+        ``starts`` are shifts [m] and drifts to begin with, ``passed`` as of ``refined``.
+        """
         # The second time with the samples that belong to the section.
         lengths = [_SECTION, _SECTION]
         middle = 0.5 * (self._place[0] + self._place[-1])
@@ -265,8 +266,22 @@ class _Fit:
         passed: float | None,
         lengths: Sequence[float],
     ) -> _Refined | None:
-        """Least squares from a shift and a drift about a place of the file, in sections of the
-        stretch of these lengths [m] one after the other; None if it leads to another shift."""
+        """Least squares in sections of the stretch, one after the other; None if they lead to
+        another shift.
+
+        Parameters
+        ----------
+        shift : float
+            Shift to begin with [m].
+        drift : float
+            Drift to begin with, about ``middle`` [-].
+        middle : float
+            Place of the file at which the shift counts [m].
+        passed : float or None
+            Cut-off of the filter that the file's values have passed [Hz], None for none.
+        lengths : sequence of float
+            Lengths of the sections [m].
+        """
         model = self.model(passed)
         slope = model.derivative()  # type: ignore[attr-defined]
         for length in lengths:
@@ -319,7 +334,11 @@ class _Fit:
         effect: float,
         others: tuple[float, ...],
     ) -> Alignment:
-        """Gain and offset at the places that were found, and uncertainties."""
+        """Gain and offset at the places of a fit, ``own``, and all uncertainties.
+
+        ``passed``, ``certainty`` and ``effect`` are those of ``filter``, ``others`` further shifts
+        [m].
+        """
         force = self._force[own.within]
         place = self._place[own.within]
         at = place - own.shift - own.drift * (place - own.middle)
@@ -358,13 +377,13 @@ class _Fit:
             float(np.sqrt(np.mean(own.rest**2))),
             float(np.corrcoef(force, modelled)[0, 1]) if force.std() > 0.0 else 0.0,
             n,
-            -n * own.cost,
             others,
         )
 
     def filter(self, own: _Refined, stated: float | None) -> tuple[float | None, float, float]:
-        """The filter that the file's values have passed most likely, how much likelier it is than
-        the stated one, and what the two make differ [N]."""
+        """The filter that the file's values have passed most likely, twice the logarithm of how
+        much likelier it is than the ``stated`` one, and the difference of the two [N], for the
+        places of a fit, ``own``."""
         force, place = self._force[own.within], self._place[own.within]
         at = place - own.shift - own.drift * (place - own.middle)
         candidates = [stated, None, *(factor * self._cut_off for factor in _FACTORS)]

@@ -1,15 +1,29 @@
-"""A measured passage beside a run: errors of the measurement, figures of both, tolerances."""
+"""Comparison of a measured passage with a run: alignment, figures of both, tolerances."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from catenary.base.errors import InputError
 from catenary.postproc.evaluate.span_differences import STATISTICS, differences, span_sums
 from catenary.postproc.measurements.alignment import CERTAIN, Alignment, align, correlation_time
+from catenary.postproc.measurements.compared import (
+    LINE_TEST,
+    Compared,
+    Comparison,
+    Finding,
+    Overlay,
+    UpliftAtSupports,
+)
+from catenary.postproc.measurements.measurement_errors import (
+    BIASES,
+    DRIFTED,
+    FORCE_SHARE,
+    SHIFT,
+    errors_of,
+)
 from catenary.postproc.measurements.passage import (
     MeasuredForce,
     MeasuredUplift,
@@ -18,16 +32,13 @@ from catenary.postproc.measurements.passage import (
 )
 from catenary.postproc.read.results import Results
 
-# Errors below these are of no account, however certain: of places [m], of the force as a share of
-# its mean, of heights [m], of a filter as a share of the standard deviation.
-_SHIFT, _DRIFTED, _FORCE_SHARE, _HEIGHT, _FILTER_SHARE = 0.2, 0.1, 0.003, 2e-3, 0.03
+# Errors of heights below this are of no account, however certain [m].
+_HEIGHT = 2e-3
 # A pantograph has no force if half of its samples lie below this share of the run's mean, and none
 # was measured if this share of the samples has no number.
 _NO_FORCE, _MOST_GAPS = 0.2, 0.2
 # Forces with a lower correlation are not those of the run, and are not used for alignment.
 _LEAST_CORRELATION = 0.6
-# A constant of so many stated deviations is no error.
-_BIASES = 3.0
 # A residual exceeds the stated noise beyond this factor.
 _MORE_THAN_NOISE = 1.3
 # The compared stretch has at least so many periods of the cut-off.
@@ -38,112 +49,6 @@ _WIDENED = 6.0
 _NEAR_MAST = 1.0
 # A support is that of the run if it is this near [m].
 _NEAR_SUPPORT = 10.0
-LINE_TEST = "comparison with a line test, EN 50318"
-
-
-@dataclass(frozen=True)
-class Finding:
-    """An error of the measurement, or of its description.
-
-    Attributes
-    ----------
-    kind : "shift", "drift", "gain", "filter", "missing pantograph", "other pantograph", "unlike",
-        "height", "gaps" or "supports"
-    pantograph : its name, empty if of none
-    text : a sentence
-    value : of what was found, in SI units, NaN without
-    """
-
-    kind: str
-    pantograph: str
-    text: str
-    value: float = float("nan")
-
-
-@dataclass(frozen=True)
-class Compared:
-    """A figure of run and measurement.
-
-    Attributes
-    ----------
-    name, pantograph, unit : in words; the unit is that of the values
-    run, measured : values
-    tolerance : how far they may differ, NaN where none is known
-    passed : None if it is not judged
-    because : why it is not judged
-    source : of the tolerance
-    """
-
-    name: str
-    pantograph: str
-    unit: str
-    run: float
-    measured: float
-    tolerance: float
-    passed: bool | None
-    because: str
-    source: str
-
-
-@dataclass(frozen=True)
-class Overlay:
-    """Histories of a pantograph on the run's places.
-
-    Attributes
-    ----------
-    pantograph : its name
-    place : (n,) of the measured samples on the run's line [m]
-    measured, run : (n,) forces below the cut-off [N]
-    measured_height, run_height : (n,) heights of the head likewise [m], None if not measured
-    alignment : None if it could not be aligned
-    """
-
-    pantograph: str
-    place: np.ndarray
-    measured: np.ndarray
-    run: np.ndarray
-    measured_height: np.ndarray | None
-    run_height: np.ndarray | None
-    alignment: Alignment | None
-
-
-@dataclass(frozen=True)
-class UpliftAtSupports:
-    """Largest uplifts (n,) at supports [m], by their places in the run [m]."""
-
-    place: np.ndarray
-    measured: np.ndarray
-    run: np.ndarray
-
-
-@dataclass(frozen=True)
-class Comparison:
-    """A measured passage beside a run.
-
-    Attributes
-    ----------
-    measured, run, lead : names of both, and a sentence on the run
-    overlays : of the pantographs that were measured
-    uplift : None if it was not measured
-    figures : of run and measurement
-    findings : errors; empty if there is none
-    remarks : sentences on the noise floor, and on what cannot be told apart
-    """
-
-    measured: str
-    run: str
-    lead: str
-    overlays: Sequence[Overlay]
-    uplift: UpliftAtSupports | None
-    figures: Sequence[Compared]
-    findings: Sequence[Finding]
-    remarks: Sequence[str]
-
-    @property
-    def passed(self) -> bool | None:
-        """Whether all judged figures are within their tolerances, None if none is judged."""
-        judged = [one.passed for one in self.figures if one.passed is not None]
-        return all(judged) if judged else None
 
 
 def compare_with(results: Results, passage: Passage) -> Comparison:
@@ -246,7 +151,10 @@ class _Comparing:
             )
         aligned = self._placed(own, place, force)
         if aligned is not None:
-            self._errors(aligned, name, run, own.bias)
+            self.findings += errors_of(aligned, name, run, passage, own.bias)
+            if aligned.other_shifts:
+                shifts = ", ".join(f"{shift:+.1f}" for shift in aligned.other_shifts[:4])
+                self.remarks.append(f"{name}: shifts of {shifts} m fit as well")
             self._noise_floor(aligned, name, passage.noise_in_band(own.noise, dt))
         at = place if aligned is None else aligned.placed(place)
         within = (at >= begin) & (at <= end)
@@ -320,58 +228,15 @@ class _Comparing:
                 return text, float(other)
         return None
 
-    def _errors(self, found: Alignment, name: str, run: RunForce, bias: float) -> None:
-        """Find errors of the measurement from the alignment; ``bias`` [N] is the stated one."""
-        passage = self._passage
-        if found.shift.differs(0.0, _SHIFT):
-            shift, way = found.shift, "far along the track" if found.shift.value > 0 else "far back"
-            by = f"{abs(shift.value):.2f} m too {way} (+- {shift.deviation:.2g} m)"
-            text = f"{name}: positions are {by} at {found.middle:.0f} m"
-            if passage.by_time:
-                early = "ahead" if shift.value > 0 else "behind"
-                text += f": the clock is {abs(shift.value) / run.speed:.3f} s {early}"
-            self._find("shift", name, text, shift.value)
-        length = found.length
-        if found.drift.differs(0.0, _DRIFTED / length):
-            drift = found.drift
-            what = "clock or speed" if passage.by_time else "positions"
-            by = f"{1e3 * drift.value:+.2f} in 1000 (+- {1e3 * drift.deviation:.2g})"
-            over = f"{drift.value * length:+.2f} m over {length:.0f} m"
-            text = f"{name}: {what} drift by {by}, {over}"
-            self._find("drift", name, text, drift.value)
-        mean = float(np.mean(run.below(passage.cut_off)(run.position)))
-        if max(found.gain_certainty, found.offset_certainty) > CERTAIN and (
-            abs(found.offset.value) > max(_FORCE_SHARE * mean, _BIASES * bias)
-        ):
-            self._find("gain", name, f"{name}: {_gain_words(found)}", found.gain.value)
-        elif found.both_certainty > CERTAIN and found.gain_beside_offset.differs(1.0, _FORCE_SHARE):
-            gain = found.gain_beside_offset
-            text = (
-                f"{name}: the force swings {gain.value:.3f} (+- {gain.deviation:.2g}) times as much"
-            )
-            self._find("gain", name, text, gain.value)
-        spread = float(np.std(run.below(passage.cut_off)(run.position)))
-        if found.filter_certainty > CERTAIN and found.filter_effect > _FILTER_SHARE * spread:
-            stated = f"{passage.cut_off:g} Hz" if passage.is_filtered else "none"
-            seems = "no filter" if found.filter is None else f"a filter of {found.filter:.3g} Hz"
-            text = (
-                f"{name}: the values seem to have passed {seems}; the description states {stated}"
-            )
-            value = np.inf if found.filter is None else found.filter
-            self._find("filter", name, text, float(value))
-        if found.other_shifts:
-            shifts = ", ".join(f"{shift:+.1f}" for shift in found.other_shifts[:4])
-            self.remarks.append(f"{name}: shifts of {shifts} m fit as well")
-
     def _noise_floor(self, found: Alignment, name: str, stated: float) -> None:
         """Add a remark on the residual and on the smallest errors that show beside it;
         ``stated`` is the noise [N]."""
         factor, length = np.sqrt(CERTAIN), found.length
         self.remarks.append(
             f"{name}: noise floor {found.residual:.2f} N (correlation {found.correlation:.3f}); "
-            f"told are a shift above {max(_SHIFT, factor * found.shift.deviation):.2g} m, a drift "
-            f"above {max(_DRIFTED, factor * found.drift.deviation * length):.2g} m, a gain above "
-            f"{100 * max(_FORCE_SHARE, factor * found.gain.deviation):.2g} %"
+            f"told are a shift above {max(SHIFT, factor * found.shift.deviation):.2g} m, a drift "
+            f"above {max(DRIFTED, factor * found.drift.deviation * length):.2g} m, a gain above "
+            f"{100 * max(FORCE_SHARE, factor * found.gain.deviation):.2g} %"
         )
         self._beyond_noise(name, "noise floor", "N", found.residual, stated)
 
@@ -447,7 +312,7 @@ class _Comparing:
         offset, rest = float(difference.mean()), float(difference.std())
         # As for forces: what remains is noise, with its correlation.
         n = difference.size / correlation_time(difference)
-        if abs(offset) > max(_HEIGHT, np.sqrt(CERTAIN / n) * rest, _BIASES * own.height_bias):
+        if abs(offset) > max(_HEIGHT, np.sqrt(CERTAIN / n) * rest, BIASES * own.height_bias):
             text = f"{name}: head heights are {1e3 * offset:+.1f} mm off the run's throughout"
             self._find("height", name, text, offset)
         self.remarks.append(f"{name}: noise floor of heights {1e3 * rest:.2f} mm")
@@ -532,13 +397,3 @@ class _Comparing:
         values = 1e3 * float(self.uplift.run.max()), 1e3 * float(self.uplift.measured.max())
         noise = 3.0 * 1e3 * max(scatter, measured.noise)
         self._figure("largest uplift at supports", "", "mm", "uplift", values, 20.0, noise)
-
-
-def _gain_words(found: Alignment) -> str:
-    """A gain, an offset, or both where the record does not tell them apart."""
-    gain = f"a gain of {found.gain.value:.3f} (+- {found.gain.deviation:.2g})"
-    offset = f"an offset of {found.offset.value:+.1f} N (+- {found.offset.deviation:.2g} N)"
-    if abs(found.gain_certainty - found.offset_certainty) < CERTAIN / 2.0:
-        return f"the measured force has {gain}, or {offset}"
-    is_gain = found.gain_certainty > found.offset_certainty
-    return f"the measured force has {gain if is_gain else offset}"

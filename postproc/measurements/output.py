@@ -12,7 +12,7 @@ import numpy as np
 
 from catenary.postproc.evaluate.wording import UNCOMPARED
 from catenary.postproc.files.disk import plain, write_all
-from catenary.postproc.measurements.comparison import LINE_TEST, Comparison
+from catenary.postproc.measurements.compared import LINE_TEST, Comparison
 from catenary.postproc.report.page import page
 from catenary.postproc.report.sections.section import Picture, Section, Text
 from catenary.postproc.report.study_table import Column, StudyTable

@@ -8,9 +8,9 @@ import h5py
 import numpy as np
 
 from catenary.postproc.channels.line_record import LineRecord
+from catenary.postproc.files.committed_rows import committed_rows
 from catenary.postproc.files.hdf5.checked import HDF5_ERRORS
 from catenary.postproc.files.hdf5.table_rows import row_blocks
-from catenary.postproc.files.result_file import committed_rows
 from catenary.postproc.files.run_schema import (
     ALL_COLUMNS,
     CLOCKS,
@@ -154,7 +154,8 @@ def scan(
 
 
 def valid_rows(table: h5py.Dataset, n_rows: int, most: float, may_be_nan: bool) -> int:
-    """Rows before the first that cannot be read, or holds NaN, infinity or more than ``most``."""
+    """Number of the first ``n_rows`` rows of a table before one that cannot be read, or holds
+    infinity, more than ``most``, or NaN unless it ``may_be_nan``."""
     n_columns = int(np.prod(table.shape[1:]))
     chunk, start = table.chunks[0] if table.chunks else 1, 0
     try:
@@ -210,7 +211,7 @@ def _in_order(table: h5py.Dataset, n: int, dt: float | None) -> int:
 
 
 def _missing_end(about: dict[str, Any], n: int) -> list[str]:
-    """Fault of a file that holds fewer steps than it says; none otherwise."""
+    """Fault of a file with fewer steps than its head states; none otherwise."""
     wanted = about.get("n_steps")
     if wanted is None or about["outcome"] == RUNNING or n == wanted + 1:
         return []

@@ -149,10 +149,6 @@ class Results(TrainOfRun):
         """Times of the records, shape (n,) [s], read anew at each call."""
         return np.asarray(self._file["time"][: self._length])
 
-    def times(self, part: slice) -> np.ndarray:
-        """Times of some records [s]."""
-        return np.asarray(self._file["time"][part])
-
     def time_at(self, row: int) -> float:
         """Time of a record [s]."""
         return float(self._file["time"][row])
@@ -178,16 +174,18 @@ class Results(TrainOfRun):
     def stored_filtered_force(
         self, index: int | None = None
     ) -> tuple[np.ndarray, dict[str, Any]] | None:
-        """The filtered contact force (n, n_pantographs) [N], or (n,) of one pantograph, and what
-        its filter is; None where the file has none that is valid, such as that of a run that is not
-        done, or a damaged force beside it."""
+        """The filtered contact force (n, n_pantographs) [N], or (n,) of pantograph ``index``, and
+        its filter.
+
+        None where the file has no valid one: its run is not done, or its contact force is damaged.
+        """
         if self._path("contact_force") in self._file.records.damaged:
             return None
         return filtered_in(self._file, (self._length, self.n_pantographs), index)
 
     def rows(self, name: str, part: slice) -> np.ndarray:
-        """Some rows of a channel, shape (rows, columns), NaN where it is damaged and where the
-        line is not recorded."""
+        """The rows ``part`` of channel ``name``, shape (rows, columns), NaN where it is damaged and
+        where the line is not recorded."""
         n, table = len(range(*part.indices(self.n_rows(name)))), self._table(name)
         columns, n_places = self.recorded_columns(name), self._n_places(name)
         valid = self._valid(name, part)
@@ -200,8 +198,8 @@ class Results(TrainOfRun):
         return whole
 
     def column(self, name: str, index: int, part: slice | None = None) -> np.ndarray:
-        """One column of a channel, all of its rows or ``part`` of them, from ``start`` to ``stop``;
-        NaN as in ``rows``."""
+        """Column ``index`` of channel ``name``, all of its rows or ``part`` of them, from ``start``
+        to ``stop``; NaN as in ``rows``."""
         part = slice(0, self.n_rows(name)) if part is None else part
         values = np.full(part.stop - part.start, np.nan)
         table, place = self._table(name), np.flatnonzero(self.recorded_columns(name) == index)

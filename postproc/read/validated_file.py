@@ -21,10 +21,10 @@ from catenary.base.errors import InputError
 from catenary.meshgen.wires import Role
 from catenary.postproc.channels.facts import NONE
 from catenary.postproc.channels.line_record import LineRecord, from_table
+from catenary.postproc.files.committed_rows import committed_rows
 from catenary.postproc.files.hdf5.checked import HDF5_ERRORS, sum_is_kept, text_of
 from catenary.postproc.files.hdf5.self_contained import open_own
 from catenary.postproc.files.kept_extremes import extremes_at
-from catenary.postproc.files.result_file import committed_rows
 from catenary.postproc.files.run_schema import (
     ALL_COLUMNS,
     FORMAT,
@@ -403,8 +403,8 @@ class ValidatedFile:
 
 
 def _state_in(file: h5py.File, slot: str, n_rows: int) -> dict[str, Any]:
-    """The state in a slot, which ``n_rows`` valid steps precede; ValueError with a clause that
-    says what is wrong with it."""
+    """The state in a slot, which ``n_rows`` valid steps precede; ValueError with a clause on its
+    fault."""
     try:
         group = file[f"checkpoint/{slot}"]
         state = {name: text_of(dataset[()]) for name, dataset in group.items()}

@@ -139,7 +139,10 @@ def table_values(
 
 
 def values_fault(values: np.ndarray, declared: Table, sizes: dict[str, int]) -> str:
-    """The fault of the values of a table, empty if they are valid; ``sizes`` as there."""
+    """The fault of the ``values`` of a table that the layout ``declared``, empty if they are valid.
+
+    ``sizes`` are those of dimensions that earlier tables have, to which these are added.
+    """
     if values.dtype.kind not in ("iu" if declared.whole else "fiu"):
         return f"holds {values.dtype} where numbers belong"
     if values.ndim != len(declared.dimensions):

@@ -45,7 +45,7 @@ class _KeptRows:
         return slice(begin, max(begin, end))
 
     def put(self, rows: np.ndarray, columns: slice) -> None:
-        """Append ``rows`` (n, ...) of these columns."""
+        """Append ``rows`` (n, ...) of some columns."""
         if self.is_whole:
             self._rows[self._n_rows : self._n_rows + len(rows)] = rows
         else:

@@ -64,7 +64,6 @@ class WatchInputs:
     arm_length : (n_arms,) lengths of steady arms [m], infinite where arms have none
     raised : (n_pantographs,) time from which on each is raised [s], infinite if it is lowered
     span : distance without contact above which a loss is reported [m]
-    speed : of the train [m/s]
     coupling : of line and pantographs, which is not stable at any step unless it is ``implicit``
     """
 
@@ -73,13 +72,12 @@ class WatchInputs:
     arm_length: np.ndarray
     raised: np.ndarray
     span: float
-    speed: float
     coupling: str
 
 
 def watch_inputs(at_rest: LineAtRest, has_train: bool = True) -> WatchInputs:
-    """Inputs of the watch of a run on a line at rest; without a train contacts are none. Not
-    collective."""
+    """Inputs of the watch of a run on a line ``at_rest``; ``has_train`` is whether there is a
+    train, without which there are no contacts. Not collective."""
     problem, model = at_rest.problem, at_rest.model
     numerics, train = problem.numerics, problem.train
     lengths = np.array([*(arms.kind.length for arms in problem.line.steady_arms), 0.0])
@@ -99,7 +97,6 @@ def watch_inputs(at_rest: LineAtRest, has_train: bool = True) -> WatchInputs:
             ]
         ),
         span=float(np.diff(problem.line.support_positions).max()),
-        speed=train.speed,
         coupling=numerics.coupling if has_train else "implicit",
     )
 

@@ -218,7 +218,7 @@ def _with_lists(name: str, section: Section) -> Section:
 
 
 def _painted(sections: Iterable[Section], kind: str) -> dict[str, bytes]:
-    """The files of all pictures, without those that cannot be drawn, which is logged."""
+    """The files of all pictures but the ones that cannot be drawn, which are logged."""
     # A summary alone does without Matplotlib.
     from catenary.postproc.report.pictures import figures
 

@@ -16,6 +16,7 @@ from catenary.mbs.build import Operation, has_joints, make_pantograph, steady_fo
 from catenary.mbs.called_model import CalledModel
 from catenary.mbs.head.head_arrays import N_DRIVE, named
 from catenary.mbs.head.newmark_head import SteppedHead
+from catenary.mbs.head.stepping import Stepping
 from catenary.mbs.head.wire_crossing import CrossingPath, FollowedPath, LateralPath, SeveralPaths
 from catenary.mbs.interface import Pantograph
 from catenary.mbs.lowering import LoweredPantograph
@@ -373,15 +374,11 @@ def _make(
     path: CrossingPath | None,
 ) -> Pantograph:
     numerics, train = problem.numerics, problem.train
+    stepping = Stepping(train.raise_time, numerics.dt, numerics.beta, numerics.gamma, path, base)
     operation = Operation(
         placement.static_force,
         nominal_height,
-        train.raise_time,
-        numerics.dt,
-        numerics.beta,
-        numerics.gamma,
-        path,
-        base,
+        stepping,
         airflow(problem, simulated, placement),
         placement.lowering if simulated.lowering else None,
         placement.regulator if simulated.regulated_lift else None,

@@ -50,7 +50,6 @@ def build(
         problem,
         effects.simulated(problem),
         mesh,
-        tuple(effect.name for effect in active),
         numbering,
         row_of_node,
         dropper_lengths,

@@ -116,7 +116,6 @@ class Model:
     Attributes
     ----------
     simulated : laws of the problem, as its effects set them
-    active : names of the effects that have something to act on, in building order
     numbering : Unknowns, the registry of all unknowns and their numbers
     row_of_node : (n_nodes,) place of each mesh node in the order along the track
     blocks : element blocks; their sums are M and K
@@ -145,7 +144,6 @@ class Model:
     problem: Problem
     simulated: Simulated
     mesh: LineMesh
-    active: tuple[str, ...]
     numbering: Unknowns
     row_of_node: np.ndarray
     dropper_lengths: np.ndarray

@@ -18,6 +18,7 @@ R < 0, its dependents get s = -released R, of any sign.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
@@ -117,33 +118,34 @@ class LinkTable:
         return numbers[np.argsort(self.index[numbers])]
 
 
+class _Part(NamedTuple):
+    """k links of one origin before all are put in order.
+
+    ``leader`` and ``bent`` are numbers in the order of the parts; ``component`` is empty for
+    dependents and bends. The rest is as in `LinkTable`.
+    """
+
+    arrays: LinkArrays
+    component: str
+    leader: np.ndarray
+    bent: np.ndarray
+    pulls: np.ndarray
+    broken: np.ndarray
+
+
 def switching_links(model: Model, dropper_force: np.ndarray) -> LinkTable:
     """Droppers, all links of one sign, and bends; ``dropper_force`` (n_droppers,) at rest [N]. Not
     collective."""
-    parts: list[LinkArrays] = []
-    names: list[str] = []
-    broken: list[np.ndarray] = []
-    firsts: list[int] = []
-    free = np.ones(model.n_dofs)
-    free[model.constrained] = 0.0
+    parts: list[_Part] = []
     for links in model.links:
-        firsts.append(sum(part.law.size for part in parts))
-        if links is model.droppers:
-            arrays = _droppers(model, links, dropper_force)
-            out = model.broken
-        else:
-            arrays = _one_sign(model, links)
-            out = np.zeros(arrays.law.size, dtype=bool)
-        # A force on an unknown that is held moves nothing.
-        parts.append(arrays._replace(weights=arrays.weights * free[arrays.unknowns]))
-        names.append(links.component)
-        broken.append(out)
-    sizes = [part.law.size for part in parts]
-    own = np.arange(sum(sizes))
-    leaders, bent, pulls = [own], [np.full(own.size, -1)], [np.ones(own.size)]
+        is_droppers = links is model.droppers
+        arrays = _droppers(model, links, dropper_force) if is_droppers else _one_sign(model, links)
+        broken = model.broken if is_droppers else np.zeros(arrays.law.size, dtype=bool)
+        parts.append(_leading(parts, arrays, links.component, broken))
+    firsts = np.cumsum([0, *(part.leader.size for part in parts)]).tolist()
     # With which link or bend each dropper slackens.
     slackens = np.zeros(0, dtype=np.int64)
-    for links, first in zip(model.links, firsts, strict=True):
+    for links, first in zip(model.links, firsts, strict=False):
         bends, slack = links.bends, np.zeros(links.bends.link.size, dtype=bool)
         alpha = np.full(links.law.size, model.damping_of(links.component)[0])
         # Links that push are followed turned.
@@ -155,48 +157,62 @@ def switching_links(model: Model, dropper_force: np.ndarray) -> LinkTable:
         sign = np.sign(bends.change * bends.side)
         arrays = _bends(links, bends, alpha[bends.link], sign)
         arrays.law["carried"][slack] = 1.0
-        leaders.append(sum(part.law.size for part in parts) + np.arange(slack.size))
-        slackens[bends.link[slack]] = leaders[-1][slack]
-        parts.append(arrays._replace(weights=arrays.weights * free[arrays.unknowns]))
-        bent.append(numbers[bends.link])
-        pulls.append(np.where(turned[bends.link], -sign, sign))
-        broken.append(np.zeros(slack.size, dtype=bool))
+        part = _leading(parts, arrays, "", np.zeros(slack.size, dtype=bool))
+        slackens[bends.link[slack]] = part.leader[slack]
+        pulls = np.where(turned[bends.link], -sign, sign)
+        parts.append(part._replace(bent=numbers[bends.link], pulls=pulls))
     for arrays, droppers in _dependents(model):
-        parts.append(arrays._replace(weights=arrays.weights * free[arrays.unknowns]))
-        leaders.append(slackens[droppers])
-        bent.append(np.full(droppers.size, -1))
-        pulls.append(np.ones(droppers.size))
-        broken.append(np.zeros(droppers.size, dtype=bool))
-    # Two at least, which kernels take without a loop.
-    m = max((part.unknowns.shape[1] for part in parts), default=2)
-    m = max(m, 2)
-    parts = [padded(part, m) for part in parts]
-    arrays = LinkArrays(*(np.concatenate(same) for same in zip(*parts, strict=True)))
+        part = _leading(parts, arrays, "", np.zeros(droppers.size, dtype=bool))
+        parts.append(part._replace(leader=slackens[droppers]))
+    return _in_order(model, parts)
+
+
+def _leading(
+    before: Sequence[_Part], arrays: LinkArrays, component: str, broken: np.ndarray
+) -> _Part:
+    """Links behind those of other parts that are their own leaders and bend none."""
+    n = arrays.law.size
+    leader = sum(part.leader.size for part in before) + np.arange(n)
+    return _Part(arrays, component, leader, np.full(n, -1), np.ones(n), broken)
+
+
+def _in_order(model: Model, parts: Sequence[_Part]) -> LinkTable:
+    """The table of all parts, in order of place."""
+    # Two unknowns at least, which kernels take without a loop.
+    m = max([2, *(part.arrays.unknowns.shape[1] for part in parts)])
+    padded_parts = [padded(part.arrays, m) for part in parts]
+    arrays = LinkArrays(*(np.concatenate(same) for same in zip(*padded_parts, strict=True)))
+    # A force on an unknown that is held moves nothing.
+    free = np.ones(model.n_dofs)
+    free[model.constrained] = 0.0
+    arrays = arrays._replace(weights=arrays.weights * free[arrays.unknowns])
+    leader = np.concatenate([part.leader for part in parts])
     # By place, then by number; dependents stand behind the leaders of which they have the number.
-    leader = np.concatenate(leaders)
     order = np.lexsort((leader, arrays.law["place"]))
     place_of = np.empty(order.size, dtype=np.int64)
     place_of[order] = np.arange(order.size)
-    distinct = tuple(dict.fromkeys(names))
-    component = np.full(leader.size, -1)
-    component[own] = np.repeat([distinct.index(name) for name in names], sizes)
+    components = tuple(dict.fromkeys(part.component for part in parts if part.component))
+    numbers = {name: number for number, name in enumerate(components)}
+    component = np.concatenate(
+        [np.full(part.leader.size, numbers.get(part.component, -1)) for part in parts]
+    )
     index = np.zeros(component.size, dtype=np.int64)
-    for number in range(len(distinct)):
+    for number in range(len(components)):
         own = component == number
         index[own] = np.arange(np.count_nonzero(own))
     arrays = arrays.of(order)
     x = model.numbering.as_vector(model.mesh.points[:, :1])
     half_length = np.abs(x[arrays.unknowns] - arrays.law["place"][:, None]).max(axis=1)
-    bends_of = np.concatenate(bent)[order]
+    bent = np.concatenate([part.bent for part in parts])[order]
     return LinkTable(
         arrays,
-        distinct,
+        components,
         component[order],
         index[order],
         place_of[leader[order]],
-        np.where(bends_of < 0, -1, place_of[bends_of]),
-        np.concatenate(pulls)[order],
-        np.concatenate(broken)[order],
+        np.where(bent < 0, -1, place_of[bent]),
+        np.concatenate([part.pulls for part in parts])[order],
+        np.concatenate([part.broken for part in parts])[order],
         half_length,
     )
 

@@ -112,12 +112,9 @@ class Unknowns:
             )
         return self.numbers[nodes, self.names.index(name)]
 
-    def by_node(self, vector: np.ndarray) -> np.ndarray:
-        """A vector (size,) by nodes and names (n_nodes, n_names), zero for what a node has not."""
-        return np.where(self.numbers >= 0, vector[self.numbers], 0.0)
-
     def as_vector(self, by_node: np.ndarray, missing: float = 0.0) -> np.ndarray:
-        """The vector (size,) of what ``by_node`` returns, ``missing`` where a number is no node's.
+        """The vector (size,) of values by node and name (n_nodes, n_names), ``missing`` where a
+        number is no node's.
 
         Nodes that share a number have the same there.
         ``by_node`` may be (n_nodes, 1), the same for all unknowns of a node.

@@ -1,14 +1,11 @@
-"""Defects and incidents of a line: what is wrong once its droppers are cut, or happens in a run.
+"""Defects of a line: what is wrong once its droppers are cut.
 
-Data only. With defects droppers keep the lengths to which they were cut for the sound line. Of
-incidents `after_incidents` changes the line, and `march` decides when. What may happen to a
-pantograph stands with its placement (`mbs.lowering`).
+Data only. Droppers keep the lengths to which they were cut for the sound line.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
@@ -72,47 +69,3 @@ class Kink:
 
 
 Defect = MissingDropper | LooseClamp | WornWire | WrongTension | HardSpot | Kink
-
-
-@dataclass(frozen=True)
-class DropperBreak:
-    """From ``time`` [s] on the dropper at ``x`` [m] carries nothing."""
-
-    time: float
-    x: float
-
-
-@dataclass(frozen=True)
-class TensionLoss:
-    """From ``time`` [s] on a ``wire`` has only the ``share`` of its first tension.
-
-    ``wire`` is the name of a wire of the line.
-    """
-
-    time: float
-    wire: str
-    share: float
-
-
-LineIncident = DropperBreak | TensionLoss
-
-
-@dataclass(frozen=True)
-class Happened:
-    """Incidents of a line up to the end of step ``step``, in order of time."""
-
-    step: int
-    incidents: tuple[LineIncident, ...] = field(default=())
-
-
-def in_steps(incidents: Sequence[LineIncident], dt: float) -> list[Happened]:
-    """Incidents up to the end of each step in which one happens, by ascending step.
-
-    Times are rounded to the nearest end of a step of ``dt`` [s].
-    """
-    ordered = sorted(incidents, key=lambda incident: incident.time)
-    steps = [round(incident.time / dt) for incident in ordered]
-    return [
-        Happened(step, tuple(ordered[: len(ordered) - steps[::-1].index(step)]))
-        for step in sorted(set(steps))
-    ]

@@ -13,8 +13,9 @@ from catenary.meshgen.line import Line
 from catenary.meshgen.slowest_wave import slowest_wave
 from catenary.meshgen.wires import Role
 from catenary.solver.problem.contact_laws import ContactLaw
-from catenary.solver.problem.defects import Defect, LineIncident, TensionLoss, WrongTension
+from catenary.solver.problem.defects import Defect, WrongTension
 from catenary.solver.problem.ends import AlongTrack, EndCondition, Fixed
+from catenary.solver.problem.incidents import LineIncident, TensionLoss
 from catenary.solver.problem.irregularities import Irregularities
 from catenary.solver.problem.wind import Wind
 

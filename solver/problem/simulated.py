@@ -11,8 +11,8 @@ from catenary.mbs.vehicle.base_motion import VehicleMotion
 from catenary.mbs.vehicle.suspension import Vehicle
 from catenary.meshgen.wires import Profile, Role, Wire
 from catenary.solver.problem.contact_laws import ContactLaw
-from catenary.solver.problem.defects import LineIncident
 from catenary.solver.problem.ends import Tensioner
+from catenary.solver.problem.incidents import LineIncident
 from catenary.solver.problem.irregularities import Heights, LengthErrors, Surface
 from catenary.solver.problem.problem import Damping
 from catenary.solver.problem.wind import Wind

@@ -63,12 +63,11 @@ class WireAtRest:
 
 @dataclass(frozen=True)
 class LineAtTemperature:
-    """A line at ``warmer`` [K] above its installation: its ``wires``, the largest ``lean`` of a
-    dropper along the track over its height, and why there is no rest, "" if there is one."""
+    """A line at ``warmer`` [K] above its installation: its ``wires``, and why there is no
+    rest, "" if there is one."""
 
     warmer: float
     wires: tuple[WireAtRest, ...]
-    lean: float
     why_not: str = ""
 
 
@@ -102,10 +101,7 @@ def over_temperatures(
         try:
             model, form = find_form(at, mesh)
         except InputError as error:
-            found.append(LineAtTemperature(float(warmer), (), 0.0, str(error)))
+            found.append(LineAtTemperature(float(warmer), (), str(error)))
             continue
-        upper, lower = mesh.droppers.T
-        drop = form.height[upper] - form.height[lower]
-        lean = np.abs(form.leaning(mesh.droppers) / drop).max(initial=0.0)
-        found.append(LineAtTemperature(float(warmer), tension_along(model, form), float(lean)))
+        found.append(LineAtTemperature(float(warmer), tension_along(model, form)))
     return found

@@ -201,7 +201,6 @@ class Tangents:
     position : (n, n_pantographs) along the track [m]
     force : (n, n_pantographs) contact forces [N]
     uplift : (n, n_arms) at the steady arms in the evaluated stretch [m]
-    arm_x : (n_arms,) places of these [m]
     speed : of the train [m/s]
     by_force : (n, m, n_pantographs) derivatives of contact forces per unit of each parameter
     by_uplift : (n, m, n_arms) those of uplifts
@@ -217,7 +216,6 @@ class Tangents:
     position: np.ndarray
     force: np.ndarray
     uplift: np.ndarray
-    arm_x: np.ndarray
     speed: float
     by_force: np.ndarray
     by_uplift: np.ndarray
@@ -282,7 +280,6 @@ def march_with_tangents(comm: Any, at_rest: LineAtRest, changes: Sequence[Change
         position=position,
         force=force,
         uplift=uplift[:, evaluated],
-        arm_x=arms[evaluated],
         speed=float(at_rest.problem.train.speed),
         by_force=found[..., :n],
         by_uplift=found[..., n:-n],

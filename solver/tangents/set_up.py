@@ -26,9 +26,9 @@ from catenary.solver.model.loads import FieldLoad, FunctionLoad, MemoryLoad, Sha
 from catenary.solver.model.matrices import whole_matrix
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import distribute
-from catenary.solver.model.switching_links import switching_links
+from catenary.solver.model.switching_links import LinkTable, switching_links
 from catenary.solver.problem.contact_laws import HertzLaw
-from catenary.solver.problem.problem import steps_of
+from catenary.solver.problem.problem import Numerics, steps_of
 from catenary.solver.statics.line_at_rest import LineAtRest
 
 # Weights of a derivative of the fourth order by values at -2, -1, 1 and 2 steps.
@@ -196,24 +196,30 @@ def set_up_of(
         speed=float(problem.train.speed),
         follows_surface=bool(pantographs.places_along.leads.contact.size)
         or bool(wires.shapes.surface.size),
-        fixed={
-            "the number of unknowns": np.array([model.n_dofs, model.n_unknowns]),
-            "places of nodes": wires.nodes["x"].copy(),
-            "places of droppers and other links": laws["place"],
-            "which links there are": np.stack(
-                [links.component, links.index, links.leader, links.bent]
-            ),
-            "which links are taut at rest, or what slack ones keep": np.stack(
-                [laws["released"], laws["carried"], links.broken]
-            ),
-            "the time step or Newmark's parameters": np.array(
-                [problem.numerics.dt, problem.numerics.beta, problem.numerics.gamma]
-            ),
-            "loads in time": _loads(model),
-            "where wires cross the strips": drives[:, :, N_DRIVE:].ravel(),
-            "the running surface": wires.shapes.surface["height"],
-        },
+        fixed=_fixed_of(model, problem.numerics, links, wires, drives),
     )
+
+
+def _fixed_of(
+    model: Model, numerics: Numerics, links: LinkTable, wires: ContactWires, drives: np.ndarray
+) -> dict[str, np.ndarray]:
+    """Parts of a set-up that a parameter must not change, by their names in sentences."""
+    laws = links.arrays.law
+    return {
+        "the number of unknowns": np.array([model.n_dofs, model.n_unknowns]),
+        "places of nodes": wires.nodes["x"].copy(),
+        "places of droppers and other links": laws["place"],
+        "which links there are": np.stack([links.component, links.index, links.leader, links.bent]),
+        "which links are taut at rest, or what slack ones keep": np.stack(
+            [laws["released"], laws["carried"], links.broken]
+        ),
+        "the time step or Newmark's parameters": np.array(
+            [numerics.dt, numerics.beta, numerics.gamma]
+        ),
+        "loads in time": _loads(model),
+        "where wires cross the strips": drives[:, :, N_DRIVE:].ravel(),
+        "the running surface": wires.shapes.surface["height"],
+    }
 
 
 def differentiate(set_up: Callable[[float], SetUp], now: SetUp, step: float, what: str) -> Change:

@@ -31,7 +31,7 @@ from catenary.solver.kernels.flush_to_zero import flushed
 from catenary.solver.linear.petsc_solvers import wants_single_steps, wants_solution
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import distribute
-from catenary.solver.problem.defects import Happened, LineIncident, in_steps
+from catenary.solver.problem.incidents import Happened, LineIncident, in_steps
 from catenary.solver.problem.problem import Problem, steps_of
 from catenary.solver.schemes.make_scheme import Parts, SchemeFactory
 from catenary.solver.schemes.one_solve import OneSolve
@@ -60,7 +60,7 @@ class Outcome:
 
     ``outcome`` is "done", "interrupted" or the sentence of what broke; ``wall`` [s] the time of the
     time loop alone, changes of the line on the way included, and ``cpu`` [s] what of it this
-    process computed, whatever else the machine did; ``simulated`` [s]; ``n_steps`` taken;
+    process computed, whatever else the machine did; ``n_steps`` taken;
     ``counters`` of the scheme; ``traffic`` is how many messages and bytes a rank sent a step since
     the line changed last, the one that sent most: to its neighbours, and each sum and broadcast as
     one; None on one rank, or if not counted; ``slow_path`` says why steps took longer than
@@ -71,7 +71,6 @@ class Outcome:
     outcome: str
     wall: float
     cpu: float
-    simulated: float
     n_steps: int
     counters: dict[str, int] = field(default_factory=dict)
     traffic: tuple[float, float] | None = None
@@ -314,7 +313,6 @@ class March:
             outcome,
             wall,
             cpu,
-            n_steps * self._problem.numerics.dt,
             n_steps,
             self._scheme.counters.as_dict(),
             self._traffic(max(1, self._stepper.step_number - since)),

@@ -16,7 +16,6 @@ import numpy as np
 from scipy import linalg
 
 from catenary.base.errors import InputError
-from catenary.meshgen.slowest_wave import slowest_phase_speed
 from catenary.meshgen.wires import Role
 from catenary.solver.model.matrices import whole_matrix
 from catenary.solver.model.model import Model
@@ -102,10 +101,6 @@ class BlochWaves:
         speed = np.where(self.frequency <= highest, np.abs(self.group_velocity), 0.0)
         at = np.unravel_index(speed.argmax(), speed.shape)
         return float(speed[at]), float(self.frequency[at])
-
-    def slowest(self) -> float:
-        """Slowest wave of the first branch, as ``slowest_phase_speed`` has it [m/s]."""
-        return slowest_phase_speed(self.phase, 2 * np.pi * self.frequency[:, 0], self.length)
 
     def harmonics(self, share: float = 0.1) -> np.ndarray:
         """Wavenumbers along the contact wire and frequencies of all waves, (n, 3).

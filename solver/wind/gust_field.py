@@ -10,7 +10,6 @@ So any stretch and any time follow from the seed alone, and memory does not grow
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Callable
 
 import numpy as np
 
@@ -121,9 +120,6 @@ class GustField:
         if len(self._kept) > _KEPT:
             self._kept.popitem(last=False)
         return made
-
-
-Fill = Callable[[int, slice, np.ndarray], None]
 
 
 def narrowed(half: np.ndarray) -> np.ndarray:

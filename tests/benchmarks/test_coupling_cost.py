@@ -37,7 +37,7 @@ def run(scene: Problem, mesh: LineMesh) -> tuple[History, str, float]:
     history = History()
     with march:
         outcome = march.run([history])
-    return history, outcome.outcome, outcome.wall / max(outcome.simulated, 1e-9)
+    return history, outcome.outcome, outcome.wall / max(outcome.n_steps * scene.numerics.dt, 1e-9)
 
 
 def filtered(history: History, dt: float) -> np.ndarray:

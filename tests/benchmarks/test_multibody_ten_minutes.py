@@ -12,8 +12,10 @@ import time
 import numpy as np
 import paper_pantograph as paper
 import pytest
+from body_mechanics import energy
 from long_runs import DT, HEIGHT, STATIC, check_balance, check_no_drift, contact_forces, mean
 
+from catenary.mbs.head.stepping import Stepping
 from catenary.mbs.mechanism.full_pantograph import FullPantograph
 from catenary.mbs.rigid.forces import Actuator, SpringDamper
 
@@ -29,13 +31,13 @@ def test_all_bodies_keep_their_joints_and_energy(seconds: int) -> None:
     n_steps = round(seconds / DT)
     forces = contact_forces(n_steps)
     forces[0] = 0.0  # it is placed without contact
-    pantograph = FullPantograph(paper.data(), STATIC, HEIGHT, 0.0, DT)
+    pantograph = FullPantograph(paper.data(), STATIC, HEIGHT, Stepping(0.0, DT))
     pantograph.place(HEIGHT + STATIC / 6000.0)
     system, head = pantograph.system, pantograph.motion.numbers[paper.HEAD]
     heights, lengths = np.empty(n_steps + 1), np.empty((n_steps + 1, len(system.lines)))
     heights[0] = pantograph.motion.position[head, 2]
     lengths[0] = system.lines.geometry(pantograph.motion)[0]
-    before, opened, wall = system.energy(pantograph.motion), 0.0, 0.0
+    before, opened, wall = energy(system, pantograph.motion), 0.0, 0.0
     for number in range(1, n_steps + 1):
         begin = time.perf_counter()
         pantograph.predict(DT * number)
@@ -56,6 +58,6 @@ def test_all_bodies_keep_their_joints_and_energy(seconds: int) -> None:
         elif isinstance(element, Actuator):
             assert not callable(element.force)
             by_actuators += element.force * (length[-1] - length[0])
-    gained = system.energy(pantograph.motion) - before
+    gained = energy(system, pantograph.motion) - before
     by_contact = -mean(forces) * np.diff(heights)
     check_balance(gained, by_contact, by_actuators, lost, within=1e-7)

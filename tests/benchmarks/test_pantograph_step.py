@@ -18,6 +18,7 @@ from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.problem import problem_of
 from catenary.mbs.build import Operation, PantographData, make_pantograph
+from catenary.mbs.head.stepping import Stepping
 from catenary.mbs.head.strips import Strips, Suspension, Turning
 from catenary.mbs.head.wire_crossing import LateralPath
 from catenary.mbs.lumped_data import LumpedData
@@ -65,7 +66,7 @@ def measure(benchmark: Any, name: str, data: PantographData, rolls: bool, moves:
     track = (Irregularity("fra_6", 3.0, 100.0, 1),)
     base = BaseMotion(VehicleMotion(track, track), 100.0, 80.0) if moves else None
     lateral = path(data.strip_offsets, base) if rolls else None
-    operation = Operation(150.0, 5.0, 0.5, 1e-3, 0.25, 0.5, lateral, base)
+    operation = Operation(150.0, 5.0, Stepping(0.5, 1e-3, 0.25, 0.5, lateral, base))
     pantograph = make_pantograph(data, operation)
     force = np.full(len(data.strip_offsets), 150.0 / len(data.strip_offsets))
 

@@ -28,14 +28,13 @@ from catenary.postproc.record.snapshots.blocks import RecordedLine
 from catenary.postproc.record.snapshots.field_layout import Course, FieldRecord
 from catenary.postproc.record.snapshots.fields import FieldRecorder
 from catenary.solver.time_loop.views.channels import TrainLayout
-from catenary.solver.time_loop.views.observers import NodeMotion, Stage, StepView, row_of
+from catenary.solver.time_loop.views.observers import NodeMotion, Stage, StepView
 
 COMM = MPI.COMM_WORLD
 N_STEPS, DT = 130, 1e-3
 # A line whose head of a file is sound, as the unit tests of the recorders have it.
-MARCH = runpy.run_path(str(Path(__file__).parents[1] / "unit/postproc/conftest.py"))["March"](
-    n_steps=N_STEPS, dt=DT, comm=COMM
-)
+CONFTEST = runpy.run_path(str(Path(__file__).parents[1] / "unit/postproc/conftest.py"))
+MARCH, row_of = CONFTEST["March"](n_steps=N_STEPS, dt=DT, comm=COMM), CONFTEST["row_of"]
 N_ARMS, N_DROPPERS, N_NODES = MARCH.arm_x.size, MARCH.dropper_x.size, MARCH.mesh.n_nodes
 Share = Callable[[int], np.ndarray]
 

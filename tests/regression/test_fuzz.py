@@ -36,7 +36,7 @@ from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.hard import runs as hard_runs
 from catenary.cases.studies.hard.runs import RunHistories
-from catenary.solver.problem.defects import DropperBreak
+from catenary.solver.problem.incidents import DropperBreak
 from catenary.solver.statics.changed_line.after_incidents import dropper_at
 
 pytestmark = pytest.mark.study

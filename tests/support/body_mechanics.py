@@ -1,17 +1,19 @@
-"""What tests ask of multibody systems besides: reactions, masses, states as vectors, tables."""
+"""Mechanics of multibody systems for tests: reactions, energies, masses, states, tables."""
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
 import numpy as np
-from scipy import linalg
+from scipy import integrate, linalg
 from scipy.interpolate import CubicSpline
 
 from catenary.base.errors import InputError
+from catenary.mbs.mechanism.reduced_pantograph import RaisingPantograph
 from catenary.mbs.mechanism.reduction import ReducedMechanism
 from catenary.mbs.rigid.arrays import ORIGIN, TimeLaw
 from catenary.mbs.rigid.bodies import Motion, Vector, normalised, quaternion_product
+from catenary.mbs.rigid.forces import BumpStop, Force, Gravity, SpringDamper
 from catenary.mbs.rigid.joints import unit
 from catenary.mbs.rigid.kinematics import Law, point
 from catenary.mbs.rigid.least_squares import null_space
@@ -34,6 +36,50 @@ def reaction(
     jacobian = system.constraints(motion, 0.0).jacobian[rows]
     force = -(jacobian.T @ multipliers[rows]).reshape(-1, 6)[motion.numbers[body]]
     return Reaction(force[:3], force[3:])
+
+
+def stored_energy(force: Force, motion: Motion) -> float:
+    """Elastic or potential energy of a force [J], weights counting from height zero; zero for a
+    force that works from outside."""
+    if isinstance(force, Gravity):
+        return float(force.acceleration * np.dot(force.masses, motion.position[:-1, 2]))
+    if isinstance(force, BumpStop):
+        length = force.line(motion).length
+        depth = max(force.shortest - length, length - force.longest, 0.0)
+        return 0.5 * force.stiffness * depth**2
+    if not isinstance(force, SpringDamper):
+        return 0.0
+    extension = force.line(motion).length - force.free_length
+    if callable(force.stiffness):
+        closely = {"epsabs": 1e-12, "epsrel": 1e-12, "limit": 200}
+        return float(integrate.quad(force.stiffness, 0.0, extension, **closely)[0])
+    return 0.5 * force.stiffness * extension**2
+
+
+def energy(system: System, motion: Motion) -> float:
+    """Kinetic energy, and the energy that all forces store [J]."""
+    kinetic = 0.5 * float(system.mass @ motion.velocities**2)
+    return kinetic + sum(stored_energy(force, motion) for force in system.forces)
+
+
+def static_force(pantograph: RaisingPantograph, head_height: float, time: float = np.inf) -> float:
+    """Force on a wire that holds the strips at this height at rest, fully raised [N].
+
+    The head's springs give way under it. The air acts as it does at a ``time`` [s].
+    """
+    data, force = pantograph._data, 0.0
+    frame, zero = data.frame, data.head_offset + data.base_height
+    on_head, on_arm, on_bodies = np.zeros(3)
+    if pantograph._air is not None:
+        on_head, on_arm, on_bodies = pantograph._blowing(pantograph._air.now(time))
+    for _ in range(50):
+        previous, below = force, force - on_head
+        arm = head_height + below / data.head_stiffness + data.strips.compression(below) - zero
+        (_, lift, _), _ = frame.at(arm)
+        force = lift - data.head_weight + on_head + on_arm + on_bodies * frame.blown_at(arm)
+        if abs(force - previous) <= 1e-10 * abs(force):
+            return float(force)
+    raise AssertionError("the head's springs give way faster than the lift falls")
 
 
 def equivalent_mass(

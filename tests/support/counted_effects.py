@@ -24,15 +24,14 @@ from catenary.solver.effects.build_model import build
 from catenary.solver.model.model import Model
 from catenary.solver.problem.contact_laws import LinearLaw
 from catenary.solver.problem.defects import (
-    DropperBreak,
     HardSpot,
     Kink,
     LooseClamp,
     MissingDropper,
-    TensionLoss,
     WornWire,
     WrongTension,
 )
+from catenary.solver.problem.incidents import DropperBreak, TensionLoss
 from catenary.solver.problem.irregularities import Heights, Irregularities, LengthErrors
 from catenary.solver.problem.problem import Damping, Problem
 from catenary.solver.problem.wind import Gusts, Wind

@@ -154,7 +154,7 @@ def test_residuals_are_called_wrong_as_rarely_as_said() -> None:
     for name in ("probability", "whiteness_probability"):
         seen = [getattr(one["force"], name) for one in found]
         assert stats.kstest(seen, "uniform").pvalue > 1e-4, name
-    assert np.isnan(found[0]["all"].whiteness) and not found[0]["all"].is_coloured
+    assert not found[0]["all"].autocorrelation.size and not found[0]["all"].is_coloured
 
 
 def test_a_right_model_is_doubted_once_in_ten_passages_at_most() -> None:

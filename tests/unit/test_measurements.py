@@ -29,7 +29,8 @@ from catenary.postproc.evaluate.compare import compare
 from catenary.postproc.evaluate.span_differences import SpanSums, differences, span_sums
 from catenary.postproc.measurements import output
 from catenary.postproc.measurements.alignment import align, correlation_time
-from catenary.postproc.measurements.comparison import Comparison, compare_with
+from catenary.postproc.measurements.compared import Comparison
+from catenary.postproc.measurements.comparison import compare_with
 from catenary.postproc.measurements.passage import RunForce
 from catenary.postproc.read.results import Results
 

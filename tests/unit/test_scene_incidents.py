@@ -12,7 +12,7 @@ from catenary.cases.scene.load import load_scene, scene_from
 from catenary.cases.scene.problem import problem_of, resolved
 from catenary.cases.scene.scene import Scene
 from catenary.mbs.lowering import Lowering
-from catenary.solver.problem.defects import DropperBreak, TensionLoss
+from catenary.solver.problem.incidents import DropperBreak, TensionLoss
 
 INCIDENTS = (
     "incidents=[{type='lowering',at_s=3.0004,force_N=-75.0,drop_m=0.25},"

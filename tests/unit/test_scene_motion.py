@@ -13,6 +13,7 @@ from catenary.cases.scene.load import load_scene, scene_from
 from catenary.cases.scene.problem import problem_of, resolved
 from catenary.cases.scene.scene import Scene
 from catenary.mbs.build import has_joints
+from catenary.mbs.head.stepping import Stepping
 from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.mechanism.full_pantograph import FullPantograph
 from catenary.mbs.mechanism.pantograph_data import AllBodies, MultibodyData, reduced
@@ -60,7 +61,7 @@ def test_all_bodies_reach_the_time_loop(overrides: list[str], expected: AllBodie
 def test_the_model_is_the_one_that_was_asked_for() -> None:
     from catenary.mbs.build import Operation, make_pantograph
 
-    operation = Operation(150.0, 5.08, 0.5, 1e-3, 0.25, 0.5)
+    operation = Operation(150.0, 5.08, Stepping(0.5, 1e-3))
     assert isinstance(make_pantograph(data(load(ALL)), operation), FullPantograph)
     assert isinstance(make_pantograph(data(load()), operation), RaisingPantograph)
 
@@ -113,7 +114,7 @@ def test_bodies_go_where_their_loops_still_close_and_tables_where_they_end() -> 
 
 
 def test_a_wire_beyond_the_bodies_reach_breaks_the_start_in_one_sentence() -> None:
-    pantograph = FullPantograph(data(load(ALL)), 150.0, 5.08, 0.5, 1e-3)
+    pantograph = FullPantograph(data(load(ALL)), 150.0, 5.08, Stepping(0.5, 1e-3))
     with pytest.raises(RunBroken, match="'seven_body' does not reach a wire at a height of 9 m"):
         pantograph.place(9.0)
 

@@ -12,7 +12,7 @@ from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.problem import line_of, problem_of
 from catenary.meshgen.wires import Role
 from catenary.solver.model.switching_links import switching_links
-from catenary.solver.problem.defects import TensionLoss
+from catenary.solver.problem.incidents import TensionLoss
 from catenary.solver.problem.watched_links import UPLIFT_STOPS
 from catenary.solver.statics.form_finding.equilibrium import find_form
 

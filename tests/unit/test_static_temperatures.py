@@ -95,8 +95,8 @@ def wire(share: float) -> WireAtRest:
 @pytest.mark.parametrize(("share", "remarks"), [(0.07, 0), (0.09, 1), (0.105, 2), (0.12, 3)])
 def test_limits_that_are_exceeded_are_named(share: float, remarks: int) -> None:
     rests = [
-        LineAtTemperature(30.0, (wire(share),), 0.1),
-        LineAtTemperature(60.0, (), 0.1, "slack"),
+        LineAtTemperature(30.0, (wire(share),)),
+        LineAtTemperature(60.0, (), "slack"),
     ]
     text = temperature_text(rests, 3.0)
     assert text.count("contact_wire: at +30 K") == remarks

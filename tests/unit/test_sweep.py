@@ -223,8 +223,9 @@ def test_measures_are_taken_and_results_dropped_on_request(tmp_path: Path) -> No
 
 
 def test_reports_are_written_on_request(tmp_path: Path) -> None:
-    (job,) = make_jobs(CASE, [Variant("one", ())], TINY, full_report=True)
-    run_jobs(tiny(Variant("one", ())), tmp_path, COMM)
+    (plain,) = tiny(Variant("one", ()))
+    job = replace(plain, full_report=True)
+    run_jobs([plain], tmp_path, COMM)
     assert not (tmp_path / "one" / "report.html").exists()
     (ended,) = run_jobs([job], tmp_path, COMM)  # done before, but without its report
     assert not ended.skipped

@@ -16,6 +16,7 @@ from dense_line import DenseLine
 from measuring import History, check, march
 from small_lines import WHOLE, mesh_of, numerics, train
 
+from catenary.mbs.head.stepping import Stepping
 from catenary.mbs.head.strips import Flexure, Strips, Suspension, Turning
 from catenary.mbs.head.wire_crossing import LateralPath, SeveralPaths
 from catenary.mbs.lumped import LumpedPantograph
@@ -220,7 +221,9 @@ def test_a_head_under_two_wires_is_that_head_at_two_places(rolls: bool) -> None:
 
     def head(lateral: Any, wires: int) -> LumpedPantograph:
         own = replace(data, strips=replace(data.strips, wires=wires))
-        made = LumpedPantograph(own, 100.0, 5.0, 0.0, 1e-3, lateral=lateral if rolls else None)
+        made = LumpedPantograph(
+            own, 100.0, 5.0, Stepping(0.0, 1e-3, lateral=lateral if rolls else None)
+        )
         made.place(5.0)
         return made
 

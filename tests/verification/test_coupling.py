@@ -12,6 +12,7 @@ from small_lines import HANGING, WHOLE, en50318_line, mesh_of, numerics, problem
 from studies import few
 
 from catenary.base.errors import RunBroken
+from catenary.mbs.head.stepping import Stepping
 from catenary.mbs.lumped import LumpedPantograph
 from catenary.mbs.lumped_data import LumpedData
 from catenary.meshgen.mesh import LineMesh
@@ -73,7 +74,7 @@ class Wall:
 
     def __init__(self, coupling: str, stiffness: float, mass: float, dt: float) -> None:
         self.mass = LumpedPantograph(
-            LumpedData((mass,), (0.0,), (0.0,)), 0.0, 0.0, raise_time=0.0, dt=dt
+            LumpedData((mass,), (0.0,), (0.0,)), 0.0, 0.0, Stepping(raise_time=0.0, dt=dt)
         )
         law = LinearInSteps(LinearLaw(stiffness, 0.0), 1, pulls=True)
         accurate = numerics(dt, coupling=coupling, eps_force=1e-9)

@@ -11,6 +11,7 @@ from measuring import check
 from scipy import linalg
 from scipy.integrate import simpson
 
+from catenary.mbs.head.stepping import Stepping
 from catenary.mbs.head.strips import (
     Flexure,
     HeadParts,
@@ -137,7 +138,7 @@ def stepped(data: LumpedData, stagger: float, n: int = 400) -> np.ndarray:
     x = np.arange(0.0, 200.0, 20.0)
     path = LateralPath(x, tuple(stagger * (-1) ** i for i in range(x.size)), 10.0,
                        data.strip_offsets, 70.0)  # fmt: skip
-    one = LumpedPantograph(data, 120.0, 5.0, 0.0, 1e-3, lateral=path)
+    one = LumpedPantograph(data, 120.0, 5.0, Stepping(0.0, 1e-3, lateral=path))
     one.place(5.0)
     found = []
     for number in range(1, n + 1):
@@ -163,10 +164,9 @@ def test_a_still_wire_at_the_end_of_a_strip_rests_where_statics_say() -> None:
     """At 0.45 m from the middle: compliance of springs and beam, from the modes themselves."""
     data = LumpedData((9.0, 15.0), (4200.0, 1e7), (300.0, 1e5), strips(6))
     damped = replace(data.strips, suspension=replace(SUSPENSION, damping=300.0))
-    one = LumpedPantograph(
-        replace(data, strips=damped), 0.0, 5.0, 0.0, 2e-3,
-        lateral=LateralPath(np.array([0.0, 1e3]), (0.45, 0.45), 10.0, (0.0,), 70.0),
-    )  # fmt: skip
+    path = LateralPath(np.array([0.0, 1e3]), (0.45, 0.45), 10.0, (0.0,), 70.0)
+    stepping = Stepping(0.0, 2e-3, lateral=path)
+    one = LumpedPantograph(replace(data, strips=damped), 0.0, 5.0, stepping)
     one.place(5.0)
     for number in range(1, 3001):
         head = one.predict(2e-3 * number)

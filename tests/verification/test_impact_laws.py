@@ -17,6 +17,7 @@ import pytest
 from measuring import check, print_table
 from scipy.optimize import brentq
 
+from catenary.mbs.head.stepping import Stepping
 from catenary.mbs.lumped import LumpedPantograph
 from catenary.mbs.lumped_data import LumpedData
 from catenary.solver.contact.followed_links import no_links
@@ -39,7 +40,7 @@ class Bounce:
 
     def __post_init__(self) -> None:
         data = LumpedData((MASS,), (0.0,), (0.0,))
-        self.ball = LumpedPantograph(data, self.lift, 0.0, raise_time=0.0, dt=self.dt)
+        self.ball = LumpedPantograph(data, self.lift, 0.0, Stepping(raise_time=0.0, dt=self.dt))
         self.inner = InnerProblem(self.law, no_links())
         self.heads = Heads(1)
         # One response for all steps: the kernel is bound to its arrays.

@@ -28,7 +28,7 @@ from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
 from catenary.solver.model.beam import shape_slopes
 from catenary.solver.model.model import Model
 from catenary.solver.problem.contact_laws import HertzLaw, KinematicLaw, LinearLaw
-from catenary.solver.problem.defects import (
+from catenary.solver.problem.incidents import (
     DropperBreak,
     Happened,
     LineIncident,

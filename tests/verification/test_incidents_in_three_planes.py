@@ -13,8 +13,8 @@ from spatial_line import SpatialLine, shape
 
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
 from catenary.meshgen.topologies.line_data import LineData
-from catenary.solver.problem.defects import DropperBreak, LineIncident, TensionLoss
 from catenary.solver.problem.ends import AlongTrack
+from catenary.solver.problem.incidents import DropperBreak, LineIncident, TensionLoss
 from catenary.solver.problem.problem import Damping
 from catenary.solver.statics.changed_line.after_incidents import changed_line
 from catenary.solver.statics.form_finding.equilibrium import find_form

@@ -18,6 +18,7 @@ from catenary.base.errors import InputError
 from catenary.cases.cli.main import app
 from catenary.cases.scene.input.toml_input import read_toml
 from catenary.mbs.build import raising_data
+from catenary.mbs.head.stepping import Stepping
 from catenary.mbs.head.strips import Strips, Suspension
 from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.mechanism.reduced_pantograph import RaisingPantograph
@@ -264,7 +265,7 @@ def test_pantograph_of_the_time_loop_answers_as_the_linearised_bodies(frequency:
     seen = 2.0 / dt * np.tan(0.5 * omega * dt)
     way = model.ways @ model.amplitudes([seen / (2 * np.pi)])[0] * size
     swing = np.array([point(rest, body, (0, 0, 0)).jacobian[2] @ way for body in (HEAD, ARM)])
-    pantograph = RaisingPantograph(raising_data(paper.data(), 150.0, 5.08), 0.0, dt)
+    pantograph = RaisingPantograph(raising_data(paper.data(), 150.0, 5.08), Stepping(0.0, dt))
     still = np.array([5.08, 5.08 + 150.0 / 6000.0])
     pantograph.restore(
         np.concatenate([still + swing.real, (1j * seen * swing).real, (-(seen**2) * swing).real])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import paper_pantograph as paper
@@ -12,6 +13,7 @@ from seven_bodies import at_rest, calibrated, pressed
 
 from catenary.base.errors import CatenaryError, InputError, RunBroken
 from catenary.mbs.build import raising_data
+from catenary.mbs.head.stepping import Stepping
 from catenary.mbs.head.strips import Strips, Suspension
 from catenary.mbs.head.wire_crossing import LateralPath
 from catenary.mbs.interface import Pantograph
@@ -28,13 +30,22 @@ STATIC, HEIGHT, DT = 150.0, 5.08, 1e-3
 WIRE = 5e4  # [N/m] contact, on a wire that does not give way
 
 
-def full(**changes: object) -> FullPantograph:
-    values: dict = {"raise_time": 0.5, "dt": DT} | changes
-    return FullPantograph(paper.data(), STATIC, HEIGHT, **values)
+def full(
+    raise_time: float = 0.5,
+    handling: str = "coordinate_partitioning",
+    substeps: int = 1,
+    **moved: Any,
+) -> FullPantograph:
+    stepping = Stepping(raise_time, DT, **moved)
+    return FullPantograph(
+        paper.data(), STATIC, HEIGHT, stepping, handling=handling, substeps=substeps
+    )
 
 
 def reduced(base: BaseMotion | None = None) -> RaisingPantograph:
-    return RaisingPantograph(raising_data(paper.data(), STATIC, HEIGHT), 2.0, DT, base=base)
+    return RaisingPantograph(
+        raising_data(paper.data(), STATIC, HEIGHT), Stepping(2.0, DT, base=base)
+    )
 
 
 def growing(times: np.ndarray) -> np.ndarray:
@@ -137,7 +148,7 @@ def test_state_is_all_that_is_needed_to_continue() -> None:
     for pantograph in (one, other):
         run_below(pantograph, wire[50:], first=50)
     assert (one.state() == other.state()).all()
-    assert one.energy() == other.energy() > 0.0
+    assert one.motion.velocities.any()
 
 
 def test_placed_head_rests_or_moves_as_it_was_told() -> None:
@@ -221,7 +232,7 @@ def test_lower_link_of_the_paper_tips_over_unless_it_is_kept_from_spinning() -> 
 def test_strips_with_springs_of_their_own_are_refused() -> None:
     strips = Strips(2, 0.4, suspension=Suspension(1.0, 5000.0, 10.0))
     with pytest.raises(InputError, match="'seven_body': strips with a suspension of their own"):
-        FullPantograph(replace(paper.data(), strips=strips), STATIC, HEIGHT, 0.5, DT)
+        FullPantograph(replace(paper.data(), strips=strips), STATIC, HEIGHT, Stepping(0.5, DT))
     assert stand(paper.data()).n_freedoms == 5
 
 

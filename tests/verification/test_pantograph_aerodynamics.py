@@ -13,6 +13,7 @@ from ts_alpha2 import TS_ALPHA2
 
 from catenary.mbs.air import Airflow, Polynomial, Tunnel, Uplift
 from catenary.mbs.build import Operation, make_pantograph, steady_forces
+from catenary.mbs.head.stepping import Stepping
 from catenary.mbs.head.strips import Strips, Suspension
 from catenary.mbs.interface import Pantograph
 from catenary.mbs.lumped_data import LumpedData
@@ -51,7 +52,7 @@ def pressed(pantograph: Pantograph, n_steps: int, height: float = HEIGHT) -> np.
 
 
 def operation(flow: Airflow | None, raise_time: float = 0.3) -> Operation:
-    return Operation(STATIC, HEIGHT, raise_time, DT, 0.25, 0.5, air=flow)
+    return Operation(STATIC, HEIGHT, Stepping(raise_time, DT), air=flow)
 
 
 @pytest.mark.parametrize("head_share", [0.0, 0.6, 1.0])

@@ -21,7 +21,8 @@ from catenary.cases.run.runner import run_case
 from catenary.cases.scene.load import load_scene
 from catenary.cases.studies.measured.description import read_description
 from catenary.cases.studies.measured.passages import passage_of, read_table
-from catenary.postproc.measurements.comparison import Comparison, compare_with
+from catenary.postproc.measurements.compared import Comparison
+from catenary.postproc.measurements.comparison import compare_with
 from catenary.postproc.read.results import Results
 
 pytestmark = pytest.mark.usefixtures("quick_reports")

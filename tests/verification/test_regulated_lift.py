@@ -12,6 +12,7 @@ from scipy import signal
 
 from catenary.mbs.build import raising_data
 from catenary.mbs.control import Regulation
+from catenary.mbs.head.stepping import Stepping
 from catenary.mbs.lumped import LumpedPantograph
 from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.mechanism.reduced_pantograph import RaisingPantograph
@@ -26,7 +27,7 @@ def closed_loop(
     regulation: Regulation | None, n: int, dt: float = DT, data: LumpedData = DATA
 ) -> tuple[np.ndarray, np.ndarray, LumpedPantograph]:
     """Force on a wire that is a spring and a damper to the ground, and the added force, (n,)."""
-    one = LumpedPantograph(data, FORCE, HEIGHT, 0.0, dt)
+    one = LumpedPantograph(data, FORCE, HEIGHT, Stepping(0.0, dt))
     one.regulate(regulation)
     zero = HEIGHT - FORCE / WIRE  # the wire unloaded: at rest the head is at its nominal height
     one.place(HEIGHT)
@@ -189,7 +190,7 @@ def test_a_controller_in_python_is_called_and_remembers() -> None:
     own, added, one = closed_loop(Same, 400)  # type: ignore[arg-type]
     assert one.by_hand
     check("largest difference [N]", np.abs(own - table).max(), 0.0, within=1e-9)
-    other = LumpedPantograph(DATA, FORCE, HEIGHT, 0.0, DT)
+    other = LumpedPantograph(DATA, FORCE, HEIGHT, Stepping(0.0, DT))
     other.regulate(Same)
     other.restore(one.state())
     assert other.added_force == added[-1] == one.added_force
@@ -201,7 +202,7 @@ def test_the_state_holds_all_that_is_remembered(delay: float) -> None:
     regulation = pi(delay=delay, sample_time=0.01)
     whole, *_ = closed_loop(regulation, 300)
     _, _, one = closed_loop(regulation, 150)
-    other = LumpedPantograph(DATA, FORCE, HEIGHT, 0.0, DT)
+    other = LumpedPantograph(DATA, FORCE, HEIGHT, Stepping(0.0, DT))
     other.regulate(regulation)
     other.restore(one.state())
     zero = HEIGHT - FORCE / WIRE
@@ -219,7 +220,7 @@ def test_a_mechanism_is_regulated_by_the_head_s_height() -> None:
     import paper_pantograph as paper
 
     raising = raising_data(paper.data(), 150.0, HEIGHT)
-    one = RaisingPantograph(raising, 0.0, DT)
+    one = RaisingPantograph(raising, Stepping(0.0, DT))
     one.regulate(
         Regulation(True, HEIGHT + 0.02, ((0.0, 0.0, 4000.0, 0.0),), -90.0, 90.0, 0.01, 0.02)
     )

@@ -22,7 +22,7 @@ from catenary.meshgen.topologies.line_data import LineData
 from catenary.solver.model.beam import shape_values
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import distribute
-from catenary.solver.problem.defects import DropperBreak
+from catenary.solver.problem.incidents import DropperBreak
 from catenary.solver.problem.problem import Damping, Problem
 from catenary.solver.statics.changed_line.after_incidents import (
     acceleration_jump,

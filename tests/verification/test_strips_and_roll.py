@@ -12,6 +12,7 @@ from scipy.integrate import solve_ivp
 from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of, train
 
 from catenary.mbs.build import raising_data
+from catenary.mbs.head.stepping import Stepping
 from catenary.mbs.head.strips import Strips, Suspension, Turning
 from catenary.mbs.head.wire_crossing import LateralPath
 from catenary.mbs.lumped import LumpedPantograph
@@ -41,10 +42,10 @@ def test_two_equal_strips_on_springs_are_one_more_mass_of_a_chain() -> None:
     own = Suspension(0.9, 5000.0, 15.0)
     strips = LumpedPantograph(
         replace(TWO, strips=Strips(2, 0.5, None, own, Turning(0.3, 200.0, 1.0))),
-        120.0, 5.5, 0.1, 1e-3,
+        120.0, 5.5, Stepping(0.1, 1e-3),
     )  # fmt: skip
     chain = LumpedData((1.8, 5.4, 15.0), (10000.0, 4200.0, 50.0), (30.0, 10.0, 90.0))
-    expected = LumpedPantograph(chain, 120.0, 5.5, 0.1, 1e-3)
+    expected = LumpedPantograph(chain, 120.0, 5.5, Stepping(0.1, 1e-3))
     for pantograph in (strips, expected):
         pantograph.place(5.45)
     for number in range(500):
@@ -57,7 +58,9 @@ def test_two_equal_strips_on_springs_are_one_more_mass_of_a_chain() -> None:
     check("strips [m]", strips.position[:2], [expected.position[0]] * 2, within=within)
     check("head and frame [m]", strips.position[[2, 4]], expected.position[1:], within=within)
     check("pitch [rad]", strips.position[3], 0.0, within=within)
-    check("energy [J]", strips.energy(), expected.energy(), within=1e-7)
+    # A velocity's round-off is that of a height by the step of 1 ms.
+    check("strips [m/s]", strips.velocity[:2], [expected.velocity[0]] * 2, within=1e3 * within)
+    check("others [m/s]", strips.velocity[[2, 4]], expected.velocity[1:], within=1e3 * within)
 
 
 def test_uneven_forces_on_two_strips_pitch_the_head_as_statics_say() -> None:
@@ -65,7 +68,7 @@ def test_uneven_forces_on_two_strips_pitch_the_head_as_statics_say() -> None:
     pitch = Turning(0.3, 200.0, 20.0)
     spacing, front, rear = 0.5, 70.0, 50.0
     data = replace(TWO, dampings=(400.0, 500.0), strips=Strips(2, spacing, None, None, pitch))
-    pantograph = LumpedPantograph(data, 120.0, 5.5, 0.0, 5e-3)
+    pantograph = LumpedPantograph(data, 120.0, 5.5, Stepping(0.0, 5e-3))
     pantograph.place(5.5)
     for number in range(20000):
         head = pantograph.predict(5e-3 * (number + 1))
@@ -81,7 +84,7 @@ def test_a_force_beside_the_middle_rolls_the_head_as_statics_say() -> None:
     """phi = - l f / k_roll, and the strip gives way by l phi more than the head."""
     place, force = 0.3, 120.0
     data = replace(TWO, dampings=(400.0, 500.0), roll=ROLL)
-    pantograph = LumpedPantograph(data, force, 5.5, 0.0, 5e-3, lateral=straight(place))
+    pantograph = LumpedPantograph(data, force, 5.5, Stepping(0.0, 5e-3, lateral=straight(place)))
     pantograph.place(5.5)
     for number in range(20000):
         head = pantograph.predict(5e-3 * (number + 1))
@@ -121,7 +124,9 @@ def test_a_rolling_head_under_a_wire_that_wanders_follows_its_equations() -> Non
     steps, errors, rolls = [4e-3, 2e-3, 1e-3, 0.5e-3], [], []
     for dt in steps:
         path = LateralPath(supports, stagger, start, (0.0,), speed)
-        pantograph = LumpedPantograph(replace(TWO, roll=ROLL), 120.0, 5.5, 0.0, dt, lateral=path)
+        pantograph = LumpedPantograph(
+            replace(TWO, roll=ROLL), 120.0, 5.5, Stepping(0.0, dt, lateral=path)
+        )
         pantograph.place(5.5)
         # The start without contact leaves the acceleration that the force at time 0 makes.
         state = pantograph.state()
@@ -178,9 +183,9 @@ def test_the_paper_s_head_rolls_under_a_wandering_wire_like_all_its_bodies() -> 
     )
     rolling = raising_data(data, force, 5.0)
     pantographs = (
-        FullPantograph(data, force, 5.0, 0.0, dt, lateral=path),
-        RaisingPantograph(rolling, 0.0, dt, lateral=path),
-        RaisingPantograph(rolling, 0.0, dt),
+        FullPantograph(data, force, 5.0, Stepping(0.0, dt, lateral=path)),
+        RaisingPantograph(rolling, Stepping(0.0, dt, lateral=path)),
+        RaisingPantograph(rolling, Stepping(0.0, dt)),
     )
     for pantograph in pantographs:
         pantograph.place(5.0)

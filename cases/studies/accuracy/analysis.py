@@ -170,7 +170,11 @@ _SAFETY, _HIGHEST_ORDER, _LOWEST_ORDER, _WITHOUT_ORDER = 1.25, 2.0, 0.5, 3.0
 
 
 def extrapolated_error(near: float, far: float) -> float:
-    """The error of the finest of three runs from what neighbours differ by."""
+    """Error of the finest of three runs, by Richardson's extrapolation.
+
+    ``near`` is the difference of the finest and the middle run, ``far`` that of the middle and the
+    coarsest, both of one unit, which is the error's as well.
+    """
     if near == 0.0 or math.isinf(near) or math.isinf(far):
         return near
     order = math.log2(far / near) if far > 0.0 else -math.inf
@@ -195,8 +199,9 @@ def separate(
 def observed_orders(rows: Sequence[Row], size: str, quantity: str) -> list[tuple[float, float]]:
     """Size and observed order towards the next finer level, coarsest first.
 
-    The order between sizes a > b with errors e and f is log(e / f) / log(a / b). Levels that
-    broke, and errors of zero, have none.
+    ``size`` is the size that varies, "dt" or "h", and ``quantity`` the one whose errors are
+    compared. The order between sizes a > b with errors e and f is log(e / f) / log(a / b). Levels
+    that broke, and errors of zero, have none.
     """
     known = [r for r in rows if r.done and size in r.sizes and r.errors.get(quantity, 0.0) != 0.0]
     known.sort(key=lambda row: -row.sizes[size])
@@ -208,19 +213,20 @@ def observed_orders(rows: Sequence[Row], size: str, quantity: str) -> list[tuple
     return result
 
 
-def pareto(rows: Sequence[Row], quantity: str = HISTORY) -> list[Row]:
-    """The rows that no other beats in both cost and error, cheapest first."""
-    known = [row for row in rows if row.done and quantity in row.percent and row.cost > 0.0]
-    known.sort(key=lambda row: (row.cost, row.percent[quantity]))
+def pareto(rows: Sequence[Row]) -> list[Row]:
+    """The rows that no other beats in both cost and error of the force history, cheapest first."""
+    known = [row for row in rows if row.done and HISTORY in row.percent and row.cost > 0.0]
+    known.sort(key=lambda row: (row.cost, row.percent[HISTORY]))
     front: list[Row] = []
     for row in known:
-        if not front or row.percent[quantity] < front[-1].percent[quantity]:
+        if not front or row.percent[HISTORY] < front[-1].percent[HISTORY]:
             front.append(row)
     return front
 
 
 def cheapest(rows: Sequence[Row], quantity: str, target: float) -> Row | None:
-    """The cheapest row within ``target`` [%] that is not there by chance, None if none is.
+    """The cheapest row with an error of a ``quantity`` within ``target`` [%] that is not there by
+    chance; None if none is.
 
     Errors of statistics change their sign as settings grow finer, and are small where they do;
     those of step and mesh may cancel. A row counts only if its errors of step and mesh alone are

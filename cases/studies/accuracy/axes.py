@@ -244,7 +244,8 @@ def parse_axes(text: str | None) -> list[Axis]:
 
 
 def step(dt: float, elements: int | None = None, quick: bool = False) -> Level:
-    """A time step [s], and elements per gap if given."""
+    """Level with a time step ``dt`` [s], and with ``elements`` per gap of droppers if given;
+    ``quick`` if the short form of the study has it."""
     assignments, sizes = [f"numerics.dt_s={dt:g}"], [("dt", dt)]
     name = f"{1e3 * dt:g}_ms"
     if elements is not None:
@@ -255,7 +256,8 @@ def step(dt: float, elements: int | None = None, quick: bool = False) -> Level:
 
 
 def mesh(elements: int, quick: bool = False, dt: float | None = None) -> Level:
-    """Elements per gap, at the scene's own step unless one [s] is given."""
+    """Level with ``elements`` per gap of droppers, at a time step ``dt`` [s], or at the scene's
+    own; ``quick`` if the short form of the study has it."""
     assignments = [f"mesh.elements_per_gap={elements}"]
     assignments += [] if dt is None else [f"numerics.dt_s={dt:g}"]
     return Level(f"{elements}_elements", tuple(assignments), (("h", 1.0 / elements),), quick)

@@ -46,7 +46,8 @@ _MARGIN = 0.09
 def write(found: Measured, out_dir: Path, target: float) -> list[Path]:
     """Write table, record, page and diagram; returns the files. Not collective.
 
-    The diagram is left out if no axis of discretisation was varied.
+    Advice is for errors of at most ``target`` [%]. The diagram is left out if no axis of
+    discretisation was varied.
     """
     content: dict[str, Content] = {TABLE: table_of(found.rows), RECORD: _record(found, target)}
     drawn = any(row.done for axis in _precise(found) for row in found.rows_of(axis.name))
@@ -57,7 +58,8 @@ def write(found: Measured, out_dir: Path, target: float) -> list[Path]:
 
 
 def table_of(rows: Sequence[Row], axis: Axis | None = None) -> StudyTable:
-    """Rows, those of one axis for people, or of all axes for files."""
+    """Table of rows: those of one ``axis``, for people, or without it those of all axes, for
+    files."""
     shown: dict[str, str] = {}
     if axis is not None:
         shown = {f"error_{name}_percent": name for name in QUANTITIES}
@@ -104,7 +106,8 @@ def _figures_of(row: Row, axis: Axis | None = None) -> dict[str, Any]:
 
 
 def as_text(found: Measured, target: float) -> str:
-    """All tables for a terminal, orders and advice."""
+    """All tables for a terminal, observed orders, and advice for errors of at most ``target``
+    [%]."""
     parts = []
     for planned in found.plan.axes:
         axis, rows = planned.axis, found.rows_of(planned.axis.name)
@@ -187,7 +190,8 @@ def runs_with_remarks(found: Measured) -> list[tuple[str, Sequence[str]]]:
 
 
 def uncertainty_text(planned: PlannedAxis, percent: Mapping[str, float]) -> str:
-    """Sentence on the uncertainty of the reference, and the runs that it is known from."""
+    """Sentence on the uncertainty of the reference of an axis, by quantity ``percent`` [%], and on
+    the runs that it is known from."""
     chains = [", ".join(map(run_in_words, chain)) for chain in planned.chains]
     from_runs = " and from ".join(chains)
     known = {what: value for what, value in percent.items() if math.isfinite(value)}
@@ -220,7 +224,8 @@ def run_in_words(name: str) -> str:
 
 
 def advices(found: Measured, target: float) -> list[str]:
-    """A sentence for each quantity that settings are chosen by."""
+    """A sentence for each quantity that settings are chosen by, on an error of at most ``target``
+    [%]."""
     return [
         advice(
             found.rows_of(axis.name),

@@ -254,7 +254,15 @@ def run(
 def evaluate(
     plan: Plan, ended: Sequence[Ended], times: Mapping[str, Sequence[float]], wall: float
 ) -> Measured:
-    """Rows of all axes from their runs. Not collective."""
+    """Rows of all axes from their runs. Not collective.
+
+    Parameters
+    ----------
+    plan : of the study
+    ended : how each run ended
+    times : by name of a run, processor time of its march in each round [s]
+    wall : wall time of all runs together [s]
+    """
     runs = {one.variant.name: one for one in ended}
     rows: list[Row] = []
     uncertainty: dict[str, dict[str, float]] = {}

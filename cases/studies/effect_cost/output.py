@@ -42,7 +42,8 @@ class Change(NamedTuple):
 
 
 def changes(found: Costs, row: Measured) -> list[Change]:
-    """Changes of all figures of all pantographs, those that are known."""
+    """Changes of all figures of all pantographs by the switch of a ``row``; unknown figures are
+    left out."""
     result = []
     for number, (before, after) in enumerate(zip(found.figures, row.figures, strict=False)):
         for name in (*FIGURES, UPLIFT):
@@ -65,12 +66,12 @@ def _share(
 
 
 def largest(found: Costs, row: Measured) -> Change | None:
-    """The largest change, None without figures."""
+    """The largest change by the switch of a ``row``, None without figures."""
     return max(changes(found, row), key=lambda change: abs(change.share), default=None)
 
 
 def advice(found: Costs, row: Measured) -> str:
-    """One sentence on whether to simulate an effect."""
+    """One sentence on whether to simulate the effect of a ``row``."""
     verb = "leave it out" if row.switch.on else "switch it on"
     if not row.done:
         return f"it was not measured, for you cannot {verb} here: {row.outcome.rstrip('.')}."
@@ -217,7 +218,7 @@ def _remarks_of(row: Measured) -> tuple[str, list[str]]:
 
 
 def sentence(found: Costs, row: Measured) -> str:
-    """The advice on an effect, and what is switched with it."""
+    """The advice on the effect of a ``row``, and the effects that are switched with it."""
     text = advice(found, row)
     if not row.switch.together:
         return text

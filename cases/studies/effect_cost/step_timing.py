@@ -101,7 +101,7 @@ class Beside(NamedTuple):
 
 
 def beside(march: RepeatedMarch, other: RepeatedMarch, rounds: int) -> Beside:
-    """Time of steps of a march over that of another. Collective.
+    """Time of steps of a march over the time of steps of an ``other`` one. Collective.
 
     A round marches both twice, as in a b b a, and takes the lesser of each. The ratio is the median
     of rounds: where the machine slows down for some of them, it does so for both.
@@ -115,7 +115,8 @@ def beside(march: RepeatedMarch, other: RepeatedMarch, rounds: int) -> Beside:
 
 
 def in_turns(marches: Mapping[str, RepeatedMarch], rounds: int) -> dict[str, float]:
-    """Least time of a step of each of several marches [us], all of them in turns. Collective."""
+    """Least time of a step of each of several marches [us], which take turns in each of so many
+    ``rounds``. Collective."""
     least = dict.fromkeys(marches, np.inf)
     for _ in range(rounds):
         for name, march in marches.items():

@@ -23,7 +23,7 @@ from catenary.cases.studies.hard.runs import RunHistories, cut_of, node_places, 
 from catenary.cases.studies.records import KeptRows
 from catenary.postproc.report.study_table import Column, StudyTable, remark_lines
 from catenary.solver.model.beam import shape_slopes
-from catenary.solver.problem.defects import DropperBreak, LineIncident, in_steps
+from catenary.solver.problem.incidents import DropperBreak, LineIncident, in_steps
 from catenary.solver.statics.line_at_rest import LineAtRest
 
 # Gauss's rule of three points is exact for the square of a cubic's slope.
@@ -31,7 +31,8 @@ _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(3)
 
 
 class Left(NamedTuple):
-    """Energy that left in a step [J]: as the balance of the run says, and as theory says."""
+    """Energy that left in a step [J]: observed in the balance of the run, and expected by
+    theory."""
 
     step: int
     observed: float
@@ -297,7 +298,7 @@ class _OneCase:
 
 
 def holds_or_not(case: HardCase, name: str, holds: bool, note: str = "") -> Criterion:
-    """A criterion without a figure."""
+    """A criterion of a case without a figure: whether it ``holds``, and a ``note`` for people."""
     return Criterion(case.name, name, float(holds), 1.0, holds, "" if note == "done" else note)
 
 
@@ -377,7 +378,8 @@ _PLAIN = ("runs to its end", "everything is finite", "the fixed-point correction
 
 
 def criteria(found: Sequence[Criterion], remarks_of: Remarks) -> StudyTable:
-    """Table of criteria, a row each, and a row with the remarks on each case that has any."""
+    """Table of criteria, a row each; ``remarks_of`` gives each case that has any a row with its
+    remarks."""
     names = ("case", "criterion", "value", "limit", "kept", "note")
     rows: list[tuple[str, ...]] = [
         (row.case, row.name, f"{row.value:.3g}", f"{row.limit:.3g}", "yes" if row.passed else "no",
@@ -394,7 +396,8 @@ def criteria(found: Sequence[Criterion], remarks_of: Remarks) -> StudyTable:
 
 
 def page(cases: Sequence[HardCase], found: Sequence[Criterion], remarks_of: Remarks) -> str:
-    """A table of Markdown with a line for each case, and below it the remarks."""
+    """A table of Markdown with a line for each case, of the criteria ``found``; below it
+    ``remarks_of`` each case."""
     columns = [
         Column("case", "case"),
         Column("words", "what is hard; *a right answer*"),

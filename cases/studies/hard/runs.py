@@ -26,7 +26,7 @@ from catenary.solver.contact.contact_wire import ContactWires
 from catenary.solver.integrators.make_line import make_line
 from catenary.solver.model.matrices import stiffness_matrix, whole_matrix
 from catenary.solver.model.partition import distribute
-from catenary.solver.problem.defects import in_steps
+from catenary.solver.problem.incidents import in_steps
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest_on_all
 from catenary.solver.time_loop.march import March
 from catenary.solver.time_loop.views.observers import NEVER, Observer, StepView
@@ -289,7 +289,8 @@ def run(
 
 
 def run_free(rest: LineAtRest, comm: Any, n_steps: int) -> RunHistories:
-    """Energy of a line that is let go from under a force at its middle; no train. Collective.
+    """Energy of a line that is let go from under a force at its middle, over ``n_steps``; no train.
+    Collective.
 
     The acceleration at the start is the one that belongs to the shape: M a = -K u.
     """

@@ -169,7 +169,7 @@ class Measurement:
         return Signal(name, values, whitening, deviation, column.bias * column.factor)
 
     def _sampled(self, values: np.ndarray) -> np.ndarray:
-        """Filter values (n, ...) at the file's places, and keep those that are compared."""
+        """Filter values (n, ...) at the file's places, and keep the values that are compared."""
         if self._dt is not None:
             values = filters.low_pass(values, self._dt, self._cut_off)
         return np.asarray(values[self._kept])

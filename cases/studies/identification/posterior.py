@@ -97,15 +97,14 @@ class Judged:
     chi_square : sum of squares of the innovations
     probability : that a right model has one as large or larger
     autocorrelation : of the innovations at lags from 1 on; empty for all signals together
-    whiteness : Q of Ljung and Box, NaN for all together
-    whiteness_probability : that a right model has one as large or larger
+    whiteness_probability : that a right model has Ljung and Box's Q as large or larger; 1 for all
+        together
     """
 
     n: int
     chi_square: float
     probability: float
     autocorrelation: np.ndarray
-    whiteness: float
     whiteness_probability: float
 
     @property
@@ -168,12 +167,11 @@ def _judged(own: np.ndarray, is_series: bool) -> Judged:
     n, chi_square = own.size, float(own @ own)
     lags = np.arange(1, min(_MOST_LAGS, n // _SAMPLES_A_LAG) + 1) if is_series else np.arange(0)
     correlation = np.array([own[lag:] @ own[:-lag] for lag in lags]) / chi_square
-    whiteness = float(n * (n + 2) * (correlation**2 / (n - lags)).sum()) if lags.size else np.nan
+    whiteness = n * (n + 2) * (correlation**2 / (n - lags)).sum()
     return Judged(
         n,
         chi_square,
         float(stats.chi2.sf(chi_square, n)),
         correlation,
-        whiteness,
         float(stats.chi2.sf(whiteness, lags.size)) if lags.size else 1.0,
     )

@@ -85,7 +85,9 @@ def places_of(
 
     Parameters
     ----------
+    table : of the file
     path : name of the table in sentences
+    measured : columns of place or time
     speed : of the train [m/s]
     start : place of the pantograph at time zero [m]
 
@@ -104,10 +106,11 @@ def places_of(
 
 
 def evened_out(places: np.ndarray, path: str) -> np.ndarray:
-    """Places (n,) that were rounded, at equal distances [m].
+    """Places (n,) at equal distances [m], from rounded ``places`` (n,).
 
     Parameters
     ----------
+    places : as the file has them [m]
     path : name of the table in sentences
 
     Raises

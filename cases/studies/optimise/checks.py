@@ -113,9 +113,14 @@ def compare(
     optimum: Mapping[str, Any],
     evaluation: Evaluation,
 ) -> list[Row]:
-    """All figures of two designs, as values by dotted keys. Not collective.
+    """All figures of two designs. Not collective; all runs are made together.
 
-    ``searched`` are the directions that the search has seen. All runs are made together.
+    Parameters
+    ----------
+    checks : with the scenes in which the designs are compared
+    searched : directions that the search has seen
+    shipped, optimum : the two designs, as values by dotted keys
+    evaluation : runs the scenes
     """
     places = [(check, member) for check in checks for member in check.scenes.members]
     wanted: list[Wanted] = [

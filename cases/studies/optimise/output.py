@@ -72,7 +72,8 @@ def keys_text(found: Sequence[Optimum]) -> str:
 
 
 def history_table(plan: Plan, history: Sequence[Point]) -> StudyTable:
-    """All points of a search in their order: objective, violation, changes of the variables."""
+    """All points of a search in their order, ``history``: objective, violation, changes of the
+    variables."""
     names = [one.name for one in plan.variables.components]
     heads = ("objective", "violation", *names, "broke")
     rows = [
@@ -88,7 +89,7 @@ def _finite(value: float) -> float | None:
 
 
 def variables_table(plan: Plan, one: Optimum) -> StudyTable:
-    """Values of the variables as shipped and at the optimum."""
+    """Values of the variables as shipped and at an optimum, ``one``."""
     rows: list[Mapping[str, Any]] = []
     for part, by in zip(plan.variables.components, one.found.change.tolist(), strict=True):
         entry = part.entries[0] if part.entries else None

@@ -188,7 +188,7 @@ def search_table(
     study: PaperStudy, statements: Sequence[Statement], searched: Mapping[str, Rows]
 ) -> StudyTable:
     """The readings of a search, the best first: by statements met, then by pantographs that meet
-    the one that the search counts."""
+    the statement that the search counts. ``searched`` has the rows of each reading by its title."""
     search, found = study.table["search"], []
     for title, rows in searched.items():
         met = [one.number for one in judge(statements, rows) if one.verdict == REPRODUCED]
@@ -224,7 +224,8 @@ def _range(rows: Rows, figure: str, where: Mapping[str, str] | None = None) -> s
 def rank(start: Rows, varied: Mapping[str, Rows], study: PaperStudy) -> list[Ranked]:
     """The case, then the variations by how much they move the ranking's figure at either damping.
 
-    Variations that broke are left out; there is no row if the case itself broke.
+    ``start`` has the rows of the case, ``varied`` those of each variation by its title. Variations
+    that broke are left out; there is no row if the case itself broke.
     """
     figure = study.table["ranking"]["figure"]
 
@@ -241,7 +242,7 @@ def rank(start: Rows, varied: Mapping[str, Rows], study: PaperStudy) -> list[Ran
 
 
 def ranking_table(study: PaperStudy, ranked: Sequence[Ranked]) -> StudyTable:
-    """The ranking for the report."""
+    """Table of a ranking, as ``rank`` returns it, for the report."""
     ranking, dampings = study.table["ranking"], study.dampings
     figure, head = ranking["figure"], FIGURES[ranking["figure"]].head
 
@@ -335,11 +336,13 @@ def _bands(
 def separation_table(
     study: PaperStudy, readings: Mapping[str, tuple[tuple[float, float], Rows]]
 ) -> StudyTable:
-    """Delay of the trailing pantograph in periods of the ringing spans, and its deviation beside
-    that of one alone.
+    """Delay of the trailing pantograph in periods of the ringing spans, and its standard deviation
+    over the deviation of a single pantograph.
 
-    A span that has been passed rings in the line's first modes; their frequencies lie close
-    together, one for each span, so that the ringing stays there until the trailing one comes.
+    ``readings`` gives by title the lowest and highest frequency of the line's first modes [Hz], and
+    the rows. A span that has been passed rings in these modes; their frequencies lie close
+    together, one for each span, so that the ringing stays there until the trailing pantograph
+    comes.
     """
     rows = []
     for title, (band, found) in readings.items():

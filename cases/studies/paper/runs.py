@@ -222,7 +222,8 @@ class PaperStudy:
 
 
 def run_name(reading: str, damping: str, train: str) -> str:
-    """Name of the run of a train under a reading."""
+    """Name of the run of a ``train`` under a ``reading``, with one of the ``damping``s of the
+    study."""
     return slug(f"{reading}__{damping}__{train}")
 
 

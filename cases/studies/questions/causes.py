@@ -93,7 +93,7 @@ def gust_forces(rest: LineAtRest, when: Sequence[tuple[float, float, float, floa
 
 
 class Causes:
-    """Looks for causes in what a result file says of its line.
+    """Looks for causes in the description of a line in a result file.
 
     Parameters
     ----------

@@ -137,6 +137,7 @@ def find_separations(marching: Marching, scene: Scene, distances: Distances) -> 
     ----------
     marching : of the case
     scene : the case, checked; all pantographs are of the kind of its first
+    distances : between the two pantographs
 
     Raises
     ------
@@ -153,7 +154,8 @@ def find_separations(marching: Marching, scene: Scene, distances: Distances) -> 
 
 
 def variant_of(scene: Scene, separation: float | None) -> Variant:
-    """The scene with two pantographs so far apart [m], or with one alone."""
+    """The scene with two pantographs ``separation`` [m] apart, or with one alone if that is
+    None."""
     kind = scene.train.pantographs[0].name
     if separation is None:
         return Variant("alone", (f"train.pantographs={text_of([{'name': kind}])}",))
@@ -192,7 +194,8 @@ class Period(NamedTuple):
 
 
 def period_in(study: SeparationStudy, scene: Scene) -> Period:
-    """The period of a study, and what theory says of the line of its scene. Not collective."""
+    """Period of a study, and the periods that theory gives for the line of its scene. Not
+    collective."""
     from catenary.cases.run.scene_mesh import mesh_of
     from catenary.cases.scene.problem import problem_of
     from catenary.cases.studies.waves.theory import wave_theory
@@ -211,7 +214,7 @@ def period_in(study: SeparationStudy, scene: Scene) -> Period:
 
 
 def period_of(d: np.ndarray, sigma: np.ndarray, theory: WaveTheory, span: float) -> Period:
-    """Period of the deviations, and those that theory offers.
+    """Period of the deviations over the distance, and the periods that theory offers.
 
     Parameters
     ----------
@@ -239,7 +242,8 @@ def period_of(d: np.ndarray, sigma: np.ndarray, theory: WaveTheory, span: float)
 
 
 def as_text(study: SeparationStudy, period: Period) -> str:
-    """Best and worst distance in sentences, the table where it is short, and what fails."""
+    """Best and worst distance in sentences, the table where it is short, criteria that fail, and
+    the ``period`` of the deviation."""
     lines = [f"{study.case}: two pantographs {study.kind} at {study.speed:g} km/h."]
     ranked = study.by_deviation
     if not ranked:
@@ -283,7 +287,7 @@ def _uplift(row: Row) -> str:
 
 
 def _explained(period: Period) -> str:
-    """Sentence on the period of the deviation, and on those that theory offers."""
+    """Sentence on the period of the deviation, and on the periods that theory offers."""
     low, high = period.ringing
     found = f"No period is found in fewer than {_LEAST_FOR_PERIOD} distances"
     if np.isfinite(period.fitted):
@@ -311,7 +315,8 @@ def _stretches(rows: Sequence[Row], name: str) -> str:
 
 
 def write(folder: Path, study: SeparationStudy, period: Period) -> list[Path]:
-    """Write table, record and picture; returns the files. Not collective."""
+    """Write table, record and picture of a study and its ``period``; returns the files. Not
+    collective."""
     table, ranked = study.table(), study.by_deviation
     record = {
         "case": study.case,
@@ -331,9 +336,12 @@ def write(folder: Path, study: SeparationStudy, period: Period) -> list[Path]:
 
 @figures.own_style()
 def draw(study: SeparationStudy, period: Period) -> Figure | None:
-    """Deviation, least force and uplift over the distance, and as a line those of one pantograph
-    alone; at distances of whole periods of the ringing the ground is shaded. None if fewer than two
-    distances could be run."""
+    """Deviation, least force and uplift over the distance, and those of one pantograph alone as a
+    line.
+
+    At whole periods of the ringing, of which ``period`` has the range, the ground is shaded. None
+    if fewer than two distances could be run.
+    """
     done = study.done
     if len(done) < 2:
         return None

@@ -68,7 +68,9 @@ class Differences(NamedTuple):
 
 
 def jobs_of(case: str, changes: Sequence[str], shortened: bool) -> list[Job]:
-    """The two runs, checked.
+    """The two runs of a case, checked: as it is, and with ``changes``, assignments ``key=value``.
+
+    Both are ``shortened`` by the case's ``[test]`` table if that is asked for.
 
     Raises
     ------
@@ -85,7 +87,7 @@ def jobs_of(case: str, changes: Sequence[str], shortened: bool) -> list[Job]:
 
 
 def run(jobs: Sequence[Job], out: Path, comm: Any, options: RunOptions) -> list[Ended]:
-    """Both runs, in folders of their names below ``out``. Collective.
+    """Make both runs of ``jobs``, in folders of their names below ``out``. Collective.
 
     Raises
     ------
@@ -100,7 +102,10 @@ def run(jobs: Sequence[Job], out: Path, comm: Any, options: RunOptions) -> list[
 
 
 def differences(changes: Sequence[str], ended: Sequence[Ended], out: Path) -> Differences:
-    """The tables of two runs that are done. Not collective."""
+    """Tables of the differences of two runs, before and after ``changes``. Not collective.
+
+    ``ended`` says how both ended, which must be done; their folders lie in ``out``.
+    """
     before, after = ended
     folders = out / before.variant.name, out / after.variant.name
     with Results(folders[0]) as a, Results(folders[1]) as b:

@@ -109,7 +109,8 @@ def _of_spots(title: str, spots: Sequence[Spot], words: str, causes: Causes) -> 
 
 
 def candidates(causes_found: Sequence[str], is_out: bool | None) -> Sequence[str]:
-    """Candidates of a place, or that there is none for one that stands out."""
+    """Candidate causes of a place. Where ``causes_found`` is empty and the place stands out from
+    its likes, ``is_out``, a sentence that there is none."""
     return causes_found or ([NONE] if is_out else [])
 
 

@@ -43,7 +43,8 @@ def jobs_of(chosen: Sequence[Configuration]) -> list[Job]:
 
 
 def run_name(one: Configuration, level: tuple[int, int], further: bool = False) -> str:
-    """The name of the run of a level, and of its folder; ``further`` on along a longer line."""
+    """Name of the run of a configuration, ``one``, at a ``level``, the numbers of its step and
+    mesh; ``further`` on along a longer line. Its folder has the same name."""
     name = f"{one.name}__{one.steps[level[0]]:g}ms_{one.elements[level[1]]}"
     return f"{name}_further_on" if further else name
 

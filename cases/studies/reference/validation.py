@@ -26,7 +26,7 @@ from catenary.cases.studies.reference.judgement import (
 from catenary.cases.studies.reference.solutions import read
 from catenary.cases.studies.sweep.jobs import Ended, Job
 from catenary.cases.studies.sweep.variants import Variant
-from catenary.postproc.measurements.comparison import LINE_TEST
+from catenary.postproc.measurements.compared import LINE_TEST
 from catenary.postproc.measurements.output import SUMMARY
 
 # Quantities of accepted_ranges.csv by their names here.

@@ -190,7 +190,8 @@ def _function(frozen: Any) -> Callable[[np.ndarray], np.ndarray]:
 
 
 def chosen(table: ChoicesTable, probabilities: np.ndarray) -> list[int]:
-    """Number of the value of each probability in (0, 1), from 0, by the values' weights."""
+    """Number of the value, from 0, for each of ``probabilities`` in (0, 1), by the weights of the
+    values of a ``table``."""
     import numpy as np
 
     weights = np.ones(len(table.values)) if table.weights is None else np.array(table.weights)

@@ -48,7 +48,7 @@ class Sensitivity:
         parameter's key
     by_uplift : of each parameter that of the largest uplift [m]
     n_steps : of the march
-    open_steps, contact_switches, link_switches : see ``Tangents``
+    contact_switches, link_switches : see ``Tangents``
     left_out : keys of usual parameters by which it cannot be differentiated, and why
     """
 
@@ -56,7 +56,6 @@ class Sensitivity:
     statistics: list[Statistics]
     max_uplift: float
     n_steps: int
-    open_steps: int
     contact_switches: int
     link_switches: int
     parameters: list[Parameter] = field(default_factory=list)
@@ -164,7 +163,6 @@ def _without_parameters(marched: Tangents, at_rest: LineAtRest) -> Sensitivity:
         statistics,
         float(marched.uplift.max()) if marched.uplift.size else float("nan"),
         len(marched.force),
-        marched.open_steps,
         marched.contact_switches,
         marched.link_switches,
     )

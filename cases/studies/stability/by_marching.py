@@ -46,7 +46,8 @@ class Bench:
     comm: Any
 
     def problem(self, coupling: str, stiffness: float, head_mass: float, dt: float) -> Problem:
-        """A head [kg] on a contact [N/m], for as many steps of ``dt`` [s] as show stability."""
+        """A head of ``head_mass`` [kg] on a contact of ``stiffness`` [N/m], for as many steps of
+        ``dt`` [s] as show whether the ``coupling`` is stable."""
         usual = self.rest.problem
         height = float(rest_height(self.rest, np.array([self.x]))[0])
         data = LumpedData(
@@ -82,7 +83,8 @@ class Bench:
         )
 
     def is_stable(self, coupling: str, stiffness: float, head_mass: float, dt: float) -> bool:
-        """Whether the program's own steps [s] keep a perturbation small."""
+        """Whether the program's own steps of ``dt`` [s] with a ``coupling`` keep a perturbation
+        small, of a head of ``head_mass`` [kg] on a contact of ``stiffness`` [N/m]."""
         problem = self.problem(coupling, stiffness, head_mass, dt)
         watched = _Growth(GROWN * stiffness * DEPTH)
         rest = self.rest
@@ -100,8 +102,9 @@ class Bench:
     ) -> tuple[float, float]:
         """A step [s] found stable and one found unstable, by bisection between two ``steps``.
 
-        They differ by the factor 1 + ``resolution`` at most; (longest, inf) if all are stable,
-        (0, shortest) if none is.
+        ``coupling``, ``stiffness`` and ``head_mass`` are as of ``is_stable``. The two differ by the
+        factor 1 + ``resolution`` at most; (longest, inf) if all are stable, (0, shortest) if none
+        is.
         """
         low, high = steps
         if self.is_stable(coupling, stiffness, head_mass, high):

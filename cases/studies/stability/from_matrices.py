@@ -141,7 +141,7 @@ def _largest(symmetric: np.ndarray) -> float:
 
 
 def point_model(model: Model, loads: np.ndarray, n_vectors: int = N_VECTORS) -> PointModel:
-    """The line reduced to forces with these ``loads`` (n_dofs, c), by so many vectors for each. Not
+    """The line reduced to forces with ``loads`` (n_dofs, c), by ``n_vectors`` for each. Not
     collective."""
     mass, stiffness, damping = matrices(model)
     factor = splu(mass)
@@ -199,13 +199,15 @@ def step_matrix(both: Coupled, step: Step, implicit: float, explicit: float) -> 
 
 
 def radius(both: Coupled, step: Step, stiffness: float, coupling: str) -> float:
-    """Spectral radius of a step with the ``implicit`` or ``explicit`` coupling."""
+    """Spectral radius of a step with the "implicit" or "explicit" ``coupling`` of ``both``, line
+    and head, by a contact of ``stiffness`` [N/m]."""
     parts = (stiffness, 0.0) if coupling == "implicit" else (0.0, stiffness)
     return float(np.abs(linalg.eigvals(step_matrix(both, step, *parts))).max())
 
 
 def exchange_ratio(both: Coupled, step: Step, stiffness: float) -> float:
-    """Largest factor by which an exchange of forces and motions multiplies errors of the forces."""
+    """Largest factor by which an exchange of forces and motions multiplies errors of the forces,
+    between line and head, ``both``, on a contact of ``stiffness`` [N/m]."""
     operator = both.mass + step.gamma * step.dt * both.damping
     operator = operator + step.beta * step.dt**2 * both.stiffness
     answer = linalg.solve(operator, both.depth, assume_a="sym")
@@ -224,7 +226,9 @@ def largest_step(
 
     Parameters
     ----------
+    both : line and head
     newmark : beta and gamma
+    stiffness : of the contact [N/m]
     coupling : "implicit", "explicit", or any other, which exchanges
     steps : least and greatest [s]
     allowed : largest factor by which a step or an exchange may multiply errors
@@ -247,9 +251,12 @@ def largest_step(
 def closed_form(line: PointModel, head_mass: float, stiffness: float) -> float:
     """Step [s] at which omega dt = 2: of one wire omega^2 = k (1 / m_head + 1 / m_wire).
 
-    For average acceleration. At the limit of the explicit coupling the motion changes its sign
-    from step to step; a = (-1)^n a_0 then leaves d = v = 0 at the ends of steps, so that neither
-    springs nor dampers act, and only masses resist: a = M^-1 r f, r . d* = dt^2 / 4 r . a. For
-    exchanges it is the limit where springs and dampers within the step do not count, A = M.
+    For average acceleration; m_head is ``head_mass`` [kg], k the ``stiffness`` of the contact
+    [N/m].
+
+    At the limit of the explicit coupling the motion changes its sign from step to step; a = (-1)^n
+    a_0 then leaves d = v = 0 at the ends of steps, so that neither springs nor dampers act, and
+    only masses resist: a = M^-1 r f, r . d* = dt^2 / 4 r . a. For exchanges it is the limit where
+    springs and dampers within the step do not count, A = M.
     """
     return float(2.0 / np.sqrt(stiffness * _largest(line.load.T @ line.load + 1.0 / head_mass)))

@@ -115,7 +115,7 @@ class Limit:
 
     @property
     def agrees(self) -> bool:
-        """Whether marching found what theory says.
+        """Whether marching found the limit of theory.
 
         That is, bracket and the stretch from the limit to where a march can show it overlap:
         exchanges that hardly converge do not end in time, and what hardly grows is not yet large.
@@ -174,9 +174,16 @@ def make_map(
     kept: KeptRows | None = None,
     n_at_once: int = 1,
 ) -> StabilityMap:
-    """Find all limits that are not ``kept`` yet. Not collective; ``comm`` is this process's.
+    """Find all limits that are not known yet. Not collective.
 
-    ``n_at_once`` points of the map are tried at the same time, each in a process of its own.
+    Parameters
+    ----------
+    draft : of the case
+    comm : of this process alone
+    grid : stiffnesses and masses of the map
+    tell : called with a line on each point that is done
+    kept : limits that were found before; without it all are found anew
+    n_at_once : points of the map that are tried at the same time, each in a process of its own
     """
     own, scene = draft.scene(), linear_scene(draft)
     find_all = _FindLimits(scene)
@@ -252,7 +259,11 @@ def _place(rest: LineAtRest, wires: ContactWires) -> float:
 def find(
     bench: Bench, line: theory.PointModel, coupling: str, stiffness: float, head_mass: float
 ) -> Limit:
-    """The limit of a coupling for a head [kg] on a contact [N/m]. Not collective."""
+    """The limit of a ``coupling`` for a head of ``head_mass`` [kg] on a contact of ``stiffness``
+    [N/m]. Not collective.
+
+    ``bench`` marches the line of the map, and ``line`` is its model for theory.
+    """
     numerics = bench.rest.problem.numerics
     newmark = numerics.beta, numerics.gamma
     masses = (head_mass, *bench.data.masses[1:])

@@ -175,9 +175,11 @@ def _refuse_petsc(variant: Variant) -> None:
 def jobs_and_refused(
     draft: Draft, variants: Sequence[Variant], full_report: bool = False
 ) -> tuple[list[Job], list[Ended]]:
-    """The jobs of the variants of a case that can be run, and how the others ended. Not collective.
+    """The jobs of the ``variants`` of a case, ``draft``, that can be run, and how the others ended.
+    Not collective.
 
-    A variant breaks alone if its values do not fit together or are implausible.
+    With ``full_report`` each run gets a report. A variant breaks alone if its values do not fit
+    together or are implausible.
 
     Raises
     ------
@@ -204,7 +206,8 @@ def jobs_and_refused(
 def in_order(
     variants: Sequence[Variant], ended: Sequence[Ended], refused: Sequence[Ended]
 ) -> list[Ended]:
-    """Ended and refused variants in the order of the variants; an interruption comes last."""
+    """Variants that ``ended`` and that were ``refused`` in the order of ``variants``; an
+    interruption comes last."""
     by_name = {one.variant.name: one for one in (*refused, *ended)}
     merged = [by_name[variant.name] for variant in variants if variant.name in by_name]
     return sorted(merged, key=lambda one: one.outcome == "interrupted")
@@ -215,12 +218,11 @@ def make_jobs(
     variants: Sequence[Variant],
     overrides: Sequence[str] = (),
     shortened: bool = False,
-    *,
-    full_report: bool = False,
 ) -> list[Job]:
-    """The variants' checked scenes. Not collective.
+    """The checked scenes of ``variants`` of a ``case``. Not collective.
 
-    A variant's own assignments come after ``overrides`` and win.
+    A variant's own assignments come after ``overrides`` and win. With ``shortened`` the case's
+    ``[test]`` table shortens all.
 
     Raises
     ------
@@ -228,7 +230,7 @@ def make_jobs(
         If a scene is wrong, with the variant's name if there are several.
     """
     draft = read_draft(case, overrides, shortened)
-    jobs, refused = jobs_and_refused(draft, variants, full_report)
+    jobs, refused = jobs_and_refused(draft, variants)
     if refused:
         raise InputError(f"variant {refused[0].variant.name}: {refused[0].outcome}")
     return jobs

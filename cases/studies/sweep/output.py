@@ -129,7 +129,7 @@ def as_text(ended: Sequence[Ended]) -> str:
 
 
 def remarks_of(ended: Sequence[Ended]) -> list[str]:
-    """Lines of remarks on the variants, each once with those that it is of."""
+    """Lines of remarks on variants: each remark once, with the variants that have it."""
     return remark_lines((one.variant.name, one.remarks) for one in ended)
 
 
@@ -142,8 +142,14 @@ def write(
 ) -> list[Path]:
     """Write table, record and picture of a sweep; returns the files. Not collective.
 
-    The picture is left out if fewer than two variants are done, or if ``plotted`` is None;
-    ``histogram`` adds those of the contact forces.
+    Parameters
+    ----------
+    out_dir : folder of the sweep
+    case : name of the case
+    ended : how each variant ended
+    plotted : statistics in the picture, None for no picture; fewer than two variants that are done
+        have none
+    histogram : whether histograms of the contact forces are written too
     """
     table = table_of(ended)
     record = {

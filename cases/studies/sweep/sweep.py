@@ -73,8 +73,16 @@ def sweep_of(
 ) -> Sweep:
     """A sweep of a case into a folder, all scenes checked. Not collective.
 
-    With ``only_statistics`` it is an ensemble: there is no run of a variant on the disk, but for
-    ``histories``, and scenes are checked when it is their turn.
+    Parameters
+    ----------
+    draft : of the case
+    variants : of the sweep
+    out : folder of the sweep
+    full_report : whether each whole run gets a report
+    only_statistics : whether it is an ensemble: there is no run of a variant on the disk, but for
+        ``histories``, and scenes are checked when it is their turn
+    histories : channels that an ensemble keeps over time
+    force : whether a sweep with other variants there is replaced
 
     Raises
     ------
@@ -104,7 +112,8 @@ def whole_runs_of(
     full_report: bool = False,
     force: bool = False,
 ) -> WholeRuns:
-    """A sweep into a folder whose variants leave whole runs. Not collective.
+    """A sweep of ``variants`` of a case, ``draft``, into a folder ``out`` where they leave whole
+    runs, with ``full_report`` a report of each. Not collective.
 
     Raises
     ------

@@ -76,7 +76,9 @@ def parse_vary(text: str) -> VariedKey:
 
 
 def whole_numbers(text: str, option: str, least: int, most: int, example: str) -> list[int]:
-    """Whole numbers ``a,b,...`` within bounds, ascending.
+    """Whole numbers of a ``text`` of the form ``a,b,...``, from ``least`` to ``most``, ascending.
+
+    ``option`` is the name of the command's option, ``example`` a right text, both for the sentence.
 
     Raises
     ------
@@ -154,7 +156,8 @@ def is_number(value: Any) -> bool:
 
 
 def check_key(key: str, where: str) -> None:
-    """Raise InputError if no scene has a dotted key; ``where`` says where it was written."""
+    """Raise InputError if no scene has a dotted key; ``where`` is the place in which it was
+    written, for the sentence."""
     from catenary.cases.scene.scene import Scene
 
     known = known_keys(Scene)
@@ -281,7 +284,8 @@ def read_named(path: Path) -> dict[str, list[str]]:
 
 
 def check_keys(variants: Sequence[Variant], where: str) -> None:
-    """Raise InputError if an assignment of a variant has an unknown key."""
+    """Raise InputError if an assignment of a variant has an unknown key; ``where`` as of
+    ``check_key``."""
     for variant in variants:
         for assignment in variant.assignments:
             check_key(parse_assignment(assignment, f"variant {variant.name}:")[0], where)

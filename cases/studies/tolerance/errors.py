@@ -71,7 +71,8 @@ class Group:
         return {table.key: found}
 
     def random(self, random: np.random.Generator, n_samples: int) -> np.ndarray:
-        """Errors over their tolerance, shape (n_samples, n), all within -1 and 1."""
+        """Errors over their tolerance, shape (``n_samples``, n), all within -1 and 1; ``random``
+        makes them."""
         shares = random.uniform(-1.0, 1.0, (n_samples, len(self.names)))
         if self.table.distribution == "uniform":
             return shares
@@ -82,7 +83,7 @@ class Group:
 
 
 def groups_of(tables: Sequence[ErrorKind], scene: Scene) -> list[Group]:
-    """The errors of a task on a line. Not collective.
+    """The errors of a task, ``tables``, on the line of a scene. Not collective.
 
     Raises
     ------

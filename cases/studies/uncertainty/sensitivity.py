@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import combinations
 from typing import Any
 
@@ -115,8 +115,6 @@ def ranked_inputs(table: RunTable) -> list[str]:
 
 
 def _given_data(table: RunTable) -> tuple[list[dict[str, Any]], list[str]]:
-    from SALib.analyze import rbd_fast
-
     keys = ranked_inputs(table)
     without = [name for name in table.inputs if name not in keys]
     notes: list[str] = []
@@ -139,20 +137,7 @@ def _given_data(table: RunTable) -> tuple[list[dict[str, Any]], list[str]]:
             if np.ptp(y) == 0.0:
                 continue
             x = known[keys].to_numpy(float)
-            # SALib seeds NumPy's global generator: it is put back as it was.
-            before = np.random.get_state()
-            try:
-                found = rbd_fast.analyze(
-                    problem_of(keys),
-                    x,
-                    y,
-                    M=_HARMONICS[len(y) >= _MANY],
-                    num_resamples=_RESAMPLES[len(y) > _MOST],
-                    conf_level=CONFIDENCE,
-                    seed=_SEED,
-                )
-            finally:
-                np.random.set_state(before)
+            found = _rbd_fast(keys, x, y)
             ranks = known[keys].rank().corrwith(known[statistic].rank())
             here = {"statistic": statistic, "pantograph": pantograph}
             for i, key in enumerate(keys):
@@ -161,3 +146,24 @@ def _given_data(table: RunTable) -> tuple[list[dict[str, Any]], list[str]]:
     if few:
         notes.append(f"first-order indices need at least {_FEWEST} runs")
     return rows, notes
+
+
+def _rbd_fast(keys: Sequence[str], x: np.ndarray, y: np.ndarray) -> Mapping[str, Any]:
+    """First-order indices of inputs (n, m), by their keys, of a statistic (n,)."""
+    from SALib.analyze import rbd_fast
+
+    # SALib seeds NumPy's global generator: it is put back as it was.
+    before = np.random.get_state()
+    try:
+        found: Mapping[str, Any] = rbd_fast.analyze(
+            problem_of(keys),
+            x,
+            y,
+            M=_HARMONICS[len(y) >= _MANY],
+            num_resamples=_RESAMPLES[len(y) > _MOST],
+            conf_level=CONFIDENCE,
+            seed=_SEED,
+        )
+    finally:
+        np.random.set_state(before)
+    return found

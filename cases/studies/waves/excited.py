@@ -74,6 +74,8 @@ def excitation_of(kind: str, settings: Settings, problem: Problem, dt: float) ->
     Parameters
     ----------
     kind : one of `excitation.KINDS`
+    settings : of the excitation
+    problem : with the line and its train
     dt : time step, which a blow lasts ten times at least [s]
 
     Raises
@@ -81,6 +83,19 @@ def excitation_of(kind: str, settings: Settings, problem: Problem, dt: float) ->
     InputError
         If something asked for is none of the kind's, or out of range, or if twin wires move as one.
     """
+    _refuse_settings(kind, settings)
+    if move_together(problem):
+        raise InputError(
+            f"--excite {kind} acts on one of two contact wires, which move as one without "
+            "effects.relative_motion: switch that on"
+        )
+    if kind == FORCE:
+        return _moving_force(settings, problem, dt)
+    return _blow(kind, settings, problem, dt)
+
+
+def _refuse_settings(kind: str, settings: Settings) -> None:
+    """Refuse settings that are none of the kind's, or without effect."""
     for name, (option, kinds) in _OPTIONS.items():
         value = getattr(settings, name)
         if value is None:
@@ -91,23 +106,31 @@ def excitation_of(kind: str, settings: Settings, problem: Problem, dt: float) ->
             raise InputError(f"{option} is {value:g}, but must be finite")
         if value == 0.0 and name in ("force", "impulse"):
             raise InputError(f"{option} is 0, which excites nothing; it may be above or below")
-    if move_together(problem):
+
+
+def _force_of(settings: Settings, problem: Problem) -> float:
+    """The force of an excitation, that of the first pantograph if none is set [N]."""
+    static = problem.train.placements[0].static_force
+    return static if settings.force is None else settings.force
+
+
+def _moving_force(settings: Settings, problem: Problem, dt: float) -> MovingForce:
+    """A force that moves with the train."""
+    train = problem.train
+    frequency = settings.frequency or 0.0
+    highest = 0.1 / dt
+    if not 0.0 <= frequency <= highest:
         raise InputError(
-            f"--excite {kind} acts on one of two contact wires, which move as one without "
-            "effects.relative_motion: switch that on"
+            f"--frequency-Hz is {frequency:g}, but must be from 0 to {highest:g}, ten time "
+            "steps a period"
         )
-    ends, train = problem.line.support_positions[[0, -1]], problem.train
-    if kind == FORCE:
-        frequency = settings.frequency or 0.0
-        highest = 0.1 / dt
-        if not 0.0 <= frequency <= highest:
-            raise InputError(
-                f"--frequency-Hz is {frequency:g}, but must be from 0 to {highest:g}, ten time "
-                "steps a period"
-            )
-        force = train.placements[0].static_force if settings.force is None else settings.force
-        _refuse_too_strong("--force-N", force, force)
-        return MovingForce(force, frequency, train.start, train.speed, train.raise_time)
+    force = _force_of(settings, problem)
+    _refuse_too_strong("--force-N", force, force)
+    return MovingForce(force, frequency, train.start, train.speed, train.raise_time)
+
+
+def _blow(kind: str, settings: Settings, problem: Problem, dt: float) -> Blow:
+    """A pulse, or the blow of a hammer."""
     if problem.window.mode == BOUNDED:
         raise InputError(
             f"window.mode is bounded, which lets move what is near a train, but a {kind} has none: "
@@ -118,6 +141,7 @@ def excitation_of(kind: str, settings: Settings, problem: Problem, dt: float) ->
         raise InputError(
             f"--duration-s is {duration:g}, but must be from {10 * dt:g}, ten time steps, to 10"
         )
+    ends = problem.line.support_positions[[0, -1]]
     at = float(ends.mean()) if settings.at is None else settings.at
     if not ends[0] < at < ends[1]:
         raise InputError(
@@ -128,7 +152,7 @@ def excitation_of(kind: str, settings: Settings, problem: Problem, dt: float) ->
         blow = hammer(at, impulse, duration)
         _refuse_too_strong("--impulse-Ns", impulse, blow.peak)
         return blow
-    force = train.placements[0].static_force if settings.force is None else settings.force
+    force = _force_of(settings, problem)
     _refuse_too_strong("--force-N", force, force)
     return Blow(at, duration, force, False)
 

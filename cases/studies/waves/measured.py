@@ -83,8 +83,12 @@ def measured_rows(
     theory: WaveTheory, seen: WavesSeen, spectrum: Transmitted | None
 ) -> list[dict[str, Any]]:
     """Group velocities of the waves of a blow beside those of the periodic line, as rows of
-    ``waves.csv``; none without a blow, periodic line or room for two stations, nor where the start
-    of the line sends waves back to these stations within the record."""
+    ``waves.csv``.
+
+    ``theory`` is that of the line, ``seen`` the motion after the blow, ``spectrum`` the spectra at
+    two stations. There are no rows without a blow, periodic line or room for two stations, nor
+    where the start of the line sends waves back to these stations within the record.
+    """
     waves, columns = theory.bloch, _stations(theory, seen)
     if waves is None or columns is None:
         return []
@@ -138,7 +142,8 @@ class Transmitted(NamedTuple):
 
 
 def transmitted(theory: WaveTheory, seen: WavesSeen) -> Transmitted | None:
-    """Spectra at two stations after a blow; None without a blow, periodic line or room."""
+    """Spectra of the motion ``seen`` at two stations after a blow, with the pass bands of
+    ``theory``; None without a blow, periodic line or room."""
     columns = _stations(theory, seen)
     if columns is None:
         return None
@@ -183,7 +188,7 @@ def _stations(theory: WaveTheory, seen: WavesSeen) -> tuple[int, int] | None:
 
 def branch_of_fastest(waves: BlochWaves, highest: float) -> tuple[np.ndarray, np.ndarray]:
     """Frequencies (n,), ascending [Hz], and group velocities [m/s] of the branch that has the
-    fastest wave up to a frequency [Hz]."""
+    fastest wave up to the frequency ``highest`` [Hz]."""
     speed = np.where(waves.frequency <= highest, np.abs(waves.group_velocity), 0.0)
     branch = int(speed.max(axis=0).argmax())
     order = np.argsort(waves.frequency[:, branch])

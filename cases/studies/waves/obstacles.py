@@ -147,7 +147,7 @@ def _model(bench: Bench, problem: Problem) -> Model:
 
 
 def _change(model: Model, wire: Wire, beyond: Conductor) -> None:
-    """Make a wire another one beyond the middle: its elements gain what that has more."""
+    """Make a wire another one beyond the middle: its elements get the difference of both wires."""
     dofs, length = wire_elements(model, wire.name, ("w", "theta_y"))
     there = model.mesh.x(model.mesh.elements(wire.name)).min(axis=1) > HALF - 1e-6
     dofs, length = dofs[there], length[there]
@@ -312,7 +312,8 @@ def _alone(name: str, bench: Bench, stiffness: float, mass: float) -> Obstacle:
 
 
 def result_of(obstacle: Obstacle, problem: Problem, frequency: np.ndarray = FREQUENCIES) -> Result:
-    """Measure an obstacle and put theory beside it. Serial."""
+    """Measure the shares that an obstacle sends back and onward at each ``frequency`` (n,) [Hz], on
+    the line of a ``problem``, and put theory beside them. Serial."""
     bench = obstacle.bench
     found = measured(bench, problem, frequency)
     omega, wires = found.omega, bench.wires

@@ -25,8 +25,16 @@ _WIDEST, _MOST = 1.2, 1600
 def space_time(
     seen: WavesSeen, theory: WaveTheory, supports: np.ndarray, what: str = "pantographs"
 ) -> Figure:
-    """Velocity of the contact wire in space and time, with supports and wave speeds, and with
-    the course of what moves, pantographs or a force."""
+    """Velocity of the contact wire in space and time, with the course of the pantographs or of a
+    force.
+
+    Parameters
+    ----------
+    seen : motion of the wire
+    theory : with the speeds of waves that are drawn
+    supports : places of supports [m]
+    what : name of what moves, for the legend
+    """
     figure = figures.new_figure(6.4)
     axes = figure.add_subplot()
     _velocity(figure, axes, seen.x, seen.time, seen.velocity)
@@ -54,7 +62,15 @@ def space_time(
 def train_frame(
     seen: WavesSeen, theory: WaveTheory, behind: float, ahead: float, what: str
 ) -> Figure:
-    """Picture of the velocity over time and distance from the first pantograph."""
+    """Velocity of the contact wire over time and distance from the first pantograph.
+
+    Parameters
+    ----------
+    seen : motion of the wire
+    theory : with the wave speed that is drawn
+    behind, ahead : distances that are shown [m]
+    what : name of what distances count from, for the axis
+    """
     figure = figures.new_figure(6.4)
     axes = figure.add_subplot()
     relative, velocity = seen.in_the_train(behind, ahead)
@@ -140,9 +156,9 @@ def transmission(found: Transmitted) -> Figure:
 
 @figures.own_style()
 def energy_parts(energy: EnergySeen, seen: WavesSeen, what: str) -> Figure:
-    """Energy ahead of and behind what moves, over time, and where it is on the mean.
+    """Energy ahead of and behind what moves, over time, and its mean over the distance from there.
 
-    ``what`` names that from which distances count.
+    ``seen`` has the places of what moves; ``what`` is its name, for the axis.
     """
     figure = figures.new_figure(6.4)
     over_time, over_place = figure.subplots(2, 1)

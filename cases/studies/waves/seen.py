@@ -109,7 +109,7 @@ class WireMotion:
         self._rows: list[np.ndarray] = []
 
     def add(self, time: float, uplift: np.ndarray) -> None:
-        """As `NodeMotion.add`."""
+        """Add the uplift of the nodes at a time, as `NodeMotion.add`."""
         self._times.append(time)
         row = np.interp(self.x, self._along, uplift[self._nodes])
         self._rows.append(row.astype(np.float32))
@@ -258,7 +258,7 @@ class EnergyMotion:
         self._rows: list[np.ndarray] = []
 
     def add(self, time: float, uplift: np.ndarray) -> None:
-        """As `NodeMotion.add`."""
+        """Add the uplift of the nodes at a time, as `NodeMotion.add`."""
         now = uplift[self._nodes]
         if self._before is not None:
             then, earlier = self._before

@@ -103,14 +103,17 @@ def study_waves(folder: Path) -> Studied:
 def study_excited(
     scene: Scene, kind: str, settings: Settings, folder: Path, force: bool
 ) -> Studied:
-    """Run a line without its train under an excitation, and write what is seen of its waves.
+    """Run a line without its train under an excitation, and write the waves that are seen. Serial.
 
-    The folder then has the files of a run. Serial.
+    The folder then has the files of a run.
 
     Parameters
     ----------
+    scene : checked scene of the line
     kind : of the excitation, see `excitation.KINDS`
+    settings : of the excitation
     folder : new, or empty, unless ``force`` is given
+    force : whether earlier results there are replaced
 
     Raises
     ------
@@ -189,7 +192,7 @@ def _write(
     what: str,
     remarks: list[str],
 ) -> Studied:
-    """Pictures and tables of what is seen and what theory says."""
+    """Pictures of the waves that are seen, and tables with theory beside them."""
     moving, origin = ("pantographs", "first pantograph") if what == "train" else (what, what)
     reflections, spectra = reflections_of(rest), transmitted(theory, seen)
     measured = [
@@ -217,7 +220,8 @@ def _write(
 
 
 def energy_rows(energy: EnergySeen, seen: WavesSeen) -> list[Row]:
-    """Energy over time: behind, between and ahead of what moves, or of the place of a blow [J]."""
+    """Energy over time [J]: behind, between and ahead of what moves, or of the place of a blow,
+    which ``seen`` has."""
     behind, between, ahead = energy.parts(places_of(seen, energy.time))
     columns = energy.time, behind, between, ahead, behind + between + ahead
     names = ("time_s", "behind_J", "between_J", "ahead_J", "total_J")
@@ -254,7 +258,8 @@ def band_rows(theory: WaveTheory) -> list[Row]:
 
 
 def as_text(theory: WaveTheory, measured: list[Row], remarks: Sequence[str] = ()) -> str:
-    """Figures for a terminal, and remarks on the run that shows the waves."""
+    """Figures of theory and ``measured`` ones for a terminal, and ``remarks`` on the run that shows
+    the waves."""
     rows = [*as_rows(theory), *measured]
     lines = [f"{row['meaning']}: {row['value']:.4g} {row['unit']}" for row in rows]
     for what, bands in (("Pass bands", theory.bands()), ("Outrun the train", theory.outrunning())):

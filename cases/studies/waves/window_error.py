@@ -77,7 +77,7 @@ class Curve(NamedTuple):
 
 
 def curve_of(name: str, scene: Scene, sizes: Sequence[int]) -> Curve:
-    """March a scene whole and with windows of these ascending sizes. Serial.
+    """March a scene whole and with windows of several sizes, which ascend. Serial.
 
     The window that the program chooses is one of them if the line is longer.
 

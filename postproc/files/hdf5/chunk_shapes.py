@@ -44,7 +44,8 @@ def step_chunk(rows_per_flush: int, n_rows: int, n_columns: int) -> Chunk:
 
 
 def line_chunk(rows_per_flush: int, n_rows: int, n_columns: int) -> Chunk:
-    """Chunk of a table with a column for each of ``n_columns`` places on the line."""
+    """Chunk of a table of ``n_rows`` rows, written ``rows_per_flush`` at a time, with a column for
+    each of ``n_columns`` places on the line."""
     n_blocks = max(1, math.ceil(n_columns / BLOCK))
     rows = _rows(rows_per_flush, n_rows, _ROWS_OF_MANY)
     return Chunk(rows, max(1, math.ceil(n_columns / n_blocks)))
@@ -87,7 +88,19 @@ def room_of(
     rows: int,
     record: LineRecord,
 ) -> int:
-    """Most bytes that an append of ``rows`` steps adds to a file, in whole chunks [B]."""
+    """Most bytes that an append adds to a file, in whole chunks [B].
+
+    Parameters
+    ----------
+    table : mapping of str to tuple
+        Channel and number of columns by path in the file.
+    chunks : mapping of str to Chunk
+        Shapes of chunks by path.
+    rows : int
+        Number of steps that are appended.
+    record : LineRecord
+        Recorded part of the line.
+    """
     total = 0
     for path, (channel, columns) in table.items():
         shape = chunks[path]

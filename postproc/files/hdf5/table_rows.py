@@ -81,8 +81,8 @@ class DamagedClock(Exception):
 
 
 def rows_before(clock: h5py.Dataset, n: int, time: float) -> int:
-    """Number of the first ``n`` ascending times of a table before ``time``; `DamagedClock` if
-    they cannot be read."""
+    """Number of the first ``n`` times of a ``clock``, a table of ascending times, before ``time``
+    [s]; `DamagedClock` if they cannot be read."""
     try:
         return int(np.searchsorted(clock[:n], time))
     except OSError as error:
@@ -144,7 +144,7 @@ def row_blocks(n_rows: int, n_columns: int, step: int = 1) -> Iterator[slice]:
 
 
 def column(dataset: h5py.Dataset, part: slice, index: int) -> np.ndarray:
-    """One column of some rows of a table, (rows,).
+    """Column number ``index`` of the rows ``part`` of a table, (rows,).
 
     In slices: of all chunks that it reads at once HDF5 makes tables, and keeps their memory.
     """

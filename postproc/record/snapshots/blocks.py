@@ -59,7 +59,8 @@ class RecordedLine:
     def of(
         cls, line: Line, mesh: LineMesh, slope: np.ndarray, lateral: LateralShape | None = None
     ) -> RecordedLine:
-        """The parts of a line with its mesh."""
+        """The parts of a line with its mesh, the ``slope`` of its nodes at rest, and its shape
+        across the track, ``lateral``, if it has one."""
         return cls(
             mesh.wires,
             mesh.droppers,
@@ -107,7 +108,8 @@ class Block:
         return bool((self.nodes != FIXED).any())
 
     def range_over(self, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """First point and number of points of a cell at least, between places [m]; shapes as those.
+        """First point and number of points of a cell at least, from ``low`` to ``high`` along the
+        track [m]; shapes as of these.
 
         Where nothing stands between them it is the nearest cell.
         """

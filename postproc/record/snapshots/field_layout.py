@@ -160,10 +160,6 @@ class Slots(BlockTables):
         """Number of the first value of a snapshot."""
         return kind.values_of(int(self.start[snapshot]))
 
-    def shown(self, snapshot: int) -> slice:
-        """Points that a snapshot shows."""
-        return slice(int(self.first[snapshot]), int(self.first[snapshot] + self.count[snapshot]))
-
     def bytes(self) -> int:
         """Size of its tables [B]."""
         of_fields = sum(kind.item_bytes * self.rows(kind) for kind in self.kinds)
@@ -172,7 +168,8 @@ class Slots(BlockTables):
 
 
 def layout_of(record: FieldRecord, blocks: list[Block], times: np.ndarray) -> list[Slots]:
-    """Places of all blocks that are recorded at snapshots of ``times`` [s]. Not collective."""
+    """Places of all blocks that the ``record`` chooses, at snapshots of ``times`` [s]. Not
+    collective."""
     return [_slots(record, block, times) for block in record.chosen(blocks)]
 
 

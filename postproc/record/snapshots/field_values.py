@@ -56,7 +56,8 @@ class FieldValues:
         self._lateral, self._curve = line.lateral, line.curve
 
     def of(self, kind: FieldKind, slots: Slots, first: int, known: Gathered) -> np.ndarray:
-        """Values of a field in a block at snapshots from number ``first`` on, one after another.
+        """Values of the field ``kind`` in the block of ``slots`` at the snapshots that are
+        ``known``, from number ``first`` on, one after another.
 
         Returns
         -------

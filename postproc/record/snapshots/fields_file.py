@@ -291,7 +291,7 @@ class FieldsFile:
 def _create(
     group: h5py.Group, name: str, shape: tuple[int, ...], number: str, how: h5p.PropDCID
 ) -> h5py.Dataset:
-    """A table as ``how`` says."""
+    """Make a table with the settings ``how``."""
     kind = h5t.py_create(np.dtype(number))
     return h5py.Dataset(h5d.create(group.id, name.encode(), kind, h5s.create_simple(shape), how))
 

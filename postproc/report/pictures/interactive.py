@@ -133,6 +133,12 @@ def _axes(axes: Axes, own: str, panels: Sequence[Axes]) -> dict[str, Any]:
 
 def _traces(axes: Axes) -> Iterator[dict[str, Any]]:
     """Curves, points, bars and ranges of a panel."""
+    yield from _bars(axes)
+    yield from _curves(axes)
+    yield from _ranges(axes)
+
+
+def _bars(axes: Axes) -> Iterator[dict[str, Any]]:
     for bars in axes.containers:
         if isinstance(bars, BarContainer):
             yield {
@@ -143,6 +149,10 @@ def _traces(axes: Axes) -> Iterator[dict[str, Any]]:
                 "marker": {"color": to_hex(bars[0].get_facecolor())},
                 **_named(bars.get_label()),
             }
+
+
+def _curves(axes: Axes) -> Iterator[dict[str, Any]]:
+    """Lines and points whose places are data."""
     for line in axes.lines:
         if line.get_transform() != axes.transData:
             continue
@@ -168,6 +178,9 @@ def _traces(axes: Axes) -> Iterator[dict[str, Any]]:
                        "symbol": f"{symbol}-open" if is_open else symbol},
             **_named(line.get_label()),
         }  # fmt: skip
+
+
+def _ranges(axes: Axes) -> Iterator[dict[str, Any]]:
     for ranges in axes.collections:
         if isinstance(ranges, LineCollection) and ranges.get_transform() == axes.transData:
             gap = np.full((1, 2), np.nan)

@@ -169,10 +169,15 @@ def static_line(results: Results) -> Figure:
 
     Of several contact wires each has a curve.
     """
-    at, lift = results.static("elasticity_x"), results.static("elasticity")
-    masts, span = results.line("support_x"), results.span_at_rest
     figure, (profile, compliance) = stacked(4.6, 2)
+    _draw_profile(profile, results)
+    _draw_elasticity(compliance, results)
+    return figure
 
+
+def _draw_profile(axes: Axes, results: Results) -> None:
+    """Contact wires at rest around the span whose elasticity is known."""
+    masts, span = results.line("support_x"), results.span_at_rest
     start, end = masts[max(span - 1, 0)], masts[min(span + 2, masts.size - 1)]
     profiles = results.contact_profiles()
     level = min(float(np.interp(masts[span], wire.x, wire.height)) for wire in profiles.values())
@@ -181,7 +186,7 @@ def static_line(results: Results) -> Figure:
         shown = (x >= start) & (x <= end)
         if np.count_nonzero(shown) < 2:
             continue
-        profile.plot(
+        axes.plot(
             x[shown],
             1e3 * (height[shown] - level),
             color=colour(number),
@@ -189,22 +194,26 @@ def static_line(results: Results) -> Figure:
             linestyle="--" if number else "-",
             label=f"{name.replace('_', ' ')} at rest",
         )
-    mark_static(profile, results, float(start), float(end))
+    mark_static(axes, results, float(start), float(end))
     tidy(
-        profile,
+        axes,
         "position along the track [m]",
         f"height above {level:.3f} m [mm]",
         "Profile at rest",
     )
-    legend_above(profile)
+    legend_above(axes)
 
+
+def _draw_elasticity(axes: Axes, results: Results) -> None:
+    """Lift of all contact wires under a unit force, and of each where there are several."""
+    at, lift = results.static("elasticity_x"), results.static("elasticity")
     own = results.static("elasticity_of_wires")
     there = np.flatnonzero(np.isfinite(own).any(axis=0)).tolist()
     if len(there) > 1:
-        names = list(profiles)
+        names = list(results.contact_profiles())
         for number in there:
             known = np.isfinite(own[:, number])
-            compliance.plot(
+            axes.plot(
                 at[known],
                 1e3 * own[known, number],
                 color=colour(number),
@@ -212,18 +221,17 @@ def static_line(results: Results) -> Figure:
                 label=f"{names[number].replace('_', ' ')} alone",
             )
     look = (GREY, "all contact wires") if len(there) > 1 else (COLOURS[0], "elasticity")
-    compliance.plot(at, 1e3 * lift, color=look[0], linewidth=1.5, label=look[1])
+    axes.plot(at, 1e3 * lift, color=look[0], linewidth=1.5, label=look[1])
     if at.size:
-        mark_static(compliance, results, float(at.min()), float(at.max()))
-    compliance.set_ylim(bottom=0.0)
+        mark_static(axes, results, float(at.min()), float(at.max()))
+    axes.set_ylim(bottom=0.0)
     tidy(
-        compliance,
+        axes,
         "position along the track [m]",
         "lift under unit force [mm/N]",
-        f"Elasticity along span {span + 1}",
+        f"Elasticity along span {results.span_at_rest + 1}",
     )
-    legend_above(compliance)
-    return figure
+    legend_above(axes)
 
 
 @own_style()

@@ -123,13 +123,15 @@ def _ticks(axes: Axes, dropper: np.ndarray, height: float, width: float, label: 
 
 
 def still_marks(axes: Axes, x: np.ndarray, low: np.ndarray, high: np.ndarray) -> None:
-    """Dashes where ranges are too small for a line that would be seen."""
+    """Dashes at places ``x`` (n,) where ranges from ``low`` to ``high`` (n,) are too small for a
+    line that would be seen."""
     still = high - low < 0.01 * (np.nanmax(high, initial=0.0) - np.nanmin(low, initial=0.0))
     axes.plot(x[still], high[still], "_", color=COLOURS[0], ms=3.0)
 
 
 def mark_static(axes: Axes, results: Results, start: float, end: float) -> None:
-    """Supports and droppers of a stretch of the line at rest, with a margin at both ends."""
+    """Supports and droppers of the line at rest from ``start`` to ``end`` [m], with a margin at
+    both ends."""
     support = results.line("support_x")
     there = (support >= start - 1e-6) & (support <= end + 1e-6)
     _supports(axes, support[there], 1.2, "support")

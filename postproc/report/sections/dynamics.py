@@ -71,7 +71,8 @@ def passing_lengths(results: Results) -> dict[str, float]:
 def contact_height(
     results: Results, pantograph: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
-    """Places (n,) [m], height of the contact wire there [m] and its gradient [-], 20 Hz low-pass.
+    """Places (n,) of a ``pantograph``, by its number [m], height of the contact wire there [m] and
+    its gradient [-], 20 Hz low-pass.
 
     None where the record does not cover the evaluation stretch or is too coarse for the filter.
     """

@@ -61,7 +61,7 @@ def _checks(run: EvaluatedRun) -> Iterator[Text | StudyTable]:
 
 
 def effects(run: EvaluatedRun, costs: tuple[Mapping[str, str], str] = ({}, "")) -> Section:
-    """Each effect that was simulated, and those that were not, with the reasons.
+    """Effects that were simulated, and effects that were not, with the reasons.
 
     Parameters
     ----------
@@ -129,7 +129,7 @@ def section(run: EvaluatedRun) -> Section:
 
 
 def _of_mesh(found: Indicators) -> list[tuple[str, str]]:
-    """The shortest waves of the mesh beside those that matter."""
+    """The shortest waves of the mesh beside the shortest waves that matter."""
     if np.isnan(found.resolved_frequency):
         return []
     required = (

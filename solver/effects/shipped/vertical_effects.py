@@ -12,7 +12,7 @@ from catenary.solver.effects.effect import Effect, Limit, register
 from catenary.solver.model.link_directions import between_nodes
 from catenary.solver.model.links import law
 from catenary.solver.problem.contact_laws import KinematicLaw
-from catenary.solver.problem.defects import DropperBreak, LineIncident, TensionLoss
+from catenary.solver.problem.incidents import DropperBreak, LineIncident, TensionLoss
 from catenary.solver.problem.problem import Problem, slowest_wave_speed
 from catenary.solver.problem.simulated import Simulated, TargetHeight
 

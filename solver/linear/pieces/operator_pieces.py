@@ -204,10 +204,6 @@ class OperatorPieces:
         self._products.append((table, product, of, damping))
         return product
 
-    def rows_of(self, piece: Piece) -> StationRows:
-        """Rows of A on the stretch that a piece is worked out on."""
-        return Stretch(self._model, piece).operator(self._coefficients)
-
     def _make(self, piece: Piece) -> None:
         rows = Stretch(self._model, piece)
         self.like = rows.like

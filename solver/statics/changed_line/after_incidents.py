@@ -55,7 +55,7 @@ from catenary.solver.model.partition import Ownership
 from catenary.solver.model.rest_shape import Equilibrium
 from catenary.solver.model.switching_links import switching_links
 from catenary.solver.model.wire_ends import tensioned_ends
-from catenary.solver.problem.defects import DropperBreak, LineIncident
+from catenary.solver.problem.incidents import DropperBreak, LineIncident
 from catenary.solver.statics.changed_line.potential import Potential
 from catenary.solver.statics.changed_line.rest_nearby import RestNearby
 from catenary.solver.statics.rest_loads import dead_loads

@@ -127,11 +127,6 @@ class Channel:
     own_picture: bool = False
 
     @property
-    def label(self) -> str:
-        """Name and unit for a table head, for instance ``contact_force [N]``."""
-        return f"{self.name} [{self.unit}]"
-
-    @property
     def of_line(self) -> bool:
         """Whether it has a column for each place on the line, which may be recorded in part."""
         return self.per in (ARM, DROPPER, WIRE_END)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -149,15 +148,6 @@ class StepView:
             raise AttributeError(f"a step shows no {name}")
         part: np.ndarray = self.row[columns[name]]
         return part
-
-
-def row_of(values: Mapping[str, np.ndarray]) -> tuple[np.ndarray, dict[str, slice]]:
-    """A row of these values by channel, and where in it each channel is."""
-    ends = np.cumsum([0, *(array.size for array in values.values())]).tolist()
-    columns = {
-        name: slice(*part) for name, part in zip(values, itertools.pairwise(ends), strict=True)
-    }
-    return np.concatenate([np.zeros(0), *values.values()]), columns
 
 
 class NodeMotion(Protocol):

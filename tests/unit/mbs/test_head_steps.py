@@ -8,6 +8,7 @@ from scipy import linalg
 from scipy.interpolate import CubicSpline
 
 from catenary.base.errors import RunBroken
+from catenary.mbs.head.stepping import Stepping
 from catenary.mbs.head.strips import Strips, Suspension, Turning, head_parts
 from catenary.mbs.head.wire_crossing import LateralPath
 from catenary.mbs.lumped import LumpedPantograph
@@ -47,7 +48,7 @@ def newmark(
 
 def test_lumped_masses_step_as_newmark_s_formulas_say() -> None:
     static, nominal = 120.0, 5.4
-    pantograph = LumpedPantograph(THREE, static, nominal, 0.0, DT, BETA, GAMMA)
+    pantograph = LumpedPantograph(THREE, static, nominal, Stepping(0.0, DT, BETA, GAMMA))
     pantograph.place(5.3)
     state = pantograph.state()
     base = nominal + static / 7000.0 + static / 15500.0
@@ -68,7 +69,7 @@ def test_lumped_masses_step_as_newmark_s_formulas_say() -> None:
 
 def test_a_raising_mechanism_steps_as_its_equation_says() -> None:
     """Tables at the predicted height, by SciPy's splines."""
-    pantograph = RaisingPantograph(RAISING, 0.0, DT, BETA, GAMMA)
+    pantograph = RaisingPantograph(RAISING, Stepping(0.0, DT, BETA, GAMMA))
     pantograph.place(5.0, velocity=0.2)
     state = pantograph.state()
     mass, lift, slowing = (
@@ -98,7 +99,7 @@ def test_a_raising_mechanism_steps_as_its_equation_says() -> None:
 
 
 def test_a_mechanism_beyond_its_reach_says_where_and_when() -> None:
-    pantograph = RaisingPantograph(RAISING, 0.0, DT)
+    pantograph = RaisingPantograph(RAISING, Stepping(0.0, DT))
     pantograph.place(5.3)
     with pytest.raises(RunBroken) as broken:
         for number in range(1000):
@@ -115,7 +116,7 @@ def test_prediction_and_compliance_are_what_a_step_does_for_any_forces() -> None
     data = RaisingData(FRAME, 7.8, 6000.0, 26.0, 76.0, 0.08, 3.6, strips)
     ends, heads = [], []
     for forces in ([0.0, 0.0], [40.0, 0.0], [0.0, 40.0]):
-        pantograph = RaisingPantograph(data, 0.0, DT, BETA, GAMMA)
+        pantograph = RaisingPantograph(data, Stepping(0.0, DT, BETA, GAMMA))
         pantograph.place(5.0)
         for number in range(5):
             head = pantograph.predict((number + 1) * DT)
@@ -133,7 +134,7 @@ def test_prediction_and_compliance_are_what_a_step_does_for_any_forces() -> None
 
 
 def test_placed_with_a_velocity_all_masses_have_it_and_dampers_between_them_are_idle() -> None:
-    pantograph = LumpedPantograph(THREE, 120.0, 5.5, 0.0, DT)
+    pantograph = LumpedPantograph(THREE, 120.0, 5.5, Stepping(0.0, DT))
     pantograph.place(5.5, velocity=0.3)
     assert np.array_equal(pantograph.velocity, [0.3, 0.3, 0.3])
     base = 5.5 + 120.0 / 7000.0 + 120.0 / 15500.0
@@ -162,8 +163,8 @@ def test_strips_heavier_than_their_head_are_refused() -> None:
 def test_where_the_wire_crosses_a_head_that_cannot_roll_makes_no_difference() -> None:
     path = LateralPath(np.array([0.0, 100.0]), (0.2, -0.2), 0.0, (0.0,), 50.0)
     pantographs = (
-        LumpedPantograph(THREE, 120.0, 5.5, 0.0, DT, lateral=path),
-        LumpedPantograph(THREE, 120.0, 5.5, 0.0, DT),
+        LumpedPantograph(THREE, 120.0, 5.5, Stepping(0.0, DT, lateral=path)),
+        LumpedPantograph(THREE, 120.0, 5.5, Stepping(0.0, DT)),
     )
     for pantograph in pantographs:
         pantograph.place(5.5)

@@ -7,6 +7,7 @@ import pytest
 
 from catenary.mbs.build import Operation, make_pantograph
 from catenary.mbs.head.newmark_head import Raising, parts_of, raised
+from catenary.mbs.head.stepping import Stepping
 from catenary.mbs.lowering import LoweredPantograph, Lowering
 from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.vehicle.base_motion import BaseMotion, Harmonic, VehicleMotion
@@ -43,7 +44,7 @@ def test_the_parts_of_many_steps_are_those_of_each() -> None:
 def lowered(base: BaseMotion | None, time: float = 0.1) -> LoweredPantograph:
     lowering = Lowering(time, -60.0, 0.05, 0.1)
     made = make_pantograph(
-        DATA, Operation(STATIC, 5.0, 0.0, DT, 0.25, 0.5, base=base, lowering=lowering)
+        DATA, Operation(STATIC, 5.0, Stepping(0.0, DT, base=base), lowering=lowering)
     )
     assert isinstance(made, LoweredPantograph)
     made.place(5.0)
@@ -65,7 +66,6 @@ def test_what_is_caught_stays_whatever_presses_on_it() -> None:
     height = fall(pantograph, range(1, 1001))
     caught = height[99] - 0.1
     assert height[-1] == pytest.approx(caught, abs=1e-14)
-    assert pantograph.energy() == 0.0
     head = pantograph.predict(1.001)
     assert not head.velocity.any() and not head.height_compliance.any()
     assert fall(pantograph, range(1001, 1011), force=500.0) == pytest.approx(caught, abs=1e-14)

@@ -7,11 +7,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from body_mechanics import static_force
 from measuring import check
 
 from catenary.base.errors import InputError, RunBroken
 from catenary.mbs.air import Airflow
 from catenary.mbs.build import Operation, make_pantograph, raising_data
+from catenary.mbs.head.stepping import Stepping
 from catenary.mbs.mechanism.pantograph_data import MultibodyData, describe, reduced, stand
 from catenary.mbs.mechanism.reduced_pantograph import RaisingPantograph
 from catenary.mbs.mechanism.reduction import Places, reduce_mechanism
@@ -97,9 +99,9 @@ def test_vehicle_stands_where_the_head_meets_the_wire_at_the_working_height() ->
     # Pressed by F the head is F / k lower above the mast, which is 1 m above the base.
     arm = 1.0 + FREE - (HEAD * G + FORCE) / STIFFNESS
     check("base [m]", data.base_height, height - arm, within=1e-9)
-    running = make_pantograph(DATA, Operation(FORCE, height, 0.0, 1e-3, 0.25, 0.5))
+    running = make_pantograph(DATA, Operation(FORCE, height, Stepping(0.0, 1e-3)))
     assert isinstance(running, RaisingPantograph)
-    check("static force there [N]", running.static_force(height), FORCE, within=1e-6)
+    check("static force there [N]", static_force(running, height), FORCE, within=1e-6)
 
 
 def test_wind_adds_to_the_force_under_way_and_not_to_the_static_one() -> None:
@@ -110,13 +112,13 @@ def test_wind_adds_to_the_force_under_way_and_not_to_the_static_one() -> None:
     )
     data = replace(DATA, wind=wind)
     assert stand(data).actuator_force == pytest.approx(stand(DATA).actuator_force, rel=1e-12)
-    operation = Operation(FORCE, 5.0, 0.0, 1e-3, 0.25, 0.5)
+    operation = Operation(FORCE, 5.0, Stepping(0.0, 1e-3))
     running = make_pantograph(data, operation)
     assert isinstance(running, RaisingPantograph)
-    check("without the effect [N]", running.static_force(5.0), FORCE, within=1e-6)
+    check("without the effect [N]", static_force(running, 5.0), FORCE, within=1e-6)
     running = make_pantograph(data, operation._replace(air=Airflow(70.0)))
     assert isinstance(running, RaisingPantograph)
-    check("under way [N]", running.static_force(5.0), FORCE + 20.0, within=1e-6)
+    check("under way [N]", static_force(running, 5.0), FORCE + 20.0, within=1e-6)
 
 
 def test_without_calibration_the_force_follows_from_the_actuator() -> None:
@@ -180,7 +182,7 @@ def test_places_that_an_actuator_moves_are_found_anew() -> None:
 
 
 def test_leaving_the_tables_ends_the_run_with_heights_and_name() -> None:
-    running = make_pantograph(DATA, Operation(FORCE, 5.0, 0.0, 1e-3, 0.25, 0.5))
+    running = make_pantograph(DATA, Operation(FORCE, 5.0, Stepping(0.0, 1e-3)))
     running.place(5.0)
     with pytest.raises(RunBroken, match="'telescope' is at 1.6.* between 0.4 m and 1.6 m only"):
         for number in range(2000):  # free of the wire it rises with 120 N on 22 kg

@@ -15,6 +15,7 @@ from catenary.mbs.head.head_arrays import (
     drive_width,
     named,
 )
+from catenary.mbs.head.stepping import Stepping
 from catenary.mbs.lumped import LumpedPantograph
 from catenary.mbs.lumped_data import LumpedData
 from catenary.solver.kernels import native
@@ -67,7 +68,7 @@ def test_arrays_that_do_not_fit_are_refused() -> None:
 
 
 def test_a_pantograph_may_outlive_what_it_was_made_by() -> None:
-    one = LumpedPantograph(LumpedData((10.0,), (50.0,), (1.0,)), 100.0, 5.0, 0.0, DT)
+    one = LumpedPantograph(LumpedData((10.0,), (50.0,), (1.0,)), 100.0, 5.0, Stepping(0.0, DT))
     one.place(5.0)
     head, position = one.stepped, one.position
     row = one.row.copy()

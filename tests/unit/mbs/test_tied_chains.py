@@ -7,6 +7,7 @@ import pytest
 
 from catenary.cases.run.describe.pantographs import description_of
 from catenary.mbs.head.head_arrays import drive_width
+from catenary.mbs.head.stepping import Stepping
 from catenary.mbs.library import READY
 from catenary.mbs.lowering import Lowering
 from catenary.mbs.lumped import LumpedPantograph
@@ -27,7 +28,7 @@ def held(part: float) -> float:
 
 
 def pantograph(raise_time: float = RAISE) -> LumpedPantograph:
-    made = LumpedPantograph(TIED, FORCE, NOMINAL, raise_time, DT)
+    made = LumpedPantograph(TIED, FORCE, NOMINAL, Stepping(raise_time, DT))
     made.place(PLACED)
     return made
 

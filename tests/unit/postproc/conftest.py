@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -26,7 +28,7 @@ from catenary.solver.problem.problem import Damping, Numerics, Placement, Proble
 from catenary.solver.statics.elasticity import Elasticity
 from catenary.solver.statics.form_finding.equilibrium import Equilibrium
 from catenary.solver.time_loop.views import channels
-from catenary.solver.time_loop.views.observers import Observer, Stage, StepView, row_of
+from catenary.solver.time_loop.views.observers import Observer, Stage, StepView
 
 N_SPANS, SPAN = 16, 50.0
 DROPPERS = tuple(5.0 + 5.0 * k for k in range(9))
@@ -144,6 +146,15 @@ def make_header(problem: Problem, mesh: LineMesh, **attributes: Any) -> Header:
         **static_datasets(line, mesh, equilibrium, elasticity, equilibrium.dropper_length),
     }
     return Header({**known, **attributes}, datasets, facts_of(problem, mesh, length))
+
+
+def row_of(values: Mapping[str, np.ndarray]) -> tuple[np.ndarray, dict[str, slice]]:
+    """A row of these values by channel, and where in it each channel is."""
+    ends = np.cumsum([0, *(array.size for array in values.values())]).tolist()
+    columns = {
+        name: slice(*part) for name, part in zip(values, itertools.pairwise(ends), strict=True)
+    }
+    return np.concatenate([np.zeros(0), *values.values()]), columns
 
 
 @dataclass

@@ -25,7 +25,7 @@ from catenary.postproc.report.study_table import texts_table
 
 def speed_section(run: EvaluatedRun) -> Section:
     """The course of the train: a sentence, a table, a picture, and what is folded."""
-    time = run.results.times(slice(None))
+    time = run.results.time
     position = run.results.column("contact_position", 0)
 
     def draw() -> Figure:

@@ -23,6 +23,7 @@ from counted_effects import (
 from small_lines import BARE, EN_PANTOGRAPH, mesh_of, train
 
 from catenary.mbs.build import Operation, make_pantograph
+from catenary.mbs.head.stepping import Stepping
 from catenary.mbs.head.strips import Turning
 from catenary.mbs.head.wire_crossing import LateralPath
 from catenary.meshgen.mesh import LineMesh
@@ -31,7 +32,7 @@ from catenary.solver.effects.build_model import build
 from catenary.solver.effects.effect import Limit
 from catenary.solver.model.model import Model
 from catenary.solver.problem.contact_laws import LinearLaw
-from catenary.solver.problem.defects import TensionLoss
+from catenary.solver.problem.incidents import TensionLoss
 from catenary.solver.problem.irregularities import Irregularities
 from catenary.solver.problem.problem import Damping
 
@@ -231,7 +232,6 @@ def test_a_scene_without_an_effect_has_no_trace_of_it(name: str, mesh: LineMesh)
     blocks, _ = BLOCKS[name]
     n = counts(mesh)
     assert name not in model.terms_of
-    assert name not in model.active
     assert {k: v for k, v in everything.terms_of.items() if k != name} == model.terms_of
     missing = contents(everything) - contents(model)
     assert missing == {(part, n[size], *has): many for (part, size, *has), many in blocks.items()}
@@ -320,7 +320,7 @@ def test_point_masses_are_those_of_the_parts(mesh: LineMesh) -> None:
 def test_a_head_has_a_roll_only_if_asked() -> None:
     """As `Pantographs` asks: with where the wire crosses the strips, or without."""
     data = replace(EN_PANTOGRAPH, roll=Turning(2.0, 470.0, 1.0))
-    operation = Operation(120.0, 5.5, 0.5, 1e-3, 0.25, 0.5)
     path = LateralPath(np.array([0.0, 100.0]), (0.2, 0.2), 0.0, (0.0,), 70.0)
-    assert make_pantograph(data, operation).state().size == 6
-    assert make_pantograph(data, operation._replace(lateral=path)).state().size == 9
+    for lateral, size in ((None, 6), (path, 9)):
+        operation = Operation(120.0, 5.5, Stepping(0.5, 1e-3, lateral=lateral))
+        assert make_pantograph(data, operation).state().size == size

@@ -12,7 +12,7 @@ from small_lines import WHOLE, ac_simple_line, mesh_of, numerics, problem_of, tr
 
 from catenary.meshgen.mesh import MESSENGER_WIRE
 from catenary.solver.contact_problem import complementarity
-from catenary.solver.problem.defects import TensionLoss
+from catenary.solver.problem.incidents import TensionLoss
 from catenary.solver.problem.problem import BOUNDED, EXACT, Problem, WindowChoice
 from catenary.solver.time_loop import compiled_steps
 from catenary.solver.time_loop import march as time_loop

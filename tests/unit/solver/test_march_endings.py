@@ -62,7 +62,6 @@ def test_a_march_runs_to_the_end_of_its_stretch(mesh: LineMesh) -> None:
     assert outcome.outcome == "done"
     # 2.1 m at 70 m/s are 30 ms.
     assert run.n_steps == outcome.n_steps == 30
-    assert outcome.simulated == pytest.approx(0.030)
     assert history.time == pytest.approx(1e-3 * np.arange(31), abs=1e-15)
     assert history.stage.n_steps == 30 and history.stage.dt == 1e-3
     assert history["contact_position"][:, 0] == pytest.approx(70.0 + 0.07 * np.arange(31))

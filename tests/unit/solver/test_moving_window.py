@@ -17,8 +17,8 @@ from catenary.cases.scene.problem import problem_of as scene_problem
 from catenary.meshgen.mesh import LineMesh
 from catenary.solver.kernels import native
 from catenary.solver.linear import station_factors
-from catenary.solver.problem.defects import DropperBreak
 from catenary.solver.problem.ends import Fixed, Periodic
+from catenary.solver.problem.incidents import DropperBreak
 from catenary.solver.problem.problem import BOUNDED, EXACT, Damping, Problem, WindowChoice
 from catenary.solver.time_loop import compiled_steps
 from catenary.solver.time_loop import march as time_loop
