@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from catenary.base.errors import CatenaryError, Fault, InputError, RunBroken
     from catenary.estimates import Uncertainty, uncertainty
     from catenary.identifications import Identified, identify
-    from catenary.line_tables import AtRest, Plan, check, plan, static
+    from catenary.line_tables import AtRest, Checked, Plan, check, plan, static
     from catenary.optimising import Optimum, optimise, tolerance
     from catenary.pictures import Pictures
     from catenary.questions import highest_speeds, separations
@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 __all__ = [
     "AtRest",
     "CatenaryError",
+    "Checked",
     "Fault",
     "Identified",
     "InputError",
@@ -64,7 +65,7 @@ __all__ = [
 _FILES = {
     "estimates": ("Uncertainty", "uncertainty"),
     "identifications": ("Identified", "identify"),
-    "line_tables": ("AtRest", "Plan", "check", "plan", "static"),
+    "line_tables": ("AtRest", "Checked", "Plan", "check", "plan", "static"),
     "optimising": ("Optimum", "optimise", "tolerance"),
     "pictures": ("Pictures",),
     "questions": ("highest_speeds", "separations"),
