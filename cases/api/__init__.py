@@ -25,10 +25,11 @@ if TYPE_CHECKING:
     from catenary.pictures import Pictures
     from catenary.questions import highest_speeds, separations
     from catenary.results import Run, open
-    from catenary.runs import run, sweep
+    from catenary.runs import restart, run
     from catenary.scenes import Scene, load
     from catenary.sensitivities import sensitivity
     from catenary.steps import Simulation
+    from catenary.sweeps import sweep
 
 __all__ = [
     "AtRest",
@@ -53,6 +54,7 @@ __all__ = [
     "open",
     "optimise",
     "plan",
+    "restart",
     "run",
     "sensitivity",
     "separations",
@@ -70,11 +72,12 @@ _FILES = {
     "pictures": ("Pictures",),
     "questions": ("highest_speeds", "separations"),
     "results": ("Run", "open"),
-    "runs": ("run", "sweep"),
+    "runs": ("restart", "run"),
     "scenes": ("Scene", "load"),
     "sensitivities": ("sensitivity",),
     "base.errors": ("CatenaryError", "Fault", "InputError", "RunBroken"),
     "steps": ("Simulation",),
+    "sweeps": ("sweep",),
 }
 _FILE_OF = {name: file for file, names in _FILES.items() for name in names}
 

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from catenary.callers import say_nothing, say_on_error_stream
 from catenary.cases.studies.optimise.task import OptimiseTask
 from catenary.cases.studies.records import KeptRows
 from catenary.cases.studies.task_files import read_task
 from catenary.cases.studies.tolerance.task import ToleranceTask
-from catenary.runs import _line, _nothing
 from catenary.scenes import Scene, SceneLike, draft_of, plain_value, scene_of
 
 if TYPE_CHECKING:
@@ -233,7 +233,7 @@ def _found(
     kept = KeptRows(None if out is None else Path(out), force)
     try:
         with workers(jobs) as pool:
-            found = find(plan, pool, kept, _line if progress else _nothing)
+            found = find(plan, pool, kept, say_on_error_stream if progress else say_nothing)
     except Interrupted as stopped:
         raise KeyboardInterrupt from stopped
     if out is not None:
