@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -29,6 +30,12 @@ from catenary.scenes import SceneLike, draft_of, plain_value
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from catenary.cases.scene.load import Draft
+    from catenary.cases.studies.sampling.tables import SamplingTable
+    from catenary.cases.studies.sweep.jobs import Ended, Part, RunOptions
+    from catenary.cases.studies.sweep.sweep import Sweep
+    from catenary.cases.studies.uncertainty.evaluation import Uncertainty as Evaluated
 
 
 def sweep(
@@ -91,13 +98,9 @@ def sweep(
     >>> table["train.speed_km_h"].tolist(), bool(table.std_N[1] > table.std_N[0])
     ([200, 250], True)
     """
-    import pandas as pd
-
     if not isinstance(jobs, int) or jobs < 0:
         raise InputError(f"jobs is {jobs!r}; it is a number of runs, or 0 for one on each core")
     from catenary.cases.studies.sweep.jobs import RunOptions, interrupted
-    from catenary.cases.studies.sweep.output import table_of
-    from catenary.cases.studies.sweep.sweep import run_sweep, sweep_of
 
     if histories and out is None:
         raise InputError("histories are kept in a file: give the folder out, too")
@@ -107,39 +110,165 @@ def sweep(
     elif vary is not None:
         raise InputError("sample makes all variants itself: give vary or sample, not both")
     else:
-        from catenary.cases.studies.sampling.samples import samples
-
-        sampling, where = sampling_like(sample)
-        variants = samples(sampling, draft.scene(), where)
+        variants, sampling = samples_of(sample, draft)
     say = say_on_error_stream if progress else say_nothing
     with ExitStack() as stack:
         folder = (
             Path(out) if out is not None else stack.enter_context(temporary_folder(comm, "sweep"))
         )
-        made = sweep_of(
+        made = plan_sweep(
             draft,
             variants,
             folder,
+            None if out is None else sampling,
             only_statistics=only_statistics,
             histories=histories,
             force=force,
         )
-        options = stack.enter_context(options_of(made.first.petsc.given()))
+        options = stack.enter_context(options_of(made.own.first.petsc.given()))
         stack.enter_context(progress_shown(False, comm))
         plan = RunOptions(force, options, say if comm.rank == 0 else say_nothing, jobs)
-        program = "a sweep of a Python program"
-        ended, _ = run_sweep(made, folder, comm, plan, program, () if sampling is None else None)
-        # Times of a rank are its own.
-        rows = on_root(comm, lambda: table_of(ended).records())
-        if sampling is not None and out is not None:
-            from catenary.cases.result_folder.folder_lock import held
-            from catenary.cases.studies.uncertainty.output import write_evaluated
-
-            with held(folder, comm, program):
-                on_root(comm, lambda: write_evaluated(folder, rows, sampling), takes_long=True)
-    if interrupted(ended):
+        drawn = None if out is None else ()
+        found = made.run(comm, plan, "a sweep of a Python program", drawn)
+    if interrupted(found.ended):
         raise KeyboardInterrupt
-    return pd.DataFrame(rows)
+    return found.table(comm)
+
+
+def samples_of(
+    sample: Mapping[str, Any] | str | Path, draft: Draft
+) -> tuple[list[Variant], SamplingTable]:
+    """The variants that a sampling makes of a case, and its checked tables. Not collective.
+
+    Parameters
+    ----------
+    sample : mapping, str or Path
+        The tables of the sampling as nested dictionaries, or the file.
+    draft : Draft
+        The case.
+    """
+    from catenary.cases.studies.sampling.samples import samples
+
+    sampling, where = sampling_like(sample)
+    return samples(sampling, draft.scene(), where), sampling
+
+
+def plan_sweep(
+    draft: Draft,
+    variants: Sequence[Variant],
+    folder: Path,
+    sampling: SamplingTable | None = None,
+    *,
+    full_report: bool = False,
+    only_statistics: bool = False,
+    histories: Sequence[str] = (),
+    force: bool = False,
+) -> PlannedSweep:
+    """A sweep of a case into a folder, all scenes checked. Not collective.
+
+    Parameters
+    ----------
+    draft, variants, full_report, only_statistics, histories, force
+        As of ``cases.studies.sweep.sweep.sweep_of``.
+    folder : Path
+        Folder of the sweep.
+    sampling : SamplingTable, optional
+        What made the variants, if the table is to be evaluated.
+
+    Raises
+    ------
+    InputError
+        As ``sweep_of``.
+    """
+    from catenary.cases.studies.sweep.sweep import sweep_of
+
+    own = sweep_of(
+        draft,
+        variants,
+        folder,
+        full_report=full_report,
+        only_statistics=only_statistics,
+        histories=histories,
+        force=force,
+    )
+    return PlannedSweep(own, folder, sampling)
+
+
+@dataclass(frozen=True)
+class PlannedSweep:
+    """A sweep that can be run, from ``plan_sweep``."""
+
+    own: Sweep
+    folder: Path
+    sampling: SamplingTable | None
+
+    def run(
+        self,
+        comm: Any,
+        options: RunOptions,
+        command: str,
+        plotted: Sequence[str] | None = (),
+        histogram: bool = False,
+    ) -> Swept:
+        """Run what is not done yet, write table and pictures, and evaluate samples. Collective.
+
+        ``comm``, ``options``, ``command``, ``plotted`` and ``histogram`` are as of
+        ``cases.studies.sweep.sweep.run_sweep``. Samples are drawn as points, not as lines.
+        """
+        from catenary.cases.studies.sweep.sweep import run_sweep
+
+        folder, sampling = self.folder, self.sampling
+        lines = plotted if sampling is None else None
+        ended, files = run_sweep(self.own, folder, comm, options, command, lines, histogram)
+        if sampling is None:
+            return Swept(ended, files)
+        from catenary.cases.result_folder.folder_lock import held
+        from catenary.cases.studies.sweep.output import table_of
+        from catenary.cases.studies.uncertainty.output import write_evaluated
+
+        def evaluate() -> tuple[Evaluated, list[Path]]:
+            return write_evaluated(folder, table_of(ended).records(), sampling, plotted or ())
+
+        with held(folder, comm, command):
+            evaluated, more = on_root(comm, evaluate, takes_long=True)
+        return Swept(ended, [*files, *more], evaluated)
+
+    def run_part(self, part: Part, comm: Any, options: RunOptions) -> list[Ended]:
+        """Run a part, as ``cases.studies.sweep.sweep.run_part``, with its sampling. Collective."""
+        from catenary.cases.studies.sweep.sweep import run_part
+
+        ended, sampling = run_part(self.own, part, self.folder, comm, options), self.sampling
+        if sampling is not None:
+            from catenary.cases.studies.uncertainty.run_table import write_sampling
+
+            on_root(comm, lambda: write_sampling(self.folder / part.folder, sampling))
+        return ended
+
+
+@dataclass(frozen=True)
+class Swept:
+    """A sweep that ended: its variants, the files, what samples say. As text what is printed."""
+
+    ended: list[Ended]
+    files: list[Path]
+    evaluated: Evaluated | None = None
+
+    def table(self, comm: Any) -> pd.DataFrame:
+        """The table that ``sweep`` returns. Collective: times of a rank are its own."""
+        import pandas as pd
+
+        from catenary.cases.studies.sweep.output import table_of
+
+        return pd.DataFrame(on_root(comm, lambda: table_of(self.ended).records()))
+
+    def __str__(self) -> str:
+        if self.evaluated is None:
+            from catenary.cases.studies.sweep import output
+
+            return output.as_text(self.ended)
+        from catenary.cases.studies.uncertainty.output import as_text
+
+        return as_text(self.evaluated)
 
 
 def _listed(vary: Mapping[str, Sequence[Any]] | None) -> list[Variant]:
