@@ -54,6 +54,17 @@ def progress_shown(progress: bool, comm: Any) -> Iterator[None]:
         logger.propagate = passed_on
 
 
+@contextmanager
+def ending_as_python() -> Iterator[None]:
+    """While entered, a signal that ends a study is a KeyboardInterrupt. Not collective."""
+    from catenary.cases.process.interrupts import Interrupted
+
+    try:
+        yield
+    except Interrupted as stopped:
+        raise KeyboardInterrupt from stopped
+
+
 def say_nothing(text: str) -> None:
     """Say nothing."""
 
