@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+import catenary
+
 ROOT = Path(__file__).parents[2]
 PARTS = ("meshgen", "mbs", "solver", "postproc", "cases")
 
@@ -176,6 +178,65 @@ def test_the_solver_never_writes_results() -> None:
         return [name for name in names if any(is_within(name, one) for one in FILE_WRITERS)]
 
     assert wrong_in((ROOT / "solver").rglob("*.py"), writers) == {}
+
+
+# Public functions whose verbs have other names.
+NAMED_OTHERWISE = {"speed": "highest_speeds", "separation": "separations"}
+# What both the face and the command line take from runs and studies: wishes as data, and what verbs
+# without a counterpart in the face need. All other work of these verbs is that of the face.
+TAKEN_BY_BOTH = {
+    "catenary.cases.studies.questions.highest_speed.Speeds",
+    "catenary.cases.studies.questions.separation.Distances",
+    "catenary.cases.studies.sweep.jobs.RunOptions",
+    "catenary.cases.studies.sweep.together.Marching",
+    "catenary.cases.studies.sweep.variants.check_keys",
+    "catenary.cases.studies.sweep.variants.product",
+    "catenary.cases.run.planning.plan.make_plan",  # submit: two figures, no table
+    "catenary.cases.run.prepared.prepare_line",  # prepare: a file, no steps
+    "catenary.cases.studies.records.held_study",  # numerics: studies that the face has not
+}
+
+
+def verbs() -> dict[str, ast.FunctionDef]:
+    """The function of each verb of the command line."""
+    found = {}
+    for path in (ROOT / "cases" / PROGRAM).rglob("*.py"):
+        for node in tree_of(path).body:
+            for mark in node.decorator_list if isinstance(node, ast.FunctionDef) else []:
+                if isinstance(mark, ast.Call) and ast.unparse(mark.func).endswith("verb"):
+                    found[ast.literal_eval(mark.args[0])] = node
+    return found
+
+
+def face_used_in(tree: ast.AST) -> set[str]:
+    """Files of the face whose names are used: ``catenary.NAME``, or imported from the file."""
+    files = {name.split(".")[1] for name in imports_in(tree) if name.startswith("catenary.")}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Attribute) and ast.unparse(node.value) == "catenary":
+            files.add(catenary._FILE_OF[node.attr])
+    return files & FACE_FILES
+
+
+def test_a_verb_with_a_counterpart_in_python_calls_that() -> None:
+    checked = set()
+    for verb, function in verbs().items():
+        name = NAMED_OTHERWISE.get(verb, verb)
+        if name in catenary._FILE_OF:
+            assert catenary._FILE_OF[name] in face_used_in(function), verb
+            checked.add(name)
+    functions = {name for name in catenary.__all__ if name.islower() and name[0] != "_"}
+    assert functions - checked == {"load", "open"}  # no verbs
+
+
+def work_taken_by(room: str) -> set[str]:
+    """What files of a room import from runs and studies, but for types."""
+    parts = ("catenary.cases.run.", "catenary.cases.studies.")
+    trees = [without_types(tree_of(path)) for path in (ROOT / "cases" / room).rglob("*.py")]
+    return {name for tree in trees for name in imports_in(tree) if name.startswith(parts)}
+
+
+def test_the_command_line_does_no_work_that_the_face_does() -> None:
+    assert work_taken_by(FACE) & work_taken_by(PROGRAM) == TAKEN_BY_BOTH
 
 
 def world_at_import(tree: ast.Module) -> Iterator[int]:
