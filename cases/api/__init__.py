@@ -20,19 +20,21 @@ if TYPE_CHECKING:
     from catenary.base.errors import CatenaryError, Fault, InputError, RunBroken
     from catenary.estimates import Uncertainty, uncertainty
     from catenary.identifications import Identified, identify
-    from catenary.line_tables import AtRest, Plan, check, plan, static
+    from catenary.line_tables import AtRest, Checked, Plan, check, plan, static
     from catenary.optimising import Optimum, optimise, tolerance
     from catenary.pictures import Pictures
     from catenary.questions import highest_speeds, separations
     from catenary.results import Run, open
-    from catenary.runs import run, sweep
+    from catenary.runs import restart, run
     from catenary.scenes import Scene, load
     from catenary.sensitivities import sensitivity
     from catenary.steps import Simulation
+    from catenary.sweeps import sweep
 
 __all__ = [
     "AtRest",
     "CatenaryError",
+    "Checked",
     "Fault",
     "Identified",
     "InputError",
@@ -52,6 +54,7 @@ __all__ = [
     "open",
     "optimise",
     "plan",
+    "restart",
     "run",
     "sensitivity",
     "separations",
@@ -64,16 +67,17 @@ __all__ = [
 _FILES = {
     "estimates": ("Uncertainty", "uncertainty"),
     "identifications": ("Identified", "identify"),
-    "line_tables": ("AtRest", "Plan", "check", "plan", "static"),
+    "line_tables": ("AtRest", "Checked", "Plan", "check", "plan", "static"),
     "optimising": ("Optimum", "optimise", "tolerance"),
     "pictures": ("Pictures",),
     "questions": ("highest_speeds", "separations"),
     "results": ("Run", "open"),
-    "runs": ("run", "sweep"),
+    "runs": ("restart", "run"),
     "scenes": ("Scene", "load"),
     "sensitivities": ("sensitivity",),
     "base.errors": ("CatenaryError", "Fault", "InputError", "RunBroken"),
     "steps": ("Simulation",),
+    "sweeps": ("sweep",),
 }
 _FILE_OF = {name: file for file, names in _FILES.items() for name in names}
 

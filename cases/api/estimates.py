@@ -14,6 +14,8 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from catenary.cases.studies.sampling.tables import SamplingTable
+    from catenary.cases.studies.uncertainty import evaluation
+    from catenary.cases.studies.uncertainty.run_table import RunTable
 
 
 @dataclass(frozen=True, repr=False)
@@ -21,7 +23,7 @@ class Uncertainty:
     """Estimates from a table of runs, with bounds of 95 % confidence, from ``uncertainty``.
 
     Bounds are columns with the end ``_low`` and ``_high``, NaN where too few runs leave them open.
-    ``pantograph`` is empty for statistics of the line.
+    ``pantograph`` is empty for statistics of the line. As text it is what the program prints.
 
     Attributes
     ----------
@@ -69,10 +71,16 @@ class Uncertainty:
     sensitivity: pd.DataFrame
     method: str
     notes: list[str]
-    _n_runs: int
+    _own: evaluation.Uncertainty
+    _runs: RunTable
+
+    def __str__(self) -> str:
+        from catenary.cases.studies.uncertainty.output import as_text
+
+        return as_text(self._own)
 
     def __repr__(self) -> str:
-        return f"<catenary.Uncertainty: {self._n_runs} runs>"
+        return f"<catenary.Uncertainty: {self._own.n_done} runs>"
 
 
 def uncertainty(
@@ -117,17 +125,16 @@ def uncertainty(
     from catenary.cases.studies.uncertainty.evaluation import evaluate
     from catenary.cases.studies.uncertainty.run_table import read_run_table, run_table
 
-    sampling = None if sample is None else sampling_like(sample)[0]
+    where = "the table"
     if isinstance(table, str | Path):
-        runs = read_run_table(Path(table))
-        if sampling is not None:
-            runs = run_table(runs.frame, sampling, str(table))
+        runs, where = read_run_table(Path(table)), str(table)
     else:
         try:
-            frame = pd.DataFrame(table)
+            runs = run_table(pd.DataFrame(table))
         except ValueError as error:
             raise InputError(f"the table has columns of several lengths: {error}") from error
-        runs = run_table(frame, sampling)
+    if sample is not None:
+        runs = run_table(runs.frame, sampling_like(sample)[0], where)
     found = evaluate(runs)
     return Uncertainty(
         pd.DataFrame(found.statistics),
@@ -136,8 +143,19 @@ def uncertainty(
         pd.DataFrame(found.sensitivity),
         found.method,
         found.notes,
-        found.n_done,
+        found,
+        runs,
     )
+
+
+def write_uncertainty(found: Uncertainty, folder: Path) -> list[Path]:
+    """Write estimates and pictures as ``catenary uncertainty`` does; returns the files.
+
+    Not collective.
+    """
+    from catenary.cases.studies.uncertainty.output import write
+
+    return write(folder, found._runs, found._own)
 
 
 def sampling_like(sample: Mapping[str, Any] | str | Path) -> tuple[SamplingTable, str]:

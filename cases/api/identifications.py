@@ -8,13 +8,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from catenary.base.lone_process import alone
-from catenary.scenes import SceneLike, checked
+from catenary.postproc.evaluate.wording import counted
+from catenary.scenes import Scene, SceneLike, checked, scene_of
 
 if TYPE_CHECKING:
     import pandas as pd
 
+    from catenary.cases.studies.identification.study import Identification
+    from catenary.cases.studies.identification.task import Task
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, repr=False)
 class Identified:
     """Result of ``identify``. As text it is what the program prints.
 
@@ -54,10 +58,15 @@ class Identified:
     directions: pd.DataFrame
     residuals: pd.DataFrame
     summary: dict[str, Any]
-    _text: str
+    _own: Identification
+
+    def __repr__(self) -> str:
+        return f"<catenary.Identified: {counted(len(self.parameters), 'parameter')}>"
 
     def __str__(self) -> str:
-        return self._text
+        from catenary.cases.studies.identification.output import as_text
+
+        return as_text(self._own)
 
 
 def identify(
@@ -110,18 +119,31 @@ def identify(
     >>> found.found.round().tolist()
     [120.0]
     """
+    own = scene_of(scene)
+    return identified(own, measured, task_of(task))
+
+
+def identified(scene: Scene, measured: str | Path | pd.DataFrame, task: Task) -> Identified:
+    """What ``identify`` finds of a scene and a task that are checked. Not collective.
+
+    Parameters
+    ----------
+    scene, measured, task
+        As of ``identify``.
+
+    Raises
+    ------
+    InputError, RunBroken
+        As ``identify``.
+    """
     import pandas as pd
 
-    own = checked(scene)
     comm = alone()  # starts MPI as one process, before anything imports it
     from catenary.cases.studies.identification import output
-    from catenary.cases.studies.identification.study import identify as identified
-    from catenary.cases.studies.identification.task import Task
-    from catenary.cases.studies.task_files import read_task
+    from catenary.cases.studies.identification.study import identify as find
 
-    wanted = read_task(task if isinstance(task, Mapping) else Path(task), Task)
     samples = measured if isinstance(measured, pd.DataFrame) else Path(measured)
-    found = identified(own, samples, wanted, comm)
+    found = find(checked(scene), samples, task, comm)
     tables = [
         pd.DataFrame(table.records())
         for table in (
@@ -137,5 +159,32 @@ def identify(
         tables[2].set_index("direction"),
         tables[3],
         output.summary_of(found),
-        output.as_text(found),
+        found,
     )
+
+
+def task_of(task: str | Path | Mapping[str, Any]) -> Task:
+    """The checked task of an identification.
+
+    Parameters
+    ----------
+    task : str, Path or mapping
+        The TOML file, or its tables.
+
+    Raises
+    ------
+    InputError
+        If it is wrong.
+    """
+    from catenary.cases.studies.identification.task import Task
+    from catenary.cases.studies.task_files import read_task
+
+    return read_task(task if isinstance(task, Mapping) else Path(task), Task)
+
+
+def write_identified(found: Identified, folder: Path) -> list[Path]:
+    """Write what ``catenary identify -o`` writes; returns the files. Not collective."""
+    from catenary.cases.studies.identification.output import files_of
+    from catenary.postproc.report.study_table import write_files
+
+    return write_files(folder, files_of(found._own))

@@ -9,13 +9,35 @@ import numpy as np
 from catenary.scenes import SceneLike, checked
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     import pandas as pd
 
     from catenary.cases.run.planning import plan as planning
     from catenary.cases.scene.scene import Scene as CheckedScene
 
 
-def check(scene: SceneLike) -> list[str]:
+class Checked(list[str]):
+    """Warnings on a scene, from ``check``, and ``sentences`` that ``catenary check`` prints.
+
+    Attributes
+    ----------
+    sentences : list of str
+        On the line, each kind of pantograph, ends, and waves that come back.
+
+    Examples
+    --------
+    >>> found = catenary.check("en50318_2002")
+    >>> found, found.sentences[0]
+    ([], 'en50318_2002 is valid: 22 spans, 1320 m, 198 droppers, 3522 nodes')
+    """
+
+    def __init__(self, warnings: list[str], sentences: list[str]) -> None:
+        super().__init__(warnings)
+        self.sentences = sentences
+
+
+def check(scene: SceneLike) -> Checked:
     """Check a scene with its line hung, beyond what ``load`` checks. Not collective.
 
     Parameters
@@ -25,8 +47,9 @@ def check(scene: SceneLike) -> list[str]:
 
     Returns
     -------
-    list of str
-        Warnings, for instance of an end so near that it sends waves back; empty if there are none.
+    Checked
+        A list of warnings, for instance of an end so near that it sends waves back; empty if there
+        are none.
 
     Raises
     ------
@@ -40,7 +63,8 @@ def check(scene: SceneLike) -> list[str]:
     """
     from catenary.cases.run.at_rest.static_table import check_line
 
-    return check_line(checked(scene)).warnings
+    found = check_line(checked(scene))
+    return Checked(found.warnings, found.sentences)
 
 
 class Plan:
@@ -304,3 +328,20 @@ def static(scene: SceneLike) -> AtRest:
 
     own = checked(scene)
     return AtRest(own, static_table(own))
+
+
+def write_rest(rest: AtRest, file: Path, registration: bool = False) -> None:
+    """Write a line at rest: its droppers as CSV, or its steady arms, or all of it as JSON.
+
+    Not collective. The ending of the file decides; ``registration`` is for the steady arms.
+
+    Raises
+    ------
+    InputError
+        If the arms are wanted and none pulls a wire sideways.
+    RunBroken
+        If the disk refuses.
+    """
+    from catenary.cases.run.at_rest.static_table import write_static
+
+    write_static(file, rest._data, registration)

@@ -2,25 +2,30 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from catenary.base.lone_process import alone
+from catenary.callers import ending_as_python, say_nothing, say_on_error_stream
 from catenary.cases.studies.optimise.task import OptimiseTask
-from catenary.cases.studies.records import KeptRows
 from catenary.cases.studies.task_files import read_task
 from catenary.cases.studies.tolerance.task import ToleranceTask
-from catenary.runs import _line, _nothing
 from catenary.scenes import Scene, SceneLike, draft_of, plain_value, scene_of
 
 if TYPE_CHECKING:
     import pandas as pd
 
+    from catenary.cases.scene.load import Draft
     from catenary.cases.studies.optimise.study import Optimum as Found
     from catenary.cases.studies.optimise.study import Plan
 
+logger = logging.getLogger("catenary.study")
+
 Task = str | Path | Mapping[str, Any]
+_PROGRAM = "a study of a Python program"
 
 
 @dataclass(frozen=True)
@@ -126,15 +131,11 @@ def optimise(
     >>> best.objective < best.shipped
     True
     """
-    from catenary.cases.result_folder.output_folder import refuse_table
-    from catenary.cases.studies.optimise import output, study
-
-    scene = scene_of(scene)
-    if out is not None:
-        refuse_table(Path(out) / output.RECORD, force)
-    plan = study.make_plan(draft_of(scene), _task(task, OptimiseTask))
-    found = _found(plan, study.optimise, output, out, jobs, force, progress)
-    return [_optimum(scene, plan, one) for one in found]
+    own = scene_of(scene)
+    say = say_on_error_stream if progress else say_nothing
+    with ending_as_python():
+        made = optima(lambda: (draft_of(own), task), out, jobs=jobs, force=force, say=say)
+    return [_optimum(own, made.plan, one) for one in made.found]
 
 
 def _optimum(scene: Scene, plan: Plan, found: Found) -> Optimum:
@@ -200,46 +201,130 @@ def tolerance(
     """
     import pandas as pd
 
-    from catenary.cases.result_folder.output_folder import refuse_table
-    from catenary.cases.studies.tolerance import output, study
+    from catenary.cases.studies.tolerance.output import table_of
 
-    if out is not None:
-        refuse_table(Path(out) / output.TABLE, force)
-    plan = study.make_plan(draft_of(scene), _task(task, ToleranceTask))
-    found = _found(plan, study.find_tolerances, output, out, jobs, force, progress)
-    rows: Sequence[Mapping[str, Any]] = output.table_of(found).records()
+    say = say_on_error_stream if progress else say_nothing
+    with ending_as_python():
+        made = tolerances(lambda: (draft_of(scene), task), out, jobs=jobs, force=force, say=say)
+    rows: Sequence[Mapping[str, Any]] = table_of(made.found).records()
     return pd.DataFrame(rows)
 
 
-def _found(
-    plan: Any,
-    find: Callable[..., Any],
-    output: Any,
+@dataclass(frozen=True)
+class Made:
+    """A study over a set of scenes: plan, what was found, its files. As text what is printed."""
+
+    plan: Any
+    found: Any
+    files: list[Path]
+    _output: Any
+
+    def __str__(self) -> str:
+        text: str = self._output.as_text(self.plan, self.found)
+        return text
+
+
+def optima(
+    read: Callable[[], tuple[Draft, Task]],
     out: str | Path | None,
-    jobs: int,
-    force: bool,
-    progress: bool,
-) -> Any:
-    """Run a planned study, write its result with ``output``, and return it.
+    *,
+    command: str = _PROGRAM,
+    jobs: int = 1,
+    force: bool = False,
+    warn: Callable[[str], None] = logger.warning,
+    say: Callable[[str], None] = say_nothing,
+) -> Made:
+    """What ``optimise`` finds. Not collective.
+
+    Parameters
+    ----------
+    read : callable
+        Gives the case and the task, once it is known that ``out`` can be taken.
+    out, jobs, force
+        As of ``optimise``.
+    command : str
+        Work of this process in words, for others that want the folder.
+    warn, say : callable
+        Called with sentences on the task, and with lines on the progress.
 
     Raises
     ------
-    KeyboardInterrupt
+    InputError
+        As ``optimise``.
+    Interrupted
         If a signal ends the study.
     """
-    from catenary.cases.process.interrupts import Interrupted
+    from catenary.cases.studies.optimise import output, study
+
+    def plan() -> study.Plan:
+        draft, task = read()
+        return study.make_plan(draft, _task(task, OptimiseTask))
+
+    return _made(plan, study.optimise, output, output.RECORD, out, command, jobs, force, warn, say)
+
+
+def tolerances(
+    read: Callable[[], tuple[Draft, Task]],
+    out: str | Path | None,
+    *,
+    command: str = _PROGRAM,
+    jobs: int = 1,
+    force: bool = False,
+    warn: Callable[[str], None] = logger.warning,
+    say: Callable[[str], None] = say_nothing,
+) -> Made:
+    """What ``tolerance`` finds. Not collective.
+
+    Parameters
+    ----------
+    read, out, command, jobs, force, warn, say
+        As of ``optima``.
+
+    Raises
+    ------
+    InputError
+        As ``tolerance``.
+    Interrupted
+        If a signal ends the study.
+    """
+    from catenary.cases.studies.tolerance import output, study
+
+    def plan() -> study.Plan:
+        draft, task = read()
+        return study.make_plan(draft, _task(task, ToleranceTask))
+
+    find = study.find_tolerances
+    return _made(plan, find, output, output.TABLE, out, command, jobs, force, warn, say)
+
+
+def _made(
+    make_plan: Callable[[], Any],
+    find: Callable[..., Any],
+    output: Any,
+    table: str,
+    out: str | Path | None,
+    command: str,
+    jobs: int,
+    force: bool,
+    warn: Callable[[str], None],
+    say: Callable[[str], None],
+) -> Made:
+    """Plan a study, find what it looks for, and leave what its ``output`` writes; ``table`` is one
+    of its files."""
+    from catenary.cases.result_folder.output_folder import refuse_table
+    from catenary.cases.studies.records import held_study
     from catenary.cases.studies.scene_sets import workers
 
-    kept = KeptRows(None if out is None else Path(out), force)
-    try:
-        with workers(jobs) as pool:
-            found = find(plan, pool, kept, _line if progress else _nothing)
-    except Interrupted as stopped:
-        raise KeyboardInterrupt from stopped
-    if out is not None:
-        output.write(Path(out), plan, found)
-        kept.forget()
-    return found
+    folder = None if out is None else Path(out)
+    if folder is not None:
+        refuse_table(folder / table, force)
+    plan = make_plan()
+    for sentence in plan.warnings:
+        warn(sentence)
+    with held_study(folder, alone(), command, force) as (kept, write), workers(jobs) as pool:
+        found = find(plan, pool, kept, say)
+        files = write(lambda own: output.write(own, plan, found))
+    return Made(plan, found, files, output)
 
 
 def _task(task: Task, model: Any) -> Any:

@@ -28,14 +28,16 @@ class Pictures:
     True
     """
 
-    def __init__(self, results: Results, evaluated: Callable[[], RunStatistics]) -> None:
+    def __init__(
+        self, results: Callable[[], Results], evaluated: Callable[[], RunStatistics]
+    ) -> None:
         self._results = results
         self._evaluated = evaluated
 
     def _drawings(self) -> Iterator[Picture]:
         from catenary.postproc.report.report import drawings
 
-        return drawings(self._results, self._evaluated())
+        return drawings(self._results(), self._evaluated())
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -96,7 +98,7 @@ class Pictures:
         from catenary.postproc.report.pictures import figures, force_pictures
 
         evaluated = self._evaluated()
-        return figures.fitted(force_pictures.force_statistics(self._results, evaluated))
+        return figures.fitted(force_pictures.force_statistics(self._results(), evaluated))
 
     def histogram(self) -> Figure:
         """Share of time [%] of the contact force below 20 Hz in bins of 10 N.

@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from catenary.base.lone_process import alone
+from catenary.base.parallel import on_root
+from catenary.callers import ending_as_python
 from catenary.cases.process.petsc_options import options_of
 from catenary.scenes import SceneLike, checked, draft_of
 
@@ -14,7 +18,12 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from catenary.cases.scene.scene import Scene as Checked
+    from catenary.cases.studies.questions.highest_speed import Speeds
+    from catenary.cases.studies.questions.separation import Distances
     from catenary.cases.studies.sweep.together import Marching
+    from catenary.postproc.report.study_table import StudyTable
+
+_PROGRAM = "a study of a Python program"
 
 
 def highest_speeds(
@@ -73,30 +82,11 @@ def highest_speeds(
     >>> float(table.highest_km_h[0]), float(table.fails_at_km_h[0])
     (305.0, 310.0)
     """
-    import pandas as pd
+    from catenary.cases.studies.questions.highest_speed import Speeds
 
-    from catenary.cases.studies.questions import highest_speed as question
-
-    speeds = question.Speeds(float(slowest), float(fastest), float(step), float(within))
+    speeds = Speeds(float(slowest), float(fastest), float(step), float(within))
     with _marching(scene, jobs) as (marching, own):
-        found = question.find_speeds(marching, own, speeds, list(criteria), direction)
-    return pd.DataFrame(question.table_of_criteria(found).records())
-
-
-@contextmanager
-def _marching(scene: SceneLike, jobs: int) -> Iterator[tuple[Marching, Checked]]:
-    """The march of variants of a scene, and the scene itself."""
-    own, comm = checked(scene), alone()
-    from catenary.cases.process.interrupts import Interrupted
-    from catenary.cases.studies.sweep.jobs import RunOptions
-    from catenary.cases.studies.sweep.together import Marching
-
-    with options_of(own.petsc.given()) as options:
-        plan = RunOptions(petsc=options, n_jobs=jobs)
-        try:
-            yield Marching(draft_of(scene), None, comm, plan), own
-        except Interrupted as stopped:
-            raise KeyboardInterrupt from stopped
+        return find_speeds(marching, own, speeds, criteria, direction).table()
 
 
 def separations(
@@ -141,11 +131,112 @@ def separations(
     >>> table.separation_m.tolist()[1:], bool(table.std_trailing_N[2] > table.std_trailing_N[1])
     ([50.0, 90.0], True)
     """
-    import pandas as pd
+    from catenary.cases.studies.questions.separation import Distances
 
-    from catenary.cases.studies.questions import separation as question
-
-    distances = question.Distances(float(nearest), float(farthest), float(step))
+    distances = Distances(float(nearest), float(farthest), float(step))
     with _marching(scene, jobs) as (marching, own):
-        found = question.find_separations(marching, own, distances)
-    return pd.DataFrame(found.table().records())
+        return find_separations(marching, own, distances, explained=False).table()
+
+
+@contextmanager
+def _marching(scene: SceneLike, jobs: int) -> Iterator[tuple[Marching, Checked]]:
+    """The march of variants of a scene, and the scene itself."""
+    own, comm = checked(scene), alone()
+    from catenary.cases.studies.sweep.jobs import RunOptions
+    from catenary.cases.studies.sweep.together import Marching
+
+    with options_of(own.petsc.given()) as options, ending_as_python():
+        yield Marching(draft_of(scene), None, comm, RunOptions(petsc=options, n_jobs=jobs)), own
+
+
+def find_speeds(
+    marching: Marching,
+    scene: Checked,
+    speeds: Speeds,
+    criteria: Sequence[str],
+    direction: str | None,
+    command: str = _PROGRAM,
+) -> Answer:
+    """What ``highest_speeds`` makes a table of, with files if the marches have a folder.
+
+    Collective.
+
+    Parameters
+    ----------
+    marching : Marching
+        Marches the variants of the scene.
+    scene, speeds, criteria, direction
+        As of ``cases.studies.questions.highest_speed.find_speeds``.
+    command : str
+        Work of this process in words, for others that want the folder.
+
+    Raises
+    ------
+    InputError, Interrupted
+        As that.
+    """
+    from catenary.cases.studies.questions import highest_speed as question
+    from catenary.cases.studies.records import held_study
+
+    with held_study(marching.out, marching.comm, command) as (_, write):
+        found = question.find_speeds(marching, scene, speeds, list(criteria), direction)
+        files = write(lambda folder: question.write(folder, found))
+    return Answer(question.table_of_criteria(found), question.as_text(found), files)
+
+
+def find_separations(
+    marching: Marching,
+    scene: Checked,
+    distances: Distances,
+    command: str = _PROGRAM,
+    *,
+    explained: bool = True,
+) -> Answer:
+    """What ``separations`` makes a table of, with files if the marches have a folder.
+
+    Collective.
+
+    Parameters
+    ----------
+    marching, scene, command
+        As of ``find_speeds``.
+    distances : Distances
+        Distances of the pantographs.
+    explained : bool
+        Whether text and files say which waves explain the distances, for which the line is hung
+        once more; without it there are none.
+
+    Raises
+    ------
+    InputError, Interrupted
+        As ``cases.studies.questions.separation.find_separations``.
+    """
+    from catenary.cases.studies.questions import separation as question
+    from catenary.cases.studies.records import held_study
+
+    comm = marching.comm
+    with held_study(marching.out, comm, command) as (_, write):
+        found = question.find_separations(marching, scene, distances)
+        if not explained:
+            return Answer(found.table(), "", [])
+        period = on_root(comm, lambda: question.period_in(found, scene), takes_long=True)
+        files = write(lambda folder: question.write(folder, found, period))
+    return Answer(found.table(), question.as_text(found, period), files)
+
+
+@dataclass(frozen=True)
+class Answer:
+    """Answer to a question, and the files with it. As text what the program prints."""
+
+    own: StudyTable
+    text: str
+    files: list[Path]
+
+    def table(self) -> pd.DataFrame:
+        """The table that a program gets."""
+        import pandas as pd
+
+        return pd.DataFrame(self.own.records())
+
+    def __str__(self) -> str:
+        return self.text

@@ -11,14 +11,16 @@ import numpy as np
 
 # Of what evaluates a run, each method loads its own: to open a folder takes none of it.
 from catenary.base.errors import InputError
+from catenary.base.parallel import on_root
 from catenary.pictures import Pictures
-from catenary.postproc.read.results import Results
+from catenary.postproc.read.results import RESULT_FILE, Results
 from catenary.solver.time_loop.views import channels
 
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
+    from catenary.cases.run.runner import RunOutcome
     from catenary.postproc.evaluate.statistics import RunStatistics
     from catenary.scenes import Scene
 
@@ -61,10 +63,24 @@ class Run:
     (('time', 'pantograph'), 'N')
     """
 
-    def __init__(self, results: Results, folder: Path | None = None) -> None:
-        self._results = results
+    def __init__(
+        self,
+        results: Results | None,
+        folder: Path | None = None,
+        told: RunOutcome | None = None,
+    ) -> None:
+        """Results that are open, or None to open those of the folder when they are asked for;
+        ``told`` is how the run ended, if this process made it."""
+        if results is not None:
+            self._results = results
         self._folder = folder
-        self.plot = Pictures(results, lambda: self._evaluated)
+        self._told = told
+        self.plot = Pictures(lambda: self._results, lambda: self._evaluated)
+
+    @cached_property
+    def _results(self) -> Results:
+        assert self._folder is not None
+        return Results(self._folder)
 
     @property
     def folder(self) -> Path | None:
@@ -86,7 +102,7 @@ class Run:
         >>> run.outcome
         'done'
         """
-        return self._results.outcome
+        return self._results.outcome if self._told is None else self._told.outcome
 
     @cached_property
     def scene(self) -> Scene:
@@ -123,11 +139,24 @@ class Run:
         >>> run.summary["case"], run.summary["speed_km_h"]
         ('en50318_2002', 250.0)
         """
+        if self._told is not None and self._told.summary:
+            return self._told.summary
         from catenary.postproc.evaluate.verdict import criteria_of
         from catenary.postproc.report.summary import summarise
 
         criteria = criteria_of(self._results, self._evaluated)
         return summarise(self._results, self._evaluated, criteria)
+
+    @property
+    def phase_wall(self) -> dict[str, float]:
+        """Wall time of each phase [s], that of the report too if this process made the run.
+
+        Examples
+        --------
+        >>> {"equilibrium", "march"} <= set(run.phase_wall)
+        True
+        """
+        return self.summary["phase_wall_s"] if self._told is None else self._told.phase_wall
 
     @property
     def statistics(self) -> pd.DataFrame:
@@ -444,6 +473,18 @@ def open(folder: str | Path) -> Run:
 
     results = Results(Path(folder), examined(Path(folder)))
     return Run(results, results.path.parent)
+
+
+def held(run: Run, comm: Any, in_memory: bool) -> Run:
+    """A run with its file open, whatever becomes of its folder. Collective.
+
+    In memory all processes have the file, of which only rank 0 may be able to see it.
+    """
+    assert run.folder is not None
+    path = run.folder / RESULT_FILE
+    if not in_memory:
+        return Run(Results(path), run.folder, run._told)
+    return Run(Results(path, image=on_root(comm, path.read_bytes)), None, run._told)
 
 
 def _about(channel: channels.Channel) -> dict[str, str]:

@@ -1,35 +1,22 @@
-"""Runs and sweeps of scenes."""
+"""Runs of scenes, and runs that go on."""
 
 from __future__ import annotations
 
-import logging
-import sys
-import tempfile
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from catenary.base.errors import InputError, RunBroken
-from catenary.base.lone_process import alone, world
-from catenary.base.parallel import launched_by_mpirun, on_root
+from catenary.base.parallel import on_root
+from catenary.callers import communicator, progress_shown, temporary_folder
 from catenary.cases.process.petsc_options import options_of
-from catenary.cases.studies.sweep.variants import (
-    Variant,
-    check_keys,
-    product,
-    text_of,
-    varied_key,
-)
-from catenary.estimates import sampling_like
-from catenary.scenes import SceneLike, checked, draft_of, plain_value
+from catenary.scenes import SceneLike, checked
 
 if TYPE_CHECKING:
-    import pandas as pd
-
+    from catenary.cases.run.continuing import Said
+    from catenary.cases.scene.scene import Scene as CheckedScene
     from catenary.results import Run
-
-_PROGRESS = "catenary.progress"
 
 
 def run(
@@ -70,7 +57,7 @@ def run(
         If the run cannot go on. What it recorded up to there is in ``out``, and in the attribute
         ``run`` of the error.
     KeyboardInterrupt
-        If a signal ended it. With ``out``, ``catenary restart`` continues it.
+        If a signal ended it. With ``out``, ``restart`` continues it.
 
     Examples
     --------
@@ -78,214 +65,223 @@ def run(
     >>> bool(100 < run.statistics.mean_N["pantograph"] < 130)
     True
     """
-    tables = checked(scene)
-    comm = _communicator(comm)
-    with ExitStack() as stack:
-        options = stack.enter_context(options_of(tables.petsc.given()))
-        stack.enter_context(_shown(progress, comm))
-        folder = Path(out) if out is not None else stack.enter_context(_temporary(comm, "run"))
-        from catenary.cases.run.runner import on_as_many, run_case
-
-        ended = on_as_many(
-            tables,
-            comm,
-            lambda ranks: run_case(
-                tables,
-                folder,
-                ranks,
-                force=force,
-                petsc_options=options,
-                only_summary=out is None,
-            ),
-        )
-        if ended.outcome == "interrupted":
-            raise KeyboardInterrupt
-        found = _read(folder, comm, in_memory=out is None)
-    if ended.outcome != "done":
-        error = RunBroken(ended.outcome)
-        error.run = found
-        raise error
-    return found
+    tables, comm = checked(scene), communicator(comm)
+    with _set_up(tables, progress, comm) as options:
+        if out is not None:
+            return _returned(run_into(Path(out), tables, comm, options, force=force), comm)
+        with temporary_folder(comm, "run") as folder:
+            made = run_into(folder, tables, comm, options, force=force, only_summary=True)
+            return _returned(made, comm, in_memory=True)
 
 
-def sweep(
-    scene: SceneLike,
-    vary: Mapping[str, Sequence[Any]] | None = None,
-    out: str | Path | None = None,
+def restart(
+    folder: str | Path,
+    until_m: float | None = None,
+    evaluate: Sequence[float] | None = None,
     *,
-    sample: Mapping[str, Any] | str | Path | None = None,
-    only_statistics: bool = False,
-    histories: Sequence[str] = (),
-    jobs: int = 1,
     force: bool = False,
     progress: bool = False,
     comm: Any = None,
-) -> pd.DataFrame:
-    """Run all combinations of some values, or samples. Collective under mpirun, as ``run``.
+) -> Run:
+    """Continue a run that was interrupted or broke, or prolong one that is done.
+
+    Collective under mpirun, as ``run``. Any number of processes may continue a run.
 
     Parameters
     ----------
-    scene : Scene, str, Path or mapping
-        What is varied.
-    vary : mapping, optional
-        Values by dotted keys, for instance ``{"train.speed_km_h": [250, 275]}``.
-    out : str or Path, optional
-        Folder into which all is written that ``catenary sweep -o`` writes: a folder for each
-        variant, tables and pictures. What is done there already is not run again.
-    sample : mapping, str or Path, optional
-        In place of ``vary``: a sampling file, or its tables, with a distribution for each key.
-        ``catenary.uncertainty`` evaluates the table.
-    only_statistics : bool
-        Whether nothing but the table is kept, and no result file of a variant: for thousands of
-        them. Variants that share a line march side by side.
-    histories : sequence of str
-        With ``only_statistics`` and ``out``: histories of all variants that are kept in
-        ``out/histories.h5``, of contact_force, filtered_force, head_height and wire_height.
-    jobs : int
-        Runs at the same time, each in a process of its own; 0 for one on each core. Under mpirun
-        the number of processes: a run on each.
-    force, progress, comm
+    folder : str or Path
+        The folder of the run, whose last state it goes on from.
+    until_m : float, optional
+        Where the leading pantograph is to stop [m], if that is later than the run says.
+    evaluate : sequence of two floats, optional
+        With ``until_m``: begin and end of the stretch to evaluate [m].
+    force : bool
+        Whether to continue even without room for all results.
+    progress, comm
         As for ``run``.
 
     Returns
     -------
-    pandas.DataFrame
-        A row for each variant and pantograph, with the columns of ``sweep.csv``: the varied keys,
-        ``outcome`` ("done", or the sentence of what is wrong with a variant), ``pantograph`` and
-        the statistics, whose units end their names.
+    Run
+        The whole run, on every process.
 
     Raises
     ------
     InputError
-        If a key, a value or a distribution is wrong, or if no variant can be run.
-    KeyboardInterrupt
-        If a signal ended it. With ``out`` the same call goes on.
+        If there is nothing to continue, or if the end is not later.
+    RunBroken, KeyboardInterrupt
+        As of ``run``.
 
     Examples
     --------
-    >>> scene = catenary.load("en50318_2002", short=True)
-    >>> table = catenary.sweep(scene, {"train.speed_km_h": [200, 250]})
-    >>> table["train.speed_km_h"].tolist(), bool(table.std_N[1] > table.std_N[0])
-    ([200, 250], True)
+    >>> made = catenary.run(catenary.load("en50318_2002", short=True), folder / "longer")
+    >>> end = made.scene["train.end_m"]
+    >>> longer = catenary.restart(folder / "longer", until_m=end + 10.0)
+    >>> longer.outcome, bool(longer.force.position.max() > end + 9.0)
+    ('done', True)
     """
-    import pandas as pd
+    from catenary.cases.run.continuing import Said
 
-    if not isinstance(jobs, int) or jobs < 0:
-        raise InputError(f"jobs is {jobs!r}; it is a number of runs, or 0 for one on each core")
-    from catenary.cases.studies.sweep.jobs import RunOptions, interrupted
-    from catenary.cases.studies.sweep.output import table_of
-    from catenary.cases.studies.sweep.sweep import run_sweep, sweep_of
+    own, comm = Path(folder), communicator(comm)
+    said, stretch = Said("until_m", "evaluate", "in restart()"), None
+    if evaluate is not None:
+        stretch = ":".join(map(str, evaluate))
 
-    if histories and out is None:
-        raise InputError("histories are kept in a file: give the folder out, too")
-    draft, comm = draft_of(scene), _communicator(comm)
-    if sample is None:
-        variants, sampling = _listed(vary), None
-    elif vary is not None:
-        raise InputError("sample makes all variants itself: give vary or sample, not both")
-    else:
-        from catenary.cases.studies.sampling.samples import samples
+    def read() -> CheckedScene:
+        return scene_to_continue(own, until_m, stretch, said)
 
-        sampling, where = sampling_like(sample)
-        variants = samples(sampling, draft.scene(), where)
-    say = _line if progress else _nothing
-    with ExitStack() as stack:
-        folder = Path(out) if out is not None else stack.enter_context(_temporary(comm, "sweep"))
-        made = sweep_of(
-            draft,
-            variants,
+    tables = on_root(comm, read, takes_long=True)
+    with _set_up(tables, progress, comm) as options:
+        extends = until_m is not None
+        made = go_on(own, tables, comm, options, force=force, extends=extends)
+        return _returned(made, comm)
+
+
+def run_into(
+    folder: Path,
+    scene: CheckedScene,
+    comm: Any,
+    petsc_options: Sequence[str],
+    *,
+    force: bool = False,
+    only_summary: bool = False,
+    tell: Callable[[str], None] = lambda outcome: None,
+    ready: Callable[[], None] = lambda: None,
+) -> Run:
+    """A run into a folder, however it ends, of which no file is open. Collective.
+
+    Parameters
+    ----------
+    folder, scene, comm, force, only_summary, tell, ready
+        As of ``cases.run.runner.run_case``.
+    petsc_options : sequence of str
+        Options that PETSc was started with, for the record.
+
+    Returns
+    -------
+    Run
+        On every process. Its ``outcome`` says how the march ended.
+
+    Raises
+    ------
+    InputError, RunBroken
+        As ``run_case``.
+    """
+    from catenary.cases.run.runner import on_as_many, run_case
+
+    ended = on_as_many(
+        scene,
+        comm,
+        lambda ranks: run_case(
+            scene,
             folder,
-            only_statistics=only_statistics,
-            histories=histories,
+            ranks,
             force=force,
-        )
-        options = stack.enter_context(options_of(made.first.petsc.given()))
-        stack.enter_context(_shown(False, comm))
-        plan = RunOptions(force, options, say if comm.rank == 0 else _nothing, jobs)
-        program = "a sweep of a Python program"
-        ended, _ = run_sweep(made, folder, comm, plan, program, () if sampling is None else None)
-        # Times of a rank are its own.
-        rows = on_root(comm, lambda: table_of(ended).records())
-        if sampling is not None and out is not None:
-            from catenary.cases.result_folder.folder_lock import held
-            from catenary.cases.studies.uncertainty.output import write_evaluated
-
-            with held(folder, comm, program):
-                on_root(comm, lambda: write_evaluated(folder, rows, sampling), takes_long=True)
-    if interrupted(ended):
-        raise KeyboardInterrupt
-    return pd.DataFrame(rows)
-
-
-def _listed(vary: Mapping[str, Sequence[Any]] | None) -> list[Variant]:
-    """The variants of lists of values."""
-    if not vary or not all(len(values) for values in vary.values()):
-        raise InputError("there is nothing to vary: give at least one key with a value")
-    varied = [
-        varied_key(
-            key, tuple(text_of(plain_value(own, f"{key} in vary")) for own in values), "vary"
-        )
-        for key, values in vary.items()
-    ]
-    variants = product(varied, {}, "in vary")
-    check_keys(variants, "in vary")
-    return variants
-
-
-def _communicator(comm: Any) -> Any:
-    if comm is not None:
-        return comm
-    return world() if launched_by_mpirun() else alone()
-
-
-@contextmanager
-def _temporary(comm: Any, what: str) -> Iterator[Path]:
-    """A folder of rank 0 that all know, removed at the end. Collective."""
-    with ExitStack() as stack:
-
-        def make() -> str:
-            return stack.enter_context(tempfile.TemporaryDirectory(prefix=f"catenary_{what}_"))
-
-        yield Path(on_root(comm, make))
-
-
-def _read(folder: Path, comm: Any, in_memory: bool) -> Run:
-    """Results of a run that this process has just made. Collective.
-
-    In memory all processes have the file that only rank 0 may be able to see.
-    """
-    from catenary.postproc.read.results import RESULT_FILE, Results
+            petsc_options=petsc_options,
+            tell=tell,
+            ready=ready,
+            only_summary=only_summary,
+        ),
+    )
     from catenary.results import Run
 
-    path = folder / RESULT_FILE
-    if not in_memory:
-        return Run(Results(path), folder)
-    return Run(Results(path, image=on_root(comm, path.read_bytes)))
+    return Run(None, folder, ended)
+
+
+def scene_to_continue(
+    folder: Path, until_m: float | None, evaluate: str | None, said: Said
+) -> CheckedScene:
+    """The checked scene with which a run goes on. Not collective.
+
+    Parameters
+    ----------
+    folder : Path
+        The folder of the run.
+    until_m : float, optional
+        Where the leading pantograph is to stop [m], None for where it stops now.
+    evaluate : str, optional
+        FROM:TO [m], None for the stretch as it is.
+    said : Said
+        Names of these two where they were given, for sentences.
+
+    Raises
+    ------
+    InputError
+        If there is no run, or as ``cases.run.continuing.extended_scene``.
+    """
+    from catenary.cases.result_folder.output_folder import refuse_impossible
+    from catenary.cases.run.continuing import extended_scene
+    from catenary.postproc.read.guard import examined
+    from catenary.postproc.read.results import Results
+
+    refuse_impossible(folder)
+    if not folder.is_dir():
+        raise InputError(f"{folder} is no folder; name the folder of a run")
+    if evaluate is not None and until_m is None:
+        raise InputError(f"{said.evaluated} belongs to {said.until}")
+    with Results(folder, examined(folder)) as results:
+        config = results.attributes["config"]
+    return extended_scene(config, str(results.path), until_m, evaluate, said)
+
+
+def go_on(
+    folder: Path,
+    scene: CheckedScene,
+    comm: Any,
+    petsc_options: Sequence[str],
+    *,
+    force: bool = False,
+    extends: bool = False,
+    tell: Callable[[str], None] = lambda outcome: None,
+) -> Run:
+    """A run that goes on, as of ``run_into``. Collective.
+
+    Parameters
+    ----------
+    folder, comm, force, extends, tell
+        As of ``cases.run.runner.restart_case``.
+    scene : Scene
+        What ``scene_to_continue`` gave.
+    petsc_options : sequence of str
+        As of ``run_into``.
+    """
+    from catenary.cases.run.runner import on_as_many, restart_case
+
+    ended = on_as_many(
+        scene,
+        comm,
+        lambda ranks: restart_case(
+            scene,
+            folder,
+            ranks,
+            petsc_options=petsc_options,
+            tell=tell,
+            force=force,
+            extends=extends,
+        ),
+    )
+    from catenary.results import Run
+
+    return Run(None, folder, ended)
 
 
 @contextmanager
-def _shown(progress: bool, comm: Any) -> Iterator[None]:
-    """While entered, progress is shown on standard error on rank 0, or nowhere. Not collective."""
-    logger = logging.getLogger(_PROGRESS)
-    before, passed_on = logger.level, logger.propagate
-    handler: logging.Handler = logging.NullHandler()
-    if progress and comm.rank == 0:
-        handler = logging.StreamHandler(sys.stderr)
-        handler.setFormatter(logging.Formatter("%(message)s"))
-    logger.addHandler(handler)
-    logger.setLevel(logging.INFO if progress else logging.WARNING)
-    logger.propagate = not progress
-    try:
-        yield
-    finally:
-        logger.removeHandler(handler)
-        logger.setLevel(before)
-        logger.propagate = passed_on
+def _set_up(scene: CheckedScene, progress: bool, comm: Any) -> Iterator[list[str]]:
+    """PETSc with the options of a scene, as words, and progress as it is wanted. Collective."""
+    with options_of(scene.petsc.given()) as options, progress_shown(progress, comm):
+        yield options
 
 
-def _line(text: str) -> None:
-    print(text, file=sys.stderr)
+def _returned(made: Run, comm: Any, in_memory: bool = False) -> Run:
+    """A run that ended, with its file open, or in memory on all ranks, of which only rank 0 may be
+    able to see the file. Collective. Raises what ``run`` says unless it is done."""
+    from catenary.results import held
 
-
-def _nothing(text: str) -> None:
-    """Say nothing."""
+    if made.outcome == "interrupted":
+        raise KeyboardInterrupt
+    own = held(made, comm, in_memory)
+    if own.outcome != "done":
+        error = RunBroken(own.outcome)
+        error.run = own
+        raise error
+    return own

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from catenary.base.lone_process import alone
@@ -10,6 +11,10 @@ from catenary.scenes import SceneLike, checked
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from catenary.cases.studies.sensitivity.study import Sensitivity
+
+SENSITIVITIES = "sensitivity.csv"
 
 
 def sensitivity(
@@ -56,12 +61,52 @@ def sensitivity(
     >>> row.change, row.unit, bool(0.9 < row.mean_change_N < 1.1)
     (1.0, 'N', True)
     """
-    import pandas as pd
+    return derivatives(scene, parameters, droppers=droppers).table()
 
-    own = checked(scene)
-    comm = alone()  # starts MPI as one process, before anything imports it
-    from catenary.cases.studies.sensitivity.output import table_of
+
+def derivatives(
+    scene: SceneLike, parameters: Sequence[str] = (), *, droppers: bool = False
+) -> Derivatives:
+    """What ``sensitivity`` makes a table of. Not collective.
+
+    Parameters
+    ----------
+    scene, parameters, droppers
+        As of ``sensitivity``.
+
+    Raises
+    ------
+    InputError, RunBroken
+        As ``sensitivity``.
+    """
+    own, comm = checked(scene), alone()  # starts MPI as one process, before anything imports it
     from catenary.cases.studies.sensitivity.study import sensitivity_of
 
-    found = sensitivity_of(own, list(parameters), comm, droppers=droppers)
-    return pd.DataFrame(table_of(found).records())
+    return Derivatives(sensitivity_of(own, list(parameters), comm, droppers=droppers))
+
+
+class Derivatives:
+    """Derivatives of the statistics of a scene. As text what the program prints."""
+
+    def __init__(self, own: Sensitivity) -> None:
+        self._own = own
+
+    def table(self) -> pd.DataFrame:
+        """The table that ``sensitivity`` returns."""
+        import pandas as pd
+
+        from catenary.cases.studies.sensitivity.output import table_of
+
+        return pd.DataFrame(table_of(self._own).records())
+
+    def write(self, folder: Path) -> list[Path]:
+        """Write ``sensitivity.csv`` into a folder; returns the files. Not collective."""
+        from catenary.cases.studies.sensitivity.output import table_of
+        from catenary.postproc.report.study_table import write_files
+
+        return write_files(folder, {SENSITIVITIES: table_of(self._own)})
+
+    def __str__(self) -> str:
+        from catenary.cases.studies.sensitivity.output import as_text
+
+        return as_text(self._own)

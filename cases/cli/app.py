@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
+import catenary
 from catenary.base.errors import InputError
 from catenary.cases.cli import completion
 from catenary.cases.terminal import console
@@ -159,11 +160,17 @@ class SceneWords:
         changes, options = self.split()
         return read_draft(self.case, changes, self.shortened), options
 
-    def load(self, *further: str) -> Scene:
-        """The scene, with further assignments. Not collective."""
-        from catenary.cases.scene.load import load_scene
+    def scene(self, *further: str) -> catenary.Scene:
+        """The scene, with further assignments, as Python programs have it. Not collective."""
+        from catenary.cases.scene.load import read_draft
 
-        return load_scene(self.case, [*self.changes, *further], self.shortened)
+        return catenary.Scene(read_draft(self.case, [*self.changes, *further], self.shortened))
+
+    def load(self, *further: str) -> Scene:
+        """The tables of that scene. Not collective."""
+        from catenary.scenes import checked
+
+        return checked(self.scene(*further))
 
 
 @dataclass

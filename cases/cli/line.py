@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+import catenary
 from catenary.base.errors import InputError
 from catenary.cases.cli.app import Force, SceneWords, serial_verb
 from catenary.cases.result_folder.output_folder import new_file
@@ -27,17 +28,14 @@ def check(
     from catenary.cases.scene.input.faults import SceneError
 
     try:
-        scene = words.load()
+        scene = words.scene()
     except SceneError as error:
         for line in error.lines():
             console.complain(line)
         return console.BAD_INPUT
-    # Modules that a refusal does not need are imported once the scene is valid.
-    from catenary.cases.run.at_rest.static_table import check_line
-
-    found = check_line(scene)
-    console.say("\n".join(found.sentences))
-    for text in found.warnings:
+    warnings = catenary.check(scene)
+    console.say("\n".join(warnings.sentences))
+    for text in warnings:
         console.warn(text)
     return console.DONE
 
@@ -116,23 +114,12 @@ def static(
         differences = range_of(over)
         console.say(temperatures(words.load(), differences, out))
         return
-    scene = words.load()
-    from catenary.cases.run.at_rest.static_table import rest_text, static_table, write_static
-    from catenary.cases.run.describe.defects import defect_facts
-    from catenary.cases.scene.problem import problem_of
-
-    table, problem = static_table(scene), problem_of(scene)
+    rest = catenary.static(words.scene())
     if out is not None:
-        write_static(out, table, registration)
-    for fact in defect_facts(scene, problem):
-        console.say(fact["says"])
-    console.say(rest_text(scene, table))
-    warmer = problem.along.warmer
-    if warmer and {"axial_motion", "temperature"} <= problem.effects:
-        from catenary.cases.run.at_rest.temperatures import temperatures
+        from catenary.line_tables import write_rest
 
-        console.say("")
-        console.say(temperatures(scene, [warmer], None))
+        write_rest(rest, out, registration)
+    console.say(str(rest))
 
 
 @serial_verb(

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+import catenary
 from catenary.base.errors import InputError
 from catenary.cases.cli.app import Force, Jobs, SceneWords, folder_option, serial_verb, tell
 from catenary.cases.terminal import console
@@ -87,10 +88,7 @@ def plan(
     for option, value in belonging.items():
         if value is not None:
             raise InputError(f"{option} belongs to plan --cost; give both")
-    scene = words.load()
-    from catenary.cases.run.planning.plan import make_plan, plan_text
-
-    console.say(plan_text(make_plan(scene)))
+    console.say(str(catenary.plan(words.scene())))
     return console.DONE
 
 

@@ -28,8 +28,8 @@ from catenary.cases.result_folder.output_folder import refuse_impossible
 from catenary.cases.terminal import console
 
 if TYPE_CHECKING:
+    import catenary
     from catenary.cases.run.planning.slurm_script import Job
-    from catenary.cases.run.runner import RunOutcome
     from catenary.cases.scene.scene import Scene
 
 
@@ -69,26 +69,14 @@ def run(
 
     comm, scene, arguments = begin(read, runs.verbose, lambda scene: scene)
     from catenary.cases.run.describe.arrivals import arrival_warnings
-    from catenary.cases.run.runner import on_as_many, run_case
+    from catenary.runs import run_into
 
     def warn() -> None:
         for text in arrival_warnings(scene):
             console.warn(text)
 
-    result = on_as_many(
-        scene,
-        comm,
-        lambda ranks: run_case(
-            scene,
-            out,
-            ranks,
-            force=runs.force,
-            petsc_options=arguments,
-            tell=_teller(out),
-            ready=warn,
-        ),
-    )
-    return _end(result, out, strict)
+    made = run_into(out, scene, comm, arguments, force=runs.force, tell=_teller(out), ready=warn)
+    return _end(made, strict)
 
 
 @verb(
@@ -119,39 +107,20 @@ def restart(
     from catenary.cases.process.petsc_options import split_extras
 
     def read() -> tuple[Scene, list[str]]:
-        from catenary.cases.run.continuing import EVALUATED, UNTIL, extended_scene
-        from catenary.postproc.read.guard import examined
-        from catenary.postproc.read.results import Results
+        from catenary.cases.run.continuing import OF_PROGRAM
+        from catenary.runs import scene_to_continue
 
         more, options = split_extras(extras or [])
         if more:
             raise InputError(f"{more[0]} cannot be changed when a run is continued")
-        refuse_impossible(folder)
-        if not folder.is_dir():
-            raise InputError(f"{folder} is no folder; name the folder of a run")
-        if evaluate is not None and until_m is None:
-            raise InputError(f"{EVALUATED} belongs to {UNTIL}")
-        with Results(folder, examined(folder)) as results:
-            config = results.attributes["config"]
-        return extended_scene(config, str(results.path), until_m, evaluate), options
+        return scene_to_continue(folder, until_m, evaluate, OF_PROGRAM), options
 
     comm, scene, arguments = begin(read, verbose, lambda scene: scene)
-    from catenary.cases.run.runner import on_as_many, restart_case
+    from catenary.runs import go_on
 
-    result = on_as_many(
-        scene,
-        comm,
-        lambda ranks: restart_case(
-            scene,
-            folder,
-            ranks,
-            petsc_options=arguments,
-            tell=_teller(folder),
-            force=force,
-            extends=until_m is not None,
-        ),
-    )
-    return _end(result, folder, strict)
+    tell, extends = _teller(folder), until_m is not None
+    made = go_on(folder, scene, comm, arguments, force=force, extends=extends, tell=tell)
+    return _end(made, strict)
 
 
 def _teller(folder: Path) -> Callable[[str], None]:
@@ -166,15 +135,16 @@ def _teller(folder: Path) -> Callable[[str], None]:
     return tell
 
 
-def _end(result: RunOutcome, folder: Path, strict: bool) -> int:
+def _end(made: catenary.Run, strict: bool) -> int:
     """Print the summary of a run that is done and return the exit code. Not collective."""
     from catenary.cases.terminal import terminal_text
 
-    if result.outcome != "done":
+    if made.outcome != "done":
         return console.BROKEN
-    text = terminal_text.summary_text(result.summary, folder, result.phase_wall, console.waited())
+    assert made.folder is not None
+    text = terminal_text.summary_text(made.summary, made.folder, made.phase_wall, console.waited())
     console.say(text)
-    return console.NOT_ACCEPTED if strict and result.accepted is False else console.DONE
+    return console.NOT_ACCEPTED if strict and made.passed is False else console.DONE
 
 
 @serial_verb(

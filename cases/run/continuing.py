@@ -8,7 +8,7 @@ import math
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -34,7 +34,17 @@ _RECORDED = ("contact_force", "head_height", "wire_height", "strip_force", "cont
 _ROUNDING = 1e-9
 # Another machine's rounding at rest, as a share and as a size [m], [N].
 _RELATIVE, _ABSOLUTE = 1e-6, 1e-6
-UNTIL, EVALUATED = "--until-m", "--evaluate"
+
+
+class Said(NamedTuple):
+    """Names of a later end and of another stretch as they were given, and where."""
+
+    until: str
+    evaluated: str
+    where: str
+
+
+OF_PROGRAM = Said("--until-m", "--evaluate", "on the command line")
 
 
 def state_to_continue(result: Path, beyond_end: bool = False) -> dict[str, Any]:
@@ -164,7 +174,11 @@ def _refusal(result: Path, what: str) -> InputError:
 
 
 def extended_scene(
-    config: dict[str, Any], file: str, until: float | None, evaluated: str | None
+    config: dict[str, Any],
+    file: str,
+    until: float | None,
+    evaluated: str | None,
+    said: Said = OF_PROGRAM,
 ) -> Scene:
     """The checked scene of a run with a later end, or another evaluated stretch. Not collective.
 
@@ -174,6 +188,7 @@ def extended_scene(
     file : its path, for sentences
     until : where the leading pantograph is to stop [m], None for where it stops now
     evaluated : ``FROM:TO`` [m], None for the stretch as it is
+    said : how these two were given, for sentences
 
     Raises
     ------
@@ -185,18 +200,19 @@ def extended_scene(
         end = float(raw["train"]["end_m"])
         if not (math.isfinite(until) and until > end):
             raise InputError(
-                f"{UNTIL} is {until:g}, but must be greater than {end:g}: the run ends there"
+                f"{said.until} is {until:g}, but must be greater than {end:g}: the run ends there"
             )
         raw["train"]["end_m"] = until
-        given.append(("train.end_m", f"on the command line ({UNTIL})"))
+        given.append(("train.end_m", f"{said.where} ({said.until})"))
     if evaluated is not None:
         try:
             first, last = (float(part) for part in evaluated.split(":"))
         except ValueError:
             raise InputError(
-                f"{EVALUATED} is {evaluated}, but must be two places [m] as from:to, e.g. 360:600"
+                f"{said.evaluated} is {evaluated}, but must be two places [m] as from:to, "
+                "e.g. 360:600"
             ) from None
         raw["evaluation"] |= {"from_m": first, "to_m": last}
-        where = f"on the command line ({EVALUATED})"
+        where = f"{said.where} ({said.evaluated})"
         given += [("evaluation.from_m", where), ("evaluation.to_m", where)]
     return scene_from(raw, Origin(file, tuple(given), recorded=True))

@@ -134,13 +134,11 @@ def on_as_many(scene: Scene, comm: Any, run: Callable[[Any], T]) -> T:
 class RunOutcome:
     """Result of a run.
 
-    ``outcome`` is "done", "interrupted" or the sentence of what broke; ``accepted`` the verdict
-    of the standard, None if not judged; ``summary`` the content of ``summary.json``;
-    ``phase_wall`` the wall time of all phases, that of the report included [s].
+    ``outcome`` is "done", "interrupted" or the sentence of what broke; ``summary`` the content of
+    ``summary.json``; ``phase_wall`` the wall time of all phases, that of the report included [s].
     """
 
     outcome: str
-    accepted: bool | None
     summary: dict[str, Any] = field(default_factory=dict)
     phase_wall: dict[str, float] = field(default_factory=dict)
 
@@ -435,18 +433,18 @@ def _report(out_dir: Path, outcome: Outcome, only_summary: bool) -> RunOutcome:
 
     try:
         if only_summary:
-            accepted = write_summary(out_dir / RESULT, out_dir)
+            write_summary(out_dir / RESULT, out_dir)
         else:
-            accepted = write_report(out_dir / RESULT, out_dir).verdict
+            write_report(out_dir / RESULT, out_dir)
         summary = json.loads((out_dir / "summary.json").read_text(encoding="utf-8"))
     except (OSError, CatenaryError) as error:
         if outcome.outcome != "done":  # reported already
-            return RunOutcome(outcome.outcome, None)
+            return RunOutcome(outcome.outcome)
         raise RunBroken(
             f"{error}; the results are complete: `catenary report {out_dir}` writes the report "
             "again"
         ) from error
-    return RunOutcome(outcome.outcome, accepted, summary)
+    return RunOutcome(outcome.outcome, summary)
 
 
 def _refuse_other_run(

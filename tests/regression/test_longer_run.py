@@ -11,6 +11,7 @@ import pytest
 from damaging import unseal
 from program import MPIRUN, assert_same_histories, assert_sound, catenary, short_run
 
+from catenary import restart
 from catenary.base.errors import InputError
 from catenary.cases.run.continuing import extended_scene
 from catenary.cases.scene.load import load_scene
@@ -55,6 +56,29 @@ def test_a_run_goes_on_to_a_later_end(whole: Path, begun: Path, tmp_path: Path) 
         for name in ("n_steps_planned", "arrivals", "effects_on", "effects_off", "n_steps"):
             assert found.attributes[name] == expected.attributes[name], name
     assert_same_tables(out, whole)
+
+
+def test_a_program_in_python_prolongs_a_run(whole: Path, begun: Path, tmp_path: Path) -> None:
+    """What is refused first leaves the run as it is."""
+    out = tmp_path / "run"
+    shutil.copytree(begun, out)
+    for given, says in (
+        ({}, "is done; there is nothing to continue"),
+        ({"evaluate": (150, 190)}, "evaluate belongs to until_m"),
+        ({"until_m": 160}, "until_m is 160, but must be greater than 170"),
+        ({"until_m": LAST, "evaluate": (150,)}, "evaluate is 150, but must be two places"),
+        ({"until_m": 1e5}, r"in restart\(\) \(until_m\)"),
+    ):
+        with pytest.raises(InputError, match=says):
+            restart(out, **given)
+    with pytest.raises(InputError, match="is no folder"):
+        restart(tmp_path / "nowhere", until_m=LAST)
+    with restart(out, until_m=LAST, evaluate=(150, 190)) as run:
+        assert run.outcome == "done" and run.summary["evaluation_m"] == [150.0, 190.0]
+        assert "report" in run.phase_wall and run.folder == out
+        with Results(whole) as expected:
+            assert np.array_equal(run.force, expected.channel("contact_force"))
+    assert_same_histories(out, whole)
 
 
 @pytest.mark.study

@@ -166,6 +166,7 @@ def test_a_table_is_evaluated_again(swept: tuple[Path, str], tmp_path: Path) -> 
     assert "std_N" in done.stdout
     first, again = (json.loads((path / "uncertainty.json").read_text()) for path in (out, tmp_path))
     assert again["quantiles"] == first["quantiles"]
+    assert done.stdout.startswith(f"{catenary.uncertainty(out / 'sweep.csv')}\n")
 
 
 def test_python_samples_and_evaluates_too(file: Path) -> None:

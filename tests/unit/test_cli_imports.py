@@ -17,6 +17,7 @@ import pytest
 pytestmark = pytest.mark.process
 
 BACKENDS = {"gmsh", "h5py", "matplotlib", "meshio", "mpi4py", "petsc4py", "scipy", "tqdm"}
+TABLES = {"pandas", "xarray"}  # of the Python face, which verbs call
 # One process runs all command lines, one after the other, and prints the exit code of each with
 # the packages that are loaded by then.
 PROGRAM = """
@@ -82,9 +83,16 @@ def test_a_sound_case_loads_what_it_is_checked_with() -> None:
     """So that the names above are those of modules."""
     (_, lumped), (_, mechanism) = run_all(["check en50318_2002", "check ambrosio2012"])
     assert "scipy" in lumped
-    unused = BACKENDS - {"scipy"}
+    unused = BACKENDS - {"scipy"} | TABLES
     assert not unused & set(lumped)
     assert not unused & set(mechanism)
+
+
+def test_results_of_the_python_face_load_no_tables_to_be_printed() -> None:
+    lines = ["plan ac_simple", "static ac_simple"]
+    for line, (code, loaded) in zip(lines, run_all(lines), strict=True):
+        assert code == 0, line
+        assert not TABLES & set(loaded), line
 
 
 # Prints the modules that are loaded when the march of a run begins, and at the end of the run.

@@ -82,7 +82,9 @@ def runner(monkeypatch: pytest.MonkeyPatch) -> types.SimpleNamespace:
 
 def outcome(said: str, accepted: bool | None) -> types.SimpleNamespace:
     return types.SimpleNamespace(
-        outcome=said, accepted=accepted, summary=SUMMARY, phase_wall={"march": 0.24, "report": 0.76}
+        outcome=said,
+        summary={**SUMMARY, "passed": accepted},
+        phase_wall={"march": 0.24, "report": 0.76},
     )
 
 

@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+import catenary
+
 ROOT = Path(__file__).parents[2]
 PARTS = ("meshgen", "mbs", "solver", "postproc", "cases")
 
@@ -22,8 +24,8 @@ MAY_IMPORT = {
     "postproc": {"base", "meshgen", "mbs", "solver", "postproc"},
     "cases": {"base", *PARTS},
 }
-# The package itself, installed as ``catenary``, stands above all: nothing below imports it.
-FACE = "api"
+# The package itself, installed as ``catenary``, stands above all: only the command line imports it.
+FACE, PROGRAM = "api", "cli"
 # What every part imports; it stands in solver/base and imports only itself.
 BASE = "base"
 # Compiled kernels, and what goes with them, are no part of the order.
@@ -72,12 +74,14 @@ def is_within(module: str, package: str) -> bool:
     return module == package or module.startswith(package + ".")
 
 
-def broken_arrows(part: str, modules: list[str], of_face: bool = False) -> list[str]:
-    """Imports that a file of ``part``, or one of the face, must not make."""
+def broken_arrows(part: str, modules: list[str], room: str = "") -> list[str]:
+    """Imports that a file of ``part``, in a ``room`` of cases, must not make."""
     wrong = []
     for module in modules:
         top, *rest = module.split(".")
-        if of_face and top == "catenary" and rest and rest[0] in FACE_FILES:
+        if room == PROGRAM and module == "catenary":
+            continue
+        if room in (FACE, PROGRAM) and top == "catenary" and rest and rest[0] in FACE_FILES:
             continue
         if top in PARTS or (top == "catenary" and not rest):
             wrong.append(f"{module} (import catenary.<part>.<module>)")
@@ -111,7 +115,10 @@ def test_the_checks_find_what_they_are_for() -> None:
         "solver", ["catenary.postproc.record.recorder", "catenary.mbs.lumped"]
     ) == ["catenary.postproc.record.recorder"]
     assert broken_arrows("cases", ["catenary.scenes.load"]) == ["catenary.scenes.load"]
-    assert broken_arrows("cases", ["catenary.scenes.load"], of_face=True) == []
+    for room in (FACE, PROGRAM):
+        assert broken_arrows("cases", ["catenary.scenes.load"], room) == []
+    assert broken_arrows("cases", ["catenary"], PROGRAM) == []
+    assert broken_arrows("cases", ["catenary"], FACE) != []
     assert {"scenes", "runs"} <= FACE_FILES
     loose = ast.parse("from mpi4py import MPI\ndef f(comm=MPI.COMM_WORLD):\n    pass\n")
     inside = ast.parse("from mpi4py import MPI\ndef f():\n    return MPI.COMM_WORLD\n")
@@ -130,7 +137,7 @@ def test_files_import_only_layers_before_their_own() -> None:
         part, *rest = path.relative_to(ROOT).parts
         if rest[0] == BASE:
             part = BASE
-        return broken_arrows(part, imports_of(path), rest[0] == FACE)
+        return broken_arrows(part, imports_of(path), rest[0])
 
     assert wrong_in(FILES, broken) == {}
 
@@ -171,6 +178,65 @@ def test_the_solver_never_writes_results() -> None:
         return [name for name in names if any(is_within(name, one) for one in FILE_WRITERS)]
 
     assert wrong_in((ROOT / "solver").rglob("*.py"), writers) == {}
+
+
+# Public functions whose verbs have other names.
+NAMED_OTHERWISE = {"speed": "highest_speeds", "separation": "separations"}
+# What both the face and the command line take from runs and studies: wishes as data, and what verbs
+# without a counterpart in the face need. All other work of these verbs is that of the face.
+TAKEN_BY_BOTH = {
+    "catenary.cases.studies.questions.highest_speed.Speeds",
+    "catenary.cases.studies.questions.separation.Distances",
+    "catenary.cases.studies.sweep.jobs.RunOptions",
+    "catenary.cases.studies.sweep.together.Marching",
+    "catenary.cases.studies.sweep.variants.check_keys",
+    "catenary.cases.studies.sweep.variants.product",
+    "catenary.cases.run.planning.plan.make_plan",  # submit: two figures, no table
+    "catenary.cases.run.prepared.prepare_line",  # prepare: a file, no steps
+    "catenary.cases.studies.records.held_study",  # numerics: studies that the face has not
+}
+
+
+def verbs() -> dict[str, ast.FunctionDef]:
+    """The function of each verb of the command line."""
+    found = {}
+    for path in (ROOT / "cases" / PROGRAM).rglob("*.py"):
+        for node in tree_of(path).body:
+            for mark in node.decorator_list if isinstance(node, ast.FunctionDef) else []:
+                if isinstance(mark, ast.Call) and ast.unparse(mark.func).endswith("verb"):
+                    found[ast.literal_eval(mark.args[0])] = node
+    return found
+
+
+def face_used_in(tree: ast.AST) -> set[str]:
+    """Files of the face whose names are used: ``catenary.NAME``, or imported from the file."""
+    files = {name.split(".")[1] for name in imports_in(tree) if name.startswith("catenary.")}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Attribute) and ast.unparse(node.value) == "catenary":
+            files.add(catenary._FILE_OF[node.attr])
+    return files & FACE_FILES
+
+
+def test_a_verb_with_a_counterpart_in_python_calls_that() -> None:
+    checked = set()
+    for verb, function in verbs().items():
+        name = NAMED_OTHERWISE.get(verb, verb)
+        if name in catenary._FILE_OF:
+            assert catenary._FILE_OF[name] in face_used_in(function), verb
+            checked.add(name)
+    functions = {name for name in catenary.__all__ if name.islower() and name[0] != "_"}
+    assert functions - checked == {"load", "open"}  # no verbs
+
+
+def work_taken_by(room: str) -> set[str]:
+    """What files of a room import from runs and studies, but for types."""
+    parts = ("catenary.cases.run.", "catenary.cases.studies.")
+    trees = [without_types(tree_of(path)) for path in (ROOT / "cases" / room).rglob("*.py")]
+    return {name for tree in trees for name in imports_in(tree) if name.startswith(parts)}
+
+
+def test_the_command_line_does_no_work_that_the_face_does() -> None:
+    assert work_taken_by(FACE) & work_taken_by(PROGRAM) == TAKEN_BY_BOTH
 
 
 def world_at_import(tree: ast.Module) -> Iterator[int]:

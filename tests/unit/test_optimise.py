@@ -12,8 +12,10 @@ import numpy as np
 import pytest
 from verb_runner import CliRunner
 
+import catenary
 from catenary.base.errors import InputError
 from catenary.cases.cli.main import app
+from catenary.cases.result_folder.folder_lock import FolderLock
 from catenary.cases.run.at_rest.static_table import static_table
 from catenary.cases.scene.input.case_files import find_case
 from catenary.cases.scene.load import Draft, read_draft
@@ -535,6 +537,32 @@ def test_the_verb_writes_what_it_says(tmp_path: Path, evaluated: Any) -> None:
     assert "rows_so_far.jsonl" not in names
     again = invoke(*words)
     assert again.exit_code == 2 and "is there already" in again.output
+
+
+@pytest.mark.usefixtures("own_hook")
+def test_a_program_in_python_gets_what_the_verb_prints(
+    tmp_path: Path, evaluated: Any, caplog: pytest.LogCaptureFixture
+) -> None:
+    evaluated(lambda scene: summary(20.0 + (masses(scene)[0] - 8.0) ** 2))
+    file, out = tmp_path / "task.toml", tmp_path / "python"
+    file.write_text(
+        f'[[variables]]\nkey = "{HEAD}"\nentries = [[1]]\nchange = [-5.0, 5.0]\n'
+        "[checks]\nn_seeds = 0\n"
+    )
+    words = [word for key, value in TINY.items() for word in ("--set", f"{key}={value}")]
+    done = invoke("optimise", "en50318_2002", str(file), "-o", str(tmp_path / "verb"), *words)
+    scene = catenary.load("en50318_2002").replace(TINY)
+    lock = FolderLock(out, "another program")
+    with pytest.raises(InputError, match="in use by process"):
+        catenary.optimise(scene, file, out)
+    lock.release()
+    caplog.clear()
+    (best,) = catenary.optimise(scene, file, out)
+    (warning,) = caplog.messages
+    assert "one speed and one train" in warning and warning in " ".join(done.stderr.split())
+    assert str(best) in done.stdout
+    for path in (tmp_path / "verb").iterdir():
+        assert (out / path.name).read_bytes() == path.read_bytes(), path.name
 
 
 @pytest.mark.usefixtures("own_hook")

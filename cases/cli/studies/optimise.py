@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -19,8 +18,13 @@ from catenary.cases.cli.app import (
     serial_verb,
     tell,
 )
-from catenary.cases.result_folder.output_folder import refuse_table
 from catenary.cases.terminal import console
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from catenary.cases.scene.load import Draft
+    from catenary.optimising import Made
 
 
 @dataclass
@@ -36,36 +40,22 @@ class TaskWords:
     n_jobs: Jobs = 1
     force: Force = False
 
-    def run(
-        self,
-        verb: str,
-        table: str,
-        task: type,
-        make_plan: Callable[..., Any],
-        find: Callable[..., Any],
-        output: Any,
-    ) -> int:
-        """Plan the study, find what it looks for, and leave what its ``output`` writes.
+    def make(self, verb: str, study: Callable[..., Made]) -> int:
+        """Make the study and print what it found. Serial."""
 
-        Serial. ``table`` is one of its files, ``task`` the model of the task.
-        """
-        from catenary.cases.studies.records import held_study
-        from catenary.cases.studies.scene_sets import workers
-        from catenary.cases.studies.task_files import read_task
+        def read() -> tuple[Draft, Path]:
+            return SceneWords(self.case, assignments=self.assignments).draft()[0], self.task_file
 
-        out, command = self.out, f"catenary {verb} {self.case}"
-        refuse_table(out / table, self.force)
-        draft, _ = SceneWords(self.case, assignments=self.assignments).draft()
-        plan = make_plan(draft, read_task(self.task_file, task))
-        for sentence in plan.warnings:
-            console.warn(sentence)
-        with (
-            held_study(out, console.alone(), command, self.force) as (kept, write),
-            workers(self.n_jobs) as pool,
-        ):
-            found = find(plan, pool, kept, console.say)
-            files = write(lambda folder: output.write(folder, plan, found))
-        tell(output.as_text(plan, found), files)
+        made = study(
+            read,
+            self.out,
+            command=f"catenary {verb} {self.case}",
+            jobs=self.n_jobs,
+            force=self.force,
+            warn=console.warn,
+            say=console.say,
+        )
+        tell(str(made), made.files)
         return console.DONE
 
 
@@ -81,11 +71,9 @@ class TaskWords:
 )
 def optimise(words: TaskWords) -> int:
     """Serial."""
-    from catenary.cases.studies.optimise import output
-    from catenary.cases.studies.optimise.study import make_plan, optimise
-    from catenary.cases.studies.optimise.task import OptimiseTask
+    from catenary.optimising import optima
 
-    return words.run("optimise", output.RECORD, OptimiseTask, make_plan, optimise, output)
+    return words.make("optimise", optima)
 
 
 @serial_verb(
@@ -98,8 +86,6 @@ def optimise(words: TaskWords) -> int:
 )
 def tolerance(words: TaskWords) -> int:
     """Serial."""
-    from catenary.cases.studies.tolerance import output
-    from catenary.cases.studies.tolerance.study import find_tolerances, make_plan
-    from catenary.cases.studies.tolerance.task import ToleranceTask
+    from catenary.optimising import tolerances
 
-    return words.run("tolerance", output.TABLE, ToleranceTask, make_plan, find_tolerances, output)
+    return words.make("tolerance", tolerances)

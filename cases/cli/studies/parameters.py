@@ -83,9 +83,6 @@ def pantograph(
         console.say("\n" + "\n".join(str(path) for path in write_study(found, out)))
 
 
-SENSITIVITIES = "sensitivity.csv"
-
-
 @serial_verb(
     "sensitivity",
     help="Rank what the parameters of a case change. It prints the derivatives of the contact-"
@@ -116,24 +113,21 @@ def sensitivity(
         ),
     ] = False,
     out: Annotated[
-        Path | None, folder_option(f"Folder for {SENSITIVITIES}; without it nothing is written.")
+        Path | None, folder_option("Folder for sensitivity.csv; without it nothing is written.")
     ] = None,
     force: Force = False,
 ) -> int:
     """Serial."""
     from catenary.cases.result_folder.output_folder import refuse_table
+    from catenary.sensitivities import SENSITIVITIES, derivatives
 
-    scene = words.load()
+    scene = words.scene()
     if out is not None:
         refuse_table(out / SENSITIVITIES, force)
-    from catenary.cases.studies.sensitivity.output import as_text, table_of
-    from catenary.cases.studies.sensitivity.study import sensitivity_of
-    from catenary.postproc.report.study_table import write_files
-
-    found = sensitivity_of(scene, keys or [], console.alone(), droppers=droppers)
-    console.say(as_text(found))
+    found = derivatives(scene, keys or [], droppers=droppers)
+    console.say(str(found))
     if out is not None:
-        console.say(f"\n{write_files(out, {SENSITIVITIES: table_of(found)})[0]}")
+        console.say(f"\n{found.write(out)[0]}")
     return console.DONE
 
 
@@ -165,17 +159,14 @@ def identify(
 ) -> int:
     """Serial."""
     from catenary.cases.result_folder.output_folder import refuse_table
-    from catenary.cases.studies.identification.task import Task
-    from catenary.cases.studies.task_files import read_task
+    from catenary.identifications import identified, task_of, write_identified
 
-    wanted = read_task(task, Task)
-    scene = SceneWords(case, extras, assignments, shortened).load()
-    from catenary.cases.studies.identification.output import PARAMETERS, as_text, files_of
-    from catenary.cases.studies.identification.study import identify as identified
-    from catenary.postproc.report.study_table import write_files
+    wanted = task_of(task)
+    scene = SceneWords(case, extras, assignments, shortened).scene()
+    from catenary.cases.studies.identification.output import PARAMETERS
 
     refuse_table(out / PARAMETERS, force)
-    found = identified(scene, measured, wanted, console.alone())
-    console.say(as_text(found))
-    console.say("\n".join(map(str, write_files(out, files_of(found)))))
+    found = identified(scene, measured, wanted)
+    console.say(str(found))
+    console.say("\n".join(map(str, write_identified(found, out))))
     return console.DONE

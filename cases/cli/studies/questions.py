@@ -6,7 +6,7 @@ import tempfile
 from contextlib import ExitStack
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -38,8 +38,8 @@ def _begun(
     out: Path | None,
     check: Callable[[], object],
     runs: StudyRuns,
-) -> tuple[Marching, Scene, Any]:
-    """The march of variants of a case, its scene, and the communicator. Collective.
+) -> tuple[Marching, Scene]:
+    """The march of variants of a case, and its scene. Collective.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def _begun(
     comm, (draft, scene), options = runs.begin(read, lambda made: made[1])
     from catenary.cases.studies.sweep.together import Marching
 
-    return Marching(draft, out, comm, options), scene, comm
+    return Marching(draft, out, comm, options), scene
 
 
 class Direction(StrEnum):
@@ -109,17 +109,13 @@ def speed(
     runs: StudyRuns,
 ) -> int:
     """Collective."""
-    from catenary.cases.studies.questions import highest_speed as question
+    from catenary.cases.studies.questions.highest_speed import Speeds
+    from catenary.questions import find_speeds
 
-    speeds = question.Speeds(slowest, fastest, step, within)
-
-    marching, scene, comm = _begun(words, "speed.csv", out, speeds.first, runs)
-    from catenary.cases.studies.records import held_study
-
-    with held_study(out, comm, f"catenary speed {words.case}") as (_, write):
-        found = question.find_speeds(marching, scene, speeds, criterion or [], direction)
-        files = write(lambda folder: question.write(folder, found))
-    tell(question.as_text(found), files)
+    speeds, command = Speeds(slowest, fastest, step, within), f"catenary speed {words.case}"
+    marching, scene = _begun(words, "speed.csv", out, speeds.first, runs)
+    found = find_speeds(marching, scene, speeds, criterion or [], direction, command)
+    tell(str(found), found.files)
     return console.DONE
 
 
@@ -148,19 +144,13 @@ def separation(
     runs: StudyRuns,
 ) -> int:
     """Collective."""
-    from catenary.cases.studies.questions import separation as question
+    from catenary.cases.studies.questions.separation import Distances
+    from catenary.questions import find_separations
 
-    distances = question.Distances(nearest, farthest, step)
-
-    marching, scene, comm = _begun(words, "separation.csv", out, distances.values, runs)
-    from catenary.base.parallel import on_root
-    from catenary.cases.studies.records import held_study
-
-    with held_study(out, comm, f"catenary separation {words.case}") as (_, write):
-        found = question.find_separations(marching, scene, distances)
-        period = on_root(comm, lambda: question.period_in(found, scene), takes_long=True)
-        files = write(lambda folder: question.write(folder, found, period))
-    tell(question.as_text(found, period), files)
+    distances, command = Distances(nearest, farthest, step), f"catenary separation {words.case}"
+    marching, scene = _begun(words, "separation.csv", out, distances.values, runs)
+    found = find_separations(marching, scene, distances, command)
+    tell(str(found), found.files)
     return console.DONE
 
 

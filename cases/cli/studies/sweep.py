@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+import catenary
 from catenary.base.errors import InputError
 from catenary.cases.cli.app import (
     Force,
@@ -27,10 +28,9 @@ from catenary.cases.terminal import console
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from catenary.cases.studies.sampling.tables import SamplingTable
     from catenary.cases.studies.sweep.jobs import Ended
-    from catenary.cases.studies.sweep.sweep import Sweep
     from catenary.cases.studies.sweep.variants import Variant
+    from catenary.sweeps import PlannedSweep
 
 _SHOWN_BROKEN, _SHOWN_REFUSED = 3, 20
 
@@ -96,15 +96,12 @@ def sweep(
     runs: StudyRuns,
 ) -> int:
     """Collective."""
-    from catenary.base.parallel import on_root
-    from catenary.cases.studies.sampling.samples import samples
-    from catenary.cases.studies.sampling.tables import read_sampling
     from catenary.cases.studies.sweep.jobs import check_statistics, parse_part
-    from catenary.cases.studies.sweep.sweep import run_part, run_sweep, sweep_of
+    from catenary.sweeps import plan_sweep, samples_of
 
     own = None if part is None else parse_part(part)
 
-    def read() -> tuple[tuple[Sweep, SamplingTable | None], list[str]]:
+    def read() -> tuple[PlannedSweep, list[str]]:
         draft, options = words.draft()
         check_statistics(_names(plotted))
         sampling = None
@@ -115,53 +112,33 @@ def sweep(
                 "--sample makes all variants itself: give neither --vary nor --variants"
             )
         else:
-            sampling = read_sampling(sample)
-            variants = samples(sampling, draft.scene(), str(sample))
+            variants, sampling = samples_of(sample, draft)
         if reports and only_statistics:
             raise InputError("--only-statistics leaves nothing that --reports could draw")
-        made = sweep_of(
+        made = plan_sweep(
             draft,
             variants,
             out,
+            sampling,
             full_report=reports,
             only_statistics=only_statistics,
             histories=_names(histories),
             force=runs.force,
         )
-        return (made, sampling), options
+        return made, options
 
-    comm, (made, sampling), options = runs.begin(read, lambda made: made[0].first)
-    for one in made.refused[:_SHOWN_REFUSED]:
+    comm, made, options = runs.begin(read, lambda made: made.own.first)
+    refused = made.own.refused
+    for one in refused[:_SHOWN_REFUSED]:
         console.warn(f"variant {one.variant.name} is not run: {one.outcome}")
-    if len(made.refused) > _SHOWN_REFUSED:
-        console.warn(f"{len(made.refused) - _SHOWN_REFUSED} more variants are not run")
+    if len(refused) > _SHOWN_REFUSED:
+        console.warn(f"{len(refused) - _SHOWN_REFUSED} more variants are not run")
     if own is not None:
-        ended = run_part(made, own, out, comm, options)
-        if sampling is not None:
-            from catenary.cases.studies.uncertainty.run_table import write_sampling
-
-            on_root(comm, lambda: write_sampling(out / own.folder, sampling))
-        return verdict(ended, "sweep")
+        return verdict(made.run_part(own, comm, options), "sweep")
     command = f"catenary sweep {words.case}"
-    drawn = _names(plotted)
-    lines = drawn if sampling is None else None  # samples are drawn as points
-    ended, files = run_sweep(made, out, comm, options, command, lines, histogram)
-    from catenary.cases.studies.sweep import output as sweep_output
-
-    if sampling is None:
-        text = sweep_output.as_text(ended)
-    else:
-        from catenary.cases.result_folder.folder_lock import held
-        from catenary.cases.studies.uncertainty import output
-
-        rows = sweep_output.table_of(ended).records()
-        with held(out, comm, command):
-            found, more = on_root(
-                comm, lambda: output.write_evaluated(out, rows, sampling, drawn), takes_long=True
-            )
-        text, files = output.as_text(found), [*files, *more]
-    tell(text, files)
-    return verdict(ended, "sweep")
+    found = made.run(comm, options, command, _names(plotted), histogram)
+    tell(str(found), found.files)
+    return verdict(found.ended, "sweep")
 
 
 def read_variants(vary: Sequence[str] | None, named: Path | None) -> list[Variant]:
@@ -264,18 +241,11 @@ def uncertainty(
     ] = None,
 ) -> None:
     """Serial."""
-    from catenary.cases.studies.sampling.tables import read_sampling
-    from catenary.cases.studies.uncertainty import output
-    from catenary.cases.studies.uncertainty.evaluation import evaluate
-    from catenary.cases.studies.uncertainty.run_table import read_run_table, run_table
+    from catenary.estimates import write_uncertainty
 
-    runs = read_run_table(table)
-    if sample is not None:
-        runs = run_table(runs.frame, read_sampling(sample), str(table))
-    found = evaluate(runs)
-    folder = out or (table if table.is_dir() else table.parent)
-    files = output.write(folder, runs, found)
-    console.say(output.as_text(found))
+    found = catenary.uncertainty(table, sample)
+    files = write_uncertainty(found, out or (table if table.is_dir() else table.parent))
+    console.say(str(found))
     console.say("\n" + "\n".join(str(path) for path in files))
 
 

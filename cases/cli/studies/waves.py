@@ -180,9 +180,9 @@ def _window_error(words: WaveWords, out: Path, text: str, vary: list[str], force
 
 def _run(scene: Scene, out: Path, force: bool) -> bool:
     """Run the case; whether it came to its end."""
-    from catenary.cases.run.runner import run_case
+    from catenary.runs import run_into
 
-    result = run_case(scene, out, console.alone(), force=force, only_summary=True)
-    if result.outcome != "done":
-        console.complain(result.outcome)
-    return result.outcome == "done"
+    made = run_into(out, scene, console.alone(), [], force=force, only_summary=True)
+    if made.outcome != "done":
+        console.complain(made.outcome)
+    return made.outcome == "done"

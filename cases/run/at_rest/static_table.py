@@ -10,7 +10,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from catenary.base.errors import InputError, RunBroken
+from catenary.cases.run.at_rest.temperatures import temperatures
 from catenary.cases.run.describe.arrivals import arrival_facts
+from catenary.cases.run.describe.defects import defect_facts
 from catenary.cases.run.describe.pantographs import kind_lines
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.problem import problem_of
@@ -87,7 +89,17 @@ def static_table(scene: Scene) -> dict[str, np.ndarray]:
 
 
 def rest_text(scene: Scene, table: Mapping[str, np.ndarray]) -> str:
-    """Text of the table: droppers, registration, sag and elasticity. Not collective."""
+    """Text of the table: defects, droppers, registration, sag and elasticity; of a line that is
+    warmer than at its installation tensions along the section too. Not collective."""
+    problem = problem_of(scene)
+    defects = [fact["says"] for fact in defect_facts(scene, problem)]
+    lines = [*defects, _table_text(scene, table)]
+    if problem.along.warmer and {"axial_motion", "temperature"} <= problem.effects:
+        lines += ["", temperatures(scene, [problem.along.warmer], None)]
+    return "\n".join(lines)
+
+
+def _table_text(scene: Scene, table: Mapping[str, np.ndarray]) -> str:
     lengths = [scene.pantographs[place.name].strips.length_m for place in scene.train.pantographs]
     half_heads = [0.5 * length for length in lengths if length is not None]
     return static_text(table, problem_of(scene).line, min(half_heads, default=None))

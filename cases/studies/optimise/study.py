@@ -1,4 +1,4 @@
-"""An optimisation from its task to its tables: what the command line and Python programs share."""
+"""An optimisation from its task to its tables."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A sweep from its variants to its table: what the command line and Python programs share."""
+"""A sweep from its variants to its table."""
 
 from __future__ import annotations
 

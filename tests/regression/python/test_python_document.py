@@ -37,8 +37,10 @@ def test_the_page_of_the_interface(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    session, steps, states, ranks = run_all(programs(DOCS / "python.md"), {}, capsys)
+    session, longer, steps, states, ranks = run_all(programs(DOCS / "python.md"), {}, capsys)
     assert re.fullmatch(r"\d+\.\d+ True\n", session)
+    # The last step ends within its way, 0.08 m, of the later end.
+    assert 9.9 < float(longer) < 10.1
     assert steps.startswith("5.0 ") or steps.startswith("4.99")
     gains = [float(word) for word in re.findall(r"sigma (\S+) N", states)]
     assert len(gains) == 3 and len(set(gains)) == 3

@@ -1,0 +1,286 @@
+"""Sweeps of scenes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from catenary.base.errors import InputError
+from catenary.base.parallel import on_root
+from catenary.callers import (
+    communicator,
+    progress_shown,
+    say_nothing,
+    say_on_error_stream,
+    temporary_folder,
+)
+from catenary.cases.process.petsc_options import options_of
+from catenary.cases.studies.sweep.variants import (
+    Variant,
+    check_keys,
+    product,
+    text_of,
+    varied_key,
+)
+from catenary.estimates import sampling_like
+from catenary.scenes import SceneLike, draft_of, plain_value
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from catenary.cases.scene.load import Draft
+    from catenary.cases.studies.sampling.tables import SamplingTable
+    from catenary.cases.studies.sweep.jobs import Ended, Part, RunOptions
+    from catenary.cases.studies.sweep.sweep import Sweep
+    from catenary.cases.studies.uncertainty.evaluation import Uncertainty as Evaluated
+
+
+def sweep(
+    scene: SceneLike,
+    vary: Mapping[str, Sequence[Any]] | None = None,
+    out: str | Path | None = None,
+    *,
+    sample: Mapping[str, Any] | str | Path | None = None,
+    only_statistics: bool = False,
+    histories: Sequence[str] = (),
+    jobs: int = 1,
+    force: bool = False,
+    progress: bool = False,
+    comm: Any = None,
+) -> pd.DataFrame:
+    """Run all combinations of some values, or samples. Collective under mpirun, as ``run``.
+
+    Parameters
+    ----------
+    scene : Scene, str, Path or mapping
+        What is varied.
+    vary : mapping, optional
+        Values by dotted keys, for instance ``{"train.speed_km_h": [250, 275]}``.
+    out : str or Path, optional
+        Folder into which all is written that ``catenary sweep -o`` writes: a folder for each
+        variant, tables and pictures. What is done there already is not run again.
+    sample : mapping, str or Path, optional
+        In place of ``vary``: a sampling file, or its tables, with a distribution for each key.
+        ``catenary.uncertainty`` evaluates the table.
+    only_statistics : bool
+        Whether nothing but the table is kept, and no result file of a variant: for thousands of
+        them. Variants that share a line march side by side.
+    histories : sequence of str
+        With ``only_statistics`` and ``out``: histories of all variants that are kept in
+        ``out/histories.h5``, of contact_force, filtered_force, head_height and wire_height.
+    jobs : int
+        Runs at the same time, each in a process of its own; 0 for one on each core. Under mpirun
+        the number of processes: a run on each.
+    force, progress, comm
+        As for ``run``.
+
+    Returns
+    -------
+    pandas.DataFrame
+        A row for each variant and pantograph, with the columns of ``sweep.csv``: the varied keys,
+        ``outcome`` ("done", or the sentence of what is wrong with a variant), ``pantograph`` and
+        the statistics, whose units end their names.
+
+    Raises
+    ------
+    InputError
+        If a key, a value or a distribution is wrong, or if no variant can be run.
+    KeyboardInterrupt
+        If a signal ended it. With ``out`` the same call goes on.
+
+    Examples
+    --------
+    >>> scene = catenary.load("en50318_2002", short=True)
+    >>> table = catenary.sweep(scene, {"train.speed_km_h": [200, 250]})
+    >>> table["train.speed_km_h"].tolist(), bool(table.std_N[1] > table.std_N[0])
+    ([200, 250], True)
+    """
+    if not isinstance(jobs, int) or jobs < 0:
+        raise InputError(f"jobs is {jobs!r}; it is a number of runs, or 0 for one on each core")
+    from catenary.cases.studies.sweep.jobs import RunOptions, interrupted
+
+    if histories and out is None:
+        raise InputError("histories are kept in a file: give the folder out, too")
+    draft, comm = draft_of(scene), communicator(comm)
+    if sample is None:
+        variants, sampling = _listed(vary), None
+    elif vary is not None:
+        raise InputError("sample makes all variants itself: give vary or sample, not both")
+    else:
+        variants, sampling = samples_of(sample, draft)
+    say = say_on_error_stream if progress else say_nothing
+    with ExitStack() as stack:
+        folder = (
+            Path(out) if out is not None else stack.enter_context(temporary_folder(comm, "sweep"))
+        )
+        made = plan_sweep(
+            draft,
+            variants,
+            folder,
+            None if out is None else sampling,
+            only_statistics=only_statistics,
+            histories=histories,
+            force=force,
+        )
+        options = stack.enter_context(options_of(made.own.first.petsc.given()))
+        stack.enter_context(progress_shown(False, comm))
+        plan = RunOptions(force, options, say if comm.rank == 0 else say_nothing, jobs)
+        drawn = None if out is None else ()
+        found = made.run(comm, plan, "a sweep of a Python program", drawn)
+    if interrupted(found.ended):
+        raise KeyboardInterrupt
+    return found.table(comm)
+
+
+def samples_of(
+    sample: Mapping[str, Any] | str | Path, draft: Draft
+) -> tuple[list[Variant], SamplingTable]:
+    """The variants that a sampling makes of a case, and its checked tables. Not collective.
+
+    Parameters
+    ----------
+    sample : mapping, str or Path
+        The tables of the sampling as nested dictionaries, or the file.
+    draft : Draft
+        The case.
+    """
+    from catenary.cases.studies.sampling.samples import samples
+
+    sampling, where = sampling_like(sample)
+    return samples(sampling, draft.scene(), where), sampling
+
+
+def plan_sweep(
+    draft: Draft,
+    variants: Sequence[Variant],
+    folder: Path,
+    sampling: SamplingTable | None = None,
+    *,
+    full_report: bool = False,
+    only_statistics: bool = False,
+    histories: Sequence[str] = (),
+    force: bool = False,
+) -> PlannedSweep:
+    """A sweep of a case into a folder, all scenes checked. Not collective.
+
+    Parameters
+    ----------
+    draft, variants, full_report, only_statistics, histories, force
+        As of ``cases.studies.sweep.sweep.sweep_of``.
+    folder : Path
+        Folder of the sweep.
+    sampling : SamplingTable, optional
+        What made the variants, if the table is to be evaluated.
+
+    Raises
+    ------
+    InputError
+        As ``sweep_of``.
+    """
+    from catenary.cases.studies.sweep.sweep import sweep_of
+
+    own = sweep_of(
+        draft,
+        variants,
+        folder,
+        full_report=full_report,
+        only_statistics=only_statistics,
+        histories=histories,
+        force=force,
+    )
+    return PlannedSweep(own, folder, sampling)
+
+
+@dataclass(frozen=True)
+class PlannedSweep:
+    """A sweep that can be run, from ``plan_sweep``."""
+
+    own: Sweep
+    folder: Path
+    sampling: SamplingTable | None
+
+    def run(
+        self,
+        comm: Any,
+        options: RunOptions,
+        command: str,
+        plotted: Sequence[str] | None = (),
+        histogram: bool = False,
+    ) -> Swept:
+        """Run what is not done yet, write table and pictures, and evaluate samples. Collective.
+
+        ``comm``, ``options``, ``command``, ``plotted`` and ``histogram`` are as of
+        ``cases.studies.sweep.sweep.run_sweep``. Samples are drawn as points, not as lines.
+        """
+        from catenary.cases.studies.sweep.sweep import run_sweep
+
+        folder, sampling = self.folder, self.sampling
+        lines = plotted if sampling is None else None
+        ended, files = run_sweep(self.own, folder, comm, options, command, lines, histogram)
+        if sampling is None:
+            return Swept(ended, files)
+        from catenary.cases.result_folder.folder_lock import held
+        from catenary.cases.studies.sweep.output import table_of
+        from catenary.cases.studies.uncertainty.output import write_evaluated
+
+        def evaluate() -> tuple[Evaluated, list[Path]]:
+            return write_evaluated(folder, table_of(ended).records(), sampling, plotted or ())
+
+        with held(folder, comm, command):
+            evaluated, more = on_root(comm, evaluate, takes_long=True)
+        return Swept(ended, [*files, *more], evaluated)
+
+    def run_part(self, part: Part, comm: Any, options: RunOptions) -> list[Ended]:
+        """Run a part, as ``cases.studies.sweep.sweep.run_part``, with its sampling. Collective."""
+        from catenary.cases.studies.sweep.sweep import run_part
+
+        ended, sampling = run_part(self.own, part, self.folder, comm, options), self.sampling
+        if sampling is not None:
+            from catenary.cases.studies.uncertainty.run_table import write_sampling
+
+            on_root(comm, lambda: write_sampling(self.folder / part.folder, sampling))
+        return ended
+
+
+@dataclass(frozen=True)
+class Swept:
+    """A sweep that ended: its variants, the files, what samples say. As text what is printed."""
+
+    ended: list[Ended]
+    files: list[Path]
+    evaluated: Evaluated | None = None
+
+    def table(self, comm: Any) -> pd.DataFrame:
+        """The table that ``sweep`` returns. Collective: times of a rank are its own."""
+        import pandas as pd
+
+        from catenary.cases.studies.sweep.output import table_of
+
+        return pd.DataFrame(on_root(comm, lambda: table_of(self.ended).records()))
+
+    def __str__(self) -> str:
+        if self.evaluated is None:
+            from catenary.cases.studies.sweep import output
+
+            return output.as_text(self.ended)
+        from catenary.cases.studies.uncertainty.output import as_text
+
+        return as_text(self.evaluated)
+
+
+def _listed(vary: Mapping[str, Sequence[Any]] | None) -> list[Variant]:
+    """The variants of lists of values."""
+    if not vary or not all(len(values) for values in vary.values()):
+        raise InputError("there is nothing to vary: give at least one key with a value")
+    varied = [
+        varied_key(
+            key, tuple(text_of(plain_value(own, f"{key} in vary")) for own in values), "vary"
+        )
+        for key, values in vary.items()
+    ]
+    variants = product(varied, {}, "in vary")
+    check_keys(variants, "in vary")
+    return variants
