@@ -42,9 +42,9 @@ class Merged(NamedTuple):
 def merge(folders: Sequence[Path]) -> Merged:
     """Several sweeps as one.
 
-    In place of a folder that has parts of a sweep alone these are taken. Variants may be disjoint or
-    in several folders. A variant that broke in one folder and was run
-    to its end in another is taken as done. Not collective.
+    In place of a folder that has parts of a sweep alone these are taken. Variants may be disjoint
+    or in several folders. A variant that broke in one folder and was run to its end in another is
+    taken as done. Not collective.
 
     Raises
     ------

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 from program import SHORT_SCENE
+from word_scenes import with_words
 
 import catenary
-from catenary.cases.scene.input.toml_input import parse_assignment
 
 pytestmark = pytest.mark.timeout(250)
 
@@ -22,8 +22,7 @@ SAME = 1e-9
 @pytest.fixture(scope="module")
 def scene() -> catenary.Scene:
     """With steps of 4 ms, some five hundred."""
-    changes = dict(map(parse_assignment, (*SHORT_SCENE, "numerics.dt_s=4e-3")))
-    return catenary.load("en50318_2002").replace(changes)
+    return with_words("en50318_2002", (*SHORT_SCENE, "numerics.dt_s=4e-3"))
 
 
 def agree(value: Any) -> bool:

@@ -6,15 +6,11 @@ import re
 from pathlib import Path
 
 import pytest
-from measuring import COMM
-from program import catenary
+from program import catenary as called
 
+import catenary
 from catenary.cases.scene.input.case_files import shipped
-from catenary.cases.studies.sweep.jobs import make_jobs
-from catenary.cases.studies.sweep.run_jobs import run_jobs
-from catenary.cases.studies.sweep.variants import parse_vary, product
 from catenary.postproc.evaluate.statistics import contact_statistics
-from catenary.postproc.read.results import Results
 
 CASES = shipped()
 # Rows of the table of windows in the README of EN 50318: mesh in the columns, misses in the cells.
@@ -57,25 +53,21 @@ def claimed() -> dict[tuple[str, int], dict[str, tuple[float, int]]]:
 
 
 @pytest.mark.study
-def test_the_windows_of_en50318_miss_what_its_readme_says(tmp_path: Path) -> None:
+def test_the_windows_of_en50318_miss_what_its_readme_says() -> None:
     """One run a mesh serves all windows; uplifts, which are of the whole run, are left to one."""
     claims = claimed()
     meshes = sorted({mesh for _, mesh in claims})
     assert (len(claims), meshes) == (12, [5, 8, 12])
-    variants = product([parse_vary(f"mesh.elements_per_gap={','.join(map(str, meshes))}")], {})
-    last = ("evaluation.to_m=840", "line.n_spans=30")
-    quiet = ("output.field_every_s=0", "output.energy_every_s=0")
-    folder = tmp_path / "runs"
-    jobs = make_jobs("en50318_2002", variants, (*last, *quiet))
-    for mesh, job in zip(meshes, run_jobs(jobs, folder, COMM), strict=True):
-        assert job.done
-        (result,) = folder.glob(f"*gap_{mesh}/run.h5")
-        with Results(result) as results:
-            position, force, height = (
-                results.channel(name)[:, 0]
-                for name in ("contact_position", "contact_force", "wire_height")
-            )
-            arms, uplift = results.line("arm_x"), results.extremes("arm_uplift")[1]
+    longer = catenary.load("en50318_2002").replace(
+        evaluation={"to_m": 840}, line={"n_spans": 30}, output={"field_every_s": 0}
+    )
+    for mesh in meshes:
+        run = catenary.run(longer.replace(mesh={"elements_per_gap": mesh}))
+        position, force, height = (
+            run.channel(name).values[:, 0]
+            for name in ("contact_position", "contact_force", "wire_height")
+        )
+        arms, uplift = run.uplift.steady_arm.values, run.uplift.largest.values
         for window in sorted({window for window, _ in claims}):
             first, last_span = (int(n) for n in re.findall(r"\d+", window))
             stretch = (60.0 * (first - 1), 60.0 * last_span)
@@ -98,7 +90,7 @@ def test_the_windows_of_en50318_miss_what_its_readme_says(tmp_path: Path) -> Non
 @pytest.mark.parametrize("speed", ["275", "320"])
 def test_ac_simple_keeps_the_allowed_mean_force(speed: str, tmp_path: Path) -> None:
     words = ["--set", f"train.speed_km_h={speed}", "output.field_every_s=0"]
-    done = catenary("run", "ac_simple", "-o", str(tmp_path / "out"), *words, cwd=tmp_path)
+    done = called("run", "ac_simple", "-o", str(tmp_path / "out"), *words, cwd=tmp_path)
     assert done.code == 0, done.stderr
     assert "WARNING" not in done.stdout + done.stderr
     (line,) = [text for text in done.stdout.splitlines() if "mean contact force" in text]
@@ -113,6 +105,6 @@ def test_ac_simple_keeps_the_allowed_mean_force(speed: str, tmp_path: Path) -> N
 def test_a_shipped_case_ends_without_a_warning(case: str, tmp_path: Path) -> None:
     """The first run of a newcomer: the case as it is shipped."""
     words = ["--set", "output.field_every_s=0"]
-    done = catenary("run", case, "-o", str(tmp_path / "out"), *words, cwd=tmp_path)
+    done = called("run", case, "-o", str(tmp_path / "out"), *words, cwd=tmp_path)
     assert done.code == 0, done.stderr
     assert "WARNING" not in done.stdout + done.stderr

@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from program import assert_sound, catenary
+from program import assert_sound
+from program import catenary as called
 
+import catenary
 from catenary.cases.scene.input.case_files import shipped
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.problem import line_of
 
 CASES = shipped()
 # One of each kind of line is run with every test, all of them in whole studies.
@@ -90,7 +90,7 @@ def table(path: Path) -> list[dict[str, str]]:
 def run(folder: Path, *words: str) -> dict[str, Any]:
     """Summary of a run into a folder."""
     # A phase that takes long leaves a line on standard error otherwise.
-    done = catenary("run", *words, "-o", str(folder), "--quiet", cwd=folder.parent, pictures=True)
+    done = called("run", *words, "-o", str(folder), "--quiet", cwd=folder.parent, pictures=True)
     assert done.code == 0, done.stderr
     assert done.stderr == ""
     return dict(json.loads((folder / "summary.json").read_text()))
@@ -119,20 +119,20 @@ def assert_kinds(found: dict[str, Any], kinds: dict[str, Any]) -> None:
 @pytest.mark.parametrize("case", ALL_CASES)
 def test_every_case_runs_and_is_judged(case: str, shortened: Any) -> None:
     folder, summary = shortened[case]
-    scene = load_scene(case, shortened=True)
+    scene = catenary.load(case, short=True)
     assert {path.name for path in folder.iterdir()} >= FILES
     assert any(path.suffix == ".png" for path in folder.iterdir())
     assert_sound(folder / "run.h5")
 
     assert_kinds(summary, TOP)
-    assert summary["case"] == scene.case.name
-    assert summary["speed_km_h"] == pytest.approx(scene.train.speed_km_h, rel=1e-12)
+    assert summary["case"] == scene.name
+    assert summary["speed_km_h"] == pytest.approx(scene["train.speed_km_h"], rel=1e-12)
     assert summary["n_ranks"] == 1
     assert summary["n_steps"] * summary["dt_s"] == pytest.approx(summary["simulated_s"], rel=1e-9)
     assert set(summary["phase_wall_s"]) >= {"mesh", "equilibrium", "prepare solver", "march"}
-    assert summary["evaluation_m"] == [scene.evaluation.from_m, scene.evaluation.to_m]
+    assert summary["evaluation_m"] == [scene[f"evaluation.{end}_m"] for end in ("from", "to")]
 
-    assert len(summary["pantographs"]) == len(scene.train.pantographs)
+    assert len(summary["pantographs"]) == len(scene["train.pantographs"])
     for pantograph in summary["pantographs"]:
         assert_kinds(pantograph, PANTOGRAPH)
         assert pantograph["min_N"] < pantograph["mean_N"] < pantograph["max_N"]
@@ -142,7 +142,7 @@ def test_every_case_runs_and_is_judged(case: str, shortened: Any) -> None:
     uplifts = [row["max_uplift_mm"] for row in supports["per_support"] if row["evaluated"]]
     assert supports["max_uplift_mm"] == max(uplifts) > 0.0
     lengths = summary["static"]["dropper_lengths_m"]
-    if scene.line.dropper is None:
+    if scene["line.dropper"] is None:
         assert summary["droppers"]["n_slackened"] == 0 and lengths == []
     else:
         assert_kinds(summary["droppers"], DROPPERS)
@@ -170,11 +170,12 @@ def test_shortened_cases_keep_their_golden_numbers(case: str, shortened: Any) ->
 
 
 @pytest.mark.parametrize("speed", [pytest.param("250", marks=pytest.mark.study), "300"])
-def test_en50318_meets_every_accepted_range(speed: str, tmp_path: Path) -> None:
+def test_en50318_meets_every_accepted_range(speed: str) -> None:
     path = CASES["en50318_2002"].parent / "reference" / "accepted_ranges.csv"
     ranges = [row for row in table(path) if row["speed_km_h"] == speed]
     assert {row["quantity"] for row in ranges} == {*QUANTITIES, "support_uplift"}
-    summary = run(tmp_path / "out", "en50318_2002", "--set", f"train.speed_km_h={speed}")
+    scene = catenary.load("en50318_2002").replace(train={"speed_km_h": int(speed)})
+    summary = catenary.run(scene).summary
     (pantograph,) = summary["pantographs"]
     outside = []
     for row in ranges:
@@ -190,24 +191,15 @@ def test_en50318_meets_every_accepted_range(speed: str, tmp_path: Path) -> None:
     assert outside == []
 
 
-def test_ac_simple_finds_the_nominal_dropper_lengths(tmp_path: Path) -> None:
+def test_ac_simple_finds_the_nominal_dropper_lengths() -> None:
     """In every span between two supports; the first and the last one hang from an anchor."""
     path = CASES["ac_simple"].parent / "reference" / "dropper_lengths.csv"
     nominal = {float(row["position_m"]): float(row["length_m"]) for row in table(path)}
-    out = tmp_path / "droppers.csv"
-    done = catenary("static", "ac_simple", "-o", str(out), cwd=tmp_path)
-    assert done.code == 0, done.stderr
-    rows = table(out)
-    scene = load_scene("ac_simple")
-    assert len(rows) == len(nominal) * scene.line.n_spans
-    length = line_of(scene).span_lengths[0]
-    differences = []
-    for row in rows:
-        span = int(row["span"])
-        if span in (1, scene.line.n_spans):
-            continue
-        place = round(float(row["x_m"]) - (span - 1) * length, 6)
-        differences.append(float(row["length_m"]) - nominal[place])
-    worst = max(abs(difference) for difference in differences)
+    rows = catenary.static("ac_simple").droppers
+    n_spans = catenary.load("ac_simple")["line.n_spans"]
+    assert len(rows) == len(nominal) * n_spans
+    inner = rows[(rows.span > 1) & (rows.span < n_spans)]
+    expected = inner.in_span_m.round(6).map(nominal.__getitem__)
+    worst = (inner.length_m - expected).abs().max()
     print(f"largest difference {1e3 * worst:.1f} mm, allowed {1e3 * LENGTH:.0f} mm")
     assert worst < LENGTH

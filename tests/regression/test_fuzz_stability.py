@@ -8,16 +8,13 @@ its results. FUZZ_SEED and FUZZ_CASES choose the seeds; a failure names its own.
 from __future__ import annotations
 
 import os
-from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import pytest
 from fuzzing_stability import extreme_scene
-from mpi4py import MPI
+from word_scenes import with_words
 
-from catenary.base.errors import InputError, RunBroken
-from catenary.cases.run.runner import run_case
-from catenary.cases.scene.load import load_scene
+import catenary
 
 pytestmark = pytest.mark.study
 
@@ -53,35 +50,40 @@ class Seen(NamedTuple):
     rotation: float
 
 
-def seen(scene: Any, folder: Path) -> Seen:
-    ended = run_case(scene, folder, MPI.COMM_SELF, force=True, only_summary=True)
-    watched = ended.summary.get("watched", {})
-    remarks = ended.summary.get("remarks", [])
+def seen(scene: catenary.Scene) -> Seen:
+    try:
+        run = catenary.run(scene, force=True)
+    except catenary.RunBroken as error:
+        if error.run is None:
+            raise
+        run = error.run
+    watched = run.summary.get("watched", {})
+    remarks = run.summary.get("remarks", [])
     return Seen(
-        ended.outcome,
+        run.outcome,
         [text for text in remarks if any(words in text for words in TELLING)],
         watched.get("most_line_energy_J", 0.0),
         watched.get("largest_rotation_rad", 0.0),
     )
 
 
-def judged(seed: int, folder: Path) -> str:
+def judged(seed: int) -> str:
     """How a scene ended; AssertionError if it ran away without a word."""
     made = extreme_scene(seed)
     dt = float(dict(word.split("=", 1) for word in made.assignments)["numerics.dt_s"])
     few = ("output.field_every_s=0", "output.energy_every_s=0")
     try:
-        whole = load_scene(made.base, [*made.assignments, *few])
-        fine = load_scene(made.base, [*made.assignments, *few, f"numerics.dt_s={dt / 4!r}"])
-        one = seen(whole, folder / "whole")
-    except (InputError, RunBroken) as error:
+        whole = with_words(made.base, [*made.assignments, *few])
+        fine = whole.replace(numerics={"dt_s": dt / 4})
+        one = seen(whole)
+    except (catenary.InputError, catenary.RunBroken) as error:
         assert "\n" not in str(error)
         return "refused"
     if one.outcome != "done":
         return "ended"
     if one.remarks:
         return "told"
-    four = seen(fine, folder / "fine")
+    four = seen(fine)
     if four.outcome != "done":
         return "ended with a quarter of the step"
     assert one.energy <= WILDLY * max(four.energy, LITTLE_ENERGY), (one, four)
@@ -90,11 +92,11 @@ def judged(seed: int, folder: Path) -> str:
 
 
 @pytest.mark.parametrize("seeds", BLOCKS, ids=str)
-def test_nothing_runs_away_without_a_word(seeds: range, tmp_path: Path) -> None:
+def test_nothing_runs_away_without_a_word(seeds: range) -> None:
     ends: dict[str, int] = {}
     for seed in seeds:
         try:
-            how = judged(seed, tmp_path)
+            how = judged(seed)
         except (Exception, AssertionError) as error:
             replay = f"FUZZ_SEED={seed} FUZZ_CASES=1 replays it"
             raise AssertionError(replay) from error

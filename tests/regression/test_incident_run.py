@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import numpy as np
 import pytest
-from program import MPIRUN, assert_same_histories, catenary, short_run
+from program import MPIRUN, SHORT_SCENE, assert_same_histories, short_run
+from program import catenary as called
+from word_scenes import with_words
 
+import catenary
 from catenary.postproc.read.results import Results
 
 INCIDENTS = (
@@ -19,16 +21,15 @@ INCIDENTS = (
 
 
 @pytest.fixture(scope="module")
-def uninterrupted(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("whole")
-    out = folder / "out"
-    done = catenary(*short_run(out, INCIDENTS), cwd=folder)
-    assert done.code == 0, done.stderr
+def uninterrupted(tmp_path_factory: pytest.TempPathFactory, quick_reports: None) -> Path:
+    out = tmp_path_factory.mktemp("whole") / "out"
+    catenary.run(with_words("en50318_2002", (*SHORT_SCENE, INCIDENTS)), out).close()
     return out
 
 
 def test_incidents_are_told(uninterrupted: Path) -> None:
-    summary = json.loads((uninterrupted / "summary.json").read_text())
+    with catenary.open(uninterrupted) as run:
+        summary = run.summary
     assert [(fact["type"], fact["time_s"]) for fact in summary["incidents"]] == [
         ("dropper_break", pytest.approx(0.6)),
         ("tension_loss", pytest.approx(1.0)),
@@ -42,11 +43,10 @@ def test_incidents_are_told(uninterrupted: Path) -> None:
 
 
 def test_rows_are_whole_and_show_what_happened(uninterrupted: Path) -> None:
-    with Results(uninterrupted) as results:
-        time, x = results.time, results.line("dropper_x")
-        dropper = results.channel("dropper_force")[:, int(np.argmin(np.abs(x - 190.5)))]
-        force = results.channel("contact_force")[:, 0]
-        assert results.complete
+    with catenary.open(uninterrupted) as run:
+        assert run.outcome == "done"
+        hung = run.channel("dropper_force").sel(dropper=190.5, method="nearest")
+        time, dropper, force = hung.time.values, hung.values, run.force.values[:, 0]
     assert np.diff(time) == pytest.approx(1e-3)
     assert dropper[600] > 10.0 and not dropper[601:].any()
     # The wire comes down behind the head, and may touch it once more while both fall.
@@ -72,14 +72,14 @@ def test_an_interrupted_run_is_continued(
         pytest.skip("there is no mpirun")
     out = tmp_path / "out"
     words = [*short_run(out, INCIDENTS), "--", "-march_ts_max_steps", str(steps)]
-    done = catenary(*words, cwd=tmp_path, ranks=ranks)
+    done = called(*words, cwd=tmp_path, ranks=ranks)
     assert done.code == 1, done.stderr
     with Results(out) as results:
         assert results.outcome == "interrupted"
         assert results.n_steps == steps == results.checkpoint["step"]
     # With pictures, which ranks have nowhere else.
     words = ["restart", str(out)]
-    again = catenary(*words, cwd=tmp_path, ranks=ranks_of_restart, pictures=ranks_of_restart > 1)
+    again = called(*words, cwd=tmp_path, ranks=ranks_of_restart, pictures=ranks_of_restart > 1)
     assert again.code == 0, again.stderr
     smallest = min(path.stat().st_size for path in out.glob("*.png"))
     assert (smallest > 1000) is (ranks_of_restart > 1)

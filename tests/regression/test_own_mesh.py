@@ -6,36 +6,39 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from program import assert_sound, catenary, short_run
+from program import SHORT_SCENE
+from verb_runner import CliRunner
+from word_scenes import with_words
 
-from catenary.postproc.read.results import Results
+import catenary
+from catenary.cases.cli.main import app
 
-# The key that makes a mesh, which a scene with a mesh of its own must not have.
-GIVEN = "mesh.elements_per_gap="
 # What another program may round coordinates to [m].
 ROUNDING = 1e-9
 # Places of nodes that Gmsh writes are off by up to this; wires divided without it are not [m].
 GMSH = 2e-9
+SCENE = with_words("en50318_2002", (*SHORT_SCENE, "output.field_every_s=0"))
 
 
 @pytest.fixture(scope="module")
 def line(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The mesh of the short scene's line."""
-    folder = tmp_path_factory.mktemp("mesh")
-    out = folder / "line.msh"
+    out = tmp_path_factory.mktemp("mesh") / "line.msh"
     words = ["mesh", "en50318_2002", "-o", str(out), "--set", "line.n_spans=10"]
-    done = catenary(*words, cwd=folder)
-    assert done.code == 0, done.stderr
+    done = CliRunner().invoke(app, words)
+    assert done.exit_code == 0, done.output
     return out
 
 
+def on(mesh: Path) -> catenary.Scene:
+    """The scene on a mesh in place of the one that it makes."""
+    return SCENE.replace(mesh={"file": mesh, "elements_per_gap": None})
+
+
 @pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def made() -> catenary.Run:
     """Results on the mesh that the scene makes."""
-    folder = tmp_path_factory.mktemp("made")
-    done = catenary(*short_run(folder / "out"), cwd=folder)
-    assert done.code == 0, done.stderr
-    return folder / "out"
+    return catenary.run(SCENE)
 
 
 def from_another_program(text: str) -> str:
@@ -62,22 +65,17 @@ def from_another_program(text: str) -> str:
     return "".join([*parts, "$Elements\n", "\n".join(lines), "\n"])
 
 
-def largest_differences(out: Path, reference: Path) -> dict[str, float]:
+def largest_differences(found: catenary.Run, expected: catenary.Run) -> dict[str, float]:
     """Largest relative difference of each history."""
-    assert assert_sound(out / "run.h5") == assert_sound(reference / "run.h5")
-    found = {}
-    with Results(out) as results, Results(reference) as expected:
-        for name in ("contact_force", "arm_uplift", "dropper_force"):
-            values = expected.channel(name)
-            found[name] = np.abs(results.channel(name) - values).max() / np.abs(values).max()
-    return found
+    differences = {}
+    for name in ("contact_force", "arm_uplift", "dropper_force"):
+        ours, theirs = (run.channel(name).values for run in (found, expected))
+        differences[name] = float(np.abs(ours - theirs).max() / np.abs(theirs).max())
+    return differences
 
 
-def test_a_mesh_given_back_gives_the_same_forces(line: Path, made: Path, tmp_path: Path) -> None:
-    out = tmp_path / "out"
-    done = catenary(*short_run(out, f"mesh.file={line}", GIVEN), cwd=tmp_path)
-    assert done.code == 0, done.stderr
-    differences = largest_differences(out, made)
+def test_a_mesh_given_back_gives_the_same_forces(line: Path, made: catenary.Run) -> None:
+    differences = largest_differences(catenary.run(on(line)), made)
     # Gmsh writes places that are off by 1.1e-9 m (``GMSH``), and elements are 0.6 m long: their
     # matrices differ by 6e-10 of the largest number, and forces by a part of that.
     print(f"{differences}, allowed 2e-10")
@@ -85,17 +83,16 @@ def test_a_mesh_given_back_gives_the_same_forces(line: Path, made: Path, tmp_pat
 
 
 def test_a_mesh_of_another_program_gives_nearly_the_same_forces(
-    line: Path, made: Path, tmp_path: Path
+    line: Path, made: catenary.Run, tmp_path: Path
 ) -> None:
-    file, out = tmp_path / "other.msh", tmp_path / "out"
+    file = tmp_path / "other.msh"
     file.write_text(from_another_program(line.read_text()))
-    done = catenary(*short_run(out, f"mesh.file={file}", GIVEN), cwd=tmp_path)
-    assert done.code == 0, done.stderr
-    with Results(out) as results, Results(made) as expected:
-        x, reference = results.line("node_points")[:, 0], expected.line("node_points")[:, 0]
-        moved = np.abs(np.sort(x) - np.sort(reference)).max()
+    x, reference = (
+        catenary.static(scene).contact_wires.x_m.to_numpy() for scene in (on(file), SCENE)
+    )
+    moved = np.abs(np.sort(x) - np.sort(reference)).max()
     assert 0.5 * ROUNDING < moved <= 1.1 * ROUNDING + GMSH
-    differences = largest_differences(out, made)
+    differences = largest_differences(catenary.run(on(file)), made)
     # The shortest element, 0.625 m, is wrong by two roundings, its bending stiffness (1 / length^3)
     # by 6 / 0.625 times each: 3e-8. Forces and uplifts answer in proportion, by no more than about
     # ten times as much.
@@ -106,10 +103,9 @@ def test_a_mesh_of_another_program_gives_nearly_the_same_forces(
 
 @pytest.mark.parametrize("group", ["contact_wire", "supports"])
 def test_a_mesh_that_lacks_a_group_is_refused(group: str, line: Path, tmp_path: Path) -> None:
-    file, out = tmp_path / "poor.msh", tmp_path / "out"
+    file = tmp_path / "poor.msh"
     file.write_text(line.read_text().replace(f'"{group}"', '"something_else"'))
-    done = catenary(*short_run(out, f"mesh.file={file}", GIVEN), cwd=tmp_path)
-    assert done.code == 2
-    (sentence,) = done.sentences
-    assert group in sentence and str(file) in sentence
+    with pytest.raises(catenary.InputError) as caught:
+        catenary.run(on(file), tmp_path / "out")
+    assert group in str(caught.value) and str(file) in str(caught.value)
     assert list(tmp_path.iterdir()) == [file]

@@ -2,29 +2,17 @@
 
 from __future__ import annotations
 
-import json
-from pathlib import Path
-from typing import Any
-
 import numpy as np
 import pytest
 from measuring import check
 from paper_pantograph import data
-from program import catenary
 
+import catenary
 from catenary.mbs.mechanism.pantograph_data import reduced, stand
-from catenary.postproc.read.results import Results
-
-
-def run(folder: Path, *words: str) -> dict[str, Any]:
-    done = catenary("run", "ambrosio2012", "--short", *words, "-o", str(folder), cwd=folder.parent)
-    assert done.code == 0, done.stderr
-    assert "WARNING" not in done.stderr and done.sentences == []  # phases may take long
-    return dict(json.loads((folder / "summary.json").read_text()))
 
 
 @pytest.mark.study
-def test_seven_bodies_run_as_two_masses_whose_lift_falls_as_theirs_does(tmp_path: Path) -> None:
+def test_seven_bodies_run_as_two_masses_whose_lift_falls_as_theirs_does() -> None:
     """Mean, deviation and extremes to what the mass changes by over the heights of the run.
 
     The case's lumped pantograph has the same lift at all heights; that of the mechanism falls by
@@ -33,11 +21,12 @@ def test_seven_bodies_run_as_two_masses_whose_lift_falls_as_theirs_does(tmp_path
     """
     standing, tables = stand(data()), reduced(data())
     (mass, _, _), (_, slope, _) = tables.at(standing.working_height)
-    found = run(tmp_path / "seven")
-    springs = f"pantographs.lumped.stiffnesses_N_per_m=[6000.0, {-slope:.1f}]"
-    words = ["--set", "train.pantographs.0.name=lumped", springs]
-    expected = run(tmp_path / "two", *words)
-    ours, theirs = found["pantographs"][0], expected["pantographs"][0]
+    scene = catenary.load("ambrosio2012", short=True)
+    springs = {"pantographs.lumped.stiffnesses_N_per_m": [6000.0, round(-slope, 1)]}
+    lumped = scene.replace({"train.pantographs.0.name": "lumped", **springs})
+    assert catenary.check(scene) == catenary.check(lumped) == []
+    run = catenary.run(scene)
+    ours, theirs = (one.summary["pantographs"][0] for one in (run, catenary.run(lumped)))
 
     assert (ours["kind"], ours["model"]) == ("seven_body", "multibody")
     assert (theirs["kind"], theirs["model"]) == ("lumped", "lumped")
@@ -45,8 +34,7 @@ def test_seven_bodies_run_as_two_masses_whose_lift_falls_as_theirs_does(tmp_path
     check("actuator [N]", ours["actuator_force_N"], 9890.0, within=98.9)  # design: within 1 %
     assert ours["static_force_N"] == theirs["static_force_N"] == 150.0
 
-    with Results(tmp_path / "seven") as results:
-        heights = results.channel("head_height")[:, 0]
+    heights = run.channel("head_height").values[:, 0]
     # The run starts where the wire is at rest, and ends with the head some centimetres higher.
     arms = standing.working_height + np.array([-1.0, 1.0]) * np.ptp(heights)
     change = max(abs(tables.at(float(arm))[0][0] / mass - 1.0) for arm in arms)

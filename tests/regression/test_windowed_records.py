@@ -12,15 +12,18 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from program import catenary
+from program import catenary as called
 from studies import few
+from word_scenes import with_words
 
+import catenary
 from catenary.postproc.film.snapshots import Snapshots
 from catenary.postproc.read.results import Results
 
 N_SPANS, SPAN, START, STEPS = 60, 54.0, 1620.0, 800
+CASE = "ambrosio2012"
 SCENE = (
-    "run", "ambrosio2012", "--quiet", "--set", f"line.n_spans={N_SPANS}",
+    f"line.n_spans={N_SPANS}",
     f"train.start_m={START}", f"train.end_m={START + 66.7}", "train.raise_time_s=0.1",
     f"evaluation.from_m={START + 10.0}", f"evaluation.to_m={START + 25.0}", "numerics.dt_s=1e-3",
     "output.field_every_s=0.05", "output.flush_every_steps=100",
@@ -31,28 +34,27 @@ WINDOWS = {
 }
 WHOLE = (f"output.field_spans=[1,{N_SPANS}]", f"output.line_channels_spans=[1,{N_SPANS}]")
 
-Run = Callable[[str, bool], Path]
+Made = Callable[[str, bool], Path]
 # Of the largest displacement, in the single precision of snapshots.
 RESOLVED = 2.0**-24
 
 
 @pytest.fixture(scope="module")
-def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
+def run(tmp_path_factory: pytest.TempPathFactory, quick_reports: None) -> Made:
     folder = tmp_path_factory.mktemp("windowed")
 
     @cache
     def made(window: str, whole: bool) -> Path:
         out = folder / f"{window}_{whole}"
         more = WHOLE if whole else ()
-        done = catenary(*SCENE, *WINDOWS[window], *more, "-o", str(out), cwd=folder)
-        assert done.code == 0, done.stderr
+        catenary.run(with_words(CASE, (*SCENE, *WINDOWS[window], *more)), out)
         return out
 
     return made
 
 
 @pytest.mark.parametrize("window", few(WINDOWS, "spans"))
-def test_snapshots_show_what_moves(window: str, run: Run) -> None:
+def test_snapshots_show_what_moves(window: str, run: Made) -> None:
     """No wave has come beyond the spans of a window, 324 m ahead and 270 m behind, within 0.8 s,
     122 m. Short waves are faster, and damping ends them: there they are less than single precision
     tells from the largest displacement. In an exact window the record ends two spans
@@ -83,7 +85,7 @@ def test_snapshots_show_what_moves(window: str, run: Run) -> None:
     assert sizes[0] < 0.35 * sizes[1], sizes
 
 
-def test_channels_of_the_line_are_recorded_where_it_moves(run: Run) -> None:
+def test_channels_of_the_line_are_recorded_where_it_moves(run: Made) -> None:
     """The same numbers within the window, nothing outside; extremes of all arms."""
     with Results(run("spans", True)) as every, Results(run("spans", False)) as part:
         whole, found = every.channel("arm_uplift"), part.channel("arm_uplift")
@@ -97,14 +99,13 @@ def test_channels_of_the_line_are_recorded_where_it_moves(run: Run) -> None:
 
 @pytest.mark.parametrize("window", few(WINDOWS, "spans"))
 def test_a_run_that_is_interrupted_goes_on_with_its_snapshots(
-    window: str, run: Run, tmp_path: Path
+    window: str, run: Made, tmp_path: Path
 ) -> None:
     out = tmp_path / "out"
-    begun = catenary(
-        *SCENE, *WINDOWS[window], "-o", str(out), "--", "-march_ts_max_steps", "450", cwd=tmp_path
-    )
+    words = ["run", CASE, "-o", str(out), "--set", *SCENE, *WINDOWS[window]]
+    begun = called(*words, "--", "-march_ts_max_steps", "450", cwd=tmp_path)
     assert begun.code == 1, begun.stderr
-    done = catenary("restart", str(out), cwd=tmp_path)
+    done = called("restart", str(out), cwd=tmp_path)
     assert done.code == 0, done.stderr
     with (
         h5py.File(out / "fields.h5") as found,

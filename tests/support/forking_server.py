@@ -22,7 +22,7 @@ from pathlib import Path
 
 PACKAGES = (
     "gmsh", "jinja2", "matplotlib.backends.backend_agg", "matplotlib.figure", "meshio",
-    "pydantic", "scipy.integrate", "scipy.interpolate", "scipy.optimize", "scipy.signal",
+    "pandas", "pydantic", "scipy.integrate", "scipy.interpolate", "scipy.optimize", "scipy.signal",
     "scipy.sparse.linalg", "tqdm", "typer",
     # Of the program, with what they import:
     "catenary.cases.cli.main", "catenary.cases.run.planning.file_sizes",

@@ -56,16 +56,16 @@ TOTAL = Channel("total", "J", "all energy of the line", RUN, energy=total)
 SCENE = (*SHORT_SCENE, "train.end_m=155", "evaluation.from_m=140", "evaluation.to_m=150")
 
 
-def run(out: Path) -> None:
+def run(out: Path, **options: bool) -> None:
     scene = load_scene("en50318_2002", [*SCENE, "output.field_every_s=0"])
-    assert run_case(scene, out, MPI.COMM_SELF).outcome == "done"
+    assert run_case(scene, out, MPI.COMM_SELF, **options).outcome == "done"
 
 
 @pytest.fixture(scope="module")
 def plain(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The run without further channels."""
     out = tmp_path_factory.mktemp("plain")
-    run(out)
+    run(out, only_summary=True)
     return out
 
 

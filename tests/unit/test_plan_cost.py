@@ -12,10 +12,11 @@ import pytest
 from measuring import registered
 from mpi4py import MPI
 from verb_runner import CliRunner
+from word_scenes import with_words
 
+import catenary
 from catenary.base.errors import InputError
 from catenary.cases.cli.main import app
-from catenary.cases.run.runner import run_case
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.problem import problem_of
@@ -94,14 +95,13 @@ def test_every_effect_is_switched_lacks_data_or_is_part_of_all_scenes(case: str)
 
 
 @pytest.mark.study
-def test_changes_are_those_of_two_runs(found: Costs, tmp_path: Path) -> None:
+def test_changes_are_those_of_two_runs(found: Costs) -> None:
     assert found.stretch == (90.0, 120.0)
-    stretch = ["evaluation.to_m=120", "train.end_m=120"]
-    summaries = []
-    for name in ([], *([f"effects.{effect}=false"] for effect in TWO)):
-        scene = load_scene(CASE, [*SHORT, *stretch, *name])
-        folder = tmp_path / str(len(summaries))
-        summaries.append(run_case(scene, folder, MPI.COMM_SELF, only_summary=True).summary)
+    scene = with_words(CASE, [*SHORT, "evaluation.to_m=120", "train.end_m=120"])
+    summaries = [
+        catenary.run(scene.replace(effects=left_out)).summary
+        for left_out in ({}, *({effect: False} for effect in TWO))
+    ]
     for figures, summary in zip(
         (found.figures, *(row.figures for row in found.rows)), summaries, strict=True
     ):

@@ -44,19 +44,6 @@ def test_accepted_ranges_are_complete() -> None:
         assert row["unit"] in ("N", "mm", "%")
 
 
-def test_form_finding_meets_the_nominal_dropper_lengths_of_ac_simple() -> None:
-    # Tolerance: the 5 mm that the benchmark's data allow.
-    nominal = np.array(
-        [float(r["length_m"]) for r in reference("ac_simple", "dropper_lengths.csv")]
-    )
-    scene = load_scene("ac_simple")
-    _, form = find_form(problem_of(scene), mesh_of(scene))
-    middle = 9 * (scene.line.n_spans // 2)
-    found = form.dropper_length[middle : middle + 9]
-    print("expected", nominal, "observed", np.round(found, 4))
-    assert np.abs(found - nominal).max() < 0.005
-
-
 @pytest.mark.study
 def test_first_guesses_of_droppers_come_near_the_lengths_of_form_finding() -> None:
     # They leave out the supports' give (27 mm in en50318_2002: 1330 N on 5e4 N/m), the clamps,

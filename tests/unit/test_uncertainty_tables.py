@@ -24,6 +24,8 @@ from catenary.cases.studies.uncertainty.run_table import (
     run_table,
 )
 
+pytestmark = pytest.mark.usefixtures("quick_reports")
+
 SPEED = "train.speed_km_h"
 SAMPLE = {"n": 30, "keys": {SPEED: {"type": "normal", "standard_deviation": 5.0}}}
 CRITERIA = ("maximum contact force", "arcing NQ")

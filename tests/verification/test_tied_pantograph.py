@@ -9,19 +9,17 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cached_property
-from pathlib import Path
 
 import numpy as np
 import pytest
 from measuring import check, march
-from program import catenary
 from scipy import linalg, signal
 from ts_alpha2 import TS_ALPHA2
 
+import catenary
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.problem import problem_of
-from catenary.postproc.read.results import Results
 
 SPAN, N_SPANS, MASS, BENDING, TENSION = 8.5, 30, 7.1, 2.7e5, 100.0
 SUPPORT, CLAMP, ALPHA, BETA = 6e5, 7.0, 1e-4, 0.0125
@@ -143,18 +141,11 @@ def judged(x: np.ndarray, force: np.ndarray) -> tuple[float, float, float]:
 
 
 @pytest.mark.parametrize("base_stiffness", [pytest.param(TIED, marks=pytest.mark.study), SOFT])
-def test_the_force_under_a_rail_is_that_of_a_plain_model(
-    base_stiffness: float, tmp_path: Path
-) -> None:
+def test_the_force_under_a_rail_is_that_of_a_plain_model(base_stiffness: float) -> None:
     tied = base_stiffness == TIED
-    done = catenary(
-        "run", "conductor_rail", "--set", "line.n_spans=30",
-        f"pantographs.tsg18f.stiffnesses_N_per_m=[53415.8, 6754.2, {base_stiffness}]",
-        "-o", "out", cwd=tmp_path,
-    )  # fmt: skip
-    assert done.code == 0, done.stderr
-    with Results(tmp_path / "out" / "run.h5") as results:
-        found = results.channel("contact_force")[1:, 0]
+    springs = {"pantographs.tsg18f.stiffnesses_N_per_m": [53415.8, 6754.2, base_stiffness]}
+    scene = catenary.load("conductor_rail").replace(springs, line={"n_spans": N_SPANS})
+    found = catenary.run(scene).force.values[1:, 0]
     x, expected = history(base_stiffness, FORCE / CONTACT if tied else 0.0, tied)
     n = min(found.size, x.size)
     x, found, expected = x[:n], found[:n], expected[:n]

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from measuring import check, march
-from program import catenary
 from small_lines import WHOLE, ac_simple_line, mesh_of, problem_of, train
 
-from catenary.postproc.read.results import Results
+import catenary
 from catenary.solver.problem.problem import Damping
 
 GAP, STIFFNESS = 0.03, 1e5
@@ -42,29 +40,23 @@ def test_a_stop_ends_the_uplift_of_its_arm(lateral: bool) -> None:
     assert np.array(seen["free"].watched).size == 0
 
 
-def test_a_file_has_forces_of_stops_where_there_are_some(tmp_path: Path) -> None:
-    short = [
-        "--short",
-        *("--set train.end_m=170 --set line.n_spans=4 --set train.raise_time_s=0.1").split(),
-    ]
-    stretch = ["--set", "evaluation.from_m=120", "--set", "evaluation.to_m=160"]
-    stop = ["--set", "line.steady_arm.uplift_stop_m=0.01", "--set", "line.damping.alpha_s=0"]
-    for name, more in (("with", stop), ("without", [])):
-        run = catenary(
-            "run", "ac_simple", "-o", str(tmp_path / name), *short, *stretch, *more, cwd=tmp_path
-        )
-        assert run.code == 0, run.stderr
-    with Results(tmp_path / "with" / "run.h5") as results:
-        force, uplift = results.channel("stop_force"), results.channel("arm_uplift")
-        pushed = 1e5 * np.maximum(0.0, uplift - 0.01)
-        check("force in the file [N]", force, pushed, within=1e-6 * pushed.max())
-        assert results.extremes("stop_force")[1].max() == force.max() > 50.0
-        assert results.line_record.whole
-    with Results(tmp_path / "without" / "run.h5") as results:
-        assert not results.has("stop_force") and results.line_record.whole
+def test_a_file_has_forces_of_stops_where_there_are_some() -> None:
+    scene = catenary.load("ac_simple", short=True).replace(
+        train={"end_m": 170, "raise_time_s": 0.1},
+        line={"n_spans": 4},
+        evaluation={"from_m": 120, "to_m": 160},
+        output={"field_every_s": 0},
+    )
+    stopped = {"steady_arm.uplift_stop_m": 0.01, "damping.alpha_s": 0}
+    run = catenary.run(scene.replace(line=stopped))
+    force, uplift = run.channel("stop_force").values, run.channel("arm_uplift").values
+    pushed = 1e5 * np.maximum(0.0, uplift - 0.01)
+    check("force in the file [N]", force, pushed, within=1e-6 * pushed.max())
+    assert force.max() > 50.0
+    assert "stop_force" not in catenary.run(scene).channels
 
 
-def test_a_stiffness_without_a_stop_is_refused(tmp_path: Path) -> None:
+def test_a_stiffness_without_a_stop_is_refused() -> None:
     key = "line.steady_arm.uplift_stop_stiffness_N_per_m"
-    run = catenary("check", "ac_simple", "--set", f"{key}=1e5", cwd=tmp_path)
-    assert run.code == 2 and "no uplift_stop_m" in run.stderr
+    with pytest.raises(catenary.InputError, match="no uplift_stop_m"):
+        catenary.load("ac_simple").replace({key: 1e5})

@@ -7,22 +7,14 @@ slow long ones down, and the force grows from nothing while the pantograph is ra
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Any
-
 import numpy as np
 import pytest
-from measuring import COMM
 
+import catenary
 from catenary.cases.run.describe.arrivals import arrival_facts, wave_line
 from catenary.cases.run.describe.wave_arrivals import Course, from_far_end
 from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.problem import problem_of
-from catenary.cases.studies.sweep.jobs import make_jobs
-from catenary.cases.studies.sweep.run_jobs import run_jobs
-from catenary.cases.studies.sweep.variants import parse_vary, product
-from catenary.postproc.evaluate.filters import low_pass
-from catenary.postproc.read.results import Results
 
 # A contact force that differs by more is another one [N]: 4e-5 of the standard deviation, far above
 # round-off, which is 1e-9.
@@ -30,15 +22,6 @@ OTHER = 1e-3
 # Of the waves that matter those of 47 to 63 Hz are the shortest (mesh.required_hz of the runs); by
 # (T k + 2 EI k^3) / (w m) their groups run at most 8 to 15 % faster than the string's waves.
 BENDING = 1.15
-
-
-def history(results: Results) -> dict[str, Any]:
-    force = results.channel("contact_force")[:, 0]
-    return {
-        "x": results.channel("contact_position")[:, 0].tolist(),
-        "force": force.tolist(),
-        "felt": low_pass(force, results.dt).tolist(),
-    }
 
 
 @pytest.mark.parametrize(
@@ -50,25 +33,21 @@ def history(results: Results) -> dict[str, Any]:
     ],
 )
 def test_the_force_changes_where_the_wave_is_met(
-    case: str, speed: int, short: int, long: int, tmp_path: Path
+    case: str, speed: int, short: int, long: int
 ) -> None:
     scene = load_scene(case, [f"train.speed_km_h={speed}", f"line.n_spans={short}"])
     problem = problem_of(scene)
     facts = arrival_facts(scene, problem)
     (told,) = facts["pantographs"]
-    variants = product([parse_vary(f"line.n_spans={short},{long}")], {})
-    words = (
-        f"train.speed_km_h={speed}",
-        f"train.end_m={problem.train.end}",
-        "output.field_every_s=0",
-        "output.energy_every_s=0",
+    fixed = catenary.load(case).replace(
+        train={"speed_km_h": speed, "end_m": problem.train.end},
+        output={"field_every_s": 0, "energy_every_s": 0},
     )
-    jobs = make_jobs(case, variants, words)
-    ended = run_jobs(jobs, tmp_path / "runs", COMM, measure=history)
-    assert all(one.done for one in ended)
-    near, far = ({k: np.array(v) for k, v in one.measured.items()} for one in ended)
-    x = far["x"]
-    first = float(x[np.abs(near["force"] - far["force"]) > OTHER][0])
+    runs = [catenary.run(fixed.replace(line={"n_spans": n})) for n in (short, long)]
+    near, far = (run.force.isel(pantograph=0) for run in runs)
+    near_felt, far_felt = (run.filtered_force.values[:, 0] for run in runs)
+    x = far.position.values
+    first = float(x[np.abs(near.values - far.values) > OTHER][0])
     start = problem.train.start
     course = Course(start, problem.train.end, problem.train.speed, problem.evaluation, start, start)
     line = wave_line(problem)
@@ -84,11 +63,11 @@ def test_the_force_changes_where_the_wave_is_met(
 
     # Before that the runs are one; after it they differ by far more than the stated 0.1 %.
     begin, end = problem.evaluation
-    sigma = far["felt"][(x >= begin) & (x <= end)].std()
+    sigma = far_felt[(x >= begin) & (x <= end)].std()
 
     def difference(low: float, high: float) -> float:
         within = (x >= low) & (x <= high)
-        error = near["felt"][within] - far["felt"][within]
+        error = near_felt[within] - far_felt[within]
         return float(np.sqrt(np.mean(error**2)) / sigma)
 
     before = difference(begin, told["far_end_met_at_m"])

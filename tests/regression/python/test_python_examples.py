@@ -13,6 +13,8 @@ import pytest
 
 import catenary
 
+pytestmark = pytest.mark.usefixtures("quick_reports")
+
 # What is no function and no class of its own: errors say what they are for.
 WITHOUT_EXAMPLE = {"__version__", "CatenaryError", "Fault", "InputError", "RunBroken"}
 PUBLIC = [name for name in catenary.__all__ if name not in WITHOUT_EXAMPLE]
@@ -43,7 +45,7 @@ DESCRIBED = described()
 
 
 @pytest.fixture(scope="module")
-def names(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+def names(tmp_path_factory: pytest.TempPathFactory, quick_reports: None) -> dict[str, Any]:
     """What examples take for given: a scene, its run, the folder of another, steps that go on."""
     folder = tmp_path_factory.mktemp("run")
     scene = catenary.load("en50318_2002", short=True)

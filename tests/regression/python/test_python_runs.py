@@ -19,6 +19,7 @@ import pytest
 from acting_scenes import SCENES
 from program import SHORT_SCENE, catenary_started
 from program import catenary as program
+from word_scenes import with_words
 
 import catenary
 from catenary.cases.scene.input.toml_input import parse_assignment
@@ -26,11 +27,6 @@ from catenary.postproc.read.results import Results
 
 WALL = {"march_wall_s", "march_cpu_s", "records_wall_s", "phase_wall_s"}
 WALL |= {"real_time_factor", "real_time_factor_with_records"}
-
-
-def with_words(case: str, words: tuple[str, ...] | list[str]) -> catenary.Scene:
-    """A scene with the assignments of a command line."""
-    return catenary.load(case).replace(dict(parse_assignment(word) for word in words))
 
 
 def without_times(summary: dict[str, Any]) -> dict[str, Any]:

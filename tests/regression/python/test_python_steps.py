@@ -8,16 +8,15 @@ from typing import Any
 import numpy as np
 import pytest
 from acting_scenes import SCENES
+from word_scenes import with_words
 
 import catenary
-from catenary.cases.scene.input.toml_input import parse_assignment
 
 
 def acting(name: str, **changes: Any) -> catenary.Scene:
     """A small scene of the tests."""
     table = SCENES[name]
-    values = dict(parse_assignment(word) for word in table["set"])
-    return catenary.load(table["case"]).replace(values, **changes)
+    return with_words(table["case"], table["set"]).replace(changes)
 
 
 @pytest.fixture(scope="module")

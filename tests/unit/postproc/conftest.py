@@ -148,6 +148,9 @@ def make_header(problem: Problem, mesh: LineMesh, **attributes: Any) -> Header:
     return Header({**known, **attributes}, datasets, facts_of(problem, mesh, length))
 
 
+BLOCK = 500  # steps
+
+
 def row_of(values: Mapping[str, np.ndarray]) -> tuple[np.ndarray, dict[str, slice]]:
     """A row of these values by channel, and where in it each channel is."""
     ends = np.cumsum([0, *(array.size for array in values.values())]).tolist()
@@ -180,6 +183,7 @@ class March:
         self._own_x = np.concatenate([own_droppers, own_arms])
         self._at_rest = 65.0 + 8.0 * np.cos(own_droppers)
         self._own_nodes = self.mesh.points[self.own(self.mesh.n_nodes), 0]
+        self._blocks: dict[int, dict[str, np.ndarray]] = {}
 
     def header(self, **attributes: Any) -> Header:
         problem = make_problem(self.line, len(self.separations), dt=self.dt, speed=self.speed)
@@ -204,10 +208,11 @@ class March:
             n_places=(2,) * len(self.separations),
         )
 
-    def position(self, t: float) -> np.ndarray:
+    # Times may be one [s], or a column of many: then there is a row for each.
+    def position(self, t: Any) -> np.ndarray:
         return self.start + SPEED * t - np.asarray(self.separations)
 
-    def force(self, t: float) -> np.ndarray:
+    def force(self, t: Any) -> np.ndarray:
         """Mean 150 N, 30 N amplitude at the span frequency, growing parts at 9 and 60 Hz."""
         p = np.arange(len(self.separations))
         phase = 2 * np.pi * t
@@ -218,12 +223,12 @@ class March:
             + 10.0 * np.sin(phase * 60.0)
         )
 
-    def wave(self, t: float, x: np.ndarray) -> np.ndarray:
+    def wave(self, t: Any, x: np.ndarray) -> np.ndarray:
         """Uplift of the line at positions x: a hump around each pantograph with a wake [m]."""
-        ahead = x - self.position(t)[:, None]
+        ahead = x - self.position(t)[..., None]
         wake = 0.02 * np.exp(np.minimum(ahead, 0.0) / 60.0) * np.sin(0.35 * ahead)
         hump = 0.06 * np.exp(-((ahead / 9.0) ** 2))
-        return np.asarray((hump + np.where(ahead < 0, wake, 0.0)).sum(axis=0))
+        return np.asarray((hump + np.where(ahead < 0, wake, 0.0)).sum(axis=-2))
 
     def places(self, t: float) -> np.ndarray:
         """Bases at rest, heights of a head and of the frame below it for each pantograph [m]."""
@@ -240,21 +245,30 @@ class March:
             return self.wave(t, x)
         return (self.wave(t, x + 1e-6) - self.wave(t, x - 1e-6)) / 2e-6
 
+    def block(self, number: int) -> dict[str, np.ndarray]:
+        """Values of channels in a block of steps, a row each: all at once take a tenth of the time
+        that they take one by one."""
+        if number not in self._blocks:
+            t = self.dt * (number * BLOCK + np.arange(BLOCK))[:, None]
+            position = self.position(t)
+            n_droppers = self._at_rest.size
+            uplift = self.wave(t, self._own_x)
+            wire = 5.3 - 0.02 + 0.015 * np.sin(2 * np.pi * position / SPAN)
+            slack = 90.0 / 0.06 * np.maximum(uplift[:, :n_droppers], 0.0)
+            self._blocks[number] = {
+                "contact_position": position,
+                "contact_force": self.force(t),
+                "head_height": wire - 0.002,
+                "wire_height": wire,
+                "dropper_force": np.maximum(self._at_rest - slack, -0.5),
+                "arm_uplift": uplift[:, n_droppers:],
+            }
+        return self._blocks[number]
+
     def view(self, step: int) -> StepView:
-        t = step * self.dt
-        position = self.position(t)
-        nodes, n_droppers = self._own_nodes, self._at_rest.size
-        uplift = self.wave(t, self._own_x)
-        wire = 5.3 - 0.02 + 0.015 * np.sin(2 * np.pi * position / SPAN)
-        slack = 90.0 / 0.06 * np.maximum(uplift[:n_droppers], 0.0)
-        values = {
-            "contact_position": position,
-            "contact_force": self.force(t),
-            "head_height": wire - 0.002,
-            "wire_height": wire,
-            "dropper_force": np.maximum(self._at_rest - slack, -0.5),
-            "arm_uplift": uplift[n_droppers:],
-        }
+        t, nodes = step * self.dt, self._own_nodes
+        number, row_in_block = divmod(step, BLOCK)
+        values = {name: rows[row_in_block] for name, rows in self.block(number).items()}
         row, columns = row_of(values | self.more(step))
         return StepView(
             step=step,

@@ -98,6 +98,7 @@ def test_each_contact_wire_has_its_name_role_facts_and_profile(
         assert (results.static("elasticity")[inner] < own[inner].min(axis=1)).all()
 
 
+@pytest.mark.usefixtures("quick_report")
 def test_the_report_shows_each_wire(tmp_path: Path, usual: dict[str, Any]) -> None:
     path = recorded(twins(0.3), tmp_path, usual)
     write_report(path, tmp_path)
@@ -106,6 +107,7 @@ def test_the_report_shows_each_wire(tmp_path: Path, usual: dict[str, Any]) -> No
     assert own[FIRST]["max"] > own[SECOND]["max"] > told["elasticity_mm_per_N"]["max"]
 
 
+@pytest.mark.usefixtures("quick_report")
 def test_arms_and_droppers_of_several_wires_are_named(
     tmp_path: Path, usual: dict[str, Any]
 ) -> None:

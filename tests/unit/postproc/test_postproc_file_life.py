@@ -188,6 +188,7 @@ def test_a_reports_files_are_all_declared(tmp_path: Path, make_march: Any, recor
     assert drawn - written <= {f"{name}.png" for name in missing}
 
 
+@pytest.mark.usefixtures("quick_report")
 def test_an_earlier_reports_files_go_and_a_users_stay(
     tmp_path: Path, make_march: Any, record_run: Any
 ) -> None:

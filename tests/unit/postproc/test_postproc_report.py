@@ -190,6 +190,7 @@ def test_dropper_table_has_what_an_installer_cuts_by(report_folder: Path, march:
     assert float(tenth["length [m]"]) == pytest.approx(upper - lower, abs=5e-5)
 
 
+@pytest.mark.usefixtures("quick_report")
 def test_a_failed_criterion_is_named(tmp_path: Path, make_march: Any, record_run: Any) -> None:
     march = make_march(separations=(0.0,), n_steps=3750, dt=2e-3, speed=160.0 / 3.6)
     record_run(tmp_path / "run.h5", march, attributes={"title": "slow"})
@@ -209,6 +210,7 @@ def test_a_failed_criterion_is_named(tmp_path: Path, make_march: Any, record_run
     assert failed == ["mean contact force"]
 
 
+@pytest.mark.usefixtures("quick_report")
 @pytest.mark.parametrize(
     "steps",
     [0, pytest.param(1, marks=pytest.mark.study), 30, pytest.param(3000, marks=pytest.mark.study)],
@@ -239,6 +241,7 @@ def test_an_interrupted_run_is_reported_as_far_as_it_went(
     assert judged["train speed against 0.7 of the wave speed"] is True
 
 
+@pytest.mark.usefixtures("quick_report")
 @pytest.mark.parametrize(
     "separations", [pytest.param((0.0,), marks=pytest.mark.study), (0.0, 31.0, 62.0, 93.0)]
 )

@@ -46,6 +46,7 @@ def test_each_strip_has_a_column(tmp_path: Path, with_strips: Any, record_run: A
         assert file["channels/strip_force"].attrs["unit"] == b"N"
 
 
+@pytest.mark.usefixtures("quick_report")
 def test_the_report_shows_them(tmp_path: Path, with_strips: Any, record_run: Any) -> None:
     record_run(tmp_path / "run.h5", with_strips)
     write_report(tmp_path, tmp_path)
