@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import contextlib
 import gc
+import io
 import logging
 import os
 import signal
 import subprocess
 import sys
 from collections.abc import Iterator
+from contextlib import redirect_stdout
 from pathlib import Path
 from unittest import mock
 
@@ -78,23 +80,48 @@ def _log_without_handlers() -> None:
 
 
 @contextlib.contextmanager
-def _quick_reports() -> Iterator[None]:
-    """Draw pictures and paint none; examine results in this process and not in one of its own."""
-    from pixels import FIGURES, PAINTERS
-
+def _examined_here() -> Iterator[None]:
+    """Examine results and snapshots in this process and not in one of its own."""
     from catenary.postproc.read import guard
 
     child = guard._child
 
-    def examined_here(words: list[str], limit: float) -> subprocess.CompletedProcess[bytes]:
-        if words[:2] != ["-m", guard.__name__]:
-            return child(words, limit)
-        return subprocess.CompletedProcess(words, 0, guard.examine(Path(words[2])).encode(), b"")
+    def walked(path: str) -> int:
+        """Exit code of the program that opens all tables of a file."""
+        try:
+            with mock.patch.object(sys, "argv", ["-c", path]), redirect_stdout(io.StringIO()):
+                exec(guard._WALK, {})
+        except SystemExit:  # refused: that is told by who opens it next
+            return 0
+        except Exception:
+            return 1
+        return 0
 
-    with (
-        mock.patch.multiple(FIGURES, **PAINTERS),
-        mock.patch.object(guard, "_child", examined_here),
-    ):
+    def answer(words: list[str], limit: float) -> subprocess.CompletedProcess[bytes]:
+        if words[:2] == ["-m", guard.__name__]:
+            said = guard.examine(Path(words[2])).encode()
+            return subprocess.CompletedProcess(words, 0, said, b"")
+        if words[:2] == ["-c", guard._WALK]:
+            return subprocess.CompletedProcess(words, walked(words[2]), b"", b"")
+        return child(words, limit)
+
+    with mock.patch.object(guard, "_child", answer):
+        yield
+
+
+@contextlib.contextmanager
+def _quick_reports() -> Iterator[None]:
+    """Draw pictures and paint none; examine results in this process."""
+    from pixels import FIGURES, PAINTERS
+
+    with mock.patch.multiple(FIGURES, **PAINTERS), _examined_here():
+        yield
+
+
+@pytest.fixture(scope="module")
+def examined_here() -> Iterator[None]:
+    """For a file of tests that damages no file so that HDF5 may crash."""
+    with _examined_here():
         yield
 
 

@@ -19,7 +19,7 @@ from catenary.postproc.record.snapshots.field_layout import Course, FieldRecord
 from catenary.postproc.record.snapshots.fields import FieldRecorder
 from catenary.postproc.record.snapshots.fields_schema import FieldsFault, read_fields
 
-pytestmark = pytest.mark.process
+pytestmark = pytest.mark.usefixtures("examined_here")
 WIRE = "contact_wire"
 
 

@@ -35,7 +35,7 @@ from catenary.postproc.record.snapshots.field_layout import Course, FieldRecord
 from catenary.postproc.record.snapshots.fields import FieldRecorder
 
 # HDF5's files are examined, and films written, by processes of their own.
-pytestmark = pytest.mark.process
+pytestmark = [pytest.mark.process, pytest.mark.usefixtures("examined_here")]
 
 
 @pytest.fixture(scope="module")

@@ -26,8 +26,7 @@ from catenary.postproc.paraview import open_in_paraview
 from catenary.postproc.read.results import Results
 from catenary.postproc.record.snapshots.fields import FieldRecorder
 
-# HDF5's files are examined by a process of its own.
-pytestmark = pytest.mark.process
+pytestmark = pytest.mark.usefixtures("examined_here")
 
 
 @pytest.fixture
