@@ -130,6 +130,8 @@ SANITIZED_TESTS ?= $(addprefix tests/unit/solver/,test_station_passes.py test_va
     test_repeated_blocks.py test_inner_problem.py test_end_memory.py) \
     $(addprefix tests/unit/mbs/,test_native_heads.py test_multibody_flat.py) \
     tests/verification/test_partly_slack_droppers.py \
+    tests/verification/test_tangents.py::test_tangents_side_by_side_are_those_of_each_alone \
+    tests/verification/test_ensembles.py::test_lanes_are_filled_again_with_trains_of_other_lengths \
     tests/regression/prepared_line/test_prepared_line.py::test_state_is_kept_and_restored_with_what_was_added
 
 sanitize: setup ## tests with kernels that check memory and arithmetic; SANITIZED_TESTS="FILE..."
