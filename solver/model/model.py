@@ -62,9 +62,11 @@ class Block:
         damping: np.ndarray | None = None,
         of_shape: bool = False,
     ) -> Block:
-        """A block of elements (n, m) whose matrices (n, m, m) are given, each its own.
+        """A block of elements, each with matrices of its own; equal ones are then stored once.
 
-        Elements that rounding alone tells from each other have the matrices of the first of them.
+        ``dofs`` (n, m) are the unknowns of each element; ``mass``, ``stiffness`` and ``damping``
+        are (n, m, m) or None, in SI units. Elements whose matrices differ by round-off get those
+        of the first of them.
         """
         terms = [mass, stiffness, damping]
         n, m = dofs.shape
@@ -206,7 +208,7 @@ class Model:
         for number, kind in enumerate(groups):
             mine = self.mesh.dropper_group == number
             own = np.stack(kind.slopes_at(self.cut_lengths[mine]))
-            # The last piece again, for those that have fewer.
+            # Droppers with fewer pieces repeat their last one.
             found[:, mine] = np.pad(
                 own, ((0, 0), (0, 0), (0, found.shape[2] - own.shape[2])), "edge"
             )
@@ -219,7 +221,7 @@ class Model:
 
     @property
     def dropper_pieces(self) -> Slopes:
-        """The piece of each dropper on which it is at rest, of what is slack there the first."""
+        """The piece of its law on which each dropper is at rest, the first for a slack dropper."""
         slopes = self.dropper_slopes
         force = np.zeros(self.broken.size) if self.form is None else self.form.dropper_force
         return slopes.at(np.where(self.dropper_gap > 0.0, 0, slopes.piece_under(force)))
