@@ -101,10 +101,12 @@ class Contacts(NamedTuple):
 
     Attributes
     ----------
-    x : (n,) where they are along the track [m]
+    x : (n,) places along the track [m]
     touches : (n,) records of ``TOUCH``
+    wires : WireShapes of the contact wires
     columns : columns of A^-1 for the nodes of the ``wires``
-    answers, gains : accelerations of the line by a unit force at each, and their gains in a step
+    answers, gains : accelerations of the line by a unit force at each contact, and their gains in a
+        step
     motion, motion_gains : of the line, see ``LineState``
     followed : links that may switch, as steps follow them
     link_columns : of A^-1 for compensations of all links of the line

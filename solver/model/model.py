@@ -34,11 +34,12 @@ class Block:
 
     Attributes
     ----------
-    dofs : (n, m) int32, unknowns of each element; a long line has very many
-    kind : (n,) int32, of each element, which of the matrices it has
+    component : name of the component, which decides on damping
+    dofs : (n, m) int32, unknowns of each element
+    kind : (n,) int32, number of the matrices of each element
     mass, stiffness : (k, m, m) or None
-    damping : (k, m, m) or None, beside what the component's damping makes of the other two
-    lateral : whether it is a wire that moves across the track, which may have its own damping
+    damping : (k, m, m) or None, in addition to the component's damping, alpha K + beta M
+    lateral : whether it is the lateral motion of a wire, which may have its own damping
     of_shape : whether the stiffness is the tangent of forces that the shape at rest decides, such
         as those of wires and droppers; others are springs without a force at rest
     """
@@ -117,6 +118,7 @@ class Model:
 
     Attributes
     ----------
+    problem, mesh : problem and mesh of the line
     simulated : laws of the problem, as its effects set them
     numbering : Unknowns, the registry of all unknowns and their numbers
     row_of_node : (n_nodes,) place of each mesh node in the order along the track
