@@ -106,7 +106,7 @@ class LineState:
         return self.read[2]
 
     def put(self, displacement: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray) -> None:
-        """Take a state, (n_local,) each."""
+        """Take displacement [m], velocity [m/s] and acceleration [m/s2], (n_local,) each."""
         x, y, z = self.read[:3]
         x[:], y[:], z[:] = displacement, velocity, acceleration
 
@@ -163,14 +163,14 @@ class PredictedLineState(LineState):
         return velocity
 
     def put(self, displacement: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray) -> None:
-        """Take a state, (n_local,) each."""
+        """Take displacement [m], velocity [m/s] and acceleration [m/s2], (n_local,) each."""
         x, y, z = self.read[:3]
         x[:], y[:], z[:] = self.ahead(displacement, velocity, acceleration)
 
     def ahead(
         self, displacement: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """x, y and z of a state, (n_local,) each."""
+        """x, y and z of displacement, velocity and acceleration, (n_local,) each."""
         dt, c_position, c_velocity, c_work = self._steps[:4]
         predicted = displacement + dt * velocity + c_position * acceleration
         y = velocity + c_velocity * acceleration
@@ -258,7 +258,10 @@ class AlphaAhead(PredictedLineState):
         return np.asarray((self.read[2] - of_known * self.known) / of_balanced)
 
     def put(self, displacement: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray) -> None:
-        """Take a state, (n_local,) each, after ``known``."""
+        """Take displacement, velocity and balanced acceleration, (n_local,) each.
+
+        ``known`` must be set before.
+        """
         x, y, z = self.read[:3]
         of_balanced, of_known = self.balance
         total = of_balanced * acceleration + of_known * self.known

@@ -209,7 +209,10 @@ class StationPasses:
 
 
 def changes_of(motion: PredictedLineState, steps: Steps | AlphaSteps, by_mass: float) -> Changes:
-    """Coefficients that take a state from one prediction to the next."""
+    """Coefficients that take ``motion`` from one prediction to the next.
+
+    ``steps`` are the factors of its method, ``by_mass`` as in ``Changes``.
+    """
     by_position, by_velocity, _ = map(float, motion.gains)
     nothing = 0.0, 0.0
     if isinstance(steps, Steps):

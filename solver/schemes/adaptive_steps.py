@@ -270,7 +270,7 @@ class StepLevels:
         stiffness: np.ndarray,
         compliance: np.ndarray,
     ) -> Decision:
-        """Decide on a step. Rank 0 only; see `schemes.StepController`."""
+        """Accept or reject a step; parameters as in `schemes.StepController`. Rank 0 only."""
         level, size = self._tried, self._dt / 2**self._tried
         error = self._error.of(time, depth, force, stiffness, compliance)
         decision = Decision(True, level)

@@ -39,6 +39,7 @@ class PlannedAxis:
 
     Attributes
     ----------
+    axis, levels : the axis and its levels
     runs : name of the run of each possible level, by the level's name
     refused : reason why a level is not possible, by the level's name
     reference : name of the run that levels are compared with
