@@ -320,8 +320,8 @@ def _renumber(
 ) -> LineMesh:
     """The mesh with the wires' nodes only, numbered along the track, the upper wires' first.
 
-    Neighbours along the track get neighbouring numbers, across all wires: what a banded or
-    distributed matrix wants.
+    Neighbours along the track get neighbouring numbers, across all wires, so that matrices have a
+    narrow band and their parts few neighbours.
     """
     points = groups.points
     used = np.concatenate([wires[name] for name in reversed(names.wires)])

@@ -118,7 +118,10 @@ def check_counts(elements_per_gap: int, support_refinement: int) -> None:
 
 
 def divisions_of(cuts: Cuts, elements_per_gap: int, support_refinement: int) -> np.ndarray:
-    """Elements between neighbouring cuts (n - 1,)."""
+    """Elements (n - 1,) between neighbouring ones of n cuts.
+
+    ``elements_per_gap`` is their number, times ``support_refinement`` in the gaps next to a mast.
+    """
     near_mast = cuts.is_mast[:-1] | cuts.is_mast[1:]
     return elements_per_gap * np.where(near_mast, support_refinement, 1)
 

@@ -114,7 +114,7 @@ def _describe(line: Line, cuts: Cuts, divisions: np.ndarray, grading: float) -> 
     for number, (dimension, name, tags) in enumerate(groups, start=1):
         if tags:
             gmsh.model.addPhysicalGroup(dimension, tags, number)
-        # A group without members is named as well: its name tells a reader that none is meant.
+        # A group without members is named as well: readers refuse a mesh without the name.
         gmsh.model.setPhysicalName(dimension, number, name)
 
 

@@ -100,7 +100,7 @@ class Clamps:
     x: tuple[float, ...]
 
 
-# Of a steady arm along itself, far stiffer than what it holds [N/m].
+# Axial stiffness of a steady arm, far above that of the wire that it holds [N/m].
 BAR_STIFFNESS = 1e7
 
 
@@ -108,17 +108,22 @@ BAR_STIFFNESS = 1e7
 class SteadyArm:
     """A steady arm hinged at its registration end and clamped to a wire.
 
-    length [m], mass per length [kg/m], clamp mass [kg], vertical stiffness at the wire [N/m].
-    ``holds_height``: whether the arm holds the wire at its height at rest and so carries weight
-    there; otherwise the wire hangs freely between the droppers next to the arm.
-    ``inclination``: by how much it rises from the wire to its hinge at rest, with lateral motion
-    [rad]; None if it is what the weight that hangs at the arm makes of it.
-    ``uplift_stop``: lift of the wire at which the arm meets a stop of ``stop_stiffness`` [m],
-    [N/m]; None without one.
-    ``by_radial_force``: whether its vertical stiffness is its radial force over its length, in
-    place of ``stiffness``.
-    ``registration_stiffness``: of the registration arm that holds its hinge, along the steady arm
-    [N/m]; None if it does not give.
+    Attributes
+    ----------
+    length : from hinge to clamp [m]
+    mass_per_length : of the arm [kg/m]
+    clamp_mass : of the clamp on the wire [kg]
+    stiffness : vertical stiffness at the wire [N/m]
+    holds_height : whether the arm holds the wire at its height at rest and so carries weight there;
+        if not, the wire hangs freely between the droppers next to the arm
+    inclination : angle by which it rises from the wire to its hinge at rest, with lateral motion
+        [rad]; None if the angle follows from the weight at the arm
+    uplift_stop : lift of the wire at which the arm meets a stop [m]; None without a stop
+    stop_stiffness : stiffness of the stop [N/m]
+    by_radial_force : whether its vertical stiffness is its radial force over its length, in place
+        of ``stiffness``
+    registration_stiffness : stiffness of the registration arm at the hinge, along the steady arm
+        [N/m]; None if it is rigid
     """
 
     length: float
@@ -134,7 +139,7 @@ class SteadyArm:
 
     @property
     def bar_stiffness(self) -> float:
-        """Between its clamp and what does not move, along the arm [N/m]."""
+        """Axial stiffness of the arm and of the registration arm that holds its hinge [N/m]."""
         if self.registration_stiffness is None:
             return BAR_STIFFNESS
         return 1.0 / (1.0 / BAR_STIFFNESS + 1.0 / self.registration_stiffness)
@@ -163,10 +168,10 @@ class Supports:
     Attributes
     ----------
     name, wire : their own name, and that of the wire that they carry
-    stiffness : vertical, of each [N/m]
+    stiffness : vertical stiffness of each support [N/m]
     x : their places, ascending [m]
-    holds : name of a wire that is to have its wanted height there at rest, by which each support is
-        as high as that takes; empty if they stay at the height of their wire's course
+    holds : name of a wire that has its wanted height there at rest: form finding sets the height of
+        each support accordingly; empty if supports are at the height of their wire's course
     """
 
     name: str
@@ -195,14 +200,15 @@ class Fittings:
 
 
 class Slopes(NamedTuple):
-    """Tables of n springs with m pieces each; the first one goes on below its begin, the last one
-    for ever.
+    """Piecewise linear laws of n springs with m pieces each.
+
+    The first piece also holds below its begin, the last one without end.
 
     Attributes
     ----------
-    begin : (n, m) stretch at which each piece begins [m], zero of the first one
-    force : (n, m) there [N], zero of the first one
-    slope : (n, m) of each piece [N/m]
+    begin : (n, m) stretch at which each piece begins [m], 0 for the first piece
+    force : (n, m) force at ``begin`` [N], 0 for the first piece
+    slope : (n, m) stiffness of each piece [N/m]
     """
 
     begin: np.ndarray
@@ -210,11 +216,12 @@ class Slopes(NamedTuple):
     slope: np.ndarray
 
     def piece_under(self, force: np.ndarray) -> np.ndarray:
-        """Pieces that have forces (n,) [N]; where one ends, the next one."""
+        """Number (n,) of the piece on which each spring has ``force`` (n,) [N]; at the end of a
+        piece that of the next one."""
         return np.asarray((force[:, None] >= self.force[:, 1:]).sum(axis=1))
 
     def at(self, piece: np.ndarray) -> Slopes:
-        """One piece of each."""
+        """The piece of number ``piece`` (n,) of each spring; arrays (n,)."""
         each = np.arange(piece.size), piece
         return Slopes(self.begin[each], self.force[each], self.slope[each])
 

@@ -110,9 +110,9 @@ class Line(Spans):
         return x[first : np.searchsorted(x, masts[span + 1])]
 
     def with_shares(self, shares: Mapping[str, float]) -> Line:
-        """The line with the tension of the named wires a share of what it was.
+        """The line with the tensions of some wires multiplied by ``shares`` [-], by name.
 
-        A wire that is clamped to others carries the same share of what it took of their tension.
+        A wire that is clamped to others takes from them its own share of the tension before.
         """
         clamped = {
             (piece.x[0], piece.x[-1], wire.tension): shares.get(wire.name, 1.0)

@@ -125,7 +125,10 @@ def reduced(mesh: LineMesh, places: np.ndarray, within: float) -> LineMesh:
 
 
 def with_nodes_at(mesh: LineMesh, wire: str, places: np.ndarray, within: float) -> LineMesh:
-    """The mesh with nodes of a wire at ``places`` (n,) [m], if none is nearer than ``within``."""
+    """The mesh with further nodes of ``wire`` at ``places`` (n,) [m].
+
+    Places nearer than ``within`` [m] to a node get none.
+    """
     nodes = mesh.wires[wire]
     x = mesh.x(nodes)
     before = np.clip(np.searchsorted(x, places) - 1, 0, x.size - 2)

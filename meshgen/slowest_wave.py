@@ -152,6 +152,8 @@ def wave_of_two_spans(
 
 
 def bends(speed: float, tension: float, mass_per_length: float) -> bool:
-    """Whether a slowest wave [m/s] is one of bending, not of a string: a wire's tension [N], mass
-    [kg/m]."""
+    """Whether a slowest wave of ``speed`` [m/s] is one of bending, not that of a string.
+
+    ``tension`` [N] and ``mass_per_length`` [kg/m] are those of the wire.
+    """
     return speed > _BENDS * float(np.sqrt(tension / mass_per_length))

@@ -37,11 +37,17 @@ EXPANSION_OF_COPPER = 1.7e-5
 
 @dataclass(frozen=True)
 class Conductor:
-    """A tensioned conductor: tension [N], mass per length [kg/m], bending stiffness EI [N m2].
+    """A tensioned conductor.
 
-    ``axial_stiffness`` EA [N] is that of a bar, None where nothing says it; ``expansion`` is by
-    temperature [1/K]. Wind meets it with its ``diameter`` [m], None where nothing says it, times
-    ``drag_coefficient``.
+    Attributes
+    ----------
+    tension : at rest [N]
+    mass_per_length : [kg/m]
+    bending_stiffness : EI [N m2]
+    axial_stiffness : EA [N], None if not given
+    expansion : coefficient of thermal expansion [1/K]
+    diameter : for wind loads [m], None if not given
+    drag_coefficient : of the diameter [-]
     """
 
     tension: float
@@ -169,11 +175,11 @@ class Wire(Conductor):
     name : of the wire, of its group in a mesh file and of its component in the damping
     role : contact, messenger, auxiliary or stitch wire
     pieces : where it runs, one piece or several by ascending x that do not overlap
-    profile : heights wanted at its droppers' lower ends; None if none hangs it
-    taken : stretches (from, to, tension) over which wires that are clamped to it carry that much of
-        its tension; where they overlap, all of them do [m], [m], [N]
-    worn : stretches (from, to, share) over which it has lost a share of its section, from below
-        [m], [m], [-]
+    profile : wanted heights at the lower ends of its droppers; None without such droppers
+    taken : stretches (from [m], to [m], tension [N]) over which a wire clamped to it carries this
+        part of its tension; parts add up where stretches overlap
+    worn : stretches (from [m], to [m], share [-]) over which it has lost a share of its section,
+        from below
     """
 
     name: str
@@ -193,7 +199,7 @@ class Wire(Conductor):
         profile: Profile | None = None,
         taken: tuple[tuple[float, float, float], ...] = (),
     ) -> Wire:
-        """A wire made of a conductor."""
+        """A wire made of a conductor; see ``Wire`` for the other parameters."""
         return cls(
             conductor.tension,
             conductor.mass_per_length,
@@ -249,9 +255,9 @@ class Wire(Conductor):
         return force
 
     def left_of(self, ends: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Shares left of section and bending stiffness between ``ends`` (n, 2) [m], (n,) each.
+        """Remaining shares of section and bending stiffness, (n,) [-], over ``ends`` (n, 2) [m].
 
-        What is worn in part has the mean of both.
+        A stretch that is worn in part has the mean along its length.
         """
         section, bending = np.ones(len(ends)), np.ones(len(ends))
         for start, end, lost in self.worn:

@@ -38,8 +38,8 @@ class Finding:
     ----------
     part : name of the part
     state : ``OK``, ``MISSING`` or ``BROKEN``
-    says : versions and facts, or what is wrong
-    remedy : how to mend it, "" if it is OK
+    facts : versions and facts, or the fault
+    remedy : sentence on how to mend it, "" if it is OK
     needed : whether no run is possible without it
     """
 

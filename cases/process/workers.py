@@ -105,12 +105,12 @@ def each(
 ) -> Generator[Outcome, None, None]:
     """Results of ``function(item, comm)`` for all items, as they come. Collective.
 
-    With ``n_at_once`` 1 the items are worked on here, by all ranks together. With more there are so
-    many processes, or, on as many ranks, each takes every n-th item; ``comm`` is then of one
-    rank alone. Items are drawn when they begin, except on ranks. An error of the program and a lost
-    process are the outcome of their item. After a signal no further item begins, and those that
-    are under way are ended: there are fewer outcomes than items. So are they when the generator is
-    closed, but for those of other ranks.
+    With ``n_at_once`` 1 all ranks together work on each item. With more, that number of processes
+    is started, or each of as many ranks takes every n-th item; ``function`` then gets a
+    communicator of one rank. Processes draw an item when they begin it, ranks draw all at once. An
+    error of the program and a lost process are the outcome of their item. A signal ends the items
+    under way and no further item begins: there are fewer outcomes than items. Closing the generator
+    does the same, except on other ranks.
 
     Parameters
     ----------

@@ -109,16 +109,16 @@ def refuse_other_run(
 
 
 def refuse_other_state(result: Path, state: Mapping[str, Any], model: Model) -> None:
-    """Raise InputError unless a state is that of its step in the records. Not collective.
+    """Raise InputError unless a state agrees with the records of its step. Not collective.
 
-    Records and state were written of the same numbers: contact forces, heights, and the uplift of
-    the line at its steady arms. What the file does not record of that step is let pass, and so are
-    arrays of another size, which the march refuses.
+    Compared are contact forces, heights, and the uplift of the line at its steady arms, as far as
+    the file records them at that step. Arrays of another size pass: the march refuses them.
 
     Parameters
     ----------
-    state : to continue from, whose arrays of the line have a row for each node along the track
-    model : of the line in the file
+    result : the result file
+    state : state to continue from; its arrays of the line have a row for each node along the track
+    model : model of the line in the file
     """
     step = state["step"]
     with Results(result) as results:

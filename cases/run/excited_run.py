@@ -20,10 +20,10 @@ class ExcitedRun:
 
     Attributes
     ----------
-    problem : of the scene, with what stands aside in place of its train
-    excitation : of the contact wire
-    snapshot_every : from one snapshot to the next where the scene does not say so [s]
-    watching : makes the observers beside the recorder, for a line at rest
+    problem : the scene's problem with a train that exerts no force, see `waves.excited`
+    excitation : excitation of the contact wire
+    snapshot_every : time between snapshots unless the scene sets it [s]
+    watching : returns the observers beside the recorder, for a line at rest
     """
 
     problem: Problem

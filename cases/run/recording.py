@@ -256,7 +256,7 @@ def snapshot_bytes(fields: FieldRecord, extent: Extent) -> float:
 
 
 def shown_share(fields: FieldRecord, problem: Problem, n_steps: int) -> float:
-    """Share of the line that snapshots show, their mean over a run."""
+    """Share of the line's length that snapshots show, mean over a run of ``n_steps`` [-]."""
     begin, end = problem.line.support_positions[[0, -1]]
     low, high = fields.edges(np.linspace(0.0, n_steps * problem.numerics.dt, _SAMPLES))
     first, last = (begin, end) if fields.stretch is None else fields.stretch

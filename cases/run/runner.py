@@ -89,7 +89,8 @@ class Phases:
 
 
 def performance(outcome: Outcome, phases: Phases, n_ranks: int) -> dict[str, Any]:
-    """Result of a run; after a restart, of its last part."""
+    """Times and counts of a run on ``n_ranks``, for its result file; after a restart those of its
+    last part."""
     counted: dict[str, float] = dict(outcome.counters)
     if outcome.traffic is not None:
         # Of the rank that sends most; a whole number unless droppers of other ranks slacken.
@@ -110,9 +111,9 @@ def performance(outcome: Outcome, phases: Phases, n_ranks: int) -> dict[str, Any
 def on_as_many(scene: Scene, comm: Any, run: Callable[[Any], T]) -> T:
     """The result of ``run`` on the ranks that a scene needs. Collective.
 
-    A window is some tens of spans, which one rank steps in less time than two can agree on: rank 0
-    runs alone, as if the others were not there, and these sleep until it is done. A signal to
-    them changes nothing; an MPI launcher hands it to rank 0 as well.
+    With a window rank 0 runs alone, and the others sleep until it has finished: a step of some tens
+    of spans takes less time than messages between ranks. Sleeping ranks ignore signals; an MPI
+    launcher sends these to rank 0 as well.
     """
     if comm.size == 1 or scene.window.mode == OFF:
         return run(comm)

@@ -68,10 +68,10 @@ def write_mesh_of(scene: Scene, path: Path, force: bool) -> LineMesh:
 
 
 def draw_scene(scene: Scene, path: Path, force: bool) -> tuple[float, float]:
-    """Draw a scene's line at rest into a new file; from where to where [m]. Not collective.
+    """Draw a scene's line at rest into a new file. Not collective.
 
-    Three spans in the middle of the evaluated stretch, or the first overlap with a span on either
-    side.
+    ``path`` is replaced only with ``force``. Returns start and end of the drawn stretch [m], three
+    spans in the middle of the evaluated stretch, or the first overlap with a span on either side.
 
     Raises
     ------
@@ -91,7 +91,7 @@ def draw_scene(scene: Scene, path: Path, force: bool) -> tuple[float, float]:
 def line_figure(
     scene: Scene, problem: Problem, mesh: LineMesh, form: Equilibrium
 ) -> tuple[Figure, tuple[float, float]]:
-    """The line of a scene at rest as a drawing, and from where to where it shows it [m].
+    """Drawing of a scene's line at rest, and the start and the end of the drawn stretch [m].
 
     Parameters
     ----------

@@ -41,9 +41,9 @@ MEMORY_PER_STEP = 40.0  # [B]
 
 
 def estimate_start(n_nodes: int, own: float = 0.0) -> float:
-    """Processor time of mesh, line at rest and what steps it [s].
+    """Processor time of mesh, line at rest, matrices and factors [s].
 
-    ``own`` is the share of spans that are kinds of their own, which none before was like.
+    ``own`` is the share of spans that are unlike all spans before them [-].
     """
     return (START_PER_NODE + START_PER_OWN_NODE * own) * n_nodes
 
@@ -58,9 +58,13 @@ def estimate_march(
 ) -> float:
     """Wall time of the time loop on one rank [s].
 
-    ``n_substeps`` is the number of substeps of all pantographs with all bodies in a step;
-    ``stations`` how many of the line's have each number of unknowns, all four by default;
-    ``gusts`` whether wind changes with time.
+    Parameters
+    ----------
+    n_dofs, n_steps : number of unknowns of the line, and of steps
+    scheme : name of the scheme
+    n_substeps : substeps of all pantographs with all bodies, in a step
+    stations : number of stations by their number of unknowns; all have four if not given
+    gusts : whether wind changes with time
     """
     step = STEP_OVERHEAD + STEP_PER_UNKNOWN * n_dofs * cost_of_stations(stations or {4: 1})
     step = SCHEME_FACTOR[scheme] * step + gusts * GUSTS_PER_UNKNOWN * n_dofs
@@ -68,8 +72,10 @@ def estimate_march(
 
 
 def cost_of_stations(stations: Mapping[int, int]) -> float:
-    """Time per unknown of a line with so many stations of each number of unknowns, in terms of one
-    of stations of four."""
+    """Time per unknown over that of a line whose stations have four unknowns [-].
+
+    ``stations`` has the number of stations by their number of unknowns.
+    """
     sizes, counts = np.array(list(stations)), np.array(list(stations.values()))
     costs = np.interp(sizes, list(STATION_COST), list(STATION_COST.values()))
     several = SEVERAL_TYPES if sizes.size > 1 else 1.0
@@ -79,7 +85,8 @@ def cost_of_stations(stations: Mapping[int, int]) -> float:
 def estimate_memory(n_dofs: int, n_steps: int = 0, by_pieces: bool = False) -> float:
     """Resident memory of a run on one rank, its report included [B].
 
-    ``by_pieces`` is whether matrices are made of what a window of spans needs alone.
+    ``n_dofs`` and ``n_steps`` are numbers of unknowns and of steps, ``by_pieces`` whether matrices
+    are made for the spans near a window alone.
     """
     each = MEMORY_PER_UNKNOWN_AT_REST if by_pieces else MEMORY_PER_UNKNOWN
     return MEMORY_BASE + each * n_dofs + MEMORY_PER_STEP * n_steps

@@ -42,8 +42,8 @@ class Draft:
     recorded: bool = False
 
     def assigned(self, values: Iterable[tuple[str, Any, str]]) -> Draft:
-        """This scene with further values: dotted key, value (``REMOVED`` takes the key away), and
-        the place where that is written.
+        """This scene with further values: dotted key, value (``REMOVED`` deletes the key) and, for
+        messages, the place where it was written.
 
         Raises
         ------
@@ -126,10 +126,11 @@ def load_scene(
 
     Parameters
     ----------
-    case : name, file or folder, or what was read of one
-    overrides : ``key=value`` each, value in TOML; they win over the file; ``key=`` removes a key
+    case : name, file or folder, or the draft read from one
+    overrides : ``key=value`` each, value in TOML; they replace values of the file; ``key=`` removes
+        a key
     shortened : apply the case's ``[test]`` table before the overrides
-    varied : further assignments, which come last, and where they were written
+    varied : further assignments, applied last, with the place where each was written
 
     Raises
     ------
@@ -146,8 +147,9 @@ def load_scene(
 def scene_from(raw: dict[str, Any], origin: Origin, folder: Path | None = None) -> Scene:
     """The checked scene of a nested table, such as ``convert.course.resolved`` gives.
 
-    ``folder`` is the folder of a relative ``mesh.file`` of the case file (one of the command
-    line is relative to the working directory) and whose name an unnamed case takes.
+    ``raw`` are the tables, ``origin`` the places where keys were written, for messages. ``folder``
+    is the base of a relative ``mesh.file`` in the case file (on the command line it is the working
+    directory); its name is that of an unnamed case.
     """
     refuse_deep(raw, origin.file)
     raw = copy.deepcopy(raw)

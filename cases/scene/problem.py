@@ -194,12 +194,19 @@ def _train(scene: Scene) -> Train:
 def pantograph_of(
     name: str, table: PantographTable, speed_km_h: float, *, reversed: bool = False
 ) -> PantographData:
-    """The data of a pantograph's model under way with a speed, which may run the other way round.
+    """The data of a pantograph's model at a train speed.
+
+    Parameters
+    ----------
+    name : of the pantograph, for messages
+    table : its table in the scene
+    speed_km_h : train speed [km/h], for aerodynamic forces
+    reversed : whether it runs the other way round
 
     Raises
     ------
     InputError
-        Published numbers of a multibody pantograph are not allowed.
+        If the data of a multibody pantograph are not allowed.
     """
     if isinstance(table, MultibodyTable):
         from catenary.cases.scene.train.multibody import multibody_of, turned

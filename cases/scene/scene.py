@@ -93,10 +93,10 @@ class Scene(Table):
 
         Parameters
         ----------
-        key : holds the name
+        key : dotted key whose value is the name
         known : allowed names
-        has : words for whose they are
-        name : the name, if the key holds several
+        has : words that introduce them in the sentence, such as their owner
+        name : the name, if the key has several
         """
         name = str(self._at(key)) if name is None else name
         if name not in known:
@@ -119,7 +119,7 @@ class Scene(Table):
         return here
 
     def fault(self, key: str, sentence: str) -> Fault:
-        """The fault of a key whose sentence ``says`` goes on after its name and its place."""
+        """The fault of a key; ``sentence`` continues after the key's name and place."""
         return Fault(key, f"{key} {self._origin.of(key)} {sentence}")
 
     def needs_effect(self, key: str, effect: str) -> Fault:

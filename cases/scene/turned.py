@@ -25,18 +25,18 @@ _NOT_OF_LINE = ("case", "train", "pantographs", "evaluation", "output", "test")
 def turned(scene: Scene) -> Scene:
     """The scene whose train runs the other way. Not collective.
 
-    Trains run towards greater x, so that the line is mirrored in place of the train: x becomes
-    L - x, with L its length; heights and lateral positions stay. The train is the same seen from
-    itself: its first pantograph leads, and it starts as far before the evaluated stretch as it
-    did, or where the running range begins if that is nearer. Heads, winds and curves act alike on
-    both sides, so that the contact force is that of the train on the line as it stands. Random
-    errors of dropper lengths are those of the same droppers. What is recorded is not chosen.
+    Trains run towards greater x, so that the line is mirrored instead: x becomes L - x, with the
+    length L of the line; heights and lateral positions stay. The order of pantographs stays: the
+    first one leads. The run-in keeps its length, unless the running range begins nearer to the
+    evaluated stretch. Heads, wind and curves are symmetric, so that the contact force is that of a
+    train in the other direction on the original line. Random errors of dropper lengths stay with
+    their droppers. Choices of what to record are dropped.
 
     Raises
     ------
     InputError
-        If the scene has a part whose mirror image no scene can say: a mesh file, a free line,
-        overlaps, alternating droppers, random heights, an irregular track.
+        If no scene describes the mirror image of a part: a mesh file, a free line, overlaps,
+        alternating droppers, random heights, an irregular track.
     """
     _refuse_one_sided(scene)
     raw, line = resolved(scene), line_of(scene)

@@ -271,7 +271,7 @@ class _Line:
                 shared.destroy()
 
     def serves(self, begin: float, end: float, together: bool) -> bool:
-        """Whether trains may run from ``begin`` to ``end`` [m], side by side if that is wanted."""
+        """Whether trains may run from ``begin`` to ``end`` [m], with ``together`` side by side."""
         if self._range is None:
             return not together
         return self._range[0] <= begin and end <= self._range[1]

@@ -98,12 +98,12 @@ def _sum(content: Mapping[str, Any]) -> int:
 
 
 class KeptRows:
-    """Rows of a study that are no figures of runs, a record for each piece of work.
+    """Rows of a study other than figures of runs, a record for each piece of work.
 
     Parameters
     ----------
-    folder : that of the study; None to keep nothing
-    force : forget what is there
+    folder : folder of the study; None to keep nothing
+    force : delete kept rows first
     """
 
     def __init__(self, folder: Path | None, force: bool = False) -> None:
@@ -194,15 +194,16 @@ class _Keeping:
 def held_study(
     out: Path | None, comm: Any, command: str, force: bool = False
 ) -> Iterator[tuple[KeptRows, Callable[[Callable[[Path], list[Path]]], list[Path]]]]:
-    """Hold the folder of a study: its kept rows, and what writes its files in their place.
+    """Lock the folder of a study. Yields its kept rows, and a function that writes its files.
 
-    Collective.
+    The kept rows are deleted once the files are written. Collective.
 
     Parameters
     ----------
     out : the folder, None to keep and write nothing
-    command : work of this process in words, for others that want the folder
-    force : forget what is kept there
+    comm : mpi4py communicator
+    command : work of this process in words, for other processes that find the folder locked
+    force : delete kept rows first
     """
     from catenary.cases.result_folder.folder_lock import held
 

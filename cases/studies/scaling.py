@@ -196,8 +196,10 @@ def work_of(scene: Scene) -> Work:
 
 
 def predict(work: Work, wire: Wire, ranks: int) -> Predicted:
-    """A step of the ``work`` of a march on so many ``ranks``, each with a core of its own, with
-    messages by ``wire``."""
+    """Predicted time of a step on ``ranks`` ranks, each with a core of its own.
+
+    ``work`` is that of a step of the march, ``wire`` the cost of messages.
+    """
     each = (work.step - work.fixed) / work.unknowns
     if ranks == 1:
         return Predicted(1, each * work.unknowns, 0.0, 0.0, work.fixed)

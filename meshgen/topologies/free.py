@@ -89,12 +89,12 @@ def hung(data: LineData) -> set[str]:
 
 
 def in_order(each_after: Iterable[tuple[str, Iterable[str]]]) -> list[str]:
-    """Names, each after those that it comes after.
+    """Names in topological order; ``each_after`` are pairs of a name and its predecessors.
 
     Raises
     ------
     InputError
-        If they come after each other in a circle.
+        If names precede each other in a circle.
     """
     try:
         return list(TopologicalSorter(dict(each_after)).static_order())
@@ -104,7 +104,7 @@ def in_order(each_after: Iterable[tuple[str, Iterable[str]]]) -> list[str]:
 
 
 def carriers(data: LineData, wire: FreeWire) -> np.ndarray:
-    """Places at which something carries a wire: its ends, supports, clamps, droppers, ascending."""
+    """Places at which a wire is carried: its ends, supports, clamps, droppers, ascending [m]."""
     places = [x for stretch in wire.stretches for x in stretch]
     assert data.wires is not None and data.links is not None
     for link in data.links:
@@ -215,8 +215,10 @@ class Loads:
         return np.asarray(np.concatenate([[0.0], np.cumsum(mass)])[np.searchsorted(at, x)])
 
     def shared(self, carriers: np.ndarray, wire: FreeWire) -> np.ndarray:
-        """Masses (n,) that hang on what carries a wire at ``carriers`` (n,), ascending: half of the
-        wire up to each neighbour, and of what hangs from that [kg]."""
+        """Masses (n,) that a wire's ``carriers``, at ascending places (n,) [m], carry [kg].
+
+        Each carries the wire, and the masses that hang from it, half-way to either neighbour.
+        """
         ends = wire.stretches[0][0], wire.stretches[-1][1]
         between = 0.5 * (carriers[1:] + carriers[:-1])
         bounds = np.concatenate([ends[:1], between, ends[1:]])

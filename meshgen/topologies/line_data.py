@@ -36,14 +36,14 @@ class FreeWire:
     ----------
     conductor, name, role : as of a ``Wire``
     stretches : (from, to) of its pieces, ascending [m]
-    heights : above the rail at its supports and ends; None if it hangs straight between clamps
-    lateral : None if it is that of the wire that it is clamped to
+    heights : heights above the rail at its supports and ends; None if it is straight between clamps
+    lateral : lateral positions; None for those of the wire that it is clamped to
     drawn : whether ``heights`` are its whole course, to which no sag is added
-    clamped_to : names of the wires that its pieces are clamped to where they start and where they
-        end, "" where they are held
-    tensioned : whether held ends have a tensioner, None as the ends of the line have
+    clamped_to : names of the wires that its pieces are clamped to at their start and at their end,
+        "" for a held end
+    tensioned : whether held ends have a tensioner; None as at the ends of the line
     clamp_mass, clamp_stiffness : of each of its clamps [kg], [N/m]
-    clamps : name of the group of these clamps, its own name and ``_clamps`` if empty
+    clamps : name of the group of these clamps; empty for its own name with ``_clamps``
     """
 
     conductor: Conductor
@@ -123,10 +123,11 @@ class Overlaps:
 
     Attributes
     ----------
-    first : numbers of the first spans of each, ascending, from 0
-    n_spans : of each, so many that none begins before the last one has ended
-    rise : height that contact wires gain from its middle to the end of their section [m]
-    distance : of the wires of the two sections from each other, sideways [m]
+    first : number of the first span of each overlap, from 0, ascending
+    n_spans : number of spans of each overlap; overlaps do not overlap each other
+    rise : height that contact wires gain from the middle of an overlap to the end of their section
+        [m]
+    distance : lateral distance of the wires of the two sections [m]
     """
 
     first: tuple[int, ...]
@@ -135,7 +136,7 @@ class Overlaps:
     distance: float
 
     def sections(self, masts: np.ndarray) -> np.ndarray:
-        """From and to of the tension sections of a line with these masts (n,), (k, 2) [m]."""
+        """Start and end of each tension section, (k, 2) [m], of a line with ``masts`` (n,) [m]."""
         first = np.array(self.first, dtype=np.int64)
         starts = np.append(masts[0], masts[first])
         return np.column_stack([starts, np.append(masts[first + self.n_spans], masts[-1])])
@@ -148,13 +149,13 @@ class LineData(Spans):
     Attributes
     ----------
     dropper_positions : per span, distances from the span's left support, ascending [m]
-    pre_sag : per span, per dropper: how far the contact wire hangs below ``contact_height`` [m]
+    pre_sag : per span and dropper, distance of the contact wire below ``contact_height`` [m]
     stagger : (n_spans + 1,) lateral position of the contact wire at each support [m]
     contact_height : height of the contact wire at the supports of the running spans [m]
     encumbrance : height of the messenger wire above ``contact_height`` at the supports [m]
     contact_wire, messenger_wire : conductors, None for the latter if there is none
     dropper : kind of the contact wire's droppers
-    support_stiffness : vertical stiffness of what carries the topmost wire at a mast [N/m]
+    support_stiffness : vertical stiffness of the topmost wire's support at a mast [N/m]
     steady_arm : the arms at the inner supports
     transition_rise : height gained by the contact wire over all transition spans of one end [m]
     topology : name of the topology that makes the line

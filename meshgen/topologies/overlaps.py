@@ -26,13 +26,13 @@ def of_next(name: str) -> str:
 
 
 def with_overlaps(line: Line, overlaps: Overlaps) -> Line:
-    """Tension sections in place of a line from anchor to anchor.
+    """The line cut into tension sections; ``line`` runs from anchor to anchor.
 
     A section ends at the last mast of an overlap, and the next one begins at its first mast.
     Contact wires are level up to the middle of the overlap, and rise from there as a parabola to
-    where their section ends. Wires of the two sections are ``distance`` apart at the masts in
-    between. Sections take turns: those of the first, third, ... section are pieces of the wires
-    that the line has, those of the others of wires whose names end in ``_next``.
+    the end of their section. Wires of the two sections are ``distance`` apart at the masts in
+    between. Wires of the first, third, ... section are pieces of the wires of ``line``; those of
+    the second, fourth, ... are pieces of wires with the same names and ``_next``.
     """
     masts = line.support_positions
     first = np.array(overlaps.first, dtype=np.int64)
@@ -74,8 +74,9 @@ class _Sections:
     Parameters
     ----------
     line : from anchor to anchor
-    ends : (n, 2) from and to of each section, ascending, of which none overlap [m]
-    running : (n, 2) from and to of where its contact wires are level because of overlaps [m]
+    ends : (n, 2) start and end of each section, ascending, without overlap [m]
+    running : (n, 2) stretch of each section between its overlaps' middles, where contact wires are
+        level [m]
     rise : height that contact wires gain from there to the end of their section [m]
     sideways : (n_masts,) shift of the wires [m]
     name : name of a wire or group, given that in the line
@@ -114,7 +115,7 @@ class _Sections:
         return found
 
     def twins(self) -> list[tuple[str, str]]:
-        """Wires side by side; both are there or none is, as they are cut at the same places."""
+        """Pairs of wires side by side. Both are cut at the same places and exist together."""
         there = {wire.name for wire in self.wires()}
         pairs = ((self._name(one), self._name(other)) for one, other in self._line.twins)
         return [pair for pair in pairs if there.issuperset(pair)]

@@ -31,9 +31,21 @@ _TOPOLOGIES: dict[str, Topology] = {}
 def register(
     name: str, parts: tuple[str, ...] = HUNG, may: tuple[str, ...] = ()
 ) -> Callable[[Make], Make]:
-    """Decorator: the function makes lines of the topology ``name``; a second one is an error.
+    """Decorator that registers a function as the maker of lines of the topology ``name``.
 
-    ``parts`` are names of what it needs of ``LineData``, ``may`` of what it takes if it is there.
+    Parameters
+    ----------
+    name : str
+        Name of the topology.
+    parts : tuple of str, optional
+        Fields of ``LineData`` that it needs.
+    may : tuple of str, optional
+        Fields that it uses if they are given.
+
+    Raises
+    ------
+    ValueError
+        If there is a topology of that name.
     """
 
     def keep(make: Make) -> Make:

@@ -10,10 +10,9 @@ _LONG = 200_000
 
 
 def give_back_long_line(n_unknowns: int) -> None:
-    """Give back what work on a line of so many unknowns has left, of a long one. Not collective.
+    """Give back memory freed by work on a line of ``n_unknowns``, if it is long. Not collective.
 
-    A search for what only refers to itself takes a tenth of a second, which a short line is not
-    worth.
+    The search for cycles of references takes a tenth of a second, too long for a short line.
     """
     if n_unknowns >= _LONG:
         gc.collect()
@@ -21,10 +20,10 @@ def give_back_long_line(n_unknowns: int) -> None:
 
 
 def give_back() -> None:
-    """Give back what the C library keeps for later, after large work is done. Not collective.
+    """Return freed memory that the C library still holds to the system. Not collective.
 
-    Sparse factors and assembly leave gigabytes of a long line with glibc; other libraries keep
-    nothing, and have no such function.
+    After factorisation and assembly of a long line glibc holds gigabytes; other C libraries hold
+    nothing and have no ``malloc_trim``.
     """
     trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
     if trim is not None:

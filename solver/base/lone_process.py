@@ -25,10 +25,10 @@ SETTINGS = {
 
 @contextlib.contextmanager
 def settings() -> Iterator[None]:
-    """While entered, MPI starts as one process alone if it is one. Not collective.
+    """Within the context MPI starts as a single process, unless mpirun started it. Not collective.
 
-    What the environment says wins. Processes that this one starts later get nothing of it: there
-    may be a launcher among them.
+    Variables that the environment already sets keep their values. Those set here are removed
+    afterwards: a process started later may be a launcher.
     """
     own = {} if launched_by_mpirun() else SETTINGS
     added = {name: value for name, value in own.items() if name not in os.environ}

@@ -63,8 +63,15 @@ class Gains(NamedTuple):
 class ContactWork(NamedTuple):
     """Work of n contact forces on the line, summed step by step; see ``contacts.hpp``.
 
-    ``total`` (1,) [J]; ``force`` (n,) [N] after the step before; ``local`` and ``value`` (n, 4) of
-    the contacts then; ``before`` and ``ahead`` (n,) [m/s]; shares p and q, and the step [s].
+    Attributes
+    ----------
+    total : (1,) work since the start on the unknowns that this rank owns [J]
+    force : (n,) contact forces at the end of the previous step [N]
+    local, value : (n, 4) local unknowns and shape functions of the contacts at that time
+    before, ahead : (n,) velocity of the wire at the end of the previous step [m/s], at the contacts
+        of that time and at the new ones
+    share_before, share_after : weights of the forces at the start and at the end of a step [-]
+    dt : time step [s]
     """
 
     total: np.ndarray
@@ -79,7 +86,10 @@ class ContactWork(NamedTuple):
 
 
 def no_work(n_contacts: int, share_after: float, dt: float) -> ContactWork:
-    """Work of contact forces before the first step."""
+    """Work of ``n_contacts`` contact forces before the first step of ``dt`` [s].
+
+    ``share_after`` is the weight of the force at the end of a step [-], 1 less that at its start.
+    """
     local, value = np.zeros((n_contacts, 4), dtype=np.int64), np.zeros((n_contacts, 4))
     force, before, ahead = np.zeros((3, n_contacts))
     shares = 1.0 - share_after, share_after
@@ -91,10 +101,12 @@ class Contacts(NamedTuple):
 
     Attributes
     ----------
-    x : (n,) where they are along the track [m]
+    x : (n,) places along the track [m]
     touches : (n,) records of ``TOUCH``
+    wires : WireShapes of the contact wires
     columns : columns of A^-1 for the nodes of the ``wires``
-    answers, gains : accelerations of the line by a unit force at each, and their gains in a step
+    answers, gains : accelerations of the line by a unit force at each contact, and their gains in a
+        step
     motion, motion_gains : of the line, see ``LineState``
     followed : links that may switch, as steps follow them
     link_columns : of A^-1 for compensations of all links of the line

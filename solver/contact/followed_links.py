@@ -31,22 +31,21 @@ class Followed(NamedTuple):
 
 
 class FollowedLinks:
-    """The links that this rank owns, with their reserve: of droppers the tension as if they could
-    push.
+    """Links that this rank owns, and their reserve: for droppers the tension if they could push.
 
-    Those that are broken take no part; they are only shown, carrying nothing. Of dampers that go on
-    acting when springs are slack nothing is here: they are a part of the line's damping.
+    Broken links are recorded with zero force and otherwise left out. So are dampers that act while
+    their springs are slack: these are a part of the line's damping.
 
     Attributes
     ----------
     table : LinkTable of the whole line
     local : LinkArrays of the whole table, with local unknowns, of which other ranks own some
-    numbers : (n,) numbers in the table of those that may carry, but dependents
+    numbers : (n,) numbers in the table of the owned, unbroken links that are no dependents
     links : LinkArrays of these, with local unknowns
-    dependents, dependent_numbers : of these, and their numbers (m,) in the table
-    reserve : (n,) what was found last, here or by a free step of the line [N]
-    moving : (2,) first of them that may switch and the one after the last; all, if there is no
-        window
+    dependents, dependent_numbers : Dependents of these links, and their numbers (m,) in the table
+    reserve : (n,) latest reserve, computed here or by a free step of the line [N]
+    moving : (2,) first of the ``links`` that may switch and the one after the last; all of them
+        without a window
     """
 
     def __init__(self, table: LinkTable, line: LineIntegrator) -> None:
@@ -125,11 +124,11 @@ class FollowedLinks:
         return np.concatenate([own, -carries * across])
 
     def energy_of_switching(self, displacement: np.ndarray, begin: int, end: int) -> float:
-        """Elastic energy that owned links add to that of K where they have switched [J].
+        """Elastic energy of switched links beyond the quadratic form of K [J], of this rank.
 
-        It is negative of slack droppers, which hold less than K makes of them, and positive of
-        closed stops; dampers store none.
-        ``displacement`` (n_local,) of the line [m]; of the links from ``begin`` to ``end``.
+        It is negative for slack droppers, which store less than K assigns to them, and positive for
+        closed stops; dampers store none. ``displacement`` (n_local,) is the line's [m], [rad]; the
+        sum runs over the links from ``begin`` to before ``end``.
         """
         links = self.links, self.dependents
         return float(native.energy_of_switching(displacement, *links, begin, end))

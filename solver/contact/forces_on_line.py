@@ -235,14 +235,24 @@ class ForcesOnLine:
     def superpose(
         self, contact_force: np.ndarray, links: np.ndarray, compensation: np.ndarray
     ) -> None:
-        """Add the answer to contact forces (n,) and compensations (m,) [N] to the line's state."""
+        """Add the line's response to contact forces and compensations to its state, and their work.
+
+        Parameters
+        ----------
+        contact_force : ndarray, shape (n,)
+            Contact forces, upward [N].
+        links : ndarray of int, shape (m,)
+            Numbers of the switched links.
+        compensation : ndarray, shape (m,)
+            Compensations of these links [N].
+        """
         self._superpose(contact_force)
         if links.size:
             self._compensate(links, compensation)
         self._add_work(contact_force)
 
     def add_work(self, contact_force: np.ndarray) -> None:
-        """Add the work of contact forces (n,) [N] in a step whose end the line's state is."""
+        """Add the work of contact forces (n,) [N] in the step that the line has just completed."""
         self._add_work(contact_force)
 
     def loads(

@@ -34,7 +34,7 @@ class Heads(HeadState):
         return int(self.height.size)
 
     def put(self, strips: slice, head: HeadState) -> None:
-        """Fill in what concerns some strips."""
+        """Copy the state of one pantograph's head to its ``strips``."""
         self.height[strips] = head.height
         self.velocity[strips] = head.velocity
         self.height_compliance[strips, strips] = head.height_compliance

@@ -36,12 +36,16 @@ def affine(numbers: np.ndarray, n: int) -> Affine:
 
 
 class Rows(NamedTuple):
-    """Links that may switch, and how contacts and they act on each other: ``numbers``
-    (capacity, 2 + 3 n), which kernels take, and views of them.
+    """Links that may switch, and their coupling to n contacts.
 
-    ``number`` (m,) of the link; ``reserve`` (m,) [N] without contact forces; for each contact
-    ``reaction`` (m, n) [-], what a unit force there adds to the reserve, ``lift`` (m, n) [m/N] and
-    ``rise`` (m, n) [m/(N s)], what a unit compensation takes off height and rate there.
+    Attributes
+    ----------
+    numbers : (capacity, 2 + 3 n) all of the following, a row for each link, for kernels
+    number : (capacity,) number of the link
+    reserve : (capacity,) reserve of the link without contact forces [N]
+    reaction : (capacity, n) change of the reserve by a unit force at each contact [-]
+    lift, rise : (capacity, n) decrease of wire height [m/N] and of its rate [m/(N s)] at each
+        contact by a unit compensation of the link
     """
 
     numbers: np.ndarray
@@ -59,9 +63,14 @@ def rows_of(numbers: np.ndarray, n: int) -> Rows:
 
 
 class Bounds(NamedTuple):
-    """Within which forces whatever switches has a row: contacts that all push up to ``push`` (n,)
-    and pull up to ``pull`` (n,) [N], 0 of those that only push, and compensations elsewhere that
-    take up to ``loss`` (1,) [N] off a reserve."""
+    """Bounds of the forces within which every link that switches has a row.
+
+    Attributes
+    ----------
+    push, pull : (n,) largest force that each contact exerts upward and downward [N]; ``pull`` is 0
+        for a contact that only pushes
+    loss : (1,) largest decrease of a reserve by the compensations of other links [N]
+    """
 
     push: np.ndarray
     pull: np.ndarray
@@ -71,11 +80,14 @@ class Bounds(NamedTuple):
 class Coupled(NamedTuple):
     """Coupling of all links of the line in the small problem, by their numbers.
 
-    ``band`` (n_links, 2 half + 1): ``band[e, d - e + half]`` is by how much a unit compensation of
-    link e takes off the reserve of link d; ``released`` (n_links,) share of what is beyond its
-    reserve that a link's compensation is; ``slackens`` (n_links,) whether it is one that slackens,
-    and no stop that closes; ``behind`` (n_links,) of a dependent how many numbers its leader is
-    before it, 0 of others; ``drop`` (n_links,) room to work, all zero before and after.
+    Attributes
+    ----------
+    band : (n_links, 2 half + 1); ``band[e, d - e + half]`` is the decrease of the reserve of link d
+        by a unit compensation of link e [-]
+    released : (n_links,) compensation of a link over its negative reserve [-]
+    slackens : (n_links,) whether the link slackens, as opposed to a stop that closes
+    behind : (n_links,) number of a dependent less that of its leader, 0 for other links
+    drop : (n_links,) work space of kernels, zero before and after each use
     """
 
     band: np.ndarray
@@ -104,7 +116,8 @@ class LineResponse:
     summed : everything that adds up over ranks, in one array
     line : Affine, free heights [m] and total rates [m/s] of the wire at the contacts; its views
     present : (n,) 1 for contacts whose wire is on the strip, else 0; the same on all ranks
-    early_height, early_rate : (n,) what the line's motion extrapolates to, or (0,) if not asked
+    early_height, early_rate : (n,) wire heights [m] and rates [m/s] extrapolated from the line's
+        motion; (0,) without ``early``
     sent_rows : (capacity, 2 + 3 n) numbers of ``rows``
     rows : Rows, its views
     share : Share, all this as kernels take it
@@ -112,9 +125,9 @@ class LineResponse:
 
     Parameters
     ----------
-    n_contacts, capacity : how many contacts and links there is room for
-    early : whether there is room for what the motion extrapolates to
-    bounds : there are none if left out
+    n_contacts, capacity : number of contacts, and of links that have room
+    early : whether there is room for extrapolated heights and rates
+    bounds : unlimited if not given
     """
 
     def __init__(
@@ -149,13 +162,13 @@ class LineResponse:
 
     @property
     def flags(self) -> tuple[float, float, float, float]:
-        """The number of links with a row, whether a rank wants this step to be the last, whether
-        one holds NaN or infinity, and for how many links one had no room."""
+        """Number of links with a row, and over all ranks: whether one ends the march with this
+        step, whether one holds NaN or infinity, and the number of links without room."""
         count, stop, broken, missing = self.summed[:N_FLAGS].tolist()
         return count, stop, broken, missing
 
     def put_stop(self, stop: bool) -> None:
-        """Say whether this rank wants this step to be the last."""
+        """Set whether this rank ends the march with this step."""
         self.summed[1] = stop
 
     @property

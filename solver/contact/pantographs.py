@@ -265,9 +265,16 @@ class Pantographs:
         return self._heads
 
     def advance(self, contact_force: np.ndarray, reported: np.ndarray, depth: np.ndarray) -> None:
-        """Take the step with these forces and depths (n_contacts,). Rank 0 only.
+        """Advance all pantographs by a step and fill the recorded outputs. Rank 0 only.
 
-        ``reported`` is what of the forces counts as contact force in the records.
+        Parameters
+        ----------
+        contact_force : ndarray, shape (n_contacts,)
+            Contact forces on the wire at the end of the step, upward [N].
+        reported : ndarray, shape (n_contacts,)
+            Contact forces that are recorded [N], see `LawInSteps.reported`.
+        depth : ndarray, shape (n_contacts,)
+            Heights of the strips above the wire at the contacts [m].
         """
         if len(self.models) == 1:
             self.models[0].advance(contact_force)
@@ -318,7 +325,7 @@ class Pantographs:
                 path.fill_ahead(times, drives[:, number, N_DRIVE : N_DRIVE + 2 * path.place.size])
 
     def measure_joints(self) -> None:
-        """Measure by how much joints are open now; no effect on ranks without models."""
+        """Measure the violation of the joint constraints; no effect on ranks without models."""
         for number in range(len(self.models)):
             self._measure_joint(number)
 
@@ -330,7 +337,7 @@ class Pantographs:
             self.constraint_violation[number] = jointed.constraint_violation()
 
     def take_over(self, other: Pantographs) -> None:
-        """Go on from where ``other`` are, the same train made for another step. Not collective."""
+        """Take over the state of ``other``, the same train at another time step. Not collective."""
         self.outputs[:] = other.outputs
         self.across[:], self.lateral_place[:] = other.across, other.lateral_place
         for mine, theirs in zip(self.models, other.models, strict=True):

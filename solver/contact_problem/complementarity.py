@@ -221,13 +221,13 @@ class Gap:
             raise RunBroken(NOT_FINITE)
 
     def under(self, force: np.ndarray, slack: np.ndarray) -> Depths:
-        """Depths [m] and rates [m/s] under forces (n,) and compensations (m,) [N]; overwritten by
-        the next call.
+        """Depths [m] and rates [m/s] under contact forces ``force`` (n,) [N] and compensations
+        ``slack`` (m,) [N]; overwritten by the next call.
 
         Raises
         ------
         RunBroken
-            If one of them is no number: what was to give the forces has no solution.
+            If one of them is not finite: the problem that gave the forces has no solution.
         """
         if not native.under(self.affine, self.line.rows, force, slack, self.found):
             raise RunBroken(NOT_FINITE)
@@ -299,8 +299,8 @@ class InnerProblem:
         return system.solution
 
     def covers(self, line: LineResponse, force: np.ndarray, slack: np.ndarray) -> bool:
-        """Whether all links that have switched under forces (n,) and compensations (m,) [N] had a
-        row."""
+        """Whether every link that switches under contact forces ``force`` (n,) [N] has a row in
+        ``line``; ``slack`` (m,) are the compensations of the links with a row [N]."""
         return not native.leaves_out(force, slack, line.rows, line.bounds, self.coupled)
 
     def _with_law(self, line: LineResponse, heads: Heads) -> InnerSolution:

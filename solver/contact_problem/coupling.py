@@ -32,7 +32,7 @@ DIVERGED = 1e9
 class Coupling(Protocol):
     """Finds the forces of a step. Lives on rank 0; not collective.
 
-    ``extrapolates`` says whether it needs what both sides extrapolate to.
+    ``extrapolates`` is whether it needs heights and rates extrapolated from both motions.
     """
 
     extrapolates: bool
@@ -44,7 +44,7 @@ class Coupling(Protocol):
         Raises
         ------
         RunBroken
-            If there are none to be found.
+            If none are found.
         """
 
     def state(self) -> np.ndarray:

@@ -54,11 +54,12 @@ class Exchange:
     Attributes
     ----------
     share : this rank's share of the inner problem, to be filled in before ``to_root``
-    messages, bytes_sent : that this rank sent since it was made; a sum or broadcast counts as one
+    messages, bytes_sent : number of messages and bytes that this rank has sent since the exchange
+        was made; a sum or broadcast counts as one message
 
     Parameters
     ----------
-    early : whether shares hold what the line extrapolates to
+    early : whether shares hold heights and rates extrapolated from the line's motion
     bounds : of all shares, see ``LineResponse``
     """
 
@@ -76,7 +77,7 @@ class Exchange:
         self.share = LineResponse(n, capacity, self._early, self._bounds)
         self._merged = LineResponse(n, capacity, self._early, self._bounds)
         self._answer = np.zeros(_HEAD + n + 2 * capacity)
-        # Said once how long they are and of what, messages cost half a microsecond less.
+        # Messages with their length and type set in advance cost half a microsecond less.
         self._answer_message = _message(self._answer)
         self._sums = _message(self.share.summed), _message(self._merged.summed)
 

@@ -32,9 +32,9 @@ class ReportedForces(NamedTuple):
 
     Attributes
     ----------
-    gamma : weight of the new force in what is reported; 0 reports the force itself
-    from_time : from which on a reported force that pulls ends the run [s]
-    latest, reported : (n,) forces of the latest step, and what is reported of it [N]
+    gamma : weight of the latest force in the reported mean [-]; 0 reports the force itself
+    from_time : time after which a reported tensile force ends the run [s]
+    latest, reported : (n,) forces at the end of the latest step, and reported forces [N]
     """
 
     gamma: float
@@ -44,9 +44,8 @@ class ReportedForces(NamedTuple):
 
 
 class StepLaw(NamedTuple):
-    """A law in a loop of kernels.
-
-    ``marched`` is the law unless it is linear, ``reported`` what of its forces is reported.
+    """A law in a loop of kernels: ``marched`` is the law unless it is linear, ``reported`` its
+    reported forces.
     """
 
     marched: HertzInSteps | None
@@ -76,12 +75,21 @@ class LawInSteps(Protocol):
         """The law itself without the cut at zero (n,) [N]."""
 
     def accept(self, time: float, depth: np.ndarray, rate: np.ndarray, force: np.ndarray) -> None:
-        """Remember a step to ``time`` [s]: depths, rates and forces (n,) at its end.
+        """Store what the law needs of an accepted step.
+
+        Parameters
+        ----------
+        time : float
+            Time at the end of the step [s].
+        depth, rate : ndarray, shape (n,)
+            Depths [m] and their rates [m/s] at the end of the step.
+        force : ndarray, shape (n,)
+            Contact forces at the end of the step [N], compression positive.
 
         Raises
         ------
         RunBroken
-            The law does not hold any longer.
+            If the law no longer holds.
         """
 
     def reported(self, force: np.ndarray) -> np.ndarray:
@@ -150,8 +158,9 @@ class HertzInSteps(_Tangents):
     Attributes
     ----------
     law : HertzLaw
-    speed : (n,) these speeds of those that touch, or of the next impact [m/s]
-    there : (n,) forces of the law where it was linearised last, not cut at zero [N]
+    speed : (n,) speed of the last impact of a closed contact, of the next one of an open contact
+        [m/s]
+    there : (n,) forces of the law at the latest point of linearisation, not cut at zero [N]
     """
 
     is_linear = False

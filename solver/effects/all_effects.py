@@ -72,9 +72,9 @@ def move_together(problem: Problem) -> dict[str, str]:
 
 
 def unknown_groups(effects: Iterable[Effect], wires: Iterable[NamedWire]) -> list[Group]:
-    """Unknowns that a set of effects needs of each wire, in groups: what one is the first to need.
+    """Unknowns of each wire that a set of effects needs, a group for each effect that adds some.
 
-    An unknown stands in the group of the effect that is the first to need it of any wire.
+    An unknown belongs to the group of the first effect that needs it on any wire.
     """
     wires = tuple(wires)
     groups: list[dict[str, tuple[str, ...]]] = []

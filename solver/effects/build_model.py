@@ -25,19 +25,33 @@ def build(
     apart: bool = False,
     cut_lengths: np.ndarray | None = None,
 ) -> Model:
-    """The model of a problem on a mesh, for given dropper lengths [m]. Not collective.
+    """The model of a problem on a mesh, for given dropper lengths. Not collective.
 
-    ``broken`` (n_droppers,) bool, droppers that carry nothing beside those that the problem has;
-    ``gap`` (n_droppers,) what droppers that are slack at rest lack to be taut [m]; none if not
-    given. ``form`` is the shape at rest, where it is known: before it is found wires are straight
-    and droppers upright. ``before`` is a model of the same problem and mesh, made with the same
-    ``form``, whose numbers and wires are taken over. ``apart`` gives wires that move together
-    unknowns of their own. ``cut_lengths`` are those that were wanted, if droppers have errors.
+    Parameters
+    ----------
+    problem : Problem
+        Problem whose active effects add their terms.
+    mesh : LineMesh
+        Mesh of the line.
+    dropper_lengths : ndarray, shape (n_droppers,)
+        Unstretched lengths [m].
+    broken : ndarray of bool, shape (n_droppers,), optional
+        Further droppers without force, beside the defective ones of the problem.
+    form : Equilibrium, optional
+        Shape at rest; without it wires are straight and droppers upright.
+    gap : ndarray, shape (n_droppers,), optional
+        Stretch that slack droppers lack to be taut at rest [m]; zero if not given.
+    before : Model, optional
+        Model of the same problem, mesh and ``form``, whose numbering and wires are taken over.
+    apart : bool, optional
+        Whether wires that move together get unknowns of their own.
+    cut_lengths : ndarray, shape (n_droppers,), optional
+        Lengths without errors of the installation [m]; ``dropper_lengths`` if not given.
 
     Raises
     ------
     InputError
-        If wires that move together have not their nodes, and what hangs there, side by side.
+        If wires that move together do not have their nodes, droppers and hardware side by side.
     """
     active = effects.active(problem)
     if before is None:

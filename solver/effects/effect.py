@@ -52,14 +52,15 @@ class Effect:
     unknowns_of_wire : unknowns that it needs at the nodes of a wire, by its name and role; those of
         one plane together, e.g. ("w", "theta_y")
     requires : effects without which it makes no sense
-    always : True for what no scene can leave out
-    applies : whether the problem holds anything for it to act on
-    instead : why it does not act on what a problem holds for it, "" if it acts or there is none
+    always : True for an effect that no scene can switch off
+    applies : whether the problem has data for it to act on
+    instead : reason why it does not act on the data that a problem has for it; "" if it acts or the
+        problem has no such data
     build : adds matrices, weights, held unknowns and loads in time to the model
-    components : names of what ``build`` adds beside wires and groups of the line, which damping
-        may be given for
-    law : the record of laws with the fields that the effect sets. Effects are applied in building
-        order, so that an effect may change what one that it requires has set
+    components : names of components that ``build`` adds beside wires and groups of the line, to
+        which a scene may give damping
+    law : returns the record of laws with the fields that the effect sets. Effects are applied in
+        building order, so that an effect may change fields set by one that it requires
     of_form : whether ``build`` reads the shape at rest, ``Model.form``
     lifts : limits of a scene that do not hold with the effect
     data : keys of the scene's data that it acts on; empty if it acts on any scene

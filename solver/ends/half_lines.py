@@ -33,10 +33,10 @@ class SpanMatrices(NamedTuple):
 
     Attributes
     ----------
-    bands : (3, c, b + 1) rows of the others: ``bands[:, r, b - d]`` joins r and r - d
-    start, end : (3, c, m) what joins the others with what it shares with the ones before and after
-    corner : (3, m, m) of the unknowns that are shared with the one before, both spans' parts
-    across : (3, m, m) rows of the start, columns of the end: what joins them directly
+    bands : (3, c, b + 1) lower bands of the c others: ``bands[:, r, b - d]`` joins r and r - d
+    start, end : (3, c, m) coupling of the c others to the m unknowns at the start and at the end
+    corner : (3, m, m) block of the m unknowns at the start, contributions of both spans summed
+    across : (3, m, m) direct coupling of the start (rows) to the end (columns)
     """
 
     bands: np.ndarray
@@ -47,13 +47,13 @@ class SpanMatrices(NamedTuple):
 
 
 class Chain(NamedTuple):
-    """Spans condensed to what they share, at n frequencies.
+    """Spans condensed to their m shared unknowns, at n frequencies.
 
     Attributes
     ----------
-    corner : (n, m, m) of the shared unknowns, before spans are condensed
-    start, end : (n, m, m) what a span takes off ``corner`` at its start and at its end
-    next : (n, m, m) rows of one, columns of the one after it
+    corner : (n, m, m) dynamic stiffness of the shared unknowns before condensation
+    start, end : (n, m, m) reduction of ``corner`` by condensing a span, at its start and at its end
+    next : (n, m, m) coupling of a cross-section (rows) to the next one (columns)
     """
 
     corner: np.ndarray
@@ -100,7 +100,7 @@ def span_matrices(own: np.ndarray, joined: np.ndarray, shared: np.ndarray) -> Sp
 
 
 def chain_at(span: SpanMatrices, weights: np.ndarray) -> Chain:
-    """Spans condensed at frequencies whose ``weights`` (n, 3) M, C and K have, complex."""
+    """Spans condensed at n frequencies; ``weights`` (n, 3) are complex factors of M, C and K."""
     m = span.corner.shape[1]
     taken = np.zeros((weights.shape[0], 2 * m, 2 * m), dtype=complex)
     beside = np.concatenate([span.start, span.end], axis=2)
@@ -114,18 +114,18 @@ def chain_at(span: SpanMatrices, weights: np.ndarray) -> Chain:
 def half_lines(chain: Chain) -> tuple[np.ndarray, np.ndarray]:
     """Stiffness of the half lines after and before a cross-section, (n, m, m) each.
 
-    ``corner`` is in both, with what the elements on either side of the cross-section add to it.
+    Each includes ``corner``, to which the elements on both sides of the cross-section contribute.
 
     Raises
     ------
     InputError
-        If what acts on it at one of the frequencies does not fade along the line.
+        If the response to a force there does not decay along the line at one of the frequencies.
     """
     after, before = chain.corner - chain.start, chain.corner - chain.end
     here = after - chain.end
     ahead, back = chain.next, np.swapaxes(chain.next, 1, 2)
     for _ in range(_MOST_PASSES):
-        # Coupling may be large in what it does to slopes beside what it does to deflections.
+        # Slopes and deflections differ in unit: products of coupling are compared, not coupling.
         to_ahead, to_back = np.linalg.solve(here, ahead), np.linalg.solve(here, back)
         forth, round_trip = ahead @ to_back, back @ to_ahead
         after, before = after - forth, before - round_trip

@@ -33,10 +33,10 @@ class LineBeyond(NamedTuple):
 
     Attributes
     ----------
-    unknowns : (m,) of the model, where it ends
-    here : (3, m, m) M, C and K that the model has there without the line beyond
-    span : of the line beyond, from the start of the line on
-    held : of the model, where it ends: what is held at masts of the line beyond
+    unknowns : (m,) unknowns of the model at its end that it shares with the line beyond
+    here : (3, m, m) M, C and K of the model at these unknowns without the line beyond
+    span : SpanMatrices of the line beyond, ordered from the start of the line
+    held : unknowns of the model at its end that are held at masts of the line beyond
     """
 
     unknowns: np.ndarray

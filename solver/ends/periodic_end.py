@@ -49,14 +49,14 @@ class StepSums:
 
 @dataclass(frozen=True)
 class PeriodicEnd:
-    """One end that goes on periodically, m unknowns.
+    """One end with a periodic line beyond, m shared unknowns.
 
     Attributes
     ----------
     beyond : the line beyond
     side : START or END
-    damping : alpha [s] and beta [1/s] of what goes into the matrices
-    sums : of the steps
+    damping : alpha [s] and beta [1/s] of C0 = alpha K0 + beta M0
+    sums : displacement and velocity as sums over the accelerations of the steps
     mass, stiffness : (m, m) M0 and K0
     """
 
@@ -73,8 +73,10 @@ class PeriodicEnd:
         return self.beyond.unknowns
 
     def memory(self, n: int) -> np.ndarray:
-        """Q_0 to Q_(n-1), (n, m, m): of accelerations so many steps ago the force [N s2/m]. Q_0 is
-        zero, as it is in the matrices. Not collective."""
+        """Q_0 to Q_(n-1), (n, m, m): force by a unit acceleration j steps ago [N s2/m].
+
+        Q_0 is zero, as the matrices contain it. Not collective.
+        """
         size = fft.next_fast_len(max(2 * n, 16), real=True)
         radius = _ALIASED ** (1.0 / size)
         turns = np.arange(size // 2 + 1) / size
@@ -99,7 +101,10 @@ class PeriodicEnd:
 def half_line(
     beyond: LineBeyond, side: int, mass: np.ndarray, damping: np.ndarray, stiffness: np.ndarray
 ) -> np.ndarray:
-    """Stiffness (n, m, m) of the line beyond where M, C and K have the weights (n,)."""
+    """Dynamic stiffness (n, m, m) of the line beyond a ``side``, ``START`` or ``END``.
+
+    ``mass``, ``damping`` and ``stiffness`` (n,) are the real or complex factors of M, C and K.
+    """
     weights = np.stack([mass, damping, stiffness], axis=1).astype(complex)
     after, before = half_lines(chain_at(beyond.span, weights))
     here = np.einsum("nw,wij->nij", weights, beyond.here)
@@ -111,12 +116,21 @@ def periodic_end(
 ) -> PeriodicEnd:
     """The end of a line that goes on as ``beyond``. Not collective.
 
-    ``damping`` is alpha [s] and beta [1/s] of the line, of which its matrices make what they can.
+    Parameters
+    ----------
+    beyond : LineBeyond
+        The half line beyond the end.
+    side : int
+        ``START`` or ``END``.
+    damping : tuple of float
+        alpha [s] and beta [1/s] of the line, for the part of its damping that the matrices contain.
+    sums : StepSums
+        Displacement and velocity as sums over the accelerations of the steps.
 
     Raises
     ------
     InputError
-        If what acts on the line does not fade along it.
+        If the response to a force at the end does not decay along the line.
     """
     zero, one = np.zeros(1), np.ones(1)
     stiffness = half_line(beyond, side, zero, zero, one)[0].real

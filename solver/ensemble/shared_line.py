@@ -38,14 +38,14 @@ from catenary.solver.statics.line_at_rest import LineAtRest
 
 
 class TautLine(NamedTuple):
-    """A line at rest, counted from the shape that it would have if droppers could push.
+    """A line at rest, with displacements from the shape that it would have if droppers could push.
 
     Attributes
     ----------
-    rest : the model of the line at rest, whose droppers may be slack
-    model, form : with all droppers taut, in the shape from which displacements count
-    moved : (n_dofs,) of the line at rest from there [m], [rad]
-    links : its links whose state is followed
+    rest : model of the line at rest, whose droppers may be slack
+    model, form : model with all droppers taut, and its shape, from which displacements count
+    moved : (n_dofs,) displacement of the line at rest from ``form`` [m], [rad]
+    links : LinkTable of ``model``
     """
 
     rest: Model
@@ -63,8 +63,10 @@ class TautLines:
         self._latest: TautLine | None = None
 
     def of(self, at_rest: LineAtRest) -> TautLine:
-        """The taut line of one at rest, that itself if nothing is slack or matrices depend on its
-        shape. Not collective."""
+        """The taut line of a line at rest. Not collective.
+
+        It is the same line if no dropper is slack or if its matrices depend on its shape.
+        """
         model, form = at_rest.model, at_rest.form
         if self._latest is None or self._latest.rest is not model:
             taut, moved = model, np.zeros(model.n_dofs)
@@ -88,9 +90,10 @@ class TautLines:
 def _displaced(
     taut: Model, gap: np.ndarray, form: Equilibrium, stiff: StiffLine
 ) -> tuple[np.ndarray, Equilibrium]:
-    """Displacement of a rest (``form``) from the taut shape, and that shape.
+    """Displacement (n_dofs,) of the rest ``form`` from the taut shape, and the taut shape.
 
-    Droppers that lack ``gap`` [m] of being taut push the taut line up by what they release.
+    Slack droppers lack ``gap`` (n_droppers,) [m] of being taut; the taut line carries the force
+    that they release as a load.
     """
     assert taut.droppers is not None
     unknowns, weights = taut.droppers.direction
@@ -114,7 +117,7 @@ N_LANES: int = native.SCENES
 
 
 class LineExtremes(NamedTuple):
-    """Extremes of what a line shows in each lane; see ``kernels/ensemble/scene_passes.hpp``.
+    """Extremes of uplift and dropper force in each lane; see ``kernels/ensemble/scene_passes.hpp``.
 
     Attributes
     ----------

@@ -139,9 +139,10 @@ class GeneralizedAlphaLine(LineIntegrator):
     def start(
         self, displacement: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray
     ) -> None:
-        """Start from a state, (n_local,) each, whose acceleration balances its forces.
+        """Start from displacement [m], [rad] and velocity [m/s], [rad/s], (n_local,) each.
 
-        The algorithm's acceleration is the same there.
+        ``acceleration`` (n_local,) balances the forces of this state; the algorithm's own
+        acceleration starts with the same values.
         """
         self._known[:] = (1.0 - self._by.ratio) * acceleration
         super().start(displacement, velocity, acceleration)

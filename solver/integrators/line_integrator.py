@@ -188,7 +188,10 @@ class LineIntegrator(ABC):
     def start(
         self, displacement: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray
     ) -> None:
-        """Start from a state, (n_local,) each, whose acceleration balances its forces."""
+        """Start from displacement [m], [rad] and velocity [m/s], [rad/s], (n_local,) each.
+
+        ``acceleration`` (n_local,) [m/s2], [rad/s2] balances the forces of this state.
+        """
         self.motion.put(displacement, velocity, acceleration)
         if self.window is not None:
             self.window.wake()
@@ -202,13 +205,15 @@ class LineIntegrator(ABC):
         return {name: partial(getattr, self, name) for name in MOTION}
 
     def kept(self) -> tuple[np.ndarray, ...]:
-        """The arrays themselves that a step changes, however the motion is kept: copied and copied
-        back, they take steps of this line back."""
+        """The arrays themselves that a step changes: copies of them, written back, undo steps."""
         return self.motion.read[:3]
 
     def exact_state(self) -> Mapping[str, Callable[[], np.ndarray]]:
-        """Functions that give each array of ``state``, and of all that steps like these need to go
-        on as if nothing had happened; to be called before the next step, one after the other."""
+        """Functions that return each array of ``state`` and of the kept predictions, by name.
+
+        From these arrays a march with the same steps continues to the last bit. Call the functions
+        before the next step, one after the other.
+        """
         kept = {name: partial(np.asarray, array) for name, array in self.motion.carried().items()}
         return {**self._parts_of_state(), **kept}
 
@@ -320,7 +325,7 @@ class LineIntegrator(ABC):
 
     @property
     def remembers(self) -> bool:
-        """Whether ends go on, so that ``past`` is a part of what a step starts from."""
+        """Whether a line goes on beyond an end, so that a step also depends on ``past``."""
         return self.loads is not None and self.loads.memories is not None
 
     def past(self) -> np.ndarray | None:
@@ -330,7 +335,7 @@ class LineIntegrator(ABC):
         return None if memories is None else memories.past()
 
     def recall(self, past: np.ndarray, n_steps: int) -> None:
-        """Remember ``n_steps`` of what ``past`` has returned. Not collective."""
+        """Restore the memory of the ends: the first ``n_steps`` of ``past``. Not collective."""
         if self.loads is not None and self.loads.memories is not None:
             self.loads.memories.recall(past, n_steps)
 

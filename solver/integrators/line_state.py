@@ -36,10 +36,18 @@ class Motion(NamedTuple):
 
 
 class Steps(NamedTuple):
-    """Factors of a step of Newmark's method: dt [s]; what an acceleration before the step adds
-    to the predictions of displacement [s2] and velocity [s]; what of the velocity products with K
-    read [s]; what the acceleration after it adds to both; and the part of damping on mass that the
-    acceleration lacks [1/s]."""
+    """Factors of a step of Newmark's method.
+
+    Attributes
+    ----------
+    dt : time step [s]
+    predict_position, predict_velocity : factors of the acceleration before the step in the
+        predictions of displacement [s2] and velocity [s]
+    work_velocity : c, so that K (d + c v) gives elastic forces and those of damping on K [s]
+    position_factor, velocity_factor : factors of the acceleration after the step in displacement
+        [s2] and velocity [s]
+    damping_share : part of damping on mass that the acceleration lacks [1/s]
+    """
 
     dt: float
     predict_position: float
@@ -98,7 +106,7 @@ class LineState:
         return self.read[2]
 
     def put(self, displacement: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray) -> None:
-        """Take a state, (n_local,) each."""
+        """Take displacement [m], velocity [m/s] and acceleration [m/s2], (n_local,) each."""
         x, y, z = self.read[:3]
         x[:], y[:], z[:] = displacement, velocity, acceleration
 
@@ -121,8 +129,8 @@ class PredictedLineState(LineState):
     Parameters
     ----------
     ahead, velocity, acceleration : arrays (n_local,) for x, y and z
-    shown : array (n_local,) that is filled when displacements are asked for
-    steps : of the steps to come, all alike
+    shown : array (n_local,) that reading ``displacement`` fills
+    steps : factors of the coming steps, all alike
     """
 
     def __init__(
@@ -155,14 +163,14 @@ class PredictedLineState(LineState):
         return velocity
 
     def put(self, displacement: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray) -> None:
-        """Take a state, (n_local,) each."""
+        """Take displacement [m], velocity [m/s] and acceleration [m/s2], (n_local,) each."""
         x, y, z = self.read[:3]
         x[:], y[:], z[:] = self.ahead(displacement, velocity, acceleration)
 
     def ahead(
         self, displacement: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """x, y and z of a state, (n_local,) each."""
+        """x, y and z of displacement, velocity and acceleration, (n_local,) each."""
         dt, c_position, c_velocity, c_work = self._steps[:4]
         predicted = displacement + dt * velocity + c_position * acceleration
         y = velocity + c_velocity * acceleration
@@ -183,10 +191,18 @@ class PredictedLineState(LineState):
 class AlphaSteps(NamedTuple):
     """Factors of a step of the generalized-alpha method, from one state ahead to the next.
 
-    With b the acceleration that balances the forces, p the known one and a = p + r b: shares of b
-    and of p before a step in what is ``known`` in it, and in what ``velocity`` and ``balance``,
-    which is z, get from both after it; by how much displacement and velocity change with b within
-    a step; dt, c, and the part of damping on mass.
+    The acceleration b balances the forces; the algorithm's own is a = p + r b, with p known when a
+    step begins.
+
+    Attributes
+    ----------
+    known : factors of b and p before a step in p of the step [-]
+    velocity : factors of b and p in the predicted velocity [s]
+    balance : factors k of b and l of p in z = k b + l p [s2]
+    position_factor, velocity_factor : factors of b in displacement [s2] and velocity [s]
+    dt : time step [s]
+    work_velocity : c, so that K (d + c v) gives elastic forces and those of damping on K [s]
+    damping_share : part of damping on mass that the acceleration lacks [1/s]
     """
 
     known: tuple[float, float]
@@ -202,17 +218,17 @@ class AlphaSteps(NamedTuple):
 class AlphaAhead(PredictedLineState):
     """State for the generalized-alpha method, whose steps need an acceleration p known before.
 
-    Kept are x = -(d* + c v*) of the coming step, y = v, and z = k b + l p, which is what d* + c v*
-    takes from accelerations: d = -(x + (dt + c) y + z).
+    Kept are x = -(d* + c v*) of the coming step, y = v, and z = k b + l p, the part of d* + c v* by
+    accelerations: d = -(x + (dt + c) y + z).
 
     Parameters
     ----------
     ahead, velocity, balance : arrays (n_local,) for x, y and z
     known : array (n_local,) of p in the latest step
-    shown : array (n_local,) that is filled when displacements are asked for
-    steps : of the steps to come, all alike; ``balance[0]`` is not zero
-    predicted : array (n_local,) for v* of the coming step, which a product with C reads; empty if
-        there is none. It is filled at the beginning of the step, from y, z and p
+    shown : array (n_local,) that reading ``displacement`` fills
+    steps : factors of the coming steps, all alike; ``balance[0]`` is not zero
+    predicted : array (n_local,) for v* of the coming step, which a product with C reads; empty
+        without such a product. The step fills it at its beginning, from y, z and p
     """
 
     def __init__(
@@ -242,7 +258,10 @@ class AlphaAhead(PredictedLineState):
         return np.asarray((self.read[2] - of_known * self.known) / of_balanced)
 
     def put(self, displacement: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray) -> None:
-        """Take a state, (n_local,) each, after ``known``."""
+        """Take displacement, velocity and balanced acceleration, (n_local,) each.
+
+        ``known`` must be set before.
+        """
         x, y, z = self.read[:3]
         of_balanced, of_known = self.balance
         total = of_balanced * acceleration + of_known * self.known

@@ -52,12 +52,14 @@ class Changes(NamedTuple):
 
     Attributes
     ----------
-    dt, by_position, by_velocity : step [s], and what x and y gain from the acceleration
+    dt : time step [s]
+    by_position, by_velocity : gains of x [s2] and y [s] by the acceleration found in the step
     damping_share : part of damping on mass that the acceleration lacks [1/s]
-    known, velocity, balance : of the generalized-alpha method the shares of z and of the known
-        acceleration before a step in what is known in it, and in what the predicted velocity and z
-        get from both
-    by_mass : if not 0 products are with M, and this times what they read is added to the answer
+    known, velocity, balance : for the generalized-alpha method, factors of z and of the known
+        acceleration before a step in the known acceleration of the step, in the predicted velocity
+        and in z; zero for Newmark's
+    by_mass : if not 0, products are with M, and ``by_mass`` times their operand is added to the
+        answer
     """
 
     dt: float
@@ -81,8 +83,16 @@ class PassParts(NamedTuple):
 
 
 class TrackedLinks(NamedTuple):
-    """Links that are looked at on the way back, which is taken in stretches of so many pairs of
-    stations; ``ranges`` (n + 1, 2) are the links behind each."""
+    """Links whose reserve the pass back computes, stretch by stretch.
+
+    Attributes
+    ----------
+    links : LinkArrays in the order along the track
+    reserve : (n_links,) filled at the end of each step [N]
+    ranges : (n + 1, 2) first link that the pass has left behind after each stretch, and the one
+        after the last
+    stretch : pairs of stations in a stretch
+    """
 
     links: LinkArrays
     reserve: np.ndarray
@@ -101,16 +111,17 @@ class StationPasses:
     parts : PassParts
     factors : as given
     known : accelerations that the motion keeps besides x, y and z, or none
-    by_mass : whether right-hand sides are made by M, as where that is shorter than by K
+    by_mass : whether right-hand sides are products with M, where these are shorter than with K
 
     Parameters
     ----------
-    parts : product, factors and what they work on. The rank's own part of ``read`` is x of the
-        motion, and what others have of it is there before a step; that of ``rates`` is y of the
-        motion, or of what it predicts of the velocity; that of ``answer`` is the acceleration
-    loads : of all that is solved for [N], or none, added in the pass forth; kept by reference
-    motion : of the rank's own stations
-    steps : scheme that the motion is kept for
+    parts : product, factors and their arrays. The rank's own part of ``read`` is x of the motion,
+        other ranks' parts are exchanged before a step; its own part of ``rates`` is y or the
+        predicted velocity, that of ``answer`` the acceleration
+    loads : forces on all unknowns that are solved for [N], or none, added in the pass forth; kept
+        by reference
+    motion : motion of the rank's own stations
+    steps : factors of the steps that the motion is kept for
     """
 
     def __init__(
@@ -147,7 +158,7 @@ class StationPasses:
         self.native.track(self.tracked(links, reserve))
 
     def tracked(self, links: LinkArrays, reserve: np.ndarray) -> TrackedLinks:
-        """Arguments of the kernels for that."""
+        """Arguments of the kernels for ``track_links``."""
         n_pairs = max(0, self._starts.size - 2) // 2
         n_stretches = -(-n_pairs // self._stretch)
         ranges = np.zeros((1 + max(1, n_stretches), 2), dtype=np.int64)
@@ -155,8 +166,10 @@ class StationPasses:
         return TrackedLinks(links, reserve, ranges, self._stretch)
 
     def arrays_in_lanes(self, n_lanes: int, loads: np.ndarray = _NO_LOADS) -> PassArrays:
-        """Arrays like these for so many further motions at rest, whose numbers of an unknown follow
-        each other, and their loads. On one rank, by Newmark's method."""
+        """Arrays of ``n_lanes`` motions at rest; values of an unknown in all lanes are contiguous.
+
+        ``loads`` are those of all lanes [N], or none. One rank, Newmark's method.
+        """
         given = self.parts.arrays
         n = given.motion.x.size
         pad = (given.factor.size - n) // 2
@@ -178,13 +191,16 @@ class StationPasses:
         )
 
     def open(self, window: WindowArrays, links: LinkArrays, reserve: np.ndarray) -> None:
-        """Take steps of the stations in a window only from now on; links as in ``track_links``."""
+        """Step only the stations in ``window`` from now on; ``links`` and ``reserve`` as in
+        ``track_links``."""
         self.native.open(window)
         self.native.track(TrackedLinks(links, reserve, window.ranges, window.low.size))
 
     def predict_velocities(self) -> None:
-        """Fill in the rank's own part of what others read of it in a product with C. A step does
-        so, too, but only after these have read."""
+        """Compute the rank's own predicted velocities, which a product with C on other ranks reads.
+
+        A step computes them as well, but after the other ranks have read.
+        """
         self.native.predict_velocities()
 
     def step(self) -> None:
@@ -193,7 +209,10 @@ class StationPasses:
 
 
 def changes_of(motion: PredictedLineState, steps: Steps | AlphaSteps, by_mass: float) -> Changes:
-    """Coefficients that take a state from one prediction to the next."""
+    """Coefficients that take ``motion`` from one prediction to the next.
+
+    ``steps`` are the factors of its method, ``by_mass`` as in ``Changes``.
+    """
     by_position, by_velocity, _ = map(float, motion.gains)
     nothing = 0.0, 0.0
     if isinstance(steps, Steps):

@@ -34,16 +34,16 @@ FEWER = 1.5
 
 
 class LineProducts:
-    """Products with M, K and C, each made when it is first asked for. Not collective.
+    """Products with M, K and C, each made at its first use. Not collective.
 
     Parameters
     ----------
     model : Model
     domain : Subdomain, whose rows are multiplied
-    like : marks of the line's stations, None if ``in_pieces`` has some
-    padded : vector that products by stations read, with one station more at both ends
-    read : a vector around the same without these
-    in_pieces : maker of products of a part of the line only, None if they are of all of it
+    like : marks of the line's stations, None with ``in_pieces``
+    padded : operand of products by stations, with one more station at both ends
+    read : PETSc vector of the same memory without these two stations
+    in_pieces : maker of products of a part of the line, None for products of all of it
 
     Attributes
     ----------
@@ -93,8 +93,8 @@ class LineProducts:
         return self._matrices[name]
 
     def multiply(self, name: str, result: np.ndarray, wrapped: PETSc.Vec) -> None:
-        """Make ``result``, and the vector around it, the product of M, K or C with what is
-        read."""
+        """Write the product of M, K or C, by ``name``, with ``read`` to ``result``; ``wrapped`` is
+        the PETSc vector of the same memory."""
         by_stations = self.by_stations(name)
         if by_stations is not None:
             by_stations.multiply(self._padded, result)

@@ -103,22 +103,22 @@ class KspSolver:
 class PartSolver(KspSolver):
     """Factors of this rank's part of the step operator, all of it on one rank.
 
-    Not collective. With an overlap as wide as the reach of A^-1 the rank's own unknowns come out
-    exactly, without a word to other ranks; ``residual`` of ``LineOperators`` verifies that.
+    Not collective. With an overlap as wide as the reach of A^-1 the rank's own unknowns are exact
+    without messages to other ranks; ``residual`` of ``LineOperators`` verifies that.
 
-    PETSc's matrix and solver are made where our own factors cannot be used, where options ask for
-    something of them, and for an iteration.
+    PETSc's matrix and solver are made if our own factors cannot be used, if PETSc's options concern
+    them, and for an iteration.
 
     Parameters
     ----------
-    part : assembles rows and columns of what it solves for, in blocks of stations or of nodes
-    own : the rank's own among them, in blocks
-    in_stations : whether its blocks are stations
-    is_whole : whether it is the whole line, which decides the prefix of its options
-    layout, stations : of its stations, None if our own factors cannot be used
-    rows : the same as ``part`` by stations, if it is known
-    turns : whether the place where our own elimination ends may be moved
-    factors : our own, if they are there already
+    part : assembles the part of the operator, in blocks of stations or of nodes
+    own : range of the rank's own blocks in the part
+    in_stations : whether the blocks are stations
+    is_whole : whether the part is the whole line, which decides the prefix of its options
+    layout, stations : of the stations of the part, None if our own factors cannot be used
+    rows : the part by stations, if it is known
+    turns : whether the place where our own elimination ends may move
+    factors : our own factors, if they have been made
 
     Attributes
     ----------

@@ -29,10 +29,15 @@ _SOFTENED = 1.0
 
 
 class Turning(NamedTuple):
-    """Kinds of stations by where elimination ends: ``to_end`` (n,) where that is further on,
-    ``to_start`` (n,) where it is before, ``here`` (m,) for each station at which it may end, one of
-    ``MIDDLES``. Steps may be taken of a part of the stations: from those in ``begins`` (n + 1,) to
-    before those in ``ends`` (n + 1,), which are the next ones outwards of each; see ``edges``."""
+    """Kinds of stations by the place where elimination ends, for lines on which it moves.
+
+    Attributes
+    ----------
+    to_end, to_start : (n,) kind of each station if elimination ends behind it, or before it
+    here : (m,) kind of every station number i ``MIDDLES`` if elimination ends there
+    begins, ends : (n + 1,) nearest stations outwards of each where steps of a part of the line may
+        begin and end, see ``edges``
+    """
 
     to_end: np.ndarray
     to_start: np.ndarray
@@ -48,10 +53,11 @@ class Turning(NamedTuple):
 def softened(whole: np.ndarray, eliminated: np.ndarray) -> np.ndarray:
     """Whether steps of a part of the line may end at stations (k,).
 
-    What is beyond is held, but the factors let it give way by its mass and stiffness D. That leaves
-    M + tau C - D in place of M + tau C there, which must not become negative: it does where
-    elements are so short that the step operator A is mostly stiffness. D is what A has more than
-    the block S after elimination; all eigenvalues of S^-1 A are to be below 2.
+    Stations beyond are held, but the factors let them give way by their mass and stiffness,
+    D = A - S, with the block A of the step operator and S, the same block after elimination. At the
+    end this leaves M + tau C - D in place of M + tau C, which must remain positive definite; where
+    elements are so short that A is mostly stiffness it does not. All eigenvalues of S^-1 A must be
+    below 2.
 
     ``whole`` (k, b, b) and ``eliminated`` (k, b, b) are A and S^-1 of each.
     """
@@ -62,8 +68,8 @@ def softened(whole: np.ndarray, eliminated: np.ndarray) -> np.ndarray:
 def edges(towards_end: np.ndarray, towards_start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Stations where steps of a part of the line may begin and end, from each outwards, (n + 1,).
 
-    ``towards_end`` and ``towards_start`` (n,) are what ``softened`` says of each station after
-    elimination to either side.
+    ``towards_end`` and ``towards_start`` (n,) are results of ``softened`` for each station, after
+    elimination from the start towards the end and the other way round.
     """
     n = towards_end.size
     number = np.arange(n + 1)
@@ -228,10 +234,9 @@ def station_factors(
 
 
 def layout_of_factors(layout: Layout, blocks: np.ndarray) -> Layout:
-    """The layout of factors of a matrix of these ``blocks``, see ``neighbours``, of a line of that
-    layout.
+    """The layout of the factors of a matrix with ``blocks`` (3, k, b, b), see ``neighbours``.
 
-    S^-1 joins all of a plane, whatever matrices join: the same kernels serve them all.
+    ``layout`` is that of the line. S^-1 fills the block of each plane, whatever the matrix joins.
     """
     joined = (blocks[0] != 0).any(axis=0) | (blocks[2] != 0).any(axis=0)
     joined |= of_pairs(layout.pitch)
@@ -287,9 +292,15 @@ def besides_of(
 
 
 class FoundFactors(NamedTuple):
-    """Factors (m, 2, b, b), the kind of station (m,) of each, and ``numbers`` of those that the
-    stations have: (n,) in order for a given middle; for any middle (n,) before it, (n,) behind it,
-    and of those where it may be. Factors stand in the order of these numbers."""
+    """Different factors of a matrix, in the order of their first use in ``numbers``.
+
+    Attributes
+    ----------
+    factors : (m, 2, b, b) S^-1 and -S^-1 B of each, see ``Eliminated``
+    kinds : (m,) kind of station that each factor is of
+    numbers : factor of each station: (n,) for a given middle; for a middle that moves (n,) for
+        stations before it, then (n,) for those behind it, then one for each place of the middle
+    """
 
     factors: np.ndarray
     kinds: np.ndarray

@@ -62,8 +62,8 @@ class StepArrays:
     read_domain : vector of ``read`` as far as the rank solves for it
     padded_rates, rates : vector that products with C multiply in two passes, as ``padded`` and
         ``read``; made when they are first asked for
-    read_here, force_here, loaded_here : vectors of this rank alone. What products fill is the
-        rank's, what is solved for perhaps the line's: two views of one array.
+    read_here, force_here, loaded_here : vectors of this rank alone, which products read and
+        fill; the solver may view the same arrays as vectors of all ranks
     """
 
     def __init__(self, domain: Subdomain, pad: int, comm: Any) -> None:
@@ -113,9 +113,9 @@ Loads = list[tuple[np.ndarray, np.ndarray]]
 class ByStations(NamedTuple):
     """A product with K and factors of A by stations, and the arrays that both work on.
 
-    ``read`` is what the product reads, ``rates`` what a product with C does, ``answer`` what the
-    solve fills, of all that is solved for. If ``by_mass`` is not 0 the product is one with M, and
-    ``by_mass`` times what it reads is to be added to the answer.
+    ``read`` is the operand of the product and ``rates`` that of a product with C; the solve fills
+    ``answer`` at all unknowns that are solved for. If ``by_mass`` is not 0 the product is with M,
+    and ``by_mass`` times its operand is to be added to the answer.
     """
 
     product: StationProduct
@@ -141,7 +141,7 @@ class LineOperators:
 
     Attributes
     ----------
-    factor : (n_local,) what products multiply: this rank's part, to be filled in
+    factor : (n_local,) this rank's part of the operand of products, to be filled in
     answer : (n_local,) this rank's part of the last solution
     domain : Subdomain
     like : marks of the line's stations, None if it is in pieces
@@ -279,7 +279,7 @@ class LineOperators:
         self._arrays.force.array[:] += force
 
     def solve(self, loads: Loads | None = None) -> None:
-        """Make ``answer`` that to the internal force and to ``loads``. Collective with loads.
+        """Solve A ``answer`` = internal force + ``loads``. Collective with loads.
 
         ``loads`` are pairs of local unknowns and forces [N], perhaps none here; None on all ranks
         if no rank has any, which saves an exchange.
@@ -323,9 +323,11 @@ class LineOperators:
         return float(arrays.loaded.array[self.domain.owned] @ self.factor)
 
     def by_rows(self) -> tuple[StationProduct, StationProduct, int] | None:
-        """Products with M and K by stations, of this rank alone, and how much longer than the
-        rank's unknowns what they read is at either end; None on several ranks, or if there are
-        none. Not collective."""
+        """Products with M and K by stations on one rank, and the padding of their operands.
+
+        The padding is the number of unknowns by which an operand is longer than the line at either
+        end. None on several ranks, or without products by stations. Not collective.
+        """
         mass, stiffness = (self._products.by_stations(name) for name in ("mass", "stiffness"))
         if self._comm.size > 1 or mass is None or stiffness is None:
             return None
@@ -357,8 +359,8 @@ class LineOperators:
 
     @property
     def rate(self) -> np.ndarray:
-        """(n_local,) what products with C multiply in two passes: this rank's part, to be filled
-        in. Collective when first asked for."""
+        """This rank's part (n_local,) of the operand of products with C in two passes, to be filled
+        in. Collective at its first use."""
         rates, domain = self._arrays.rates, self.domain
         if self._rate_halo is None:
             self._rate_halo = Halo(self._comm, self._ownership, domain.read_low, rates)

@@ -54,7 +54,7 @@ class OperatorBands:
     ----------
     model : Model
     coefficients : of M, K and C in A
-    end : unknown beyond which none are asked for
+    end : number of unknowns whose bands are ever read
     """
 
     def __init__(self, model: Model, coefficients: tuple[float, float, float], end: int) -> None:
@@ -63,10 +63,10 @@ class OperatorBands:
         self._numbers = np.zeros((1, 0))
 
     def between(self, first: int, last: int) -> np.ndarray:
-        """Bands of the unknowns from ``first`` to before ``last``, alone; (k, last - first).
+        """Bands (k, last - first) of A for the columns from ``first`` to before ``last``.
 
-        Number j of band i is the entry of A in row ``first`` + j + i and column ``first`` + j. What
-        is in rows from ``last`` on is not to be read.
+        Entry [i, j] is that of A in row ``first`` + j + i and column ``first`` + j. Entries of rows
+        from ``last`` on are undefined.
         """
         if first < self._first or last > self._last:
             self._put_together(first, max(last, min(first + _AT_ONCE, self._end)))
@@ -206,7 +206,10 @@ class UnitResponses:
         x: np.ndarray,
         half_length: np.ndarray | None = None,
     ) -> tuple[Places, float]:
-        """Places of ``columns``, and the reach of their windows [m]. Collective."""
+        """Places of ``columns``, which has the same parameters, and the reach of their windows [m].
+
+        Collective.
+        """
         half = np.zeros(x.size) if half_length is None else half_length
         windows = self.windows
         if windows.reach > _LONG and x.size:
@@ -285,7 +288,7 @@ class UnitResponses:
         return np.ascontiguousarray(answers.T)
 
     def _kinds(self, places: Places, like: LikeStations) -> tuple[np.ndarray, np.ndarray]:
-        """Places of which each has columns of its own, and which of these each place shares."""
+        """Numbers of the places with own columns, and for each place the one that it shares."""
         starts = self.windows.numbering.starts
         marks = like.fingerprints(places.first, places.last)
         low, n = starts[places.first], places.x.size

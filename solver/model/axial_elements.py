@@ -48,7 +48,11 @@ def strain_rows(model: Model, wire: str) -> np.ndarray:
 
 
 def shape_of(course: np.ndarray, slope: np.ndarray, pairs: np.ndarray) -> np.ndarray:
-    """Deflection and slope at both ends of elements ``pairs`` (n, 2), (n, 4)."""
+    """Deflection [m] and slope [-] at the first and the second end of elements, (n, 4).
+
+    ``course`` [m] and ``slope`` (n_nodes,) are those of the nodes, ``pairs`` (n, 2) the elements'
+    nodes.
+    """
     return np.stack([course[pairs], slope[pairs]], axis=2).reshape(-1, 4)
 
 

@@ -68,7 +68,11 @@ class ModelBuilder:
     def add_springs(
         self, component: str, nodes: np.ndarray, unknown: str, stiffness: float | np.ndarray
     ) -> None:
-        """Springs from nodes to the ground [N/m], without force in the equilibrium."""
+        """Springs from ``nodes`` (n,) to the ground, without force at rest.
+
+        ``unknown`` is the name of the displacement that they resist; ``stiffness`` (n,), or one for
+        all, in [N/m], or [N m/rad] for a rotation.
+        """
         values = np.broadcast_to(np.asarray(stiffness, dtype=float), nodes.shape)
         dofs = self.model.dofs(nodes, unknown)[:, None]
         self.add_block(Block.of_elements(component, dofs, stiffness=values[:, None, None]))
@@ -81,9 +85,11 @@ class ModelBuilder:
         hanging_mass: float | np.ndarray | None = None,
         unknown: str = "w",
     ) -> None:
-        """Point masses [kg]; ``hanging_mass`` is what the node carries if it is not the same.
+        """Point masses at ``nodes`` (n,); ``mass`` (n,), or one for all [kg].
 
-        Those of heights move along the track and sideways as well, where nodes do.
+        ``unknown`` is the displacement that they resist: masses on heights, "w", have weight and
+        resist motion along the track and sideways as well, where nodes have it. ``hanging_mass``
+        is the mass that the node carries at rest, if it differs from ``mass``.
         """
         values = np.broadcast_to(np.asarray(mass, dtype=float), nodes.shape)
         dofs = self.model.dofs(nodes, unknown)
@@ -98,7 +104,10 @@ class ModelBuilder:
             self.model.hanging.append(Hanging(dofs, own))
 
     def add_masses_at(self, component: str, places: Direction, mass: np.ndarray) -> None:
-        """Point masses (n,) [kg] at places of wires in the vertical plane, which they weigh on."""
+        """Point masses ``mass`` (n,) [kg] with weight, anywhere on wires, in the vertical plane.
+
+        ``places`` are the directions of the deflections there.
+        """
         unknowns, weights = places
         matrices = mass[:, None, None] * weights[:, :, None] * weights[:, None, :]
         self.add_block(Block.of_elements(component, unknowns, mass=matrices))
@@ -112,15 +121,29 @@ class ModelBuilder:
         of_shape: bool = False,
         bends: Bends = NO_BENDS,
     ) -> Links:
-        """Links with directions and laws as `model.links` makes them; of ``of_shape`` see `Block`.
+        """Add links to the model and to K, and return them. No weight is added.
 
-        Those that act one way are followed in the time loop, and those that bend; what stands open
-        at rest is no part of K. Their forces at rest are the rest shape's: no weight is added here.
+        The time loop follows those that act one way and those that bend; links open at rest are no
+        part of K.
+
+        Parameters
+        ----------
+        component : str
+            Name of their component, which decides on damping.
+        direction : Direction
+            Unknowns and weights of each link.
+        law : ndarray, shape (n,)
+            Records of `links.LAW`.
+        of_shape : bool, optional
+            Whether form finding finds their forces at rest, see `Block`.
+        bends : Bends, optional
+            Further bends of their laws.
 
         Raises
         ------
         ValueError
-            If further links of one sign are named like the droppers, whose channel they are not of.
+            If further links of one sign have the name of the droppers, whose channel records
+            droppers alone.
         """
         model, links = self.model, Links(component, direction, law, of_shape, bends)
         if model.droppers is not None and component == model.droppers.component:

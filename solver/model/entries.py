@@ -35,7 +35,11 @@ def iterate_sums(
     sums: Sequence[tuple[float, float, float]],
     wanted: np.ndarray | None = None,
 ) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """``iterate_entries`` of several ``sums`` of M, K and C, with the values (k, n) of each."""
+    """``iterate_entries`` for k sums of M, K and C at once, with values (k, n).
+
+    ``sums`` are their coefficients of M, K and C; ``first``, ``last`` and ``wanted`` select rows as
+    in ``iterate_entries``.
+    """
     for block in model.blocks:
         alpha, beta = model.damping_of_block(block)
         near = block.near(first, last)

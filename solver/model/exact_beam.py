@@ -60,8 +60,11 @@ def stiffness(length: np.ndarray, bending_stiffness: float, tension: np.ndarray)
 
 
 def moment_share(length: np.ndarray, bending_stiffness: float, tension: np.ndarray) -> np.ndarray:
-    """Moments at the ends under a uniform load q as a share of q h^2 / 12, (n,) [-]; parameters as
-    of ``stiffness``. It is 3 (c - 1) / k^2, one without tension."""
+    """Moments at the ends under a uniform load q over q h^2 / 12, (n,) [-]: 3 (c - 1) / k^2.
+
+    They are 1 without tension. ``length`` (n,) [m], ``bending_stiffness`` [N m2] and ``tension``
+    (n,) [N] as in ``stiffness``.
+    """
     return _functions(length, bending_stiffness, tension)[2]
 
 

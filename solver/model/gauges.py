@@ -132,7 +132,7 @@ def _watch_stops(
             gap = max(tensioner.travel - sign * moved, 0.0)
             _open(watched[name], i, sign * outwards, gap, tensioner.stop_stiffness)
         return
-    # The stop bears what the tension at rest lacks of what the weights pull.
+    # The stop bears the difference of the weights' pull and the tension at rest.
     wire, tension = model.problem.line.wire(end.wire), watched[TENSION]
     low, high = tensioner.band(wire.name, wire, model.problem.gravity)
     name, sign, pull = (LOW_STOP, -1.0, low) if moved > 0.0 else (HIGH_STOP, 1.0, high)
@@ -150,7 +150,7 @@ def _open(table: LinkArrays, i: int, weights: np.ndarray, gap: float, stiffness:
 
 
 def _row(table: LinkArrays, i: int, unknowns: np.ndarray, place: GaugePlace) -> None:
-    """Give gauge ``i`` of a table its unknowns and its place; it shows what it watches as it is."""
+    """Give gauge ``i`` of a table its unknowns and its place; it shows its reserve unchanged."""
     table.unknowns[i] = unknowns
     table.law["place"][i], table.law["carried"][i] = place.x, 1.0
 

@@ -44,9 +44,9 @@ class Bends(NamedTuple):
     Attributes
     ----------
     link : (k,) number of the link
-    stretch : (k,) where its law bends, from where it is at rest [m]
-    side : (k,) beyond which it does: 1 if for what is longer, -1 if for what is shorter
-    change : (k,) slope beyond less that before [N/m]
+    stretch : (k,) stretch at which its law bends, beyond that at rest [m]
+    side : (k,) 1 if the other slope holds for longer stretches, -1 if for shorter ones
+    change : (k,) slope beyond the bend less that before it [N/m]
     """
 
     link: np.ndarray
@@ -126,10 +126,10 @@ def law(
 
 
 def slips(place: np.ndarray, holds: np.ndarray, damping: np.ndarray) -> np.ndarray:
-    """Laws of n links that let dampers of the line slip, as records of ``LAW``.
+    """Laws of n links at ``place`` (n,) [m] that let dampers of the line slip, records of ``LAW``.
 
-    Together with such a damper [N s/m] a link resists its stretch getting shorter with
-    min(-damping e', holds): it takes back what the damper does beyond ``holds`` (n,) >= 0 [N].
+    A damper of ``damping`` (n,) [N s/m] and its link together resist shortening with
+    min(-damping e', holds): the link cancels the damper's force beyond ``holds`` (n,) >= 0 [N].
     """
     result = np.zeros(np.shape(place), dtype=LAW)
     result["place"], result["rest"], result["damping"] = place, holds, damping

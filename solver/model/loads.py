@@ -51,7 +51,11 @@ def harmonics(
     phases: Sequence[float],
     mean: float = 0.0,
 ) -> TimeFunction:
-    """``mean`` + sum of amplitude cos(2 pi frequency t + phase), frequencies in [Hz]."""
+    """``mean`` + sum of amplitude cos(2 pi frequency t + phase).
+
+    ``frequencies`` [Hz], ``amplitudes`` and ``phases`` [rad] have one entry for each term;
+    amplitudes have the unit of the function.
+    """
     omega = 2.0 * np.pi * np.array(frequencies, dtype=float)
     waves = np.column_stack([omega, np.array(amplitudes, float), np.array(phases, float)])
     return TimeFunction(HARMONICS, np.concatenate([[mean], waves.ravel()]))
@@ -98,7 +102,7 @@ class FieldLoad:
 
 @dataclass(frozen=True)
 class FunctionLoad:
-    """A function in Python, called once a step: the slow way, told in log and report.
+    """A function in Python, called once a step: slow, which log and report state.
 
     Attributes
     ----------
@@ -115,17 +119,17 @@ class FunctionLoad:
 
 @dataclass(frozen=True)
 class MemoryLoad:
-    """Forces -sum over j >= 1 of Q_j b_(n - j) of past accelerations b, such as of a line beyond.
+    """Forces -sum over j >= 1 of Q_j b_(n - j) by past accelerations b, such as of a line beyond.
 
-    What the latest acceleration does is in the matrices. The accelerations are those that balance
-    the forces at the ends of steps of ``dt`` [s].
+    The matrices contain the term of the latest acceleration. Accelerations are those that balance
+    the forces at the ends of steps of ``dt``.
 
     Attributes
     ----------
-    unknowns : (m,) numbers of unknowns, of which one rank owns all
-    dt : [s]
-    n_steps : the most steps of a march
-    numbers : of a number of steps n all Q (n, m, m) [N s2/m], Q_0 being zero
+    unknowns : (m,) numbers of unknowns, all owned by one rank
+    dt : time step [s]
+    n_steps : largest number of steps of a march
+    numbers : ``numbers(n)`` returns Q_0 to Q_(n - 1), (n, m, m) [N s2/m], with Q_0 = 0
     """
 
     unknowns: np.ndarray

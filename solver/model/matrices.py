@@ -52,10 +52,11 @@ def part_of(
     held_diagonal: float,
     size: int,
 ) -> sparse.bsr_matrix:
-    """Ranges of rows and columns of a sum of M, K and C in blocks of ``size``. Not collective.
+    """Ranges of rows and columns of a sum of M, K and C, with ``coefficients`` in this order.
 
-    Both ranges begin and end between blocks. Entries beyond ``columns`` are left out; those of
-    held unknowns are zero but for ``held_diagonal``. Indices are sorted.
+    The result has sorted blocks of ``size``; ``rows`` and ``columns`` are (first, last) unknowns
+    between blocks. Entries beyond ``columns`` are left out; those of held unknowns are zero but for
+    ``held_diagonal``. Not collective.
     """
     # By stretches, as entries take several times the memory of blocks.
     step = _STRETCH - _STRETCH % size

@@ -34,11 +34,12 @@ class Block:
 
     Attributes
     ----------
-    dofs : (n, m) int32, unknowns of each element; a long line has very many
-    kind : (n,) int32, of each element, which of the matrices it has
+    component : name of the component, which decides on damping
+    dofs : (n, m) int32, unknowns of each element
+    kind : (n,) int32, number of the matrices of each element
     mass, stiffness : (k, m, m) or None
-    damping : (k, m, m) or None, beside what the component's damping makes of the other two
-    lateral : whether it is a wire that moves across the track, which may have its own damping
+    damping : (k, m, m) or None, in addition to the component's damping, alpha K + beta M
+    lateral : whether it is the lateral motion of a wire, which may have its own damping
     of_shape : whether the stiffness is the tangent of forces that the shape at rest decides, such
         as those of wires and droppers; others are springs without a force at rest
     """
@@ -62,9 +63,11 @@ class Block:
         damping: np.ndarray | None = None,
         of_shape: bool = False,
     ) -> Block:
-        """A block of elements (n, m) whose matrices (n, m, m) are given, each its own.
+        """A block of elements, each with matrices of its own; equal ones are then stored once.
 
-        Elements that rounding alone tells from each other have the matrices of the first of them.
+        ``dofs`` (n, m) are the unknowns of each element; ``mass``, ``stiffness`` and ``damping``
+        are (n, m, m) or None, in SI units. Elements whose matrices differ by round-off get those
+        of the first of them.
         """
         terms = [mass, stiffness, damping]
         n, m = dofs.shape
@@ -115,6 +118,7 @@ class Model:
 
     Attributes
     ----------
+    problem, mesh : problem and mesh of the line
     simulated : laws of the problem, as its effects set them
     numbering : Unknowns, the registry of all unknowns and their numbers
     row_of_node : (n_nodes,) place of each mesh node in the order along the track
@@ -206,7 +210,7 @@ class Model:
         for number, kind in enumerate(groups):
             mine = self.mesh.dropper_group == number
             own = np.stack(kind.slopes_at(self.cut_lengths[mine]))
-            # The last piece again, for those that have fewer.
+            # Droppers with fewer pieces repeat their last one.
             found[:, mine] = np.pad(
                 own, ((0, 0), (0, 0), (0, found.shape[2] - own.shape[2])), "edge"
             )
@@ -219,7 +223,7 @@ class Model:
 
     @property
     def dropper_pieces(self) -> Slopes:
-        """The piece of each dropper on which it is at rest, of what is slack there the first."""
+        """The piece of its law on which each dropper is at rest, the first for a slack dropper."""
         slopes = self.dropper_slopes
         force = np.zeros(self.broken.size) if self.form is None else self.form.dropper_force
         return slopes.at(np.where(self.dropper_gap > 0.0, 0, slopes.piece_under(force)))

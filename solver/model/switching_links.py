@@ -65,16 +65,16 @@ class LinkTable:
 
     Attributes
     ----------
-    arrays : LinkArrays, in a number all over the line
+    arrays : LinkArrays with unknowns of the whole line
     components : names of components
-    component, index : (n,) which of these each is of, -1 for dependents and bends, and its
-        number there
-    leader : (n,) number of the link that each switches with, for most its own
-    bent : (n,) number of the link that each bends, -1 of others and where that is not followed
-    pulls : (n,) what a unit compensation of a bend adds to the force of its link, 1 or -1
-    broken : (n,) whether it carries nothing any longer
-    half_length : (n,) how far its unknowns are from its place [m]
-    switches : whether any of them does
+    component, index : (n,) number of the component of each link, -1 for dependents and bends, and
+        its number within the component
+    leader : (n,) number of the link that each switches with, for most links their own
+    bent : (n,) number of the link that a bend belongs to, -1 for others and if it is not followed
+    pulls : (n,) force that a unit compensation of a bend adds to that of its link [-], 1 or -1
+    broken : (n,) whether the link no longer carries anything
+    half_length : (n,) largest distance of its unknowns from its place [m]
+    switches : whether any link switches
     """
 
     arrays: LinkArrays
@@ -224,7 +224,7 @@ def _droppers(model: Model, links: Links, force: np.ndarray) -> LinkArrays:
     law["place"], law["carried"] = links.law["place"], 1.0
     # Slackness is one more bend if another bend is nearer at rest.
     law["released"] = np.where(model.dropper_pieces.begin > 0.0, 0.0, 1.0 - kept)
-    # One that is slack at rest stands open: its reserve is what it lacks to be taut.
+    # A dropper slack at rest is an open link: its reserve is the force that it lacks to be taut.
     slack = (model.dropper_gap > 0.0) & ~model.broken
     law["rest"][slack] = (model.dropper_gap * law["stiffness"])[slack]
     law["stiffness"][slack] *= -1.0
@@ -234,8 +234,8 @@ def _droppers(model: Model, links: Links, force: np.ndarray) -> LinkArrays:
 
 
 def _released_alpha(model: Model) -> np.ndarray:
-    """Damping of droppers that goes slack with their springs over their stiffness, (n_droppers,)
-    [s]."""
+    """Ratio (n_droppers,) of the damping of droppers that goes slack with the spring to their
+    stiffness [s]."""
     stiffness = model.dropper_stiffness
     none = np.zeros(stiffness.size)
     return np.divide(model.released_damping, stiffness, out=none, where=stiffness > 0.0)
@@ -253,7 +253,7 @@ def _dropper_bends(model: Model, force: np.ndarray) -> tuple[Bends, np.ndarray]:
         model.dropper_gap > 0.0, -model.dropper_gap, on.begin + (force - on.force) / on.slope
     )
     side = np.where(slopes.begin > on.begin[:, None], 1.0, -1.0)
-    # Below the first piece is what a slack dropper keeps.
+    # Below the first piece the slope is that of a slack dropper.
     less = np.concatenate([kept * slopes.slope[:, :1], slopes.slope[:, :-1]], axis=1)
     change = side * (slopes.slope - less)
     bends = (change != 0.0) & ~model.broken[:, None]

@@ -34,18 +34,19 @@ class Unknowns:
     """Numbers and places of unknowns, those of held ones included.
 
     A cross-section has a place for each unknown that a station may have. Stations of one type
-    have the same places. What a station has without a node is missing: a held unknown.
+    have the same places. An unknown of a station without a node is missing: it is held.
 
     Attributes
     ----------
-    names : of all unknowns, as effects asked for them
-    numbers : (n_nodes, n_names) number of each, by nodes of the mesh; -1 for what a node has not.
-        Nodes of wires that move together have the same
-    station : (n_nodes,) of each node
-    starts : (n_stations + 1,) number of the first unknown of each station, and how many there are
-    planes : places of a cross-section in each group
-    station_types : places of each type, ascending, as unknowns of a station follow each other
-    station_type : (n_stations,) of each station
+    names : names of all unknowns, group by group
+    numbers : (n_nodes, n_names) number of each unknown of each mesh node, -1 if the node does not
+        have it. Nodes of wires that move together share numbers
+    station : (n_nodes,) station of each node
+    starts : (n_stations + 1,) number of the first unknown of each station; the last entry is the
+        number of all unknowns
+    planes : number of places of a cross-section in each group
+    station_types : places of each type, ascending, in the order of a station's unknowns
+    station_type : (n_stations,) type of each station
     in_stations : whether matrices join stations to those beside them only, as far as wires and
         droppers tell; if not, each node is a station
     low, high : (n_stations,) ascending places [m]: no node from a station on stands before its low,

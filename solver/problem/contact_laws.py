@@ -102,10 +102,11 @@ def uses_rate(law: ContactLaw) -> bool:
 
 
 def _gonthier(restitution: float) -> float:
-    """The factor with which a body bounces off exactly as fast as ``restitution`` says.
+    """Hysteresis factor chi by which a body rebounds with exactly ``restitution`` times its speed.
 
-    chi (1 + e) = log((1 + chi) / (1 - chi e)), what is left of m v dv/dd = -K d^n (1 + chi v / v0)
-    for every m, K, n and v0. Besides chi = 0 it has one solution.
+    The equation is chi (1 + e) = log((1 + chi) / (1 - chi e)), the integral of
+    m v dv/dd = -K d^n (1 + chi v / v0) for every m, K, n and v0. Besides chi = 0 it has one
+    solution.
     """
     e = restitution
     if e == 1.0:

@@ -64,11 +64,11 @@ class Tensioner:
         return self.efficiency == 1.0
 
     def mass(self, name: str, wire: Conductor, gravity: float) -> float:
-        """Mass of the weights of a wire [kg]."""
+        """Mass of the weights of the wire ``name`` at ``gravity`` [m/s2] [kg]."""
         return self.weights.get(name, wire.tension / (self.ratio * gravity))
 
     def inertia(self, name: str, wire: Conductor, gravity: float) -> float:
-        """Mass that the end of the wire feels: the weights move ``ratio`` times as fast [kg]."""
+        """Inertia of the weights at the end of the wire, ``ratio``^2 times their mass [kg]."""
         return self.ratio**2 * self.mass(name, wire, gravity)
 
     def band(self, name: str, wire: Conductor, gravity: float) -> tuple[float, float]:
@@ -98,7 +98,10 @@ class AlongTrack:
     warmer: float = 0.0
 
     def tensioned(self, x: float, line_ends: tuple[float, float], close: float) -> bool:
-        """Whether wires that end at ``x`` have a tensioner there [m]."""
+        """Whether wires that end at ``x`` [m] have a tensioner there.
+
+        ``line_ends`` are start and end of the line [m]; places nearer than ``close`` [m] are one.
+        """
         at_start, at_end = (abs(x - end) < close for end in line_ends)
         if at_start:
             return self.start

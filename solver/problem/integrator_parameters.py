@@ -58,11 +58,17 @@ AVERAGE_ACCELERATION = Integration(0.25, 0.5)
 def integration_of(
     integrator: str, spectral_radius: float, beta: float = 0.25, gamma: float = 0.5
 ) -> Integration:
-    """Parameters of order two for a spectral radius at infinite omega dt; Newmark's as they are.
+    """Parameters of second order for a spectral radius at infinite omega dt.
 
-    ``spectral_radius`` is 0 to 1, for HHT ``LEAST_RADIUS_OF_HHT`` to 1; what takes longer than a
-    few steps is kept, and the fastest vibrations shrink by it in each step. At 1 both methods are
-    average acceleration.
+    Parameters
+    ----------
+    integrator : str
+        Name of the method.
+    spectral_radius : float
+        0 to 1, for HHT ``LEAST_RADIUS_OF_HHT`` to 1: factor of the fastest vibrations in each step
+        [-]. Vibrations of many steps a period are kept. At 1 both methods are average acceleration.
+    beta, gamma : float, optional
+        Newmark's parameters, for Newmark's method alone, whatever the spectral radius [-].
     """
     if integrator == NEWMARK:
         return Integration(beta, gamma)

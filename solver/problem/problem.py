@@ -89,8 +89,8 @@ class WindowChoice:
 
     ``mode`` is ``off`` (all), ``exact`` (all that any wave has reached) or ``bounded``: those whose
     motion exceeds ``tolerance`` times the largest one of the line, or those from ``spans_behind``
-    behind the last pantograph to ``spans_ahead`` ahead of the first one. ``fading`` [m2/s], over
-    the square of its length, is the damping on mass with which the outer part of it ends.
+    behind the last pantograph to ``spans_ahead`` ahead of the first one. Both ends of the window
+    are damped on mass, by ``fading`` [m2/s] over the square of their length.
     """
 
     mode: str = OFF

@@ -78,13 +78,14 @@ class Wind:
 
     Attributes
     ----------
-    speed : mean at ``reference_height`` [m] above ground [m/s]
-    direction : in which it blows: 0 with the train, pi/2 to the left of it, pi against it [rad]
-    height : of the wires above ground [m]
-    profile : how the mean grows with the height
-    density : of the air [kg/m3]
+    speed : mean wind speed at ``reference_height`` [m/s]
+    direction : direction of the flow: 0 with the train, pi/2 to the left of it, pi against it [rad]
+    height : height of the wires above ground [m]
+    reference_height : height above ground at which ``speed`` is given [m]
+    profile : growth of the mean with the height
+    density : density of the air [kg/m3]
     quadratic : whether gusts act with the square of the whole speed, or linearised about the mean
-    stretches : of other exposure, which do not overlap
+    stretches : stretches of other exposure, which do not overlap
     gusts : None for a steady wind
     """
 

@@ -58,7 +58,7 @@ class Past(NamedTuple):
 
 
 class Tried(NamedTuple):
-    """A step that is judged, (n,) each; see ``StepError.of``."""
+    """Results of a tentative step at n contacts, (n,) each; see ``StepError.of``."""
 
     depth: np.ndarray
     force: np.ndarray
@@ -104,7 +104,7 @@ class StepError:
         return float(self._largest(time))
 
     def accept(self, time: float, depth: np.ndarray, force: np.ndarray) -> None:
-        """Remember a step that was taken."""
+        """Store an accepted step to ``time`` [s]: depths [m] and forces [N] (n,) at its end."""
         self._tried.depth[:], self._tried.force[:] = depth, force
         self._remember(time)
         self._known = min(self._known + 1, _PAST)
@@ -270,7 +270,7 @@ class StepLevels:
         stiffness: np.ndarray,
         compliance: np.ndarray,
     ) -> Decision:
-        """Decide on a step. Rank 0 only; see `schemes.StepController`."""
+        """Accept or reject a step; parameters as in `schemes.StepController`. Rank 0 only."""
         level, size = self._tried, self._dt / 2**self._tried
         error = self._error.of(time, depth, force, stiffness, compliance)
         decision = Decision(True, level)

@@ -12,8 +12,9 @@ from catenary.solver.contact.pantographs import Pantographs
 
 
 def find_crossings(interaction: ForcesOnLine, pantographs: Pantographs, time: float) -> None:
-    """Note where wires that move sideways cross the strips at ``time`` [s], the end of a step whose
-    contacts are located and whose forces do not act yet. Collective."""
+    """Find where wires that move sideways cross the strips at ``time`` [s], the end of a step.
+
+    Contacts are located then, and their forces do not act yet. Collective."""
     interaction.find_across()
     pantographs.cross(time, interaction.presence)
 
@@ -59,14 +60,22 @@ class StepController(Protocol):
         stiffness: np.ndarray,
         compliance: np.ndarray,
     ) -> Decision:
-        """Decide on a step to ``time`` [s]. Rank 0 only.
+        """Accept or reject a step from its results at n contacts. Rank 0 only.
 
-        At its contacts (n,) it has found depths [m], forces [N], stiffnesses [N/m] of the law's
-        tangent, and ``compliance`` is what a force takes off the depth within the step [m/N].
+        Parameters
+        ----------
+        time : float
+            Time at the end of the step [s].
+        depth, force : ndarray, shape (n,)
+            Depths [m] and contact forces [N] at the end of the step.
+        stiffness : ndarray, shape (n,)
+            Slope of the contact law at these depths [N/m].
+        compliance : ndarray, shape (n,)
+            Decrease of the depth by a unit force within the step [m/N].
         """
 
     def set_level(self, level: int) -> None:
-        """Learn the level of what was decided. All ranks."""
+        """Set the level of the next step, as ``decide`` returned it on rank 0. All ranks."""
 
 
 class StepRejected(Exception):
@@ -80,14 +89,13 @@ class Scheme(Protocol):
     pantographs: Pantographs
 
     def step(self, time: float, stop: bool) -> bool:
-        """Advance to ``time`` [s]; False if any rank wants this step to be the last. Collective.
+        """Advance to ``time`` [s]; False if ``stop`` is set on any rank. Collective.
 
         Raises
         ------
         RunBroken
-            On all ranks, if the step has no solution or holds something that is no number;
-            NotConverged if iterations ended before they were there. What it says needs no time and
-            no place: ``Stepper`` adds them.
+            On all ranks, if the step has no solution or a result is not finite; NotConverged if
+            iterations ended above their tolerances. ``Stepper`` adds time and place to the message.
         """
 
     @property

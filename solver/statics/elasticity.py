@@ -45,8 +45,8 @@ class Elasticity:
 
     @cached_property
     def lift(self) -> np.ndarray:
-        """Lift of a head that presses with a unit force from where it touches all contact wires,
-        (n,) [m/N]; of a single wire its own."""
+        """Lift of a head by a unit force if it touches all contact wires, (n,) [m/N]; with a single
+        wire the compliance of the wire."""
         return self.pressed(np.zeros(self.compliance.shape[:2]), 1.0)
 
     def pressed(self, height: np.ndarray, force: float) -> np.ndarray:

@@ -95,7 +95,8 @@ def stable_form(
 def line_at_rest(problem: Problem, mesh: LineMesh, sound: SoundLine | None = None) -> LineAtRest:
     """The line of a problem at rest, found by this process. Not collective.
 
-    ``sound`` is that of a problem that differs in errors of length alone.
+    ``sound`` is the sound line of a problem that differs only in errors of dropper length, if it
+    has been found.
 
     Raises
     ------

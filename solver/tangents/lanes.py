@@ -51,11 +51,11 @@ class TangentLanes(NamedTuple):
 
 
 def groups_of(line: LineIntegrator, changes: Sequence[Change]) -> list[list[int]]:
-    """Numbers of the changes whose motions stand side by side.
+    """Groups of changes, by number, whose motions are stepped side by side.
 
-    Changes that load the line stand by themselves, next to those of the same rows: all of a group
-    take the products that one of them needs. Lines without kernels for several scenes have groups
-    of one.
+    Changes that load the line have groups apart from the others, sorted by the rows that they load:
+    a group computes a product for all its members if one needs it. Without kernels for several
+    scenes each change is a group.
     """
     passes = line.passes
     assert passes is not None
@@ -67,7 +67,7 @@ def groups_of(line: LineIntegrator, changes: Sequence[Change]) -> list[list[int]
         if change.loads_line
     }
     without = [k for k in range(len(changes)) if k not in rows]
-    # Each next to one whose rows are nearest to its own, from that with most on.
+    # From the change with most rows on, each is followed by the one with the most similar rows.
     loaded, latest = [], set().union(*rows.values())
     while rows:
         loaded.append(min(rows, key=lambda k: len(rows[k] ^ latest)))

@@ -144,7 +144,7 @@ def set_up_of(
     at_rest : LineAtRest
         Line at rest.
     n_steps : int, optional
-        Number of steps whose drives are wanted; of all steps if not given.
+        Number of steps for which drives are computed; all steps of the run if not given.
     same_line : SetUp, optional
         Set-up of another march of the same line at rest, whose matrices are taken over.
 
@@ -242,7 +242,7 @@ def differentiate(set_up: Callable[[float], SetUp], now: SetUp, step: float, wha
     Raises
     ------
     InputError
-        If the parameter changes what has no derivative, such as the mesh.
+        If the parameter changes a part of the set-up without derivative, such as the mesh.
     """
     found = {number: set_up(number * step) for number in _STENCIL}
     for other in found.values():
@@ -313,8 +313,10 @@ def differentiate(set_up: Callable[[float], SetUp], now: SetUp, step: float, wha
 def _matrices(
     found: Sequence[dict[int, sparse.csc_matrix]], now: Sequence[sparse.csc_matrix], step: float
 ) -> list[MatrixTerm]:
-    """Derivatives of K, C and M from each of them at several steps of the parameter, and from what
-    they are now."""
+    """Derivatives of K, C and M by the parameter.
+
+    ``found`` are K, C and M at several multiples of the parameter's ``step``, ``now`` at its value.
+    """
     stiffness, damping, mass = (_derivative(matrices, step) for matrices in found)
 
     def left_by(shares: Sequence[float]) -> sparse.csc_matrix:
@@ -332,7 +334,7 @@ def _matrices(
 
 
 def _derivative(matrices: dict[int, sparse.csc_matrix], step: float) -> sparse.csc_matrix:
-    """Without what is round-off of the matrix."""
+    """Derivative of a matrix, zero where its change is round-off of the entry."""
     total = sum(_STENCIL[number] * matrix for number, matrix in matrices.items()) / step
     changed = abs(total) > abs(matrices[1]) * (_ROUNDINGS / abs(step))
     derivative = total.multiply(changed).tocsc()
@@ -341,10 +343,10 @@ def _derivative(matrices: dict[int, sparse.csc_matrix], step: float) -> sparse.c
 
 
 def _shares(whole: sparse.csc_matrix, *parts: sparse.csc_matrix) -> list[float]:
-    """Factors of ``parts`` whose sum is nearest to ``whole``, zero of a part without influence.
+    """Least-squares factors of ``parts`` whose sum approximates ``whole``; small ones are zero.
 
-    They are rounded within ``_PROPORTIONAL``, so that parameters have the same factors and tangents
-    share the sums of motions that these make.
+    They are rounded to digits beyond ``_PROPORTIONAL``, so that different parameters get equal
+    factors and their tangents share sums of motions.
     """
     sizes = [float(np.sqrt(part.multiply(part).sum())) or 1.0 for part in parts]
     scaled = [part / size for part, size in zip(parts, sizes, strict=True)]

@@ -43,13 +43,13 @@ class KeptMotions(NamedTuple):
 
     Attributes
     ----------
-    motion_of : (n,) number of the motion that keeps a step, -1 if none does
+    motion_of : (n,) number of the motion kept of each step, -1 if none is
     numbers : (m,) room for displacements and velocities, one motion after another
-    stations : (k, 3) of each motion the stations that are kept, first and one after the last, and
-        where its numbers begin
-    used : (1,) how much of the room is
+    stations : (k, 3) for each motion the first station kept, the one after the last, and the index
+        of its first entry in ``numbers``
+    used : (1,) used entries of ``numbers``
     moved : ``ShownMotion.moved``
-    places : arrays that are kept with a motion
+    places : places of the pantographs' masses, which are kept with a motion
     kept_places : (k, l) room for these
     """
 
@@ -100,18 +100,18 @@ class CompiledSteps:
 
     Attributes
     ----------
-    scheme : whose steps they are
-    most : steps of the largest block
-    times : (most,) of the steps that are prepared [s]
-    rows : (most, width) what each of them shows; empty if nobody looks
-    taken : steps of the latest block that were taken, fewer than asked for if one broke, if there
+    scheme : the scheme whose steps are taken
+    most : number of steps of the largest block
+    times : (most,) times of the prepared steps [s]
+    rows : (most, width) values of all channels after each step; empty without ``shows``
+    taken : number of steps taken in the latest block, fewer than requested if one broke, if there
         was no room for its motion, or if loads were not known for all of them
-    most_motions : steps of a block of which the motion can be kept
+    most_motions : largest number of steps of a block whose motion can be kept
 
     Parameters
     ----------
     dt : time step [s]
-    shows : whether rows are wanted
+    shows : whether rows are recorded
     """
 
     def __init__(self, scheme: OneSolve, showing: Showing, dt: float, shows: bool) -> None:
@@ -223,9 +223,10 @@ class CompiledSteps:
     def show_to(
         self, observer_list: ObserverList, step: int, kept: Sequence[int], *, broke: bool
     ) -> None:
-        """Show the steps of the latest block, which are those after the one of number ``step``.
+        """Show observers the steps of the latest block, the first of which follows number ``step``.
 
-        ``kept`` are those of ``take``. A block that ``broke`` has left its state amid a step.
+        ``kept`` are the indices of the steps whose motion was kept, as passed to ``take``. A block
+        that ``broke`` has left its state amid a step.
         """
         times, rows = self.times[self._block], self.rows[self._block]
         observer_list.show_block(step, times, rows, self._views(step, times, rows, kept, broke))
@@ -233,7 +234,7 @@ class CompiledSteps:
     def _views(
         self, step: int, times: np.ndarray, rows: np.ndarray, kept: Sequence[int], broke: bool
     ) -> Iterator[StepView]:
-        """Views of the steps of which more than the row is left, then of the last one."""
+        """Views of the steps whose motion was kept, then of the last step."""
         showing, room = self._showing, self._kept
         starts, seen = showing.shown.columns.starts, 0
         for number, at in enumerate(kept):
@@ -249,7 +250,7 @@ class CompiledSteps:
             yield showing.view_of(step + self.taken, times, rows, broke=broke)
 
     def _keep_motion(self, number: int) -> bool:
-        """Keep the motion of a step as that of a number, none if below 0; whether there is room."""
+        """Keep the motion of a step as motion ``number``, unless negative; False without room."""
         kept, motion = self._kept, self._showing.motion
         if number < 0:
             return True
@@ -335,7 +336,10 @@ class CompiledSteps:
 def compiled_steps(
     scheme: Scheme, showing: Showing, dt: float, shows: bool
 ) -> CompiledSteps | None:
-    """Compiled loop over the steps of a scheme, None if it has none. Not collective."""
+    """Compiled loop over steps of ``dt`` [s], None if the scheme has none. Not collective.
+
+    ``showing`` gives the rows of the steps, which are recorded if ``shows`` is set.
+    """
     if not isinstance(scheme, OneSolve) or scheme.comm.size > 1 or scheme.judge is not None:
         return None
     line = scheme.interaction.line

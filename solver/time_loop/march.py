@@ -58,14 +58,17 @@ from catenary.solver.window.moving_columns import MovingColumns
 class Outcome:
     """Result of a march.
 
-    ``outcome`` is "done", "interrupted" or the sentence of what broke; ``wall`` [s] the time of the
-    time loop alone, changes of the line on the way included, and ``cpu`` [s] what of it this
-    process computed, whatever else the machine did; ``n_steps`` taken;
-    ``counters`` of the scheme; ``traffic`` is how many messages and bytes a rank sent a step since
-    the line changed last, the one that sent most: to its neighbours, and each sum and broadcast as
-    one; None on one rank, or if not counted; ``slow_path`` says why steps took longer than
-    they could, empty if they did not; ``finishing`` [s] is the time after the loop in which
-    observers wrote what they still held.
+    Attributes
+    ----------
+    outcome : "done", "interrupted" or the sentence of what broke
+    wall : wall time of the time loop, changes of the line on the way included [s]
+    cpu : processor time of this process in the time loop [s]
+    n_steps : number of steps taken
+    counters : counters of the scheme, by name
+    traffic : messages and bytes a step since the line changed last, of the rank that sent most: to
+        its neighbours, and each sum and broadcast as one; None on one rank, or if not counted
+    slow_path : reason why steps took longer than they could, "" if they did not
+    finishing : time after the loop in which observers wrote their remaining data [s]
     """
 
     outcome: str

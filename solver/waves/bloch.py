@@ -77,12 +77,11 @@ class BlochWaves:
     contact_x: np.ndarray
 
     def pass_bands(self, highest: float) -> np.ndarray:
-        """Ranges of frequency in which a wave travels, those that overlap as one, (n, 2) [Hz].
+        """Ranges of frequency up to ``highest`` [Hz] in which waves travel, (n, 2) [Hz].
 
-        A gap below the error of the frequencies is none.
-
-        Up to ``highest`` [Hz]. Ends of branches lie at phases 0 and pi but for those that cross:
-        a band's ends are known to the distance of two phases there.
+        Ranges that overlap, or whose gap is below the error of the frequencies, are merged. Ends
+        of branches lie at phases 0 and pi; where branches cross, a band's ends are accurate to
+        the change of frequency between two phases.
         """
         low, high = self.frequency.min(axis=0), self.frequency.max(axis=0)
         merged: list[list[float]] = []
@@ -214,7 +213,7 @@ def bloch_waves(period: Period, highest: float) -> BlochWaves:
 class _Basis(NamedTuple):
     """Shapes in which the waves of a span are sought (R. Craig, M. Bampton, AIAA J. 6, 1968).
 
-    What a span does statically when the unknowns at its start and its end move, (n, b) each, and
+    Static shapes of a span under unit displacements at its start and at its end, (n, b) each, and
     its modes with both held, (n, m).
     """
 

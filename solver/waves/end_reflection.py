@@ -40,15 +40,17 @@ class EndReflection:
     reflected: np.ndarray
 
     def of_faster(self, speed: float) -> tuple[float, float]:
-        """Largest and rms reflection of waves that outrun a train [m/s]; NaN if none does."""
+        """Largest and rms reflection of waves faster than ``speed`` [m/s]; NaN if none is."""
         found = self.reflected[self.group_velocity > speed]
         if not found.size:
             return np.nan, np.nan
         return float(found.max()), float(np.sqrt((found**2).mean()))
 
     def energy_of_faster(self, speed: float) -> tuple[float, float]:
-        """Largest and mean share of the energy of waves that outrun a train [m/s] that comes back,
-        the same energy coming at all frequencies with each wave; NaN if none does."""
+        """Largest and mean reflected share of the energy of waves faster than ``speed`` [m/s].
+
+        All waves carry the same energy at all frequencies; NaN if none is faster.
+        """
         largest, rms = self.of_faster(speed)
         return largest**2, rms**2
 
@@ -56,9 +58,9 @@ class EndReflection:
 def end_reflection(model: Model, side: int, frequency: np.ndarray) -> EndReflection:
     """Reflection by the ``START`` or ``END`` of a model at frequencies (f,) [Hz]. Not collective.
 
-    The line before the end is taken to repeat its span next to that. Both have the damping of the
-    line, alpha and beta of the whole; it counts from where the end begins. Waves of which it leaves
-    less than a hundredth after a span do not count.
+    ``side`` is ``START`` or ``END``. The line before the end is taken as periodic, with the span
+    next to the end. Both have the line's damping, alpha and beta of the whole; it acts from where
+    the end begins. Waves that it reduces to less than a hundredth within a span are left out.
 
     Raises
     ------

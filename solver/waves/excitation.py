@@ -110,7 +110,7 @@ Excitation = MovingForce | Blow
 
 
 def hammer(at: float, impulse: float, duration: float) -> Blow:
-    """Half a sine of an impulse [N s]."""
+    """A half-sine blow of ``impulse`` [N s], upwards, within ``duration`` [s] at ``at`` [m]."""
     return Blow(at, duration, 0.5 * np.pi * impulse / duration, True)
 
 

@@ -91,8 +91,9 @@ def change_of_wire(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Shares of a wave on ``first`` that come back from where it becomes ``second``, and go on.
 
-    Both have bending stiffness; deflection, slope, moment and vertical force are continuous. Of
-    strings they are (Z1 - Z2) / (Z1 + Z2) and 2 Z1 / (Z1 + Z2). Shapes (f,).
+    Amplitudes (f,) complex at the angular frequencies ``omega`` (f,) [1/s]. Both wires have bending
+    stiffness; deflection, slope, moment and vertical force are continuous. For strings the
+    amplitudes are (Z1 - Z2) / (Z1 + Z2) and 2 Z1 / (Z1 + Z2).
     """
     one, two = answer(first, omega), answer(second, omega)
     # exp(-i k x) on the left, R exp(i k x) + N exp(q x) there, T exp(-i k x) + M exp(-q x) beyond.

@@ -37,11 +37,22 @@ from catenary.solver.wind.wind_at import (
 def along(
     model: Model, wire: str, unknowns: tuple[str, str], points: np.ndarray | None = None
 ) -> tuple[np.ndarray, sparse.csr_matrix]:
-    """Unknowns (n,) of a wire in a plane, and forces (n, n_points) of loads per length at points.
+    """Unknowns (n,) of a wire in a plane, and work-equivalent forces (n, n_points) of unit loads.
 
-    The load per length [N/m] is linear between ``points`` (n_points,) [m], which ascend, and
-    constant beyond them; without points they are the wire's nodes. It is taken at nodes, and linear
-    along each element. Forces are those that do the same work.
+    Column j holds the forces [N], [N m] by a load per length of 1 N/m at point j. The load is
+    linear between points and constant beyond them; it is evaluated at nodes, and linear along each
+    element.
+
+    Parameters
+    ----------
+    model : Model
+        Discrete line.
+    wire : str
+        Name of the wire.
+    unknowns : tuple of str
+        Names of deflection and slope in the plane.
+    points : ndarray, shape (n_points,), optional
+        Ascending places [m]; the wire's nodes if not given.
     """
     dofs, length = wire_elements(model, wire, unknowns)
     nodes = model.mesh.wires[wire]
@@ -60,7 +71,7 @@ def along(
 
 
 def _interpolation(x: np.ndarray, points: np.ndarray) -> sparse.csr_matrix:
-    """Values at ``x`` (n,) of what is linear between ``points`` (m,), as a matrix (n, m)."""
+    """Matrix (n, m) of linear interpolation from ``points`` (m,) to ``x`` (n,) [m]."""
     m = points.size
     if m == 1:
         return sparse.csr_matrix(np.ones((x.size, 1)))

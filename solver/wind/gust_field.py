@@ -123,10 +123,11 @@ class GustField:
 
 
 def narrowed(half: np.ndarray) -> np.ndarray:
-    """Power of a process of correlation exp(-a d) over that of what is linear between its values at
-    points h apart, both over lengths beyond h; ``half`` is a h / 2, shape as it.
+    """Factor on the power of a gust process, for a field that is linear between points [-].
 
-    2 / a over the sum of h exp(-a h |j|) over all j.
+    The process has the correlation exp(-a d), the points are h apart, ``half`` is a h / 2. The
+    factor is 2 / a over the sum of h exp(-a h |j|) over all j: over lengths beyond h the load has
+    the power of the process. Shape as ``half``.
     """
     return np.asarray(np.tanh(half) / half)
 

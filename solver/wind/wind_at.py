@@ -39,14 +39,16 @@ def directions(wind: Wind) -> tuple[float, float]:
 
 
 def across_at(wind: Wind, tunnels: tuple[Tunnel, ...], places: np.ndarray) -> np.ndarray:
-    """Mean wind to the left of the track at places [m/s], shape as ``places``."""
+    """Mean wind to the left of the track [m/s] at ``places`` [m], of the same shape; 0 in
+    ``tunnels``."""
     return directions(wind)[1] * wind.mean * exposure(wind, places, tunnels)
 
 
 def mean_load(
     wind: Wind, tunnels: tuple[Tunnel, ...], wire: Wire, places: np.ndarray
 ) -> np.ndarray:
-    """Mean lateral load on a wire at places [N/m], shape as ``places``; to the left positive."""
+    """Mean lateral load on a wire [N/m] at ``places`` [m], of the same shape; to the left positive,
+    0 in ``tunnels``."""
     speed = across_at(wind, tunnels, places)
     return np.asarray(0.5 * wind.density * drag_width(wire) * np.abs(speed) * speed)
 
@@ -65,7 +67,8 @@ def gust_points(spacing: float, start: float, end: float) -> np.ndarray:
 def horizontal_gusts(
     wind: Wind, points: np.ndarray, spread: float | None = None
 ) -> tuple[GustField, GustField]:
-    """Gusts along the mean wind and across it to the left; ``spread`` as of ``GustField``."""
+    """Gusts at ``points`` (n,) [m] along the mean wind and across it to the left; ``spread`` as in
+    ``GustField``."""
     return GustField(wind, ALONG, points, spread), GustField(wind, ACROSS, points, spread)
 
 

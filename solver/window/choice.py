@@ -80,7 +80,10 @@ def window_sentence(problem: Problem) -> str:
 def spans_of_window(
     problem: Problem, ahead: float | None = None, behind: float | None = None
 ) -> WindowChoice:
-    """A window of so many spans, by default as many as damping and speed need."""
+    """A window of ``ahead`` and ``behind`` spans ahead of and behind the train.
+
+    Both follow from damping and speed unless both are given.
+    """
     fades = _fading_rate(problem) < _SLOW
     if ahead is None or behind is None:
         wanted = _WANTED if fades else _WANTED_WITHOUT
@@ -136,9 +139,10 @@ def reach_of_motion(problem: Problem) -> Reach | None:
 
 
 def estimated_error(problem: Problem, ahead: float, behind: float) -> float:
-    """Error of the force history below 20 Hz by a window of so many spans [% of sigma].
+    """Error of the force history below 20 Hz by a window [% of its standard deviation].
 
-    From what was measured, by the time that waves need to an end and back and their rate of fading.
+    ``ahead`` and ``behind`` are its spans ahead of and behind the train. The estimate interpolates
+    errors measured on one line, scaled by the time of waves to an end and back and by their decay.
     Not collective.
     """
     spans = min(ahead, _BEHIND * behind) * _worth(problem)

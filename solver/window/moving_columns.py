@@ -17,9 +17,10 @@ class Columns(NamedTuple):
     ----------
     ends : the first station that moves and the one after the last, kept up to date by a window
     starts : (n + 1,) first unknown of each station
-    first : (n + 1, k) of each of k tables the first column of those that follow from a station or
-        one behind it
-    last : (n + 1, k) the one after the last column of those that follow from stations before one
+    first : (n + 1, k) for each of k tables the first column that follows from a station or from one
+        behind it
+    last : (n + 1, k) for each of k tables the column after the last one that follows from stations
+        before a station
     """
 
     ends: np.ndarray
@@ -35,9 +36,16 @@ class Columns(NamedTuple):
 def columns_of(
     tables: Sequence[np.ndarray], n_unknowns: int, stations: tuple[np.ndarray, np.ndarray] | None
 ) -> Columns:
-    """Columns of ``tables``: unknowns (m, l) that each of m columns follows from. Not collective.
+    """Columns of several tables by the stations that they follow from. Not collective.
 
-    ``stations`` are ``ends`` and ``starts``; without them the line is one station, which moves.
+    Parameters
+    ----------
+    tables : sequence of ndarray, shape (m, l)
+        Unknowns that each of the m columns of a table follows from.
+    n_unknowns : int
+        Unknowns of the rank.
+    stations : tuple of ndarray or None
+        ``ends`` and ``starts``; without them the line is a single station, which moves.
     """
     ends, starts = (np.array([0, 1]), np.array([0, n_unknowns])) if stations is None else stations
     n = starts.size - 1

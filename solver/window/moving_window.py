@@ -23,26 +23,29 @@ STEP, IS_FRESH = 0, 1
 
 
 class WindowArrays(NamedTuple):
-    """A window as kernels take it. No step reads or writes stations outside of it, which are at
-    rest, but for those beside it, which are held where they are.
+    """A window as kernels take it.
+
+    Stations outside are at rest: steps do not read or write them, except those next to the window,
+    which are held in place.
 
     Attributes
     ----------
-    state : (2,) int, steps taken, and whether the whole line is still alive
-    every, guard : steps between two looks, and stations that are looked at
+    state : (2,) int, number of steps taken, and whether the whole line still moves
+    every : steps between two checks of where the window ends
+    guard : number of stations at each end whose motion a check examines
     by_motion : share of the largest motion below which stations rest, 0 if spans decide
-    spans_behind, spans_ahead : these
-    fading : how much fades at a look [m2]
-    is_exact : whether what rests is made zero, or stays where it is
+    spans_behind, spans_ahead : spans of the window behind the last and ahead of the first contact
+    fading : ``WindowChoice.fading`` times the time between two checks [m2]
+    is_exact : whether stations at rest are set to zero, or keep their displacement
     peak : (2,) largest of x and y of the motion
-    contacts : (n,) where contacts are [m], by reference
+    contacts : (n,) places of the contacts [m], by reference
     loaded : (2,) first and last place with a load [m]
-    margin : how far around both a step and what switches in it reach [m]
-    masts : (k,) where spans end [m]
+    margin : distance that a step and links that switch in it reach beyond contacts and loads [m]
+    masts : (k,) ends of the spans [m]
     low, high : (n,) of stations, see ``Unknowns``
     starts : (n + 1,) first unknown of each station
-    links_before : (n + 1,) how many links stand before each
-    edges : (2, n + 1) where a window that is to begin, or end, at a station does so
+    links_before : (n + 1,) number of links before each station
+    edges : (2, n + 1) station where a window that should begin, or end, at a station does so
     ends, kinds, turning : of ``StationFactors``
     links : (2,) the first link that may switch and the one after the last
     ranges : (2, 2) the same for the pass back, see ``StationPasses.track_links``
@@ -97,14 +100,14 @@ class MovingWindow:
 
     Parameters
     ----------
-    choice : of a window that moves
+    choice : WindowChoice of a window that moves
     dt : time step [s]
-    model : of the line
-    factors : of its step operator, whose middle may be moved
-    contacts : (n,) where they are [m]; kept by reference
-    reach : how far a step reaches [m]
+    model : model of the line
+    factors : factors of its step operator; the place where elimination ends may move
+    contacts : (n,) places of the contacts [m]; kept by reference
+    reach : distance that a force moves the line within a step [m]
     links : (m, k) unknowns of each link, in the order along the track
-    moving_links : (2,) int, filled with the first that may switch and the one after the last
+    moving_links : (2,) int, filled with the first link that may switch and the one after the last
     known : accelerations that the motion keeps besides x, y and z, or none
     operators : of a line in pieces, None if it is whole
     """

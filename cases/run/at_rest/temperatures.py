@@ -110,7 +110,9 @@ def range_of(text: str) -> list[float]:
 
 
 def temperatures(scene: Scene, differences: Sequence[float], picture: Path | None) -> str:
-    """The table over temperatures; the picture is drawn into a new file. Not collective.
+    """The table of a line over temperatures. Not collective.
+
+    ``differences`` are those from the installation [K]; ``picture`` is a new file, or None.
 
     Raises
     ------

@@ -77,11 +77,11 @@ class Arrivals(NamedTuple):
     Attributes
     ----------
     run_in, run_in_spans : distance from the start to the evaluated stretch [m], in spans [-]
-    start_share : estimate of what the start leaves in the force history, in standard deviations
-    far_end : the first wave from the far end, None if none comes before the end of the run
-    near_end : the first wave from the near end, None likewise
-    far_share : share of the amplitude that the least damped wave from the far end has kept where
-        the stretch ends [-]
+    start_share : rms of the start's remainder in the force history over the standard deviation,
+        estimated [-]
+    far_end, near_end : first wave from either end of the line, None if none arrives within the run
+    far_share : remaining amplitude of the least damped wave from the far end at the end of the
+        stretch, over its first one [-]
     """
 
     run_in: float
@@ -143,8 +143,11 @@ def far_share(line: WaveLine, course: Course) -> float:
 
 
 def start_share(line: WaveLine, speed: float, run_in: float) -> float:
-    """Estimate of what the start leaves in the force history after ``run_in`` [m]: rms over the
-    standard deviation, 1 at most [-]."""
+    """Estimated rms of the start's remainder in the force history, over its standard deviation [-].
+
+    At most 1. ``speed`` is the train's [m/s], ``run_in`` the distance from the start to the
+    evaluated stretch [m].
+    """
     if run_in <= 0.0:
         return 1.0
     return min(1.0, START_SHARE * line.span / run_in * math.exp(-line.decay * run_in / speed))
@@ -164,8 +167,8 @@ def run_in_for(line: WaveLine, speed: float) -> float:
 
 
 def end_for(line: WaveLine, course: Course) -> float:
-    """Least place of the line's end for no reflected wave to be felt in the stretch [m]: none is
-    met, or those that are have faded."""
+    """Least place of the line's end without a perceptible reflection in the stretch [m]: waves meet
+    the pantograph later, or have decayed."""
     time = (course.stretch[1] - course.start) / course.speed
     unmet = 0.5 * ((line.speed + course.speed) * time + course.leader + course.start)
     if line.decay == 0.0:

@@ -175,10 +175,10 @@ def run_size(needs: Needs) -> RunSize:
 
 
 def total_size(runs: Iterable[Kept], n_at_once: int = 1) -> RunSize:
-    """Size of several runs, of which so many are made at the same time. Not collective.
+    """Size of several runs, ``n_at_once`` of which are made at the same time. Not collective.
 
-    Result files that do not stay take the room of so many of the largest ones. Runs whose scenes
-    bring their own mesh, which is not read here, are not counted.
+    Of result files that are deleted after their run the ``n_at_once`` largest count. Runs whose
+    scenes bring their own mesh, which is not read here, do not count.
     """
     left = seconds = 0.0
     n_steps = 0
@@ -217,11 +217,17 @@ def _substeps(problem: Problem) -> int:
 
 
 def flush_cadence(problem: Problem, n_dofs: int, recording: Recording) -> int:
-    """Steps between two flushes: about 0.2 s of wall time at full speed, and what fits into memory.
+    """Steps between two flushes of the result file: about 0.2 s of wall time on one rank.
 
-    Not so few that the file is made of small chunks, and whole chunks of them. The same on any
-    number of ranks, so that their files are. Where a window moves the state of the whole line is
-    written so rarely that this does not count.
+    At most the steps that fit into memory, and a whole number of chunks that are not small. With a
+    window steps are cheap and the interval is longer, so that writing the state of the whole line
+    takes a small share of the time. Files do not depend on the number of ranks.
+
+    Parameters
+    ----------
+    problem : the problem of the run
+    n_dofs : number of unknowns of the whole line
+    recording : recorded places and cadence
     """
     n_moving = round(n_dofs * moving_share(problem))
     step = estimate_march(n_moving, 1, problem.numerics.scheme, _substeps(problem))

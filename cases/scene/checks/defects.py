@@ -130,7 +130,10 @@ def dropper_faults(
     dropper: int,
     parts: tuple[str, str] = (".span", ".dropper"),
 ) -> Iterator[Fault]:
-    """The number of a span, or of a dropper in it, that the line does not have."""
+    """The fault of a number of a span, or of a dropper in it, that the line does not have.
+
+    ``span`` and ``dropper`` count from 1; ``parts`` complete ``key`` to the key of each.
+    """
     if span > line.n_spans:
         yield scene.refused(key + parts[0], f"the line has {counted(line.n_spans, 'span')}")
         return

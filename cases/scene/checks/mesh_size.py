@@ -30,8 +30,10 @@ MANY_NODES = 50_000
 
 
 class Size(NamedTuple):
-    """Number of spans, droppers, nodes of all wires, and unknowns of a line, how many kinds of
-    spans there are, and whether matrices are made of what a window of spans needs alone."""
+    """Size of a line: numbers of spans, droppers, nodes of wires, unknowns, and different spans.
+
+    ``by_pieces`` is whether matrices are made for the spans near a window alone.
+    """
 
     spans: int
     droppers: int

@@ -19,7 +19,7 @@ _LONGEST_TAG = 60
 
 
 def refusal(origin: Origin, key: str, value: object, why: str) -> Fault:
-    """The fault that says what a key is, where it was written, and why it cannot be."""
+    """The fault of a key with its value, the place where it was written, and the reason ``why``."""
     unit = unit_of(key)
     number = f"{value:g}" if isinstance(value, float) else shown(value)
     in_unit = f" {unit}" if unit else ""
@@ -27,7 +27,7 @@ def refusal(origin: Origin, key: str, value: object, why: str) -> Fault:
 
 
 def unknown_key(key: str, where: str, known: Sequence[str]) -> str:
-    """The sentence for an unknown key."""
+    """The sentence for an unknown key, written at ``where``, with the nearest of the ``known``."""
     near = nearest(key, known)
     if key.startswith("petsc."):
         hint = f"; did you mean {near}?" if near and near.startswith("petsc.") else ""

@@ -247,7 +247,7 @@ def _courses(
 def free_links(
     line: LineTable, origin: Origin, spans: tuple[float, ...], wires: tuple[FreeWire, ...] | None
 ) -> tuple[FreeLink, ...] | None:
-    """The links of a free line, None of another one.
+    """The links of a free line with span lengths ``spans`` [m] and ``wires``; None for other lines.
 
     Raises
     ------

@@ -75,7 +75,7 @@ Incident = Annotated[
 def line_incidents(
     tables: Sequence[IncidentTable], line: Line, dt: float
 ) -> tuple[LineIncident, ...]:
-    """Incidents of a line; times [s] at ends of steps of ``dt`` [s]."""
+    """Incidents of ``line`` from a scene's ``tables``, each at the end of a step of ``dt`` [s]."""
     found: list[LineIncident] = []
     for table in tables:
         time = at_step(table.at_s, dt)

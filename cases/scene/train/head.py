@@ -169,6 +169,10 @@ def strips_of(table: StripsTable, spring: float = 0.0, damper: float = 0.0) -> S
 
 
 def turning_of(inertia: float, distance: float, spring: float, damper: float) -> Turning:
-    """A head on two halves of its spring and damper at a distance [m] from each other."""
+    """Roll of a head whose spring and damper act in two halves at a lateral ``distance`` [m].
+
+    ``inertia`` about the roll axis [kg m2], ``spring`` [N/m] and ``damper`` [N s/m] of both halves
+    together.
+    """
     square = (0.5 * distance) ** 2
     return Turning(inertia, spring * square, damper * square)

@@ -48,7 +48,7 @@ def turned(data: MultibodyData) -> MultibodyData:
 
 
 def multibody_of(name: str, table: MultibodyTable, speed_km_h: float) -> MultibodyData:
-    """A multibody pantograph; forces of the wind are those at this speed."""
+    """A multibody pantograph; aerodynamic forces are those at the train speed [km/h]."""
     table = table.in_force()
     bodies = tuple(
         Body(body, b.mass_kg, tuple(b.inertia_kg_m2), tuple(b.position_m), tuple(b.turn))

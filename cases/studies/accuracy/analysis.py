@@ -16,8 +16,8 @@ from catenary.base.errors import InputError
 
 
 class Quantity(NamedTuple):
-    """A figure whose error is measured: its key in a summary, its unit, and the figure of the
-    reference that makes 100 %."""
+    """A figure whose error is measured: its key in a summary, its unit, and the key of the figure
+    of the reference that percentages refer to."""
 
     key: str
     unit: str
@@ -61,18 +61,18 @@ class Row:
     Attributes
     ----------
     axis, level : names
-    outcome : "done", or what broke or is not possible
+    outcome : "done", or the reason why there is no result
     sizes : refined sizes by name
-    errors : quantity -> difference from the reference in its unit, of the pantograph where it is
-        largest, signed (``HISTORY``: rms)
-    percent : quantity -> its magnitude in percent of the reference's scale
+    errors : quantity -> difference from the reference in its unit, signed (``HISTORY``: rms), of
+        the pantograph with the largest one
+    percent : quantity -> magnitude of the error in percent of the reference's scale
     cost : processor time of the march per simulated second, the least of all timings [s/s]
-    timings : how many runs that is the least of
+    timings : number of timings
     estimate : the run's own estimate of the error of the history [N]
-    iterations : rounds a step takes: of its small problem, or corrections (whole solves)
-    by_step, by_mesh : quantity -> error of the step alone and of the mesh alone in percent, where
-        both are refined: they may cancel in ``percent``
-    remarks : sentences about what decides the run's results
+    iterations : mean rounds in a step: of its small problem, or corrections (whole solves)
+    by_step, by_mesh : quantity -> errors of the step alone and of the mesh alone in percent, if the
+        axis refines both; they may cancel in ``percent``
+    remarks : sentences on what decides the run's results
     """
 
     axis: str
@@ -103,9 +103,9 @@ class Row:
 def compare(
     found: Found, reference: Found, scale_of: Found | None = None
 ) -> tuple[dict[str, float], dict[str, float]]:
-    """Errors in units and in percent, see ``Row``; what either run does not have is left out.
+    """Errors of ``found`` in units and in percent, see ``Row``; only of figures of both runs.
 
-    ``scale_of`` is the run whose figures make 100 %, the reference if it is not given.
+    ``scale_of`` is the run whose figures percentages refer to, the reference if it is not given.
     """
     errors: dict[str, float] = {}
     percent: dict[str, float] = {}
@@ -147,11 +147,11 @@ def uncertainties(
 ) -> dict[str, float]:
     """Uncertainty of a reference itself, by quantity [%]; infinite if it is not known.
 
-    Each of ``chains`` holds three runs, of which each has half the fineness of the one before it in
-    one size. With d and D, by what the first two and the last two differ, the observed order is
-    p = log2(D / d), and the error of the first 1.25 d / (2^p - 1), of which the sizes' sum is
-    taken. Orders above 2, that of all schemes, are not trusted; where differences do not shrink,
-    three times the larger one stands for the error.
+    Each of ``chains`` holds three runs; each run is twice as coarse in one size as the one before.
+    With the differences d of the first two runs and D of the last two, the observed order is
+    p = log2(D / d) and the error of the first run 1.25 d / (2^p - 1). Errors of all sizes are
+    added. The order is taken as 2 at most, that of all schemes; if it is below 1/2, the error is
+    three times the larger difference.
 
     Source: P. J. Roache, J. Fluids Eng. 116 (1994) 405-413, the grid convergence index.
     """
@@ -170,10 +170,10 @@ _SAFETY, _HIGHEST_ORDER, _LOWEST_ORDER, _WITHOUT_ORDER = 1.25, 2.0, 0.5, 3.0
 
 
 def extrapolated_error(near: float, far: float) -> float:
-    """Error of the finest of three runs, by Richardson's extrapolation.
+    """Error of the finest of three runs, by Richardson's extrapolation, in the unit of ``near``.
 
     ``near`` is the difference of the finest and the middle run, ``far`` that of the middle and the
-    coarsest, both of one unit, which is the error's as well.
+    coarsest.
     """
     if near == 0.0 or math.isinf(near) or math.isinf(far):
         return near
@@ -225,12 +225,11 @@ def pareto(rows: Sequence[Row]) -> list[Row]:
 
 
 def cheapest(rows: Sequence[Row], quantity: str, target: float) -> Row | None:
-    """The cheapest row with an error of a ``quantity`` within ``target`` [%] that is not there by
-    chance; None if none is.
+    """The cheapest row whose error of ``quantity`` is reliably within ``target`` [%], or None.
 
-    Errors of statistics change their sign as settings grow finer, and are small where they do;
-    those of step and mesh may cancel. A row counts only if its errors of step and mesh alone are
-    within the target as well, and those of all rows that are at least as fine in every size.
+    An error may be small by chance: as settings are refined it may change its sign, and errors of
+    step and mesh may cancel. So the errors of step and mesh alone must be within the target, too,
+    and the errors of all rows that are at least as fine in every size.
     """
     known = [row for row in rows if row.done and quantity in row.percent and row.cost > 0.0]
 

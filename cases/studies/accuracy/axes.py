@@ -61,19 +61,19 @@ class Reference:
 
 @dataclass(frozen=True)
 class Axis:
-    """One thing that is varied.
+    """A setting, or several together, that a study varies.
 
     Attributes
     ----------
     name, title : for the option ``--axes`` and for headings
     kind : ``DISCRETISATION`` or ``MODEL``
-    levels : the levels for a scene, quick ones only on request; none where it has nothing to vary
-    reference : for a scene, the reference of a discretisation axis; None for models, which are
-        compared with the scene as it is
-    refined : which of the levels' sizes an observed order belongs to, "" if none
-    step_alone : for a level of step and mesh, the one with its mesh and the reference's step: what
-        the two differ by is the error of the step, what is left that of the mesh; None if the axis
-        does not refine both
+    levels : returns the levels for a scene; empty if the scene has nothing to vary
+    reference : returns the reference of a discretisation axis; None for models, which are compared
+        with the unchanged scene
+    refined : the size of the levels to which an observed order belongs, "" if none
+    step_alone : returns the level with the same mesh and the reference's step. The difference of
+        the two is the error of the step, the remainder that of the mesh; None if the axis does not
+        refine both
     """
 
     name: str

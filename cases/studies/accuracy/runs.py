@@ -35,10 +35,16 @@ AS_IT_IS = Level("as_it_is", ())
 
 @dataclass(frozen=True)
 class PlannedAxis:
-    """An axis with its levels, the name of each one's run, and why others are not possible.
+    """An axis with its levels and their runs.
 
-    ``runs`` and ``refused`` are by level name; ``reference`` and ``chains`` are names of runs, the
-    latter none for models. ``step_alone`` are names of runs by level name, see ``Axis``.
+    Attributes
+    ----------
+    axis, levels : the axis and its levels
+    runs : name of the run of each possible level, by the level's name
+    refused : reason why a level is not possible, by the level's name
+    reference : name of the run that levels are compared with
+    chains : names of the runs of each chain, see ``Reference``; empty for models
+    step_alone : name of the run with the reference's step, by the level's name, see ``Axis``
     """
 
     axis: Axis
@@ -52,9 +58,18 @@ class PlannedAxis:
 
 @dataclass(frozen=True)
 class Plan:
-    """Plan of a study: the case's name, axes, jobs, how often short runs are timed, and
-    whether levels are those of the short form; ``overrides`` are those of the command line,
-    ``asked`` the axes, of which some may have nothing to vary."""
+    """Plan of a study.
+
+    Attributes
+    ----------
+    case : name of the case
+    axes : axes with something to vary
+    jobs : all runs
+    repeats : number of timings of a short run
+    quick : whether levels are those of the short form
+    overrides : assignments of the command line, for all runs
+    asked : names of the requested axes, some of which may have nothing to vary
+    """
 
     case: str
     axes: Sequence[PlannedAxis]
@@ -212,11 +227,11 @@ def run(
     comm: Any,
     options: RunOptions = AS_USUAL,
 ) -> tuple[Measured, list[Ended]]:
-    """Run what is not done yet; returns what was found and all runs. Collective.
+    """Run what is not done yet; returns the measurements and all runs. Collective.
 
-    Repeats go through all settings before any is timed again, so that a disturbance does not
-    fall on a single one. They are made one at a time also where first runs are made several at a
-    time, whose times then count for long runs alone.
+    Each repetition times all settings in turn, so that a disturbance does not fall on a single one.
+    Repetitions run one at a time. If first runs are made several at a time, their times count for
+    long runs alone.
 
     Raises
     ------

@@ -115,8 +115,10 @@ def beside(march: RepeatedMarch, other: RepeatedMarch, rounds: int) -> Beside:
 
 
 def in_turns(marches: Mapping[str, RepeatedMarch], rounds: int) -> dict[str, float]:
-    """Least time of a step of each of several marches [us], which take turns in each of so many
-    ``rounds``. Collective."""
+    """Least time of a step of each of several marches, by name [us]. Collective.
+
+    In each of ``rounds`` rounds the marches take turns.
+    """
     least = dict.fromkeys(marches, np.inf)
     for _ in range(rounds):
         for name, march in marches.items():

@@ -42,8 +42,9 @@ class LineBalance:
     makes at most (1 - gamma)^2 k (h e')^2 / 2; one that tightens makes nothing. The same holds for
     an uplift stop that opens or closes.
 
-    **What a dropper does across it** goes with it where it slackens: (N / l) q^2 / 2 comes and goes
-    at once. The balance takes what it leaves as a load on a line that keeps it: `across`.
+    **The transverse stiffness of a dropper**, N / l, vanishes when it slackens: its energy
+    (N / l) q^2 / 2 comes and goes at once. The balance treats the missing force as a load on a line
+    that keeps this stiffness: `across`.
 
     Integrators other than Newmark's are balanced like average acceleration. After incidents the
     terms are those of the line as it was.

@@ -112,7 +112,8 @@ class HardCase(Table):
         return self
 
     def scene(self, short: bool = False, halvings: int = 0, fixed_point: bool = False) -> Scene:
-        """Its scene with the step halved so often, or by the paper's correction."""
+        """Its scene, in the ``short`` form, with the step halved ``halvings`` times, or with the
+        paper's ``fixed_point`` correction."""
         table = collection()
         words = [*table.common, *self.set, *(self.short if short else [])]
         words += _CORRECTION if fixed_point else ()

@@ -45,16 +45,19 @@ class RunHistories:
     Attributes
     ----------
     outcome : "done", or the sentence of what broke
-    time : (n,) [s]; position, force, height, wire : (n, n_pantographs) [m], [N], [m], [m]
-    on_wires : (n, n_pantographs n_wires) force on each contact wire [N]; no columns if there is one
-    taut : (n, n_droppers) whether a dropper carries anything; only on one rank
-    energy : (n,) of the line [J]; work : (n,) of the contact forces and gusts on it since the start
-        [J]; both empty without ``with_work``
-    terms : (n,) what numerical damping, and slack droppers across them, add to the energy in the
-        balance [J], see `LineBalance`; empty like these
-    one_switch : the most that one dropper may have made in one switch [J], see `LineBalance`
-    counters : of the scheme
-    kept : by step, dropper forces [N] and the line's displacement as incidents found them
+    time : (n,) [s]
+    position, force, height, wire : (n, n_pantographs) place of the contact [m], contact force [N],
+        heights of head and wire [m]
+    on_wires : (n, n_pantographs n_wires) force on each contact wire [N]; no columns with one wire
+    stops : (n, n_stops) whether a stop is closed
+    taut : (n, n_droppers) whether a dropper carries a force; only on one rank
+    energy : (n,) energy of the line [J]; empty without ``with_work``
+    work : (n,) work of contact forces and gusts on the line since the start [J]; empty likewise
+    terms : (n,) terms of numerical damping and of slack droppers' transverse stiffness that the
+        balance adds to the energy [J], see `LineBalance`; empty likewise
+    one_switch : largest energy that one dropper may have made in one switch [J], see `LineBalance`
+    counters : counters of the scheme
+    kept : by step, dropper forces [N] and the line's displacement right before an incident
     remarks : sentences of a run's own watch, see `RunWatch`; none without one
     """
 
@@ -76,10 +79,10 @@ class RunHistories:
     remarks: list[str] = field(default_factory=list)
 
     def energy_gain(self, besides: Collection[int] = ()) -> float:
-        """The most that energy less work rises above its least value before, of the largest energy.
+        """Largest rise of energy less work above an earlier value, over the largest energy [-].
 
         Damping only lowers it; any rise is spurious. After incidents the energy, which counts from
-        the first rest, may be negative. What the steps from ``besides`` change is left out.
+        the first rest, may be negative. Changes in the steps from ``besides`` are left out.
         """
         balance = self.energy - self.work
         if self.terms.size:

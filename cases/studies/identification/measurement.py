@@ -175,8 +175,9 @@ class Measurement:
         return np.asarray(values[self._kept])
 
     def of_march(self, position: np.ndarray, values: np.ndarray, dt: float) -> np.ndarray:
-        """Sample a march's values (n_steps, ...) at positions (n_steps,) [m], ``dt`` [s] apart, as
-        the file's: filtered, and at the places of the samples.
+        """Values of a march, filtered and sampled at the places of the measured samples.
+
+        ``values`` (n_steps, ...) are at ascending ``position`` (n_steps,) [m], ``dt`` [s] apart.
 
         Raises
         ------

@@ -74,8 +74,8 @@ class Measured(Table):
 
     Attributes
     ----------
-    place, time : which of the two columns there is; place is start + speed time
-    force, head_height : at least one of them
+    place, time : column of places, or of times, one of them; place is start + speed time
+    force, head_height : columns of the signals, at least one of them
     pantograph : number of the pantograph on the train, from 1
     filter_Hz : bandwidth of force and height, the cut-off of the filter of EN 50317
     is_filtered : whether the values in the file have passed this filter, and noise is theirs;

@@ -41,10 +41,11 @@ class Row(NamedTuple):
 
     Attributes
     ----------
-    check, scene, direction, pantograph : where
-    searched : whether the search has seen the direction
-    shipped, optimum : statistics by name, those that the run gives
-    outcome : "done", or why a run has no figures
+    check, scene, direction, pantograph : their names
+    searched : whether the search included the direction
+    shipped, optimum : statistics of both designs, by name
+    failed : acceptance criteria that fail at the optimum alone
+    outcome : "done", or the reason why a run has no figures
     """
 
     check: str

@@ -227,12 +227,11 @@ class Problem:
         return [speeds is None or member.speed in speeds for member in self.scenes.members]
 
     def natural_steps(self, spread: float) -> np.ndarray:
-        """Changes, (n, n), a column each, of which random sums leave droppers taut.
+        """Columns (n, n), whose sums with standard normal factors are changes with taut droppers.
 
-        The shares by which a sum with standard normal factors scatters are at most ``spread`` of
-        the width of bounds, and forces of droppers at rest scatter by half of what they are above
-        the least one. Alone a sag that moves by some millimetres makes neighbours slack. Makes no
-        runs.
+        The standard deviations of the changes are at most ``spread`` times the width of the
+        bounds, those of dropper forces at rest at most half of their margin above the least one.
+        A change of a single sag by some millimetres would make neighbours slack. Makes no runs.
         """
         own = self.variables
         width = own.high - own.low

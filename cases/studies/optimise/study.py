@@ -60,9 +60,9 @@ class Optimum:
     Attributes
     ----------
     method : "gradient" or "cma"
-    shipped, found : the case as it is and the best point, rounded as far as that is allowed
-    values : the scene's keys at the optimum
-    is_rounded : whether its changes are whole multiples of what the task asks for
+    shipped, found : the unchanged case and the best point, rounded if a rounded point is allowed
+    values : values of the scene's keys at the optimum
+    is_rounded : whether its changes are whole multiples of the task's units
     n_runs : runs of the search
     history : all points of the search
     rows : figures under all checks
@@ -216,8 +216,8 @@ def _by(method: str, plan: Plan, evaluation: Evaluation, say: Callable[[str], No
 
 
 def _rounded(problem: Problem, best: Point) -> Point:
-    """The best point in whole units: where these leave what is allowed, a little nearer to the case
-    as shipped; as it is if none is allowed."""
+    """The best point in whole units, moved towards the case as shipped if it violates constraints
+    more than the best point; the best point itself if no such point is found."""
     for share in _SHARES:
         point = problem.points([problem.variables.rounded(share * best.change)])[0]
         if point.violation <= best.violation:

@@ -316,8 +316,8 @@ def _numbers(raw: Any, prefix: str = "") -> Iterator[str]:
 def parameters_of(
     scenes: ChangedScenes, keys: Sequence[str], with_droppers: bool = False
 ) -> list[Parameter]:
-    """The parameters of some keys, and lengths of evaluated droppers if they are wanted; the usual
-    ones if neither is.
+    """The parameters of ``keys``, and with ``with_droppers`` the lengths of all evaluated droppers;
+    the usual parameters without either.
 
     Raises
     ------

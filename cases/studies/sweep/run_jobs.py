@@ -66,23 +66,24 @@ def run_jobs(
 ) -> list[Ended]:
     """Run what is not done yet, each job in ``out_dir/<name>``. Collective.
 
-    An interruption leaves out those that it ended and those that had not begun; a last entry says
-    so.
+    After an interruption the list lacks the jobs that it ended and those that had not begun; its
+    last entry is the interruption.
 
     Parameters
     ----------
     jobs : the same on all ranks
-    measure : takes figures from each result file, on rank 0; to be pickled if ``options.n_jobs``
-        is not 1
+    out_dir : folder of all runs
+    measure : takes figures from each result file, on rank 0; it can be pickled if
+        ``options.n_jobs`` is not 1
 
     Raises
     ------
     InputError
-        If ``out_dir`` cannot be written to, or if it or a job's folder holds other results and
-        ``options.force`` is not given, or if there is no room for all runs, or if so many runs at a
-        time and so many ranks do not fit together; nothing is run then.
+        If ``out_dir`` cannot be written to, if it or a job's folder holds other results and
+        ``options.force`` is not given, if the disk has no room for all runs, or if
+        ``options.n_jobs`` does not suit the number of ranks; nothing is run then.
     RunBroken
-        If a record of what is done cannot be written.
+        If the record of a finished run cannot be written.
     """
     n_at_once = at_once(options.n_jobs, comm)
     earlier = on_root(comm, lambda: _earlier(jobs, out_dir, options.force, measure is not None))

@@ -48,8 +48,10 @@ class WholeRuns(NamedTuple):
     def run(
         self, out: Path, comm: Any, options: RunOptions, part: Part | None = None
     ) -> list[Ended]:
-        """Run what is not done yet, and say how the variants ended; those of a ``part`` alone, if
-        it is given, without the refused ones. Collective."""
+        """Run what is not done yet; returns how all variants ended, in their order. Collective.
+
+        With a ``part`` only its variants are run and returned, without the refused ones.
+        """
         from catenary.cases.studies.sweep.run_jobs import run_jobs
 
         if part is not None:
@@ -166,10 +168,10 @@ def run_sweep(
 
 
 def run_part(sweep: Sweep, part: Part, out: Path, comm: Any, options: RunOptions) -> list[Ended]:
-    """Run a part of a sweep, as a task of a job array; how its variants ended. Collective.
+    """Run a part of a sweep, as a task of a job array; returns how its variants ended. Collective.
 
-    The part has a table of its own in a folder of its own, for ``catenary merge``. Where parts
-    share ``out`` the whole sweep, once all are done, writes that of all.
+    The part writes a table to a folder of its own, for ``catenary merge``. If parts share ``out``,
+    the sweep run there after all of them writes the table of all variants.
     """
     from catenary.base.parallel import on_root
     from catenary.cases.studies.sweep import output
@@ -181,7 +183,7 @@ def run_part(sweep: Sweep, part: Part, out: Path, comm: Any, options: RunOptions
 
 
 def refuse_other_sweep(out: Path, variants: Sequence[Variant], force: bool) -> None:
-    """Refuse to replace the table of a sweep that had variants which this one has not."""
+    """Raise InputError if ``out`` has a table of a sweep with other variants, unless ``force``."""
     refuse_impossible(out)
     path = out / "sweep.json"
     if force or not path.is_file():

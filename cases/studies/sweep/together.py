@@ -65,15 +65,17 @@ class Ensemble(NamedTuple):
     def run(
         self, out: Path | None, comm: Any, options: RunOptions, part: Part | None = None
     ) -> list[Ended]:
-        """March what is not done yet, and say how variants ended, in their order. Collective.
+        """March what is not done yet; returns how variants ended, in their order. Collective.
 
-        An interruption ends the list early; its last entry says so. A variant that cannot be run,
-        or breaks, stops no other.
+        An interruption ends the list early and is its last entry. A variant that cannot be run, or
+        breaks, stops no other.
 
         Parameters
         ----------
         out : folder in which pieces of work are kept, None to keep none
-        part : of the pieces of work, all if None
+        comm : mpi4py communicator
+        options : options of the runs
+        part : part of the pieces of work, None for all
         """
         size = max(_LEAST, min(_MOST, -(-len(self.variants) // _PIECES)))
         pieces = pieces_of_work(self.variants, size)
@@ -118,13 +120,14 @@ class Ensemble(NamedTuple):
 def ensemble_of(
     draft: Draft, variants: Sequence[Variant], histories: Sequence[str] = ()
 ) -> Ensemble:
-    """An ensemble of which one variant at least can be run; others are looked at when it is their
-    turn. Not collective.
+    """An ensemble of ``variants`` that keeps ``histories``, by name. Not collective.
+
+    At least one variant can be run; those after the first such are checked at their turn.
 
     Raises
     ------
     InputError
-        If no variant can be run, or if a value of one that comes before the first such is out of
+        If no variant can be run, or if a value of a variant before the first possible one is out of
         bounds.
     """
     refused: CatenaryError | None = None

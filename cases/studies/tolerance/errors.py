@@ -35,10 +35,11 @@ class Group:
 
     Attributes
     ----------
-    table : as the task has them
-    names : of each error, n of them
-    near : which of them are near the evaluated stretch, shape (n,)
-    unit : of errors and tolerances
+    table : the errors as the task describes them
+    names : names of the n errors
+    near : (n,) bool, whether each is near the evaluated stretch
+    unit : unit of errors and tolerances
+    places : place of each error, as the scene's key takes it
     given : the scene's own value of the key that the errors are written to
     """
 

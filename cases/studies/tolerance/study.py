@@ -98,18 +98,19 @@ class Tolerance:
 
     Attributes
     ----------
-    criterion, error, unit : which; ``EACH`` is all criteria at once that the line keeps without
-        errors
-    level : largest tolerance at which enough samples keep the criterion, in the error's unit, or
-        of all together in tolerances of the task; 0 if the line without errors does not keep it
-    most : greatest tolerance that was looked at
-    kept, n_samples : samples that keep it at that level, of how many
+    criterion, error, unit : names of both, and unit of the error; ``EACH`` stands for all criteria
+        together that the line keeps without errors
+    level : largest tolerance at which enough samples keep the criterion, in the error's unit, or,
+        of all errors together, in multiples of the task's tolerances; 0 if the line without errors
+        does not keep it
+    most : largest tolerance examined
+    kept, n_samples : number of samples that keep the criterion at that level, and of all samples
     least_share : lower bound of the share of all lines that keep it there (C. Clopper, E. Pearson,
         Biometrika 26, 1934)
-    linear : tolerance in the worst case by slopes, infinite without slopes; None if not asked for
-    checked : largest tolerance at which the line with that worst case keeps the criterion
-    lost_at : least tolerance at which a line that was run, of the samples or of the worst case, is
-        known to lose it, below which the true worst case lies; None if none does
+    linear : worst-case tolerance by slopes, infinite without slopes; None if not requested
+    checked : largest tolerance at which the line of that worst case keeps the criterion
+    lost_at : least tolerance at which a line that was run, of the samples or of the worst case,
+        loses it: an upper bound of the true worst-case tolerance; None if no line loses it
     """
 
     criterion: str

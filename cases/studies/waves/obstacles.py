@@ -68,8 +68,8 @@ class Measured(NamedTuple):
     Attributes
     ----------
     back, onward : (f, n, n) complex; onward is zero beyond an end
-    omega : (f,) the angular frequencies that the line's matrices see: a step of average
-        acceleration takes w for (2 / dt) tan(w dt / 2) [1/s]
+    omega : (f,) angular frequencies of the discrete motion, (2 / dt) tan(w dt / 2) for the angular
+        frequency w and steps of average acceleration [1/s]
     """
 
     back: np.ndarray
@@ -78,16 +78,17 @@ class Measured(NamedTuple):
 
 
 def measured(bench: Bench, problem: Problem, frequency: np.ndarray) -> Measured:
-    """Run a pulse on each wire of a bench and measure what comes back and goes on. Serial.
+    """Run a pulse on each wire of a bench and measure reflected and transmitted waves. Serial.
 
-    The pulse is measured before the obstacle as it comes and as it returns, and beyond it as it
-    goes on, on each of the wires; windows in time keep them apart. There is no damping, and
-    droppers pull and push: theory has neither.
+    On each wire the incoming and the reflected pulse are measured before the obstacle, the
+    transmitted one beyond it; windows in time separate them. As in the theory there is no damping,
+    and droppers pull and push.
 
     Parameters
     ----------
-    problem : whose effects say which masses and springs the obstacle has
-    frequency : (f,) positive [Hz]
+    bench : wires and obstacle
+    problem : problem whose effects give masses and springs of the obstacle
+    frequency : (f,) > 0 [Hz]
     """
     model = _model(bench, problem)
     n, f = len(bench.wires), frequency.size
@@ -239,9 +240,11 @@ class Result(NamedTuple):
 
     Attributes
     ----------
-    wires : names
-    back, onward : (2, f, n, n) complex, measured and by theory: on the wire of the row, of a unit
-        wave on that of the column
+    name : name of the obstacle
+    wires : names of the wires
+    frequency : (f,) [Hz]
+    back, onward : (2, f, n, n) complex amplitudes, measured and by theory, on the wire of the row,
+        by a unit wave on that of the column
     """
 
     name: str

@@ -118,7 +118,7 @@ def study_excited(
     Raises
     ------
     InputError
-        If something asked for is impossible, or the folder holds something.
+        If a setting is impossible, or the folder is not empty.
     RunBroken
         If the march breaks.
     """
@@ -220,8 +220,10 @@ def _write(
 
 
 def energy_rows(energy: EnergySeen, seen: WavesSeen) -> list[Row]:
-    """Energy over time [J]: behind, between and ahead of what moves, or of the place of a blow,
-    which ``seen`` has."""
+    """Energy of the line over time [J]: behind, between and ahead of the moving sources.
+
+    ``seen`` has the places of the pantographs or of a moving force, or the place of a blow.
+    """
     behind, between, ahead = energy.parts(places_of(seen, energy.time))
     columns = energy.time, behind, between, ahead, behind + between + ahead
     names = ("time_s", "behind_J", "between_J", "ahead_J", "total_J")

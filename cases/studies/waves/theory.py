@@ -175,7 +175,7 @@ def reflection_rows(found: list[EndReflection], speed: float) -> list[dict[str, 
 
 
 def curve_rows(found: list[EndReflection]) -> list[dict[str, Any]]:
-    """Every wave that comes to an end, with what comes back."""
+    """Every wave that travels to an end, with its reflection."""
     return [
         {"end": side, "frequency_Hz": float(f), "group_velocity_m_per_s": float(v), "reflected": r}
         for side, end in zip(SIDES, found, strict=False)
@@ -189,7 +189,7 @@ def curve_rows(found: list[EndReflection]) -> list[dict[str, Any]]:
 def draw_reflections(
     found: list[EndReflection], ends: tuple[EndCondition, EndCondition], speed: float
 ) -> Figure:
-    """Reflection over frequency, waves that outrun the train filled."""
+    """Reflection by both ends over frequency; waves faster than ``speed`` [m/s] are filled."""
     figure = figures.new_figure(4.2)
     axes = figure.add_subplot()
     for number, (side, end, kind) in enumerate(zip(SIDES, found, ends, strict=False)):

@@ -43,10 +43,10 @@ class Error(NamedTuple):
 
     Attributes
     ----------
-    ahead, behind : spans
-    history : rms difference of the force from that of the whole line [% of its sigma]
-    sigma : difference of the standard deviation, with its sign [%]
-    estimated : of ``history`` by the program [%]
+    ahead, behind : spans of the window ahead of and behind the train
+    history : rms difference of the force from that on the whole line [% of its standard deviation]
+    sigma : relative difference of the standard deviation, signed [%]
+    estimated : the program's estimate of ``history`` [%]
     is_default : whether the program chooses this window
     remarks : sentences of the march in this window
     """
@@ -68,7 +68,7 @@ class Error(NamedTuple):
 class Curve(NamedTuple):
     """Errors by ascending size, of a line called ``name``, empty if there is no other.
 
-    ``remarks`` are what the march of the whole line told of itself.
+    ``remarks`` are those of the march of the whole line.
     """
 
     name: str
@@ -180,7 +180,7 @@ def as_text(curves: Sequence[Curve]) -> str:
 
 
 def _forces(rest: LineAtRest, window: WindowChoice) -> tuple[list[np.ndarray], list[str]]:
-    """Filtered force (n,) of each pantograph in the stretch [N], and what the march told."""
+    """Filtered force (n,) of each pantograph in the stretch [N], and remarks of the march."""
     problem, seen = replace(rest.problem, window=window), Keeper()
     at_rest = rest._replace(problem=problem)
     watch = RunWatch(MPI.COMM_SELF, watch_inputs(at_rest), watch_cadence(problem.numerics.dt))

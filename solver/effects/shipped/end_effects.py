@@ -32,10 +32,10 @@ def layer_damping(x: np.ndarray, begin: float, end: float, damping: float) -> np
 
 
 def layer_blocks(model: Model, begin: float, end: float, damping: float) -> list[Block]:
-    """Blocks of damping that make a stretch of a model a layer, for all masses that it has so far.
+    """Damping blocks of an absorbing layer, for all masses that the model has so far.
 
-    Parameters are those of ``layer_damping``; an element takes the value at its middle. Not
-    collective.
+    ``begin`` and ``end`` [m] and ``damping`` [1/s] are those of ``layer_damping``; an element takes
+    the value at its middle. Not collective.
     """
     x = model.numbering.as_vector(model.mesh.points[:, :1])
     found = []

@@ -82,12 +82,12 @@ class FactorPieces:
         self.can_begin[[0, n]] = self.can_end[[0, n]] = True
 
     def make(self, piece: Piece, rows: StationRows) -> None:
-        """Work out those of a piece, of whose stretch the operator has ``rows``.
+        """Compute the factors of a piece from the ``rows`` of the operator in its stretch.
 
         Raises
         ------
         RunBroken
-            If they are not finite, or join what the layout does not.
+            If a factor is not finite or has entries outside of the layout.
         """
         stations, n = self._stations.part(piece.low, piece.high), rows.kinds.size
         whole = completed(rows, stations)
@@ -130,8 +130,8 @@ class WantedPieces(NamedTuple):
     Attributes
     ----------
     moving : length of the longest stretch that moves [m]
-    ahead : by how much that may shift before the next stretch is made [m]
-    around : stations that are needed beside it
+    ahead : distance that it may advance before the next piece is made [m]
+    around : number of stations that are needed on either side of it
     """
 
     moving: float
@@ -141,9 +141,10 @@ class WantedPieces(NamedTuple):
     def pieces_of(
         self, model: Model, coefficients: Coefficients, reach: float
     ) -> OperatorPieces | None:
-        """Operators of the line by pieces, None if they are as well made of all of it at once.
+        """Operators of the line by pieces; None if making them for the whole line costs no more.
 
-        Not collective. ``reach`` is that of a step [m].
+        ``coefficients`` are those of M, K and C in A, ``reach`` is that of a step [m]. Not
+        collective.
         """
         numbering = model.numbering
         if not (numbering.in_stations and wants_own_solver()):
@@ -189,8 +190,8 @@ class OperatorPieces:
         pieces.add(self._make)
 
     def product(self, of: Coefficients, damping: Coefficients | None) -> StationProduct:
-        """The product with a sum of M, K and C ``of`` these coefficients; it subtracts one with
-        that of ``damping``. Of pieces that are made after this."""
+        """The product with the sum of M, K and C with coefficients ``of``, less that with the sum
+        with coefficients ``damping``; filled for pieces that are made after this call."""
         layout = self.layout
         if damping is not None:
             joined = joined_by(self._model, damping)

@@ -27,17 +27,19 @@ class Layout:
     Parameters
     ----------
     widths : unknowns of a station in each plane, as they follow each other in vectors
-    own, beside : (b, b) bool, what is joined within a station, and between a station and those
-        beside it; all of each plane by default. Of factors the former is what elimination joins
+    own, beside : (b, b) bool, pattern of the block of a station, and of the blocks between
+        neighbours; full in each plane by default. For factors ``own`` is the pattern after
+        elimination
     damped : whether a product with K is one with C as well
     factors : whether of factors
-    station_types : places in a cross-section that stations of each type have; none if all have all
+    station_types : places in a cross-section that stations of each type have; empty if all stations
+        have all places
 
     Attributes
     ----------
     pitch : unknowns of a cross-section
-    whole, places, number : of one of its ``parts``: what it is a part of, which unknowns of that it
-        has, and of which station type it is
+    whole, places, number : for one of the ``parts`` of a layout: that layout, the places that the
+        part has of it, and its station type
     """
 
     whole: Layout | None = None

@@ -25,10 +25,10 @@ from catenary.solver.model.alike import kinds_of
 def layout_of(
     operator: np.ndarray, stiffness: np.ndarray, station_types: tuple[tuple[int, ...], ...] = ()
 ) -> Layout | None:
-    """Layout of a line by its blocks of A and K, see ``neighbours``, and by the types of its
-    stations if there are several.
+    """Layout of a line; None if a cross-section has more than ``MOST_UNKNOWNS`` unknowns.
 
-    None if there are more unknowns than kernels take.
+    ``operator`` and ``stiffness`` (3, n, b, b) are blocks of A and K, see ``neighbours``;
+    ``station_types`` are the places of each type in a cross-section, empty for a single type.
     """
     joined = (operator != 0).any(axis=(0, 1)) | (stiffness != 0).any(axis=(0, 1))
     widths = _planes(joined)
@@ -45,13 +45,13 @@ def of_pairs(size: int) -> np.ndarray:
 
 
 def with_damping(layout: Layout, damping: np.ndarray | None) -> Layout:
-    """Extend a layout to products with C, by its blocks."""
+    """Extend a layout to products with C, whose blocks are ``damping``, see ``neighbours``."""
     found = layout if damping is None else joining(layout, damping)
     return found.changed(damped=True)
 
 
 def joining(layout: Layout, blocks: np.ndarray) -> Layout:
-    """A layout for a matrix of these blocks, see ``neighbours``, too."""
+    """Extend a layout to a matrix with ``blocks`` (3, n, b, b), see ``neighbours``."""
     before, own, after = (blocks != 0).any(axis=1)
     return layout.changed(own=layout.own | own, beside=layout.beside | before | after)
 
@@ -67,11 +67,17 @@ def _planes(joined: np.ndarray) -> tuple[int, ...]:
 def kinds_by_type(
     layout: Layout, station_type: np.ndarray, pack: Callable[[Layout, Any], np.ndarray]
 ) -> tuple[np.ndarray, np.ndarray, int, int]:
-    """Kinds (n,) of stations, the numbers of all kinds in a row, how many kinds there are, and how
-    many numbers of all stations are not zero.
+    """Different rows of numbers of stations, each stored once.
 
-    ``pack`` returns the numbers of stations in the layout of their type, (n, m). A kind is the
-    place of its first number, int32.
+    ``station_type`` (n,) is the type of each station; ``pack(layout, stations)`` returns the
+    numbers (k, m) of stations of one type.
+
+    Returns
+    -------
+    kinds : (n,) int32, place of the first number of each station in ``numbers``
+    numbers : numbers of all kinds, one kind after another
+    n_kinds : number of kinds
+    count : number of non-zero numbers of all stations, before like ones are merged
     """
     begins, numbers = np.zeros(station_type.size, dtype=np.int32), [np.zeros(0)]
     end = n_kinds = count = 0
@@ -139,8 +145,8 @@ class StationProduct:
         self._products.multiply(0, self.kinds.size, factor, velocity, result)
 
     def multiply_rows(self, begin: int, end: int, factor: np.ndarray, result: np.ndarray) -> None:
-        """The rows from ``begin`` to ``end`` of that, where the layout is not damped; of others
-        ``result`` stays as it is."""
+        """Write the rows of the stations from ``begin`` to before ``end`` of K ``factor`` to
+        ``result``; other rows stay. Not for a damped layout."""
         self._products.multiply(begin, end, factor, factor, result)
 
 
@@ -153,9 +159,21 @@ def station_product(
 ) -> StationProduct | None:
     """Products with a matrix in sorted blocks, or with its rows by stations.
 
-    The first row is that of column ``first``; ``damping`` has kinds of the same stations. The
-    factor has a whole cross-section more at both ends than the matrix has ``columns``, which are
-    alike if not given. None if the matrix joins what the layout does not.
+    None if the matrix has entries outside of the layout.
+
+    Parameters
+    ----------
+    matrix : sparse.bsr_matrix or StationRows
+        Matrix whose rows are multiplied, one block for each station.
+    first : int
+        Station of the columns that the first row belongs to.
+    layout : Layout
+        Layout of the rows.
+    damping : sparse.bsr_matrix or StationRows, optional
+        C, with kinds of the same stations; its product is subtracted.
+    columns : Sections, optional
+        Stations of the columns, all of one type if not given. The operand has one more station at
+        both ends.
     """
     rows = rows_of(matrix, first, columns)
     damped = None if damping is None else rows_of(damping, first, columns)
@@ -176,9 +194,10 @@ def station_product(
 def packed_rows(
     layout: Layout, rows: StationRows, damping: StationRows | None, station_type: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, int] | None:
-    """Kinds and numbers of stations as ``StationProduct`` keeps them, and how many kinds there are.
+    """Kinds and numbers of rows as ``StationProduct`` keeps them, and the number of kinds.
 
-    ``station_type`` (n,) of the stations; None if the matrices join what the layout does not.
+    ``station_type`` (n,) is the type of each row; None if a matrix has entries outside of the
+    layout.
     """
     numbers: list[tuple[np.ndarray, Literal["own", "beside"]]] = []
     for part, sign in ((rows, 1.0), (damping, -1.0)):

@@ -45,7 +45,8 @@ class StationRows(NamedTuple):
 def rows_of(
     matrix: sparse.bsr_matrix | StationRows, first: int = 0, columns: Sections | None = None
 ) -> StationRows | None:
-    """Rows of a matrix in sorted blocks, each a kind of its own; see ``neighbours``."""
+    """Rows of a matrix in sorted blocks, each a kind of its own; ``first`` and ``columns`` as in
+    ``neighbours``."""
     if isinstance(matrix, StationRows):
         return matrix
     blocks = neighbours(matrix, first, columns)
@@ -95,7 +96,8 @@ class LikeRows:
         columns: tuple[int, int],
         held_diagonals: Sequence[float],
     ) -> list[StationRows] | None:
-        """``sum_of`` several at once; None if one of them joins stations that are no neighbours."""
+        """``sum_of`` for several ``sums`` at once, each with its held diagonal; None if one joins
+        stations that are no neighbours."""
         width = self._model.numbering.width
         blocks = np.zeros((len(sums), 3, self._chosen.size, width, width))
         for begin in range(0, self._chosen.size, _STRETCH):

@@ -220,8 +220,7 @@ def acceleration_jump(
 
 
 def _compensation(line: ChangedLine, displacement: np.ndarray, velocity: np.ndarray) -> np.ndarray:
-    """Forces on the line beside those of K and C, of droppers that have switched and of what goes
-    with them, (n_dofs,) [N]."""
+    """Forces (n_dofs,) of switched droppers and their dependents beyond those of K and C [N]."""
     table = switching_links(line.model, line.form.dropper_force)
     unknowns, weights, law = table.arrays
     stretch, rate = (

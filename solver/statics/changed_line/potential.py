@@ -54,7 +54,8 @@ class Potential:
         return np.where(self.model.broken, 0.0, self.model.dropper_slopes.force_at(stretch))
 
     def form(self, moved: np.ndarray) -> Equilibrium:
-        """The shape after a displacement (n_dofs,), forces of droppers as if they could push."""
+        """The shape displaced by ``moved`` (n_dofs,) [m], [rad], with forces of droppers as if they
+        could push."""
         model, known = self.model, self.known
         every = np.arange(model.mesh.n_nodes)
         form = replace(

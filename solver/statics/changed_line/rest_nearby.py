@@ -85,14 +85,14 @@ class TensionedEnd:
 
 
 class Rest(NamedTuple):
-    """A rest that was found.
+    """A rest near a known one.
 
     Attributes
     ----------
-    form : the shape, with what droppers carry in it
-    moved : (n_dofs,) displacement from the known rest
-    reserve : (n_droppers,) what droppers would carry if they could push [N]
-    gap : (n_droppers,) what those that are slack lack to be taut [m]
+    form : the shape, with the forces of droppers in it
+    moved : (n_dofs,) displacement from the known rest [m], [rad]
+    reserve : (n_droppers,) tension of droppers if they could push [N]
+    gap : (n_droppers,) stretch that slack droppers lack to be taut [m], 0 for taut ones
     """
 
     form: Equilibrium
@@ -137,10 +137,10 @@ class RestNearby:
     Parameters
     ----------
     potential : of the line as it is now about the known rest
-    load : (n_dofs,) what it has to carry beside the former line's loads [N], [N m]
-    ends_stay : whether ends that are held along the track at the known rest stay so
-    stiff : a line with the same matrices, if there is one; of a line whose matrices depend on its
-        shape none is of use
+    load : (n_dofs,) loads of the line less those of the former line [N], [N m]
+    ends_stay : whether ends that are held along the track at the known rest remain held
+    stiff : factors of a line with the same matrices, if there are any; ignored if matrices depend
+        on the shape
     """
 
     def __init__(
@@ -287,7 +287,7 @@ class RestNearby:
 
 
 def where(model: Model) -> str:
-    """At what temperature a line is that has no rest, for a sentence; "" if at that of its
+    """Words on the temperature of a line without a rest, for a message; "" at that of its
     installation."""
     warmer = model.simulated.warmer
     if not warmer:

@@ -19,18 +19,18 @@ from catenary.solver.statics.rest_loads import dead_loads
 def hang(
     problem: Problem, cut: Model, form: Equilibrium, stiff: StiffLine | None = None
 ) -> tuple[Model, Equilibrium]:
-    """The model of a line as it hangs, and its equilibrium. Not collective.
+    """The model of a line with its defects, and its equilibrium. Not collective.
 
     Parameters
     ----------
     problem : Problem
-        Problem whose line is the one that hangs and whose effects are all that it has.
+        Problem of the line with its defects, with all its effects.
     cut : Model
         Model of the line for which droppers were cut.
     form : Equilibrium
-        Its equilibrium; droppers that push there slacken, and others take their part.
+        Equilibrium of ``cut``; droppers that push there slacken, and others take over their force.
     stiff : StiffLine, optional
-        Factors that serve if the line has the matrices of theirs.
+        Factors of a line, used if the matrices are the same.
 
     Raises
     ------

@@ -108,20 +108,20 @@ _AT_ONCE = 1 << 10
 
 
 class BandedFactors:
-    """Factors of a matrix (n, n) that joins what is close to each other. Not collective.
+    """Factors of a banded matrix (n, n). Not collective.
 
-    The columns of ``given`` unknowns, of which the force is looked for in place of the value, hold
-    the numbers of ``forces`` alone.
+    The value of a ``given`` unknown is known and its force is not: the column of the unknown holds
+    the entries ``forces`` in place of those of the parts.
 
     Attributes
     ----------
-    from_given : (n,) the sum of all parts times the values of the given unknowns
+    from_given : (n,) sum of all parts times the values of the given unknowns
 
     Parameters
     ----------
     parts : summands of the matrix
-    given, values : unknowns (m,) that are given, and their values (m,)
-    forces : rows, columns and numbers (k,) of the columns of given unknowns
+    given, values : (m,) numbers of the given unknowns, and their values
+    forces : rows, columns and entries (k,) of the columns of given unknowns
     size : n
 
     Raises

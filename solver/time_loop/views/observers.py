@@ -23,17 +23,17 @@ class Stage:
     ----------
     train : properties that determine which channels are recorded
     dt, start_time : time step and time of the initial state [s]
-    n_steps : steps planned
-    arm_x, dropper_x : positions of steady arms and droppers [m]
-    owned_arms, owned_droppers : indices of those whose values this rank provides; every index has
-        exactly one owner
+    n_steps : number of planned steps
+    arm_x, dropper_x : (n_arms,), (n_droppers,) positions of steady arms and droppers [m]
+    owned_arms, owned_droppers : indices of the arms and droppers whose values this rank provides;
+        every index has exactly one owner
     node_points : (n_nodes, 3) static equilibrium shape of the line [m], z up
-    owned_nodes : node numbers of what ``StepView.node_motion`` returns, one owner each
-    unknowns : names of the unknowns that nodes have
-    moving : which columns of arms and droppers have changed since the rows that were shown before
+    owned_nodes : numbers of the nodes in ``StepView.node_motion``; every node has one owner
+    unknowns : names of the unknowns of nodes
+    moving : columns of arms and droppers that have changed since the previous rows
     wire_ends : places of gauges at wire ends and mid-points, none without motion along the track
-    owned_ends : indices of those whose values this rank provides
-    n_places : how many numbers say where each pantograph's masses or bodies are; on rank 0
+    owned_ends : indices of the gauges whose values this rank provides
+    n_places : number of places of masses or bodies of each pantograph; on rank 0
     """
 
     train: TrainLayout
@@ -54,8 +54,8 @@ class Stage:
 
     @property
     def places(self) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-        """Positions of what columns of the line's channels stand for, by its kind, and those that
-        this rank owns."""
+        """Positions [m] and owned indices of the columns of the line's channels, by their subject:
+        arm, dropper or wire end."""
         return {
             channels.ARM: (self.arm_x, self.owned_arms),
             channels.DROPPER: (self.dropper_x, self.owned_droppers),
@@ -80,13 +80,12 @@ class StepView:
     ----------
     step, time : number of the last step (0 is the initial state) and its time [s]
     row : (n,) the values of all channels after it, one after another
-    columns : where in a row each channel is, by name
-    times, rows : (k,) [s] and (k, n), the same of each step of the view; alone those of the last
-        if they are not given
-    node_uplift : () -> (n owned nodes,) vertical displacement [m]; not collective
-    node_motion : (name of an unknown, whether its rate is meant, which of the owned nodes, all if
-        that is left out) -> (n nodes,) [m], [m/s] or
-        [-], [1/s], zero for nodes without it; not collective
+    columns : slice of a row for each channel, by name
+    times, rows : (k,) times [s] and (k, n) rows of all steps of the view; those of the last step
+        alone if not given
+    node_uplift : () -> (n owned nodes,) vertical displacement [m], up positive; not collective
+    node_motion : (name of an unknown, whether its rate, indices of owned nodes or all) ->
+        (n nodes,) [m], [m/s] or [-], [1/s], zero for nodes without it; not collective
     wire_tension : () -> (n_nodes,) tension of the wires ahead of all nodes [N], the same array as
         long as it does not change; not collective
     pantograph_places : () -> heights of the pantographs' bases, then where masses and bodies of
@@ -100,7 +99,7 @@ class StepView:
     state : () -> arrays by name on rank 0 with which to continue, None elsewhere, each of which is
         made when it is read, before the next step; collective
 
-    What no observer has asked for at the last step may be refused, but its row.
+    A view refuses parts of the last step that no observer requested; its row is always there.
     """
 
     step: int
@@ -137,7 +136,7 @@ class StepView:
         return self.rows[:, self.columns[channel]]
 
     def checkpoint(self) -> dict[str, Any] | None:
-        """The same, to be kept. Collective."""
+        """A copy of ``state`` that stays valid after the next step. Collective."""
         state = self.state()
         return None if state is None else dict(state)
 
@@ -154,7 +153,10 @@ class NodeMotion(Protocol):
     """One unknown of a rank's nodes, or its rate. Not collective."""
 
     def __call__(self, name: str, rate: bool, among: np.ndarray | None = None, /) -> np.ndarray:
-        """The values of those owned nodes whose numbers among them are given, of all if not."""
+        """Values (n,) of the unknown ``name``, or of its rate, at owned nodes.
+
+        ``among`` (n,) are indices among the owned nodes, all of them if not given.
+        """
 
 
 # A step that never comes.
@@ -164,9 +166,9 @@ NEVER = 2**62
 class Observer(ABC):
     """Watches a run. All methods are called on all ranks at the same steps.
 
-    Each step is shown once, in order, the initial state first. Many are shown at once, which costs
-    little a step: all of a state can be seen at the steps that ``next_state`` names, motion at
-    those of ``next_motion``.
+    Each step is shown once, in order, the initial state first, many steps in one view. Every step
+    shows its row; those that ``next_state`` returns show the whole state, those of ``next_motion``
+    the motion.
     """
 
     def start(self, stage: Stage) -> None:  # noqa: B027  (many need nothing)
@@ -174,25 +176,25 @@ class Observer(ABC):
 
     @abstractmethod
     def next_state(self, step: int) -> int:
-        """The next step after ``step`` whose state is to be shown, ``NEVER`` if rows will do.
+        """The next step after ``step`` whose state is to be shown, ``NEVER`` if rows suffice.
 
-        Called when all steps up to ``step`` are shown. Steps of which each state is wanted take
-        many times as long.
+        Called when all steps up to ``step`` are shown. A run that shows the state of every step
+        takes many times as long.
         """
 
     def next_motion(self, step: int) -> int:
-        """The next step after ``step`` of which the motion of nodes, the places of pantographs or
-        ``energies`` are to be shown and no more; asked for any step.
+        """The next step after ``step`` whose motion is to be shown, ``NEVER`` if none.
 
-        A block goes on behind such a step, of which these are kept.
+        The motion is that of nodes, the places of pantographs and ``energies``. It is kept while
+        compiled steps go on, so that it costs less than a state. Called for any ``step``.
         """
         return NEVER
 
     @abstractmethod
     def observe(self, view: StepView) -> None:
-        """After the steps of ``view``, the last of which may be one that was asked for.
+        """Process the steps of ``view``, the last of which may be a requested one.
 
-        May be collective at steps that depend only on ``view.step`` and ``next_state``.
+        It may be collective at steps that follow from ``view.step`` and ``next_state`` alone.
         """
 
     def finish(self, outcome: str) -> None:  # noqa: B027  (many need nothing)

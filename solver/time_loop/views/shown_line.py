@@ -11,21 +11,21 @@ from catenary.solver.window.moving_columns import Columns, columns_of, widen
 
 
 class ShownMotion:
-    """Displacement and velocity of a rank's unknowns, kept from one look to the next.
+    """Displacement and velocity of a rank's unknowns, brought up to date when they are read.
 
-    Of a line of which a window moves a look takes what the window takes. Not collective.
+    With a window only stations that have moved are updated. Not collective.
 
     Parameters
     ----------
     line : LineIntegrator
-    columns : with the stations of the line, and which of them move
-    pad : zeros that arrays have at either end, for products that read beyond the line
+    columns : Columns, with the stations of the line and the range that moves
+    pad : number of zeros at either end of the arrays, for products that read beyond the line
 
     Attributes
     ----------
-    moved : (2,) first station that has moved since the latest look, and the one after the last;
-        those who step the line keep it
-    changed : (2,) the same of what looks have changed, until ``take_changes``
+    moved : (2,) first station that has moved since the latest update, and the one after the last;
+        steps widen it
+    changed : (2,) the same for stations updated since the latest ``take_changes``
     """
 
     def __init__(self, line: LineIntegrator, columns: Columns, pad: int) -> None:
@@ -47,12 +47,12 @@ class ShownMotion:
             self.moved[:] = 0, self._columns.n_stations
 
     def show(self, stations: tuple[int, int], numbers: np.ndarray) -> None:
-        """Show a step that the line has left, from what was kept of it.
+        """Show an earlier step from its kept motion.
 
         Parameters
         ----------
         stations : tuple of int
-            Stations that had moved since the look before, see ``moved``.
+            Stations that had moved since the update before, see ``moved``.
         numbers : ndarray
             Displacements, then velocities, of these stations' unknowns.
         """
@@ -77,8 +77,8 @@ class ShownMotion:
         return self._velocity
 
     def take_changes(self) -> tuple[int, int]:
-        """First station that has changed since it was asked for last, and the one after the last;
-        the first is not before the last if none has."""
+        """First station that has changed since the latest call, and the one after the last; if none
+        has, the first is not less than the second."""
         self._bring_up_to_date()
         begin, end = self.changed.tolist()
         self.changed[0], self.changed[1] = self._columns.n_stations, 0

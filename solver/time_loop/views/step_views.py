@@ -156,7 +156,7 @@ class Showing:
         )
 
     def stage(self, dt: float, start_time: float, n_steps: int) -> Stage:
-        """Description of the run, which its steps do not change."""
+        """Facts of a run of ``n_steps`` steps of ``dt`` [s] from ``start_time`` [s]."""
         mesh, train = self._model.mesh, self._pantographs
         points = mesh.points.copy()
         points[:, 2] = self._form.height
@@ -205,9 +205,9 @@ class Showing:
         return self._view
 
     def cross(self, time: float, *, found: bool = False) -> None:
-        """Note where wires that move sideways cross the strips at ``time`` [s], if any do.
+        """Find where wires that move sideways cross the strips at ``time`` [s], if any do.
 
-        ``found`` says whether what they do there is known, of a state that was restored.
+        ``found`` is whether their lateral motion there is already known, as in a restored state.
         Collective.
         """
         if not self._pantographs.lateral:
@@ -359,8 +359,11 @@ def _owned_gauges(
 def _further_links(
     links: FollowedLinks, watched: Mapping[str, LinkArrays]
 ) -> tuple[LinkArrays, Dependents, np.ndarray, dict[str, np.ndarray]]:
-    """Owned links of one sign beside droppers, then gauges, bends of these, room for their forces
-    [N], and that by component and by what a gauge shows."""
+    """Owned links of one sign other than droppers, followed by gauges.
+
+    Returns them, their bends, an array for their forces [N], and views of that array by the names
+    of components and of quantities of gauges.
+    """
     shown = {name: links.shown(name)[1:] for name in links.table.components if name != DROPPERS}
     parts = {name: own for name, (own, _) in shown.items()} | dict(watched)
     if not parts:
