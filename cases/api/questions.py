@@ -10,7 +10,13 @@ from typing import TYPE_CHECKING
 
 from catenary.base.lone_process import alone
 from catenary.base.parallel import on_root
-from catenary.callers import ending_as_python, say_nothing, say_on_error_stream
+from catenary.callers import (
+    ending_as_python,
+    listed,
+    n_at_once,
+    say_nothing,
+    say_on_error_stream,
+)
 from catenary.cases.process.petsc_options import options_of
 from catenary.scenes import SceneLike, checked, draft_of, scene_of
 
@@ -34,7 +40,7 @@ def highest_speeds(
     *,
     step: float = 10.0,
     within: float = 1.0,
-    criteria: Sequence[str] = (),
+    criteria: str | Sequence[str] = (),
     direction: str | None = None,
     jobs: int = 1,
     force: bool = False,
@@ -58,7 +64,7 @@ def highest_speeds(
         Distance of the speeds marched first [km/h]. Narrower stretches may be missed.
     within : float
         How closely ends of stretches are found [km/h].
-    criteria : sequence of str
+    criteria : str or sequence of str
         Parts of names of criteria, all criteria if there are none.
     direction : str
         "forward" or "backward"; None for both, as far as the scene's line can be turned.
@@ -96,7 +102,7 @@ def highest_speeds(
 
     speeds = Speeds(float(slowest), float(fastest), float(step), float(within))
     with _marching(scene, out, TABLE, speeds.first, jobs, force, progress) as (marching, own):
-        return find_speeds(marching, own, speeds, criteria, direction).table()
+        return find_speeds(marching, own, speeds, listed(criteria), direction).table()
 
 
 def separations(
@@ -171,7 +177,7 @@ def _marching(
     from catenary.cases.result_folder.output_folder import refuse_table
 
     check()
-    folder = None if out is None else Path(out)
+    n_jobs, folder = n_at_once(jobs), None if out is None else Path(out)
     if folder is not None:
         refuse_table(folder / table, force)
     given = scene_of(scene)
@@ -181,7 +187,7 @@ def _marching(
 
     say = say_on_error_stream if progress else say_nothing
     with options_of(own.petsc.given()) as petsc, ending_as_python():
-        yield Marching(draft_of(given), folder, comm, RunOptions(force, petsc, say, jobs)), own
+        yield Marching(draft_of(given), folder, comm, RunOptions(force, petsc, say, n_jobs)), own
 
 
 def find_speeds(

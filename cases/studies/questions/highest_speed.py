@@ -12,7 +12,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import product
-from math import ceil
+from math import ceil, inf
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -77,7 +77,7 @@ class Speeds(NamedTuple):
                 f"{_SLOWEST:g} to {_FASTEST:g} km/h"
             )
         step, within = option("--step", "step"), option("--within", "within")
-        if not 0.0 < self.within <= self.step:
+        if not 0.0 < self.within <= self.step < inf:
             raise InputError(
                 f"{within} {self.within:g} {step} {self.step:g} is not possible: {within} is above "
                 f"0 and at most {step}"

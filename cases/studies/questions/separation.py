@@ -17,7 +17,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
-from math import floor
+from math import floor, inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -79,7 +79,7 @@ class Distances(NamedTuple):
                 f"{_LEAST:g} to {_FARTHEST:g} m"
             )
         step = option("--step", "step")
-        if not self.step > 0.0:
+        if not 0.0 < self.step < inf:
             raise InputError(f"{step} {self.step:g} is not possible: it is above 0 m")
         length = self.farthest - self.nearest
         if length / self.step > MOST:

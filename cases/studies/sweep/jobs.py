@@ -56,7 +56,7 @@ def check_statistics(names: Sequence[str]) -> None:
 
 def check_histories(names: Sequence[str]) -> None:
     """Raise InputError if one of ``names`` is no history that an ensemble keeps."""
-    _check_names(names, HISTORIES, f"history of {option('--histories', 'histories')}")
+    _check_names(names, HISTORIES, "history")
 
 
 def _check_names(names: Sequence[str], known: Mapping[str, Any], what: str) -> None:

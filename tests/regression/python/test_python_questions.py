@@ -16,6 +16,7 @@ from catenary.cases.cli.main import all_verbs
 pytestmark = pytest.mark.usefixtures("quick_reports")
 
 CASE = "en50318_2002"
+OPTIMISED = {"variables": [{"key": "line.contact_wire.tension_N", "change": [0.0, 4000.0]}]}
 Asked = Callable[..., pd.DataFrame]
 QUESTIONS: dict[str, tuple[Asked, tuple[float, float], dict[str, Any], list[str], set[str]]] = {
     "speed": (
@@ -88,6 +89,35 @@ def test_a_search_that_was_stopped_goes_on_in_its_folder(
     table = ask(scene, *span, tmp_path, **options)
     assert sum(marched) == 3 and (table.outcome == "done").all()
     assert not (tmp_path / "rows_so_far").exists()
+
+
+def test_one_name_stands_for_a_list_of_one(scene: catenary.Scene) -> None:
+    """Not for a list of its letters, of which each is a part of some name."""
+    table = catenary.highest_speeds(scene, 300, 310, within=10, criteria="wave speed")
+    assert table.criterion.tolist()[1:] == ["train speed against 0.7 of the wave speed"]
+    key = "pantographs.reference.static_force_N"
+    assert catenary.sensitivity(scene, key).parameter.tolist() == [key]
+
+
+@pytest.mark.parametrize("jobs", [-1, 1.5, "2"])
+@pytest.mark.parametrize(
+    "ask",
+    [
+        *(asked for asked, *_ in QUESTIONS.values()),
+        lambda scene, jobs: catenary.sweep(scene, {"train.speed_km_h": [200]}, jobs=jobs),
+        lambda scene, jobs: catenary.optimise(scene, OPTIMISED, jobs=jobs),
+    ],
+)
+def test_jobs_is_a_number_of_processes(ask: Asked, jobs: Any, scene: catenary.Scene) -> None:
+    with pytest.raises(catenary.InputError, match="jobs is .*; it is a number of processes"):
+        ask(scene, jobs=jobs)
+
+
+@pytest.mark.parametrize("step", [0.0, -1.0, float("nan"), float("inf")])
+@pytest.mark.parametrize("ask", [asked for asked, *_ in QUESTIONS.values()])
+def test_a_step_is_finite_and_above_zero(ask: Asked, step: float, scene: catenary.Scene) -> None:
+    with pytest.raises(catenary.InputError, match=rf"step {step:g} is not possible"):
+        ask(scene, step=step)
 
 
 @pytest.mark.parametrize("verb", QUESTIONS)
