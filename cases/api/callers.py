@@ -5,11 +5,12 @@ from __future__ import annotations
 import logging
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
+from catenary.base.errors import InputError
 from catenary.base.lone_process import alone, world
 from catenary.base.parallel import launched_by_mpirun, on_root
 
@@ -63,6 +64,20 @@ def ending_as_python() -> Iterator[None]:
         yield
     except Interrupted as stopped:
         raise KeyboardInterrupt from stopped
+
+
+def n_at_once(jobs: Any) -> int:
+    """The argument ``jobs`` of a function. Raises InputError if it is no number of processes."""
+    if not isinstance(jobs, int) or jobs < 0:
+        raise InputError(
+            f"jobs is {jobs!r}; it is a number of processes, or 0 for one on each core"
+        )
+    return jobs
+
+
+def listed(names: str | Sequence[str]) -> list[str]:
+    """Names of an argument, where a text is one name and not one for each of its letters."""
+    return [names] if isinstance(names, str) else list(names)
 
 
 def say_nothing(text: str) -> None:

@@ -132,7 +132,7 @@ def uncertainty(
         try:
             runs = run_table(pd.DataFrame(table))
         except ValueError as error:
-            raise InputError(f"the table has columns of several lengths: {error}") from error
+            raise InputError(f"the table is no table of columns of one length: {error}") from error
     if sample is not None:
         runs = run_table(runs.frame, sampling_like(sample)[0], where)
     found = evaluate(runs)

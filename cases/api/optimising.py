@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from catenary.base.lone_process import alone
-from catenary.callers import ending_as_python, say_nothing, say_on_error_stream
+from catenary.callers import ending_as_python, n_at_once, say_nothing, say_on_error_stream
 from catenary.cases.studies.optimise.task import OptimiseTask
 from catenary.cases.studies.task_files import read_task
 from catenary.cases.studies.tolerance.task import ToleranceTask
@@ -315,13 +315,13 @@ def _made(
     from catenary.cases.studies.records import held_study
     from catenary.cases.studies.scene_sets import workers
 
-    folder = None if out is None else Path(out)
+    n_jobs, folder = n_at_once(jobs), None if out is None else Path(out)
     if folder is not None:
         refuse_table(folder / table, force)
     plan = make_plan()
     for sentence in plan.warnings:
         warn(sentence)
-    with held_study(folder, alone(), command, force) as (kept, write), workers(jobs) as pool:
+    with held_study(folder, alone(), command, force) as (kept, write), workers(n_jobs) as pool:
         found = find(plan, pool, kept, say)
         files = write(lambda own: output.write(own, plan, found))
     return Made(plan, found, files, output)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,9 +10,15 @@ from typing import TYPE_CHECKING
 
 from catenary.base.lone_process import alone
 from catenary.base.parallel import on_root
-from catenary.callers import ending_as_python
+from catenary.callers import (
+    ending_as_python,
+    listed,
+    n_at_once,
+    say_nothing,
+    say_on_error_stream,
+)
 from catenary.cases.process.petsc_options import options_of
-from catenary.scenes import SceneLike, checked, draft_of
+from catenary.scenes import SceneLike, checked, draft_of, scene_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -30,12 +36,15 @@ def highest_speeds(
     scene: SceneLike,
     slowest: float = 200.0,
     fastest: float = 360.0,
+    out: str | Path | None = None,
     *,
     step: float = 10.0,
     within: float = 1.0,
-    criteria: Sequence[str] = (),
+    criteria: str | Sequence[str] = (),
     direction: str | None = None,
     jobs: int = 1,
+    force: bool = False,
+    progress: bool = False,
 ) -> pd.DataFrame:
     """Highest speed at which the acceptance criteria hold in both directions, all and each.
 
@@ -48,16 +57,23 @@ def highest_speeds(
         The scene, or whatever ``load`` takes for one; its own speed is replaced.
     slowest, fastest : float
         Range of speeds [km/h].
+    out : str or Path, optional
+        Folder into which all is written that ``catenary speed -o`` writes. A search that was
+        stopped goes on there.
     step : float
         Distance of the speeds marched first [km/h]. Narrower stretches may be missed.
     within : float
         How closely ends of stretches are found [km/h].
-    criteria : sequence of str
+    criteria : str or sequence of str
         Parts of names of criteria, all criteria if there are none.
     direction : str
         "forward" or "backward"; None for both, as far as the scene's line can be turned.
     jobs : int
         Processes that march, 0 for one on each core.
+    force : bool
+        Whether results in ``out`` are replaced.
+    progress : bool
+        Whether what is marched and the time left are shown on standard error.
 
     Returns
     -------
@@ -70,10 +86,10 @@ def highest_speeds(
     Raises
     ------
     InputError
-        If the range is none, if no speed can be run, if no criterion has a wanted name, or if the
-        line cannot be turned for the one ``direction``.
+        If the range is none, if no speed can be run, if no criterion has a wanted name, if the
+        line cannot be turned for the one ``direction``, or if ``out`` cannot be taken.
     KeyboardInterrupt
-        If a signal ended it.
+        If a signal ended it. With ``out`` the same call goes on.
 
     Examples
     --------
@@ -82,20 +98,23 @@ def highest_speeds(
     >>> float(table.highest_km_h[0]), float(table.fails_at_km_h[0])
     (305.0, 310.0)
     """
-    from catenary.cases.studies.questions.highest_speed import Speeds
+    from catenary.cases.studies.questions.highest_speed import TABLE, Speeds
 
     speeds = Speeds(float(slowest), float(fastest), float(step), float(within))
-    with _marching(scene, jobs) as (marching, own):
-        return find_speeds(marching, own, speeds, criteria, direction).table()
+    with _marching(scene, out, TABLE, speeds.first, jobs, force, progress) as (marching, own):
+        return find_speeds(marching, own, speeds, listed(criteria), direction).table()
 
 
 def separations(
     scene: SceneLike,
     nearest: float = 31.0,
     farthest: float = 400.0,
+    out: str | Path | None = None,
     *,
     step: float = 1.0,
     jobs: int = 1,
+    force: bool = False,
+    progress: bool = False,
 ) -> pd.DataFrame:
     """Statistics of two pantographs over their distance, and of one alone.
 
@@ -108,8 +127,11 @@ def separations(
         The scene, or whatever ``load`` takes for one; its own pantographs are replaced.
     nearest, farthest, step : float
         Distances [m]: from ``nearest`` on, ``step`` apart, ``farthest`` at most.
-    jobs : int
-        Processes that march, 0 for one on each core.
+    out : str or Path, optional
+        Folder into which all is written that ``catenary separation -o`` writes. Marches that were
+        stopped go on there.
+    jobs, force, progress
+        As for ``highest_speeds``.
 
     Returns
     -------
@@ -120,9 +142,9 @@ def separations(
     Raises
     ------
     InputError
-        If the range is none, or if nothing can be run.
+        If the range is none, if nothing can be run, or if ``out`` cannot be taken.
     KeyboardInterrupt
-        If a signal ended it.
+        If a signal ended it. With ``out`` the same call goes on.
 
     Examples
     --------
@@ -131,22 +153,41 @@ def separations(
     >>> table.separation_m.tolist()[1:], bool(table.std_trailing_N[2] > table.std_trailing_N[1])
     ([50.0, 90.0], True)
     """
-    from catenary.cases.studies.questions.separation import Distances
+    from catenary.cases.studies.questions.separation import TABLE, Distances
 
     distances = Distances(float(nearest), float(farthest), float(step))
-    with _marching(scene, jobs) as (marching, own):
-        return find_separations(marching, own, distances, explained=False).table()
+    with _marching(scene, out, TABLE, distances.values, jobs, force, progress) as (marching, own):
+        return find_separations(marching, own, distances, explained=out is not None).table()
 
 
 @contextmanager
-def _marching(scene: SceneLike, jobs: int) -> Iterator[tuple[Marching, Checked]]:
-    """The march of variants of a scene, and the scene itself."""
-    own, comm = checked(scene), alone()
+def _marching(
+    scene: SceneLike,
+    out: str | Path | None,
+    table: str,
+    check: Callable[[], object],
+    jobs: int,
+    force: bool,
+    progress: bool,
+) -> Iterator[tuple[Marching, Checked]]:
+    """The march of variants of a scene, and the scene itself.
+
+    ``check`` raises InputError if what is asked for is impossible; ``table`` is left in ``out``.
+    """
+    from catenary.cases.result_folder.output_folder import refuse_table
+
+    check()
+    n_jobs, folder = n_at_once(jobs), None if out is None else Path(out)
+    if folder is not None:
+        refuse_table(folder / table, force)
+    given = scene_of(scene)
+    own, comm = checked(given), alone()
     from catenary.cases.studies.sweep.jobs import RunOptions
     from catenary.cases.studies.sweep.together import Marching
 
-    with options_of(own.petsc.given()) as options, ending_as_python():
-        yield Marching(draft_of(scene), None, comm, RunOptions(petsc=options, n_jobs=jobs)), own
+    say = say_on_error_stream if progress else say_nothing
+    with options_of(own.petsc.given()) as petsc, ending_as_python():
+        yield Marching(draft_of(given), folder, comm, RunOptions(force, petsc, say, n_jobs)), own
 
 
 def find_speeds(

@@ -8,13 +8,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from catenary.base.errors import InputError, RunBroken
+from catenary.base.options import option
 from catenary.base.parallel import on_root
 from catenary.callers import communicator, progress_shown, temporary_folder
 from catenary.cases.process.petsc_options import options_of
 from catenary.scenes import SceneLike, checked
 
 if TYPE_CHECKING:
-    from catenary.cases.run.continuing import Said
     from catenary.cases.scene.scene import Scene as CheckedScene
     from catenary.results import Run
 
@@ -120,15 +120,12 @@ def restart(
     >>> longer.outcome, bool(longer.force.position.max() > end + 9.0)
     ('done', True)
     """
-    from catenary.cases.run.continuing import Said
-
-    own, comm = Path(folder), communicator(comm)
-    said, stretch = Said("until_m", "evaluate", "in restart()"), None
+    own, comm, stretch = Path(folder), communicator(comm), None
     if evaluate is not None:
         stretch = ":".join(map(str, evaluate))
 
     def read() -> CheckedScene:
-        return scene_to_continue(own, until_m, stretch, said)
+        return scene_to_continue(own, until_m, stretch)
 
     tables = on_root(comm, read, takes_long=True)
     with _set_up(tables, progress, comm) as options:
@@ -188,9 +185,7 @@ def run_into(
     return Run(None, folder, ended)
 
 
-def scene_to_continue(
-    folder: Path, until_m: float | None, evaluate: str | None, said: Said
-) -> CheckedScene:
+def scene_to_continue(folder: Path, until_m: float | None, evaluate: str | None) -> CheckedScene:
     """The checked scene with which a run goes on. Not collective.
 
     Parameters
@@ -201,8 +196,6 @@ def scene_to_continue(
         Where the leading pantograph is to stop [m], None for where it stops now.
     evaluate : str, optional
         FROM:TO [m], None for the stretch as it is.
-    said : Said
-        Names of these two where they were given, for sentences.
 
     Raises
     ------
@@ -210,7 +203,7 @@ def scene_to_continue(
         If there is no run, or as ``cases.run.continuing.extended_scene``.
     """
     from catenary.cases.result_folder.output_folder import refuse_impossible
-    from catenary.cases.run.continuing import extended_scene
+    from catenary.cases.run.continuing import EVALUATE, UNTIL, extended_scene
     from catenary.postproc.read.guard import examined
     from catenary.postproc.read.results import Results
 
@@ -218,10 +211,10 @@ def scene_to_continue(
     if not folder.is_dir():
         raise InputError(f"{folder} is no folder; name the folder of a run")
     if evaluate is not None and until_m is None:
-        raise InputError(f"{said.evaluated} belongs to {said.until}")
+        raise InputError(f"{option(*EVALUATE)} belongs to {option(*UNTIL)}")
     with Results(folder, examined(folder)) as results:
         config = results.attributes["config"]
-    return extended_scene(config, str(results.path), until_m, evaluate, said)
+    return extended_scene(config, str(results.path), until_m, evaluate)
 
 
 def go_on(

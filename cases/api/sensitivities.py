@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from catenary.base.lone_process import alone
+from catenary.callers import listed
 from catenary.scenes import SceneLike, checked
 
 if TYPE_CHECKING:
@@ -18,7 +19,7 @@ SENSITIVITIES = "sensitivity.csv"
 
 
 def sensitivity(
-    scene: SceneLike, parameters: Sequence[str] = (), *, droppers: bool = False
+    scene: SceneLike, parameters: str | Sequence[str] = (), *, droppers: bool = False
 ) -> pd.DataFrame:
     """Sensitivities of the statistics of a scene to its parameters, from one march.
 
@@ -30,7 +31,7 @@ def sensitivity(
     ----------
     scene : Scene, str, Path or mapping
         The scene, or whatever ``load`` takes for one.
-    parameters : sequence of str
+    parameters : str or sequence of str
         Keys of numbers, or of lists whose entries change together; with the number of an entry
         behind it (``line.dropper.pre_sag_mm.3``) that one alone. Those of pantographs, contact,
         wires, droppers and damping if there are none.
@@ -61,7 +62,7 @@ def sensitivity(
     >>> row.change, row.unit, bool(0.9 < row.mean_change_N < 1.1)
     (1.0, 'N', True)
     """
-    return derivatives(scene, parameters, droppers=droppers).table()
+    return derivatives(scene, listed(parameters), droppers=droppers).table()
 
 
 def derivatives(

@@ -10,6 +10,7 @@ import numpy as np
 
 from catenary.base.errors import InputError, RunBroken
 from catenary.base.lone_process import alone
+from catenary.cases.scene.input.faults import shown
 from catenary.scenes import SceneLike, checked
 from catenary.solver.kernels import native
 
@@ -376,7 +377,10 @@ class Simulation:
         self.close()
 
     def _add(self, name: str, value: Any) -> None:
-        values = np.asarray(value, dtype=float)
+        try:
+            values = np.asarray(value, dtype=float)
+        except (TypeError, ValueError):
+            raise InputError(f"{name} is {shown(value)}; it must be a number or numbers") from None
         own = self._own.inputs[name]
         if values.shape not in ((), own.shape):
             raise InputError(

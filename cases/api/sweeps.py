@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,12 +12,15 @@ from catenary.base.errors import InputError
 from catenary.base.parallel import on_root
 from catenary.callers import (
     communicator,
+    listed,
+    n_at_once,
     progress_shown,
     say_nothing,
     say_on_error_stream,
     temporary_folder,
 )
 from catenary.cases.process.petsc_options import options_of
+from catenary.cases.scene.input.faults import shown
 from catenary.cases.studies.sweep.variants import (
     Variant,
     check_keys,
@@ -45,7 +48,7 @@ def sweep(
     *,
     sample: Mapping[str, Any] | str | Path | None = None,
     only_statistics: bool = False,
-    histories: Sequence[str] = (),
+    histories: str | Sequence[str] = (),
     jobs: int = 1,
     force: bool = False,
     progress: bool = False,
@@ -68,7 +71,7 @@ def sweep(
     only_statistics : bool
         Whether nothing but the table is kept, and no result file of a variant: for thousands of
         them. Variants that share a line march side by side.
-    histories : sequence of str
+    histories : str or sequence of str
         With ``only_statistics`` and ``out``: histories of all variants that are kept in
         ``out/histories.h5``, of contact_force, filtered_force, head_height and wire_height.
     jobs : int
@@ -98,8 +101,7 @@ def sweep(
     >>> table["train.speed_km_h"].tolist(), bool(table.std_N[1] > table.std_N[0])
     ([200, 250], True)
     """
-    if not isinstance(jobs, int) or jobs < 0:
-        raise InputError(f"jobs is {jobs!r}; it is a number of runs, or 0 for one on each core")
+    n_jobs = n_at_once(jobs)
     from catenary.cases.studies.sweep.jobs import RunOptions, interrupted
 
     if histories and out is None:
@@ -122,12 +124,12 @@ def sweep(
             folder,
             None if out is None else sampling,
             only_statistics=only_statistics,
-            histories=histories,
+            histories=listed(histories),
             force=force,
         )
         options = stack.enter_context(options_of(made.own.first.petsc.given()))
         stack.enter_context(progress_shown(False, comm))
-        plan = RunOptions(force, options, say if comm.rank == 0 else say_nothing, jobs)
+        plan = RunOptions(force, options, say if comm.rank == 0 else say_nothing, n_jobs)
         drawn = None if out is None else ()
         found = made.run(comm, plan, "a sweep of a Python program", drawn)
     if interrupted(found.ended):
@@ -273,14 +275,17 @@ class Swept:
 
 def _listed(vary: Mapping[str, Sequence[Any]] | None) -> list[Variant]:
     """The variants of lists of values."""
-    if not vary or not all(len(values) for values in vary.values()):
+    if vary is not None and not isinstance(vary, Mapping):
+        raise InputError(f"vary is {shown(vary)}; it must be a table of lists of values by keys")
+    varied = []
+    for key, values in (vary or {}).items():
+        if isinstance(values, str | Mapping) or not isinstance(values, Iterable):
+            raise InputError(f"{key} in vary is {shown(values)}; it must be a list of values")
+        texts = tuple(text_of(plain_value(own, f"{key} in vary")) for own in values)
+        if texts:
+            varied.append(varied_key(str(key), texts, "vary"))
+    if not varied or len(varied) < len(vary or {}):
         raise InputError("there is nothing to vary: give at least one key with a value")
-    varied = [
-        varied_key(
-            key, tuple(text_of(plain_value(own, f"{key} in vary")) for own in values), "vary"
-        )
-        for key, values in vary.items()
-    ]
     variants = product(varied, {}, "in vary")
     check_keys(variants, "in vary")
     return variants

@@ -17,6 +17,7 @@ import typer
 import catenary
 from catenary.base.errors import InputError
 from catenary.cases.cli import completion
+from catenary.cases.cli.varied_words import Verb
 from catenary.cases.terminal import console
 
 if TYPE_CHECKING:
@@ -58,7 +59,7 @@ def verb(name: str, *, help: str, epilog: str, serial: bool = False) -> Callable
 
     def added(function: Command) -> Any:
         guarded = console.guarded(console.serial(function) if serial else function)
-        return app.command(name, help=help, epilog=epilog)(guarded)
+        return app.command(name, cls=Verb, help=help, epilog=epilog)(guarded)
 
     return added
 
@@ -209,7 +210,8 @@ Vary = Annotated[
         "--vary",
         metavar="KEY=V1,V2,...",
         autocompletion=completion.assignments,
-        help="Values that a key takes; repeatable, all combinations are run.",
+        help="Values that a key takes; all combinations are run. Repeatable, or further keys with "
+        "several values follow directly; a word with a single value is an assignment.",
     ),
 ]
 NamedVariants = Annotated[

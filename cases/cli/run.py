@@ -107,13 +107,12 @@ def restart(
     from catenary.cases.process.petsc_options import split_extras
 
     def read() -> tuple[Scene, list[str]]:
-        from catenary.cases.run.continuing import OF_PROGRAM
         from catenary.runs import scene_to_continue
 
         more, options = split_extras(extras or [])
         if more:
             raise InputError(f"{more[0]} cannot be changed when a run is continued")
-        return scene_to_continue(folder, until_m, evaluate, OF_PROGRAM), options
+        return scene_to_continue(folder, until_m, evaluate), options
 
     comm, scene, arguments = begin(read, verbose, lambda scene: scene)
     from catenary.runs import go_on

@@ -13,6 +13,7 @@ from typing import Any
 
 from catenary.base.errors import CatenaryError, RunBroken
 from catenary.base.lone_process import alone
+from catenary.base.options import command_line
 from catenary.base.parallel import NO_MEMORY
 from catenary.cases.process import interrupts, library_settings, matplotlib_setup
 
@@ -50,19 +51,20 @@ def _work(answers: _Answers) -> None:
     """Take items and answer each, until a signal has come."""
     connection = answers.connection
     try:
-        level, initialise, function = connection.recv()
+        level, names_options, initialise, function = connection.recv()
         _set_up_logging(answers, level)
-        if initialise is not None:
-            initialise()
-        comm = alone()
-        while answers.goes_on:
-            item = connection.recv()
-            try:
-                answers.send("value", function(item, comm))
-            except CatenaryError as error:
-                answers.send("error", error)
-            except MemoryError:
-                answers.send("error", RunBroken(NO_MEMORY))
+        with command_line(names_options):
+            if initialise is not None:
+                initialise()
+            comm = alone()
+            while answers.goes_on:
+                item = connection.recv()
+                try:
+                    answers.send("value", function(item, comm))
+                except CatenaryError as error:
+                    answers.send("error", error)
+                except MemoryError:
+                    answers.send("error", RunBroken(NO_MEMORY))
     except (EOFError, ConnectionError):
         raise
     except Exception:

@@ -22,6 +22,7 @@ from multiprocessing.connection import wait
 from typing import Any, Generic, NamedTuple, TypeVar
 
 from catenary.base.errors import CatenaryError, InputError, RunBroken
+from catenary.base.options import is_command_line, option
 from catenary.base.parallel import launched_by_mpirun, wait_for_all
 from catenary.cases.process.interrupts import StopRequest
 
@@ -90,8 +91,9 @@ def at_once(wanted: int, comm: Any) -> int:
         return wanted or cores()
     if wanted not in (0, 1, n_ranks):
         raise InputError(
-            f"-j is {wanted} on {n_ranks} ranks; give -j {n_ranks}, with which each rank makes "
-            "runs of its own, or no -j, with which all ranks share each run"
+            f"{option('-j', 'jobs')} is {wanted} on {n_ranks} ranks; give "
+            f"{option(f'-j {n_ranks}', f'jobs={n_ranks}')}, with which each rank makes runs of its "
+            f"own, or no {option('-j', 'jobs')}, with which all ranks share each run"
         )
     return wanted or n_ranks
 
@@ -310,7 +312,7 @@ class _Process:
         theirs.close()
         os.close(alive)
         level = logging.getLogger("catenary").getEffectiveLevel()
-        self._send((level, initialise, function))
+        self._send((level, is_command_line(), initialise, function))
 
     def is_there(self) -> bool:
         """Whether it has not ended while it had nothing to do."""

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from catenary.base.errors import InputError
+from catenary.base.options import option
 from catenary.cases.result_folder.folder_lock import refusal
 from catenary.postproc.evaluate.wording import duration
 from catenary.postproc.files.own_files import (
@@ -91,7 +92,7 @@ def refuse_impossible(folder: Path) -> None:
     except OSError as error:
         raise refusal(folder, error) from error
     if not stat.S_ISDIR(found.st_mode):
-        raise InputError(f"-o {folder} is a file; name a folder for the results")
+        raise InputError(f"{folder} is a file; name a folder for the results")
 
 
 def refuse_table(path: Path, force: bool) -> None:
@@ -101,14 +102,24 @@ def refuse_table(path: Path, force: bool) -> None:
     """
     refuse_impossible(path.parent)
     if not force and path.exists():
-        raise InputError(f"{path} is there already; name another folder with -o, or give --force")
+        raise InputError(f"{path} is there already; {another_folder()}, or give {force_option()}")
+
+
+def another_folder() -> str:
+    """The advice to write elsewhere, for sentences."""
+    return f"name another folder with {option('-o', 'out')}"
+
+
+def force_option() -> str:
+    """What lets results be replaced and large runs be run, for sentences."""
+    return option("--force", "force=True")
 
 
 def refuse_earlier(folder: Path, force: bool) -> None:
     """Raise InputError if a folder holds a run's results and ``force`` is not given."""
     result = folder / RUN_FILE
     if result.is_dir() and not result.is_symlink():
-        raise InputError(f"{result} is a folder; remove it, or name another one with -o")
+        raise InputError(f"{result} is a folder; remove it, or {another_folder()}")
     if force or not os.path.lexists(result):
         return
     what = "holds the results of an earlier run"
@@ -117,7 +128,7 @@ def refuse_earlier(folder: Path, force: bool) -> None:
     elif not _is_hdf5(result):
         what = "is there already, and is no result file"
     raise InputError(
-        f"{result} {what}; name another folder with -o, or give --force to replace "
+        f"{result} {what}; {another_folder()}, or give {force_option()} to replace "
         f"{'them' if 'results' in what else 'it'}"
     )
 
@@ -140,8 +151,8 @@ def check_size(folder: Path, size: RunSize, force: bool) -> None:
         if beyond:
             raise InputError(
                 f"the run is very large: {takes}; beyond {volume(MOST_BYTES)}, "
-                f"{duration(MOST_SECONDS)} or {MOST_STEPS} steps give --force to run it all the "
-                "same"
+                f"{duration(MOST_SECONDS)} or {MOST_STEPS} steps give {force_option()} to run it "
+                "all the same"
             )
     if beyond or size.n_bytes > LARGE or size.seconds > LONG:
         logger.info(takes)
@@ -196,10 +207,10 @@ def _refuse_without_room(
 ) -> None:
     if size.n_bytes <= room:
         return
-    elsewhere = "name another folder with -o, " if other_folder else ""
+    elsewhere = f"{another_folder()}, " if other_folder else ""
     raise InputError(
         f"there is no room for the results: {takes}; free some space, {elsewhere}{less}or give "
-        "--force to run until the disk is full"
+        f"{force_option()} to run until the disk is full"
     )
 
 

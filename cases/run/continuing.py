@@ -8,11 +8,12 @@ import math
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from catenary.base.errors import InputError
+from catenary.base.options import option
 from catenary.cases.scene.input.faults import Origin
 from catenary.cases.scene.load import scene_from
 from catenary.cases.scene.scene import Scene
@@ -36,15 +37,7 @@ _ROUNDING = 1e-9
 _RELATIVE, _ABSOLUTE = 1e-6, 1e-6
 
 
-class Said(NamedTuple):
-    """Names of a later end and of another stretch as they were given, and where."""
-
-    until: str
-    evaluated: str
-    where: str
-
-
-OF_PROGRAM = Said("--until-m", "--evaluate", "on the command line")
+UNTIL, EVALUATE = ("--until-m", "until_m"), ("--evaluate", "evaluate")
 
 
 def state_to_continue(result: Path, beyond_end: bool = False) -> dict[str, Any]:
@@ -67,8 +60,8 @@ def state_to_continue(result: Path, beyond_end: bool = False) -> dict[str, Any]:
     with Results(result) as results:
         if results.complete and not beyond_end:
             raise InputError(
-                f"the run in {result} is done; there is nothing to continue, unless --until-m says "
-                "where it is to end"
+                f"the run in {result} is done; there is nothing to continue, unless "
+                f"{option(*UNTIL)} says where it is to end"
             )
         excitation = results.attributes.get("excitation")
         if excitation:
@@ -178,7 +171,6 @@ def extended_scene(
     file: str,
     until: float | None,
     evaluated: str | None,
-    said: Said = OF_PROGRAM,
 ) -> Scene:
     """The checked scene of a run with a later end, or another evaluated stretch. Not collective.
 
@@ -188,7 +180,6 @@ def extended_scene(
     file : its path, for sentences
     until : where the leading pantograph is to stop [m], None for where it stops now
     evaluated : ``FROM:TO`` [m], None for the stretch as it is
-    said : how these two were given, for sentences
 
     Raises
     ------
@@ -196,23 +187,25 @@ def extended_scene(
         If that is not later, or impossible.
     """
     raw, given = copy.deepcopy(config), []
+    where = option("on the command line", "in restart()")
     if until is not None:
         end = float(raw["train"]["end_m"])
         if not (math.isfinite(until) and until > end):
             raise InputError(
-                f"{said.until} is {until:g}, but must be greater than {end:g}: the run ends there"
+                f"{option(*UNTIL)} is {until:g}, but must be greater than {end:g}: the run ends "
+                "there"
             )
         raw["train"]["end_m"] = until
-        given.append(("train.end_m", f"{said.where} ({said.until})"))
+        given.append(("train.end_m", f"{where} ({option(*UNTIL)})"))
     if evaluated is not None:
         try:
             first, last = (float(part) for part in evaluated.split(":"))
         except ValueError:
             raise InputError(
-                f"{said.evaluated} is {evaluated}, but must be two places [m] as from:to, "
-                "e.g. 360:600"
+                f"{option(*EVALUATE)} is {evaluated}, but must be two places [m]"
+                f"{option(' as from:to, e.g. 360:600', ', e.g. (360, 600)')}"
             ) from None
         raw["evaluation"] |= {"from_m": first, "to_m": last}
-        where = f"{said.where} ({said.evaluated})"
+        where = f"{where} ({option(*EVALUATE)})"
         given += [("evaluation.from_m", where), ("evaluation.to_m", where)]
     return scene_from(raw, Origin(file, tuple(given), recorded=True))

@@ -19,6 +19,7 @@ import typer
 from catenary.base.errors import CatenaryError, InputError
 from catenary.base.lone_process import alone as alone
 from catenary.base.lone_process import world as world
+from catenary.base.options import command_line
 from catenary.base.parallel import NO_MEMORY, launched_by_mpirun, on_root
 from catenary.cases.scene.input.plain_text import plain, shown
 from catenary.postproc.files.disk_errors import reason
@@ -196,9 +197,10 @@ def guarded(command: Callable[..., int | None]) -> Callable[..., None]:
             for name, group in groups.items():
                 own = [field.name for field in dataclasses.fields(group)]
                 kwargs[name] = group(**{field: kwargs.pop(field) for field in own})
-            code = command(*args, **kwargs)
-            for tell in _last_words:
-                tell()
+            with command_line():
+                code = command(*args, **kwargs)
+                for tell in _last_words:
+                    tell()
         except CatenaryError as error:
             complain(str(error))
             code = error.exit_code

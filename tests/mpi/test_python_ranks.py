@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -52,6 +53,14 @@ def test_all_ranks_are_told_what_is_wrong(scene: catenary.Scene) -> None:
     with pytest.raises(catenary.InputError, match="slack") as found:
         catenary.run(scene.replace(loose))
     assert agree(str(found.value))
+
+
+def test_each_rank_may_ask_for_itself(scene: catenary.Scene, tmp_path: Path) -> None:
+    """Functions that are not collective, with a folder of each rank."""
+    folder = tmp_path / str(COMM.rank)
+    found = catenary.highest_speeds(scene, 240, 250, folder, within=10, criteria="wave speed")
+    assert agree(found.to_json()) and found.highest_km_h.tolist() == [250.0, 250.0]
+    assert (folder / "speed.csv").is_file()
 
 
 def test_each_rank_steps_a_line_of_its_own(scene: catenary.Scene) -> None:

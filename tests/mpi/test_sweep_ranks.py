@@ -104,5 +104,5 @@ def test_an_error_on_a_rank_reaches_all_when_the_others_are_done(folder: Path) -
 @pytest.mark.skipif(COMM.size == 1, reason="for several ranks")
 def test_as_many_runs_at_a_time_as_there_are_ranks_or_one(folder: Path) -> None:
     jobs = make_jobs(CASE, VARIANTS[1:], TINY)
-    with pytest.raises(InputError, match=f"-j is {COMM.size + 1} on {COMM.size} ranks"):
+    with pytest.raises(InputError, match=f"jobs is {COMM.size + 1} on {COMM.size} ranks"):
         run_jobs(jobs, folder, COMM, RunOptions(n_jobs=COMM.size + 1))

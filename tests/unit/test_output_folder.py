@@ -135,7 +135,7 @@ def test_a_very_large_run_asks_for_force(
     what: str, tmp_path: Path, plenty: None, caplog: pytest.LogCaptureFixture
 ) -> None:
     size, words = LARGE[what]
-    with pytest.raises(InputError, match="give --force to run it all the same") as caught:
+    with pytest.raises(InputError, match="give force=True to run it all the same") as caught:
         check_size(tmp_path, size, force=False)
     assert words in str(caught.value) and "1000000.0 GB are free" in str(caught.value)
     with caplog.at_level(logging.INFO, logger="catenary.run"):
@@ -170,7 +170,7 @@ def test_the_files_of_a_run_that_is_continued_are_room(
 ) -> None:
     """It goes on in them, whatever other names they have."""
     monkeypatch.setattr(output_folder, "free_bytes", lambda folder: 0.5e6)
-    with pytest.raises(InputError, match=r"0\.5 MB are free; free some space, or give --force"):
+    with pytest.raises(InputError, match=r"0\.5 MB are free; free some space, or give force=True"):
         check_room_to_continue(tmp_path, SMALL, force=False)
     check_room_to_continue(tmp_path, SMALL, force=True)
     (tmp_path / "run.h5").write_bytes(bytes(1_000_000))

@@ -132,5 +132,5 @@ def test_how_many_at_once() -> None:
     alone, eight = SimpleNamespace(size=1), SimpleNamespace(size=8)
     assert [at_once(wanted, alone) for wanted in (0, 1, 5)] == [cores(), 1, 5]
     assert [at_once(wanted, eight) for wanted in (0, 1, 8)] == [8, 1, 8]
-    with pytest.raises(InputError, match="-j is 3 on 8 ranks; give -j 8"):
+    with pytest.raises(InputError, match="jobs is 3 on 8 ranks; give jobs=8"):
         at_once(3, eight)

@@ -95,7 +95,8 @@ def waves(
         typer.Option(
             "--vary",
             metavar="KEY=V1,V2,...",
-            help="With --window-error: a curve for each value.",
+            help="With --window-error: a curve for each value, or combination of those of several "
+            "keys.",
         ),
     ] = None,
     force: Force = False,

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from itertools import pairwise
 
 from catenary.cases.scene.input.faults import Fault
-from catenary.cases.scene.keys.table import TAKE_AWAY
+from catenary.cases.scene.keys.table import take_away
 from catenary.cases.scene.keys.units import speed_from_km_h
 from catenary.cases.scene.line.line_data import wire_tables
 from catenary.cases.scene.problem import pantograph_of, static_force
@@ -43,7 +43,7 @@ def check_wind(scene: Scene, line: LineData) -> Iterator[Fault]:
     is_given = "roughness_length_m" in table.model_fields_set and not scene.origin.recorded
     if is_given and table.profile == "power" and table.gusts is None:
         why = "nothing reads it with the profile power and no gusts"
-        yield scene.refused("wind.roughness_length_m", why + TAKE_AWAY)
+        yield scene.refused("wind.roughness_length_m", why + take_away())
     wind = wind_of(table)
     if wind is not None and (not math.isfinite(wind.mean) or wind.mean <= 0.0):
         yield scene.refused("wind.height_m", "there is no wind at that height")
@@ -82,7 +82,7 @@ def check_crosswind(scene: Scene, line: LineData) -> Iterator[Fault]:
             key = f"pantographs.{name}.crosswind_factor"
             why = (
                 "the air has no forces on this pantograph: give it aerodynamics or a force of type "
-                f"aerodynamic_force{TAKE_AWAY}"
+                f"aerodynamic_force{take_away()}"
             )
             yield scene.refused(key, why)
 

@@ -7,7 +7,7 @@ import functools
 from collections.abc import Iterator, Mapping
 
 from catenary.cases.scene.input.faults import Fault, shown
-from catenary.cases.scene.keys.table import TAKE_AWAY
+from catenary.cases.scene.keys.table import take_away
 from catenary.cases.scene.line.droppers import FEWEST_SAGGING
 from catenary.cases.scene.line.line_data import arm_tables, dropper_tables, hanging_table
 from catenary.cases.scene.problem import problem_of
@@ -133,7 +133,7 @@ def _idle_arms(scene: Scene) -> Iterator[Fault]:
     for key, arm in arm_tables(scene.line).items():
         if arm.mass_kg_per_m and not arm.length_m and scene.effects.get("arm_inertia") is not False:
             why = f"an arm of length 0 has no mass by it: give {key}.length_m, or clamp_kg alone"
-            yield scene.refused(f"{key}.mass_kg_per_m", why + TAKE_AWAY)
+            yield scene.refused(f"{key}.mass_kg_per_m", why + take_away())
 
 
 def _idle_clamps(scene: Scene) -> Iterator[Fault]:
@@ -147,7 +147,7 @@ def _idle_clamps(scene: Scene) -> Iterator[Fault]:
             if name in wire.model_fields_set:
                 why = (
                     f"{wire.name} has no clamp: neither start nor end names a wire to which it is "
-                    f"clamped{TAKE_AWAY}"
+                    f"clamped{take_away()}"
                 )
                 yield scene.refused(f"line.wires.{i}.{name}", why)
 
@@ -177,7 +177,7 @@ def _lateral_places(scene: Scene) -> Iterator[Fault]:
         else:
             continue
         for name in set(idle) & wire.model_fields_set:
-            yield scene.refused(f"line.wires.{i}.{name}", why + TAKE_AWAY)
+            yield scene.refused(f"line.wires.{i}.{name}", why + take_away())
 
 
 def _dropper_lengths(scene: Scene, line: LineData) -> Iterator[Fault]:
@@ -206,7 +206,7 @@ def _sagging(scene: Scene) -> Iterator[Fault]:
                 f"there is none: spans have {counted(most, 'dropper')}"
             )
             at = f"{key}.pre_sag_mid_mm"
-            yield scene.refused(at, why + TAKE_AWAY)
+            yield scene.refused(at, why + take_away())
 
 
 # Keys of random irregularities.
@@ -221,7 +221,7 @@ def _random(scene: Scene) -> Iterator[Fault]:
             if part in table.model_fields_set:
                 key = f"irregularities.{name}.{part}"
                 why = f"nothing is random without irregularities.{name}.standard_deviation_mm"
-                yield scene.refused(key, why + TAKE_AWAY)
+                yield scene.refused(key, why + take_away())
 
 
 def _further_overlaps(scene: Scene, line: LineData) -> Iterator[Fault]:
@@ -236,7 +236,7 @@ def _further_overlaps(scene: Scene, line: LineData) -> Iterator[Fault]:
             f"which one may begin is {last}"
         )
         key = "line.overlap.repeat_every_spans"
-        yield scene.refused(key, why + TAKE_AWAY)
+        yield scene.refused(key, why + take_away())
 
 
 RELATIVE_MOTION = "relative_motion"

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from catenary.cases.scene.input.faults import Fault
-from catenary.cases.scene.keys.table import TAKE_AWAY
+from catenary.cases.scene.keys.table import take_away
 from catenary.cases.scene.line.free import FreeWireTable
 from catenary.cases.scene.line.line import LineTable
 from catenary.cases.scene.line.line_data import TENSIONER, along_of, arm_tables, wire_tables
@@ -204,7 +204,7 @@ def _weights(scene: Scene, line: LineData) -> Iterator[Fault]:
             continue
         if tensioned and name not in tensioned and not scene.origin.recorded:
             why = f"no end of this wire has a tensioner, only those of {', '.join(tensioned)}"
-            yield scene.refused(key, why + TAKE_AWAY)
+            yield scene.refused(key, why + take_away())
             continue
         tension = wires[name].tension
         low, high = tensioner.band(name, wires[name], _GRAVITY)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from catenary.cases.scene.input.faults import Fault
-from catenary.cases.scene.keys.table import TAKE_AWAY
+from catenary.cases.scene.keys.table import take_away
 from catenary.cases.scene.problem import problem_of
 from catenary.cases.scene.run.contact import HERTZ, WITH_RESTITUTION
 from catenary.cases.scene.scene import Scene
@@ -121,7 +121,7 @@ def check_iterations(scene: Scene) -> Iterator[Fault]:
         if name in numerics.model_fields_set and not any(made[reader] for reader in readers):
             needed = " or ".join(f"numerics.{reader}" for reader in readers)
             why = f"nothing reads it with scheme {scheme}; take {needed}, or leave the key out"
-            yield scene.refused(f"numerics.{name}", why + TAKE_AWAY)
+            yield scene.refused(f"numerics.{name}", why + take_away())
 
 
 def check_window(scene: Scene) -> Iterator[Fault]:

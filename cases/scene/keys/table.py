@@ -7,6 +7,8 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
+from catenary.base.options import option
+
 
 class Table(BaseModel):
     """A table of ``case.toml``.
@@ -21,8 +23,9 @@ class Table(BaseModel):
     )
 
 
-# Advice on removing a key of a case file, for sentences about keys that exclude others.
-TAKE_AWAY = " (--set KEY= takes one away)"
+def take_away() -> str:
+    """Advice on removing a key of a case file, for sentences about keys that exclude others."""
+    return f" ({option('--set KEY=', 'None in replace()')} takes one away)"
 
 
 def _as_list(value: Any) -> Any:
@@ -33,7 +36,7 @@ def exactly_one(table: Table, *names: str) -> None:
     """Raise ``ValueError`` unless exactly one of the keys ``names`` is given."""
     given = [name for name in names if getattr(table, name) is not None]
     if len(given) != 1:
-        but = "none is given" if not given else f"{' and '.join(given)} are given{TAKE_AWAY}"
+        but = "none is given" if not given else f"{' and '.join(given)} are given{take_away()}"
         raise ValueError(f"needs exactly one of {', '.join(names)}, but {but}")
 
 
@@ -41,7 +44,7 @@ def either(table: Table, one: str, other: str) -> None:
     """Raise ``ValueError`` if two keys both differ from their defaults."""
     fields = type(table).model_fields
     if all(getattr(table, name) != fields[name].default for name in (one, other)):
-        raise ValueError(f"takes {one} or {other}, but both are given{TAKE_AWAY}")
+        raise ValueError(f"takes {one} or {other}, but both are given{take_away()}")
 
 
 def together(table: Table, one: str, other: str) -> None:

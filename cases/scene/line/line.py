@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from catenary.cases.scene.keys.table import TAKE_AWAY, OneOrMore, Table, stretch, together
+from catenary.cases.scene.keys.table import OneOrMore, Table, stretch, take_away, together
 from catenary.cases.scene.line.droppers import DropperTable, Span
 from catenary.cases.scene.line.ends import EndsTable, OverlapTable, TemperatureTable, TensionerTable
 from catenary.cases.scene.line.free import FreeLinkTable, FreeWireTable
@@ -105,7 +105,7 @@ class TransitionTable(Table):
         if given and not self.n_spans_start + self.n_spans_end:
             raise ValueError(
                 f"must not have {' and '.join(given)} without transition spans, n_spans_start or "
-                f"n_spans_end{TAKE_AWAY}"
+                f"n_spans_end{take_away()}"
             )
         return self
 

@@ -6,7 +6,7 @@ from typing import Any, Literal
 
 from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
-from catenary.cases.scene.keys.table import TAKE_AWAY, Table
+from catenary.cases.scene.keys.table import Table, take_away
 from catenary.solver.problem.contact_laws import (
     HYSTERESIS,
     ContactLaw,
@@ -69,14 +69,14 @@ class ContactTable(Table):
         for key, laws in _ACTS_WITH.items():
             if key in self.model_fields_set and self.law not in laws:
                 raise ValueError(
-                    f"must not give {key}, which does not act with law {self.law}{TAKE_AWAY}"
+                    f"must not give {key}, which does not act with law {self.law}{take_away()}"
                 )
         if self.law in WITH_RESTITUTION and self.restitution is None:
             raise ValueError(f"must give restitution, which law {self.law} is made of")
         both = {"stiffness_N_per_m", "hertz_stiffness_N_per_m1_5"} & self.model_fields_set
         if len(both) == 2 and self.hertz_stiffness_N_per_m1_5 is not None:
             raise ValueError(
-                "must give stiffness_N_per_m or hertz_stiffness_N_per_m1_5, not both" + TAKE_AWAY
+                "must give stiffness_N_per_m or hertz_stiffness_N_per_m1_5, not both" + take_away()
             )
         return self
 

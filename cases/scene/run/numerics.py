@@ -12,7 +12,7 @@ from pydantic import (
     model_validator,
 )
 
-from catenary.cases.scene.keys.table import TAKE_AWAY, Table
+from catenary.cases.scene.keys.table import Table, take_away
 from catenary.solver.problem.integrator_parameters import (
     AVERAGE_ACCELERATION,
     HHT,
@@ -47,7 +47,7 @@ class MeshTable(Table):
     def _consistent(self) -> MeshTable:
         ignored = self.model_fields_set & {"elements_per_gap", "support_refinement", "grading"}
         if self.file is not None and ignored:
-            raise ValueError(f"takes file or {sorted(ignored)[0]}, but both are given{TAKE_AWAY}")
+            raise ValueError(f"takes file or {sorted(ignored)[0]}, but both are given{take_away()}")
         return self
 
 
@@ -130,17 +130,17 @@ class NumericsTable(Table):
         if self.coupling is not None and self.scheme != "one_solve":
             raise ValueError(
                 f"must not give coupling, which belongs to scheme one_solve, with {self.scheme}"
-                + TAKE_AWAY
+                + take_away()
             )
         if self.iterations is not None:
             if self.scheme != "fixed_point":
                 raise ValueError(
                     "must not give iterations, which belongs to scheme fixed_point, with "
-                    f"{self.scheme}{TAKE_AWAY}"
+                    f"{self.scheme}{take_away()}"
                 )
             if "max_iterations" in self.model_fields_set:
                 raise ValueError(
-                    f"takes iterations or max_iterations, but both are given{TAKE_AWAY}"
+                    f"takes iterations or max_iterations, but both are given{take_away()}"
                 )
         if 2 * self.newmark_beta < self.newmark_gamma:
             raise ValueError(
@@ -157,7 +157,7 @@ class NumericsTable(Table):
             if smallest is not None:
                 raise ValueError(
                     "must not give smallest_dt_s without adaptive_tolerance_N, which halves steps"
-                    + TAKE_AWAY
+                    + take_away()
                 )
             return
         if smallest is not None and not self.dt_s / MOST_DIVIDED <= smallest <= 0.5 * self.dt_s:
@@ -173,7 +173,7 @@ class NumericsTable(Table):
             if radius is not None:
                 raise ValueError(
                     "must not give spectral_radius, which belongs to integrators hht and "
-                    "generalized_alpha, with newmark, whose damping is newmark_gamma" + TAKE_AWAY
+                    "generalized_alpha, with newmark, whose damping is newmark_gamma" + take_away()
                 )
             return
         if radius is None:
@@ -188,7 +188,8 @@ class NumericsTable(Table):
         if own != AVERAGE_ACCELERATION[:2]:
             raise ValueError(
                 "must not give newmark_beta and newmark_gamma, which belong to integrator newmark, "
-                f"with {self.integrator}, whose parameters follow from spectral_radius" + TAKE_AWAY
+                f"with {self.integrator}, whose parameters follow from spectral_radius"
+                + take_away()
             )
 
     @model_serializer(mode="wrap")
@@ -234,10 +235,10 @@ class WindowTable(Table):
         if self.mode != "bounded" and given:
             raise ValueError(
                 f"must not give {given[0]}, which belongs to mode bounded, with {self.mode}"
-                + TAKE_AWAY
+                + take_away()
             )
         if "tolerance" in given and len(given) > 1:
-            raise ValueError(f"takes tolerance or {given[1]}, but both are given{TAKE_AWAY}")
+            raise ValueError(f"takes tolerance or {given[1]}, but both are given{take_away()}")
         if len(given) == 1 and given[0] in _SPANS:
             other = _SPANS[1 - _SPANS.index(given[0])]
             raise ValueError(f"must give {other} with {given[0]}, or neither")

@@ -6,7 +6,7 @@ from typing import Literal
 
 from pydantic import Field, model_validator
 
-from catenary.cases.scene.keys.table import TAKE_AWAY, Table, stretch
+from catenary.cases.scene.keys.table import Table, stretch, take_away
 from catenary.cases.scene.keys.units import angle_from_deg
 from catenary.solver.problem.wind import Gusts, Profile, Stretch, Wind, friction_velocity_of
 
@@ -67,7 +67,7 @@ class GustsTable(Table):
         if self.turbulence_intensity is not None and self.friction_velocity_m_per_s is not None:
             raise ValueError(
                 "must have turbulence_intensity or friction_velocity_m_per_s, but both are given"
-                f"{TAKE_AWAY}"
+                f"{take_away()}"
             )
         if self.highest_hz <= self.lowest_hz:
             raise ValueError(

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
-from catenary.cases.scene.keys.table import TAKE_AWAY, Table
+from catenary.cases.scene.keys.table import Table, take_away
 from catenary.mbs.head.strips import Flexure, Strips, Suspension, Turning
 
 # Keys that belong together: a strip's own suspension, a head's pitch.
@@ -106,13 +106,13 @@ class StripsTable(Table):
         if self.number == 1:
             for name in ("spacing_m", *_PITCH):
                 if getattr(self, name) is not None:
-                    raise ValueError(f"must not have {name} with number = 1{TAKE_AWAY}")
+                    raise ValueError(f"must not have {name} with number = 1{take_away()}")
         if self.rake_deg and self.length_m is None:
             raise ValueError("needs length_m for strips with rake_deg")
         if self.rake_deg and self.pitch_inertia_kg_m2 is not None:
             raise ValueError(
                 "must not have rake_deg with pitch_inertia_kg_m2, whose lever arms are those of "
-                f"strips that are square to the track{TAKE_AWAY}"
+                f"strips that are square to the track{take_away()}"
             )
         for pair in (_SUSPENSION, _PITCH):
             given = [name for name in pair if getattr(self, name) is not None]
@@ -121,7 +121,7 @@ class StripsTable(Table):
         if self.damping_N_s_per_m > 0 and self.mass_kg is None:
             raise ValueError(
                 "must not have damping_N_s_per_m without mass_kg and stiffness_N_per_m, because "
-                f"it acts between a strip and the head{TAKE_AWAY}"
+                f"it acts between a strip and the head{take_away()}"
             )
         return self
 

@@ -17,7 +17,7 @@ from pydantic import (
 
 from catenary.base.errors import InputError
 from catenary.cases.scene.input.toml_input import assign
-from catenary.cases.scene.keys.table import TAKE_AWAY, Table, ascending, exactly_one
+from catenary.cases.scene.keys.table import Table, ascending, exactly_one, take_away
 from catenary.cases.scene.train.head import RollTable, SomeMass, StripsTable
 from catenary.cases.scene.train.laws import AerodynamicsTable, LawTable, RegulationTable
 from catenary.cases.scene.train.mechanism import BodyTable, ForceTable, JointTable, Name
@@ -121,7 +121,7 @@ class LumpedTable(_Pressing):
                                strict=True):  # fmt: skip
             if filled.setdefault(key, list(values)) != list(values) and model in READY:
                 raise ValueError(
-                    f'must not have {key} beside model = "{model}", which has its own{TAKE_AWAY}'
+                    f'must not have {key} beside model = "{model}", which has its own{take_away()}'
                 )
         return filled
 
@@ -224,29 +224,29 @@ class MultibodyTable(_Pressing):
         elif given:
             raise ValueError(
                 f"must not have {given[0]} with calibrate = false, because the static force "
-                f"follows from the actuator{TAKE_AWAY}"
+                f"follows from the actuator{take_away()}"
             )
         if self.strips.pitch_inertia_kg_m2 is not None:
             raise ValueError(
                 "must not have strips.pitch_inertia_kg_m2, because the pitch of its head follows "
-                f"from bodies, joints and forces{TAKE_AWAY}"
+                f"from bodies, joints and forces{take_away()}"
             )
         if self.strips.rake_deg:
             raise ValueError(
                 "must not have strips.rake_deg, because its head is pressed where a strip "
-                f"that is square to the track is{TAKE_AWAY}"
+                f"that is square to the track is{take_away()}"
             )
         if self.motion == "all_bodies":
             if self.strips.mass_kg is not None:
                 raise ValueError(
                     "must not have strips.mass_kg with motion = all_bodies, because strips on "
-                    f"springs of their own are no bodies{TAKE_AWAY}"
+                    f"springs of their own are no bodies{take_away()}"
                 )
         for key in _OF_ALL_BODIES:
             if self.motion == "reduced" and key in self.model_fields_set:
                 raise ValueError(
                     f"must not have {key} with motion = reduced, because it acts only with "
-                    f"motion = all_bodies{TAKE_AWAY}"
+                    f"motion = all_bodies{take_away()}"
                 )
         for correction in self.corrections:
             _number_at(self, correction.key)

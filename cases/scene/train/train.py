@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
-from catenary.cases.scene.keys.table import PAIR, TAKE_AWAY, Table, band, within
+from catenary.cases.scene.keys.table import PAIR, Table, band, take_away, within
 from catenary.cases.scene.keys.units import angle_from_deg
 from catenary.mbs.vehicle.base_motion import Harmonic, Source, VehicleMotion
 from catenary.mbs.vehicle.base_motion import Table as MotionOf
@@ -91,7 +91,7 @@ class MotionTable(Table):
         if len(sine) == 1:
             raise ValueError(f"needs amplitude_m and frequency_hz together, but only has {sine[0]}")
         if self.phase_deg and not sine:
-            raise ValueError(f"must not have phase_deg without amplitude_m{TAKE_AWAY}")
+            raise ValueError(f"must not have phase_deg without amplitude_m{take_away()}")
         if not sine and self.by_time is None and self.by_place is None:
             raise ValueError(
                 "needs by_time, by_place (or files of these) or amplitude_m, but none is given"
@@ -198,7 +198,7 @@ class VehicleTable(Table):
         if self.suspension is not None and not self._has_track():
             raise ValueError(
                 "must have irregularity or a course by_place with suspension, because what depends "
-                f"on time is the base's own motion{TAKE_AWAY}"
+                f"on time is the base's own motion{take_away()}"
             )
         return self
 

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from catenary.base.errors import InputError
+from catenary.base.options import option
 from catenary.cases.scene.problem import resolved
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.optimise.task import VariableTable
@@ -129,7 +130,7 @@ def _value(tables: dict[str, Any], key: str, where: str) -> Any:
     if not all(is_number(one) for one in numbers):
         raise InputError(
             f"{where} is {key}, which has no number or list of numbers in the scene; give it there "
-            "first, e.g. by --set"
+            f"first, e.g. by {option('--set', 'replace()')}"
         )
     return [float(one) for one in found] if isinstance(found, list) else float(found)
 

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import product
-from math import ceil
+from math import ceil, inf
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -20,6 +20,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from catenary.base.errors import InputError
+from catenary.base.options import option
 from catenary.cases.scene.input.faults import shown
 from catenary.cases.scene.scene import Scene
 from catenary.cases.scene.turned import BACKWARD, DIRECTIONS, FORWARD, has_mirrored_line, turned
@@ -71,18 +72,20 @@ class Speeds(NamedTuple):
         """
         if not _SLOWEST <= self.slowest < self.fastest <= _FASTEST:
             raise InputError(
-                f"--from {self.slowest:g} --to {self.fastest:g} is no range of speeds: give two "
-                f"ascending speeds from {_SLOWEST:g} to {_FASTEST:g} km/h"
+                f"{option('--from', 'slowest')} {self.slowest:g} {option('--to', 'fastest')} "
+                f"{self.fastest:g} is no range of speeds: give two ascending speeds from "
+                f"{_SLOWEST:g} to {_FASTEST:g} km/h"
             )
-        if not 0.0 < self.within <= self.step:
+        step, within = option("--step", "step"), option("--within", "within")
+        if not 0.0 < self.within <= self.step < inf:
             raise InputError(
-                f"--within {self.within:g} --step {self.step:g} is not possible: --within is above "
-                "0 and at most --step"
+                f"{within} {self.within:g} {step} {self.step:g} is not possible: {within} is above "
+                f"0 and at most {step}"
             )
         count = ceil((self.fastest - self.slowest) / self.step - 1e-9) + 1
         if count > MOST:
             raise InputError(
-                f"--step {self.step:g} makes {count} speeds; at most {MOST} are allowed"
+                f"{step} {self.step:g} makes {count} speeds; at most {MOST} are allowed"
             )
         evenly = [round(self.slowest + number * self.step, 4) for number in range(count - 1)]
         return [*evenly, self.fastest]
@@ -233,7 +236,8 @@ def _criteria(ended: Iterable[Ended], wanted: Sequence[str]) -> tuple[list[str],
     for text in wanted:
         if not any(text.lower() in name.lower() for name in known):
             raise InputError(
-                f"--criterion {shown(text)} is part of no criterion; there are {'; '.join(known)}"
+                f"{option('--criterion', 'criteria')} {shown(text)} is part of no criterion; there "
+                f"are {'; '.join(known)}"
             )
     if wanted:
         known = [name for name in known if any(text.lower() in name.lower() for text in wanted)]

@@ -17,7 +17,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
-from math import floor
+from math import floor, inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -25,6 +25,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from catenary.base.errors import InputError
+from catenary.base.options import option
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.sweep.jobs import Ended
 from catenary.cases.studies.sweep.output import failed_criteria
@@ -73,14 +74,16 @@ class Distances(NamedTuple):
         """
         if not _LEAST <= self.nearest < self.farthest <= _FARTHEST:
             raise InputError(
-                f"--from {self.nearest:g} --to {self.farthest:g} is no range of distances: give "
-                f"two ascending ones from {_LEAST:g} to {_FARTHEST:g} m"
+                f"{option('--from', 'nearest')} {self.nearest:g} {option('--to', 'farthest')} "
+                f"{self.farthest:g} is no range of distances: give two ascending ones from "
+                f"{_LEAST:g} to {_FARTHEST:g} m"
             )
-        if not self.step > 0.0:
-            raise InputError(f"--step {self.step:g} is not possible: it is above 0 m")
+        step = option("--step", "step")
+        if not 0.0 < self.step < inf:
+            raise InputError(f"{step} {self.step:g} is not possible: it is above 0 m")
         length = self.farthest - self.nearest
         if length / self.step > MOST:
-            raise InputError(f"--step {self.step:g} makes more than {MOST} distances")
+            raise InputError(f"{step} {self.step:g} makes more than {MOST} distances")
         count = floor(length / self.step + 1e-9) + 1
         return [round(self.nearest + number * self.step, 4) for number in range(count)]
 

@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from catenary.base.errors import InputError
+from catenary.base.options import option
 from catenary.cases.scene.input.faults import Origin, shown
 from catenary.cases.scene.keys.error_sentences import unknown_key
 from catenary.cases.scene.keys.keys import is_known, known_keys
@@ -156,8 +157,8 @@ class ChangedScenes:
             _change(raw, parameter, by)
         return self._checked(raw)
 
-    def parameter(self, key: str, where: str = "in --parameter") -> Parameter:
-        """The parameter of a key; ``where`` it was written, for sentences.
+    def parameter(self, key: str, where: str = "") -> Parameter:
+        """The parameter of a key; ``where`` it was written, for sentences, if not as an option.
 
         Raises
         ------
@@ -171,6 +172,7 @@ class ChangedScenes:
         if not is_known(key, known) and not (
             parts[-1].isdigit() and is_known(key.rpartition(".")[0], known)
         ):
+            where = where or f"in {option('--parameter', 'parameters')}"
             raise InputError(unknown_key(key, where, known))
         if parts[0] == "pantographs" and len(parts) > 2:
             if self._is_ready(parts[1]):

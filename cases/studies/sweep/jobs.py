@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple, TypeVar
 
 from catenary.base.errors import InputError
+from catenary.base.options import option
 from catenary.cases.process.interrupts import Interrupted
 from catenary.cases.scene.input.faults import UnfitScene, shown
 from catenary.cases.scene.input.toml_input import Assigned
@@ -55,7 +56,7 @@ def check_statistics(names: Sequence[str]) -> None:
 
 def check_histories(names: Sequence[str]) -> None:
     """Raise InputError if one of ``names`` is no history that an ensemble keeps."""
-    _check_names(names, HISTORIES, "history of --histories")
+    _check_names(names, HISTORIES, "history")
 
 
 def _check_names(names: Sequence[str], known: Mapping[str, Any], what: str) -> None:
@@ -168,7 +169,8 @@ def _refuse_petsc(variant: Variant) -> None:
         if assignment.split("=")[0].strip().split(".")[0] == "petsc":
             raise InputError(
                 f"variant {variant.name} assigns {shown(assignment)[1:-1]}, but PETSc takes its "
-                "options once, when the program starts: give them with --set or after --"
+                "options once, when the program starts: give them "
+                f"{option('with --set or after --', 'to the scene by replace()')}"
             )
 
 

@@ -23,7 +23,9 @@ from catenary.cases.process.interrupts import Interrupted
 from catenary.cases.process.petsc_options import idle_names, look_up_all_but, start_petsc
 from catenary.cases.process.workers import Outcome, WorkerLost, at_once, each
 from catenary.cases.result_folder.output_folder import (
+    another_folder,
     check_room_of_runs,
+    force_option,
     refuse_earlier,
     refuse_impossible,
 )
@@ -237,8 +239,8 @@ def _found(job: Job, folder: Path, measured: bool) -> Ended | None:
         return None
     if record.get("config") != wanted:
         raise InputError(
-            f"{folder} holds the results of {job.variant.name} with another configuration; name "
-            "another folder with -o, or give --force to replace them"
+            f"{folder} holds the results of {job.variant.name} with another configuration; "
+            f"{another_folder()}, or give {force_option()} to replace them"
         )
     summary = read_summary(folder / SUMMARY, record)
     missing = job.keep_results and not (folder / RESULT).is_file()
@@ -260,8 +262,8 @@ def _refuse_other_run(folder: Path, wanted: dict[str, Any]) -> None:
         same = True
     if not same:
         raise InputError(
-            f"{folder / RESULT} holds the results of another run; name another folder with -o, or "
-            "give --force to replace them"
+            f"{folder / RESULT} holds the results of another run; {another_folder()}, or "
+            f"give {force_option()} to replace them"
         )
 
 

@@ -8,7 +8,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 from catenary.base.errors import InputError
-from catenary.cases.result_folder.output_folder import refuse_earlier, refuse_impossible
+from catenary.base.options import option
+from catenary.cases.result_folder.output_folder import (
+    another_folder,
+    force_option,
+    refuse_earlier,
+    refuse_impossible,
+)
 from catenary.cases.scene.load import Draft
 from catenary.cases.studies.sweep.jobs import (
     Ended,
@@ -96,7 +102,8 @@ def sweep_of(
     if not only_statistics:
         if histories:
             raise InputError(
-                "--histories goes with --only-statistics: whole runs keep all in run.h5"
+                f"{option('--histories', 'histories')} goes with "
+                f"{option('--only-statistics', 'only_statistics')}: whole runs keep all in run.h5"
             )
         return whole_runs_of(draft, variants, out, full_report=full_report, force=force)
     from catenary.cases.studies.sweep.together import ensemble_of
@@ -196,6 +203,6 @@ def refuse_other_sweep(out: Path, variants: Sequence[Variant], force: bool) -> N
     other = sorted(there - {variant.name for variant in variants})
     if other:
         raise InputError(
-            f"{path} is the table of a sweep with other variants ({other[0]}); name another folder "
-            "with -o, or give --force to replace it"
+            f"{path} is the table of a sweep with other variants ({other[0]}); "
+            f"{another_folder()}, or give {force_option()} to replace it"
         )

@@ -66,7 +66,7 @@ def parse_vary(text: str) -> VariedKey:
     """
     key, equals, rest = text.partition("=")
     key = key.strip()
-    values = tuple(_split(rest))
+    values = tuple(split_values(rest))
     if not equals or not key or not all(values):
         raise InputError(
             f"--vary {shown(text)} must have the form key=value,value,..., e.g. "
@@ -170,8 +170,8 @@ def _quoted(value: Any) -> str:
     return json.dumps(value) if isinstance(value, str) else text_of(value)
 
 
-def _split(text: str) -> list[str]:
-    """``text`` cut at the commas that stand outside of brackets and quotes."""
+def split_values(text: str) -> list[str]:
+    """The values of ``v1,v2,...``: ``text`` cut at commas outside of brackets and quotes."""
     parts, depth, quote, start = [], 0, "", 0
     for place, letter in enumerate(text):
         if quote:

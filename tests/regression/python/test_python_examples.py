@@ -5,6 +5,7 @@ from __future__ import annotations
 import doctest
 import inspect
 import pydoc
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,7 @@ WITHOUT_EXAMPLE = {"__version__", "CatenaryError", "Fault", "InputError", "RunBr
 PUBLIC = [name for name in catenary.__all__ if name not in WITHOUT_EXAMPLE]
 # Examples of more than a second, whose subjects have tests of their own.
 LONG = {"Identified", "identify", "optimise", "Optimum", "uncertainty"}
+DOCS = Path(__file__).parents[3] / "docs"
 FLAGS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
 
 
@@ -80,6 +82,26 @@ def test_a_function_says_what_it_takes_gives_and_refuses(name: str) -> None:
     for parameter in parameters:
         assert parameter in text.split("Returns\n---")[0], parameter
     assert "ollective" in text, "whether it is collective"
+
+
+def test_the_documents_have_every_name() -> None:
+    page = (DOCS / "python.md").read_text(encoding="utf-8")
+    listed = set(re.findall(r"^\| `(\w+)\(", page, re.MULTILINE))
+    called = {name for name in PUBLIC if not inspect.isclass(getattr(catenary, name))}
+    assert listed == called | {"Simulation"}
+    reference = (DOCS / "reference" / "python.md").read_text(encoding="utf-8")
+    described = re.findall(r"^::: catenary\.(\w+)$", reference, re.MULTILINE)
+    assert sorted(described) == sorted(set(catenary.__all__) - {"__version__"})
+
+
+@pytest.mark.parametrize("name", [name for name in PUBLIC if name[0].islower()])
+def test_the_documents_name_arguments_in_their_order(name: str) -> None:
+    page = (DOCS / "python.md").read_text(encoding="utf-8")
+    (row,) = re.findall(rf"^\| `{name}\((.*?)\)`", page, re.MULTILINE)
+    own = [n for n, one in inspect.signature(getattr(catenary, name)).parameters.items()
+           if one.kind is not inspect.Parameter.KEYWORD_ONLY]  # fmt: skip
+    names = row.split(", ")
+    assert names == own[: len(names)]
 
 
 def test_names_that_are_not_there_are_refused() -> None:

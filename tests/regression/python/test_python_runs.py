@@ -328,6 +328,10 @@ def test_a_variant_that_does_not_fit_is_told_in_its_row(scene: catenary.Scene) -
     [
         ({}, "nothing to vary"),
         ({"train.speed_km_h": []}, "nothing to vary"),
+        ({"train.speed_km_h": 200}, "train.speed_km_h in vary is 200; it must be a list of values"),
+        ({"train.speed_km_h": "200"}, 'vary is "200"; it must be a list of values'),
+        (["train.speed_km_h"], "it must be a table of lists"),
+        ({3: [1, 2]}, "3 in vary is unknown"),
         ({"train.sped_km_h": [200]}, "train.sped_km_h in vary is unknown; did you mean"),
         ({"train.speed_km_h": [200, 200]}, "vary train.speed_km_h names 200 twice"),
         ({"petsc.ksp_type": ["cg"]}, "vary petsc.ksp_type is not possible"),
@@ -336,7 +340,7 @@ def test_a_variant_that_does_not_fit_is_told_in_its_row(scene: catenary.Scene) -
     ],
 )
 def test_what_cannot_be_varied_is_refused(
-    vary: dict[str, list[Any]], says: str, scene: catenary.Scene, temporary: Path
+    vary: Any, says: str, scene: catenary.Scene, temporary: Path
 ) -> None:
     with pytest.raises(catenary.InputError, match=says):
         catenary.sweep(scene, vary)

@@ -142,6 +142,7 @@ def test_what_is_set_acts_from_the_next_step_on(name: str, scene: catenary.Scene
     ("value", "says"),
     [
         (np.nan, "must be finite"),
+        ("5 N", 'lift_force is "5 N"; it must be a number or numbers'),
         ([np.inf], "must be finite"),
         ([1.0, 2.0], r"shape \(2,\); it must be a number, or one of each of 1"),
         (np.zeros((1, 1)), "shape"),
