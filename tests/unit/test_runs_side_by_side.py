@@ -190,5 +190,5 @@ def test_a_program_of_a_user_needs_no_guard_of_its_main_part(tmp_path: Path) -> 
 
 @pytest.mark.parametrize("jobs", [-1, 1.5, "2"])
 def test_a_number_of_runs_that_is_none_is_refused(jobs: Any) -> None:
-    with pytest.raises(InputError, match="jobs is .*; it is a number of runs"):
+    with pytest.raises(InputError, match="jobs is .*; it is a number of processes"):
         catenary.sweep(CASE, {"train.speed_km_h": [250]}, jobs=jobs)
