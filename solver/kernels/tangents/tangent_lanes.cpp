@@ -137,6 +137,7 @@ void load(const TangentLanes& lanes, const LineMotion& motion) {
 
 void superpose(const Contacts& contacts, Array2<double> forces, const TangentLanes& lanes) {
     for (int64_t i = 0; i < forces.rows; ++i) {
+        if (std::ranges::all_of(forces[i], [](double force) { return force == 0.0; })) continue;
         const auto& [low, high] = contacts.touches[i].filled;
         const auto answer = part(contacts.answers.by_force[i], low, high);
         add_answer(forces[i].data(), answer, low, lanes.motion, contacts.motion_gains);
