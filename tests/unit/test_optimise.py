@@ -582,8 +582,9 @@ def test_shipped_tasks_are_tasks_of_their_case() -> None:
     case = read_draft("ac_simple")
     plan = study.make_plan(case, read_task(folder / "droppers.toml", OptimiseTask))
     assert plan.variables.low.size == 5 and len(plan.scenes.members) == 2
-    for name in ("droppers_for_all", "droppers_by_speed"):
-        assert len(read_task(folder / f"{name}.toml", OptimiseTask).variables) == 1
+    variables = {"droppers_for_all": 1, "droppers_by_speed": 1, "droppers_and_tension": 2}
+    for name, n in variables.items():
+        assert len(read_task(folder / f"{name}.toml", OptimiseTask).variables) == n
     tolerances = make_plan(case, read_task(folder / "installation.toml", ToleranceTask))
     assert (tolerances.task.samples.n, tolerances.task.samples.allowed) == (299, 0)
     assert len(tolerances.groups[0].names) == 270
