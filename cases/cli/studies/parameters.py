@@ -166,7 +166,7 @@ def identify(
     from catenary.cases.studies.identification.output import PARAMETERS
 
     refuse_table(out / PARAMETERS, force)
-    found = identified(scene, measured, wanted)
-    console.say(str(found))
+    found = identified(scene, measured, wanted, console.say)
+    console.say(f"\n{found}\n")
     console.say("\n".join(map(str, write_identified(found, out))))
     return console.DONE

@@ -328,7 +328,7 @@ class _Search:
         """
         weak = self._weak.setdefault(varied.name, set())
         order = sorted(range(self.samples.n), key=lambda number: number not in weak)
-        failed = 0
+        failed, n_runs = 0, self.evaluation.n_runs
         for first in range(0, len(order), _PART):
             numbers = order[first : first + _PART]
             lines = self._margins([varied.values(level, varied.sample(i)) for i in numbers])
@@ -337,6 +337,12 @@ class _Search:
             ]
             weak.update(own)
             failed += len(own)
+            if self.evaluation.n_runs > n_runs:
+                n_runs = self.evaluation.n_runs
+                self.say(
+                    f"    {varied.name} +-{level:.3g} {varied.unit}: {first + len(numbers)} of "
+                    f"{len(order)} lines run, {failed} fail"
+                )
             if failed > enough:
                 break
         return failed
