@@ -124,7 +124,7 @@ def sensitivity(
     scene = words.scene()
     if out is not None:
         refuse_table(out / SENSITIVITIES, force)
-    found = derivatives(scene, keys or [], droppers=droppers)
+    found = derivatives(scene, keys or [], droppers=droppers, progress=not console.is_quiet())
     console.say(str(found))
     if out is not None:
         console.say(f"\n{found.write(out)[0]}")

@@ -23,6 +23,7 @@ from catenary.cases.studies.scene_sets import (
 )
 from catenary.cases.studies.tolerance.errors import Group, groups_of
 from catenary.cases.studies.tolerance.task import SamplesTable, ToleranceTask
+from catenary.postproc.evaluate.wording import counted
 
 # A row for each thing that is measured of a run, such as a pantograph: its criterion and margin.
 Margins = dict[str, list[float]]
@@ -196,7 +197,7 @@ def find_tolerances(
         for one in search.tolerances(varied):
             say(f"{one.error}, {one.criterion}: {one.level:.3g} {one.unit}")
             found.append(one)
-    say(f"{search.evaluation.n_runs} runs")
+    say(counted(search.evaluation.n_runs, "run"))
     return found
 
 
