@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from catenary.base.lone_process import alone
+from catenary.callers import say_nothing, say_on_error_stream
 from catenary.postproc.evaluate.wording import counted
 from catenary.scenes import Scene, SceneLike, checked, scene_of
 
@@ -73,6 +74,8 @@ def identify(
     scene: SceneLike,
     measured: str | Path | pd.DataFrame,
     task: str | Path | Mapping[str, Any],
+    *,
+    progress: bool = False,
 ) -> Identified:
     """Find parameters of a scene from a measured contact force, head height, or both.
 
@@ -89,6 +92,8 @@ def identify(
     task : str, Path or mapping
         The TOML file, or its tables: columns, units and noise of the measurement, parameters that
         are looked for and their priors; see ``docs/guide/identification.md``.
+    progress : bool
+        Whether a line on each march is shown on standard error.
 
     Returns
     -------
@@ -120,16 +125,24 @@ def identify(
     [120.0]
     """
     own = scene_of(scene)
-    return identified(own, measured, task_of(task))
+    say = say_on_error_stream if progress else say_nothing
+    return identified(own, measured, task_of(task), say)
 
 
-def identified(scene: Scene, measured: str | Path | pd.DataFrame, task: Task) -> Identified:
+def identified(
+    scene: Scene,
+    measured: str | Path | pd.DataFrame,
+    task: Task,
+    say: Callable[[str], None] = say_nothing,
+) -> Identified:
     """What ``identify`` finds of a scene and a task that are checked. Not collective.
 
     Parameters
     ----------
     scene, measured, task
         As of ``identify``.
+    say : callable
+        Called with a line on each march.
 
     Raises
     ------
@@ -143,7 +156,7 @@ def identified(scene: Scene, measured: str | Path | pd.DataFrame, task: Task) ->
     from catenary.cases.studies.identification.study import identify as find
 
     samples = measured if isinstance(measured, pd.DataFrame) else Path(measured)
-    found = find(checked(scene), samples, task, comm)
+    found = find(checked(scene), samples, task, comm, say)
     tables = [
         pd.DataFrame(table.records())
         for table in (

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from catenary.base.lone_process import alone
-from catenary.callers import listed
+from catenary.callers import listed, progress_shown
 from catenary.scenes import SceneLike, checked
 
 if TYPE_CHECKING:
@@ -19,7 +19,11 @@ SENSITIVITIES = "sensitivity.csv"
 
 
 def sensitivity(
-    scene: SceneLike, parameters: str | Sequence[str] = (), *, droppers: bool = False
+    scene: SceneLike,
+    parameters: str | Sequence[str] = (),
+    *,
+    droppers: bool = False,
+    progress: bool = False,
 ) -> pd.DataFrame:
     """Sensitivities of the statistics of a scene to its parameters, from one march.
 
@@ -38,6 +42,8 @@ def sensitivity(
     droppers : bool
         Whether the length of each dropper in the evaluated stretch is a parameter, too: how many
         millimetres it is too long.
+    progress : bool
+        Whether a terminal shows a bar on standard error.
 
     Returns
     -------
@@ -62,17 +68,21 @@ def sensitivity(
     >>> row.change, row.unit, bool(0.9 < row.mean_change_N < 1.1)
     (1.0, 'N', True)
     """
-    return derivatives(scene, listed(parameters), droppers=droppers).table()
+    return derivatives(scene, listed(parameters), droppers=droppers, progress=progress).table()
 
 
 def derivatives(
-    scene: SceneLike, parameters: Sequence[str] = (), *, droppers: bool = False
+    scene: SceneLike,
+    parameters: Sequence[str] = (),
+    *,
+    droppers: bool = False,
+    progress: bool = False,
 ) -> Derivatives:
     """What ``sensitivity`` makes a table of. Not collective.
 
     Parameters
     ----------
-    scene, parameters, droppers
+    scene, parameters, droppers, progress
         As of ``sensitivity``.
 
     Raises
@@ -83,7 +93,9 @@ def derivatives(
     own, comm = checked(scene), alone()  # starts MPI as one process, before anything imports it
     from catenary.cases.studies.sensitivity.study import sensitivity_of
 
-    return Derivatives(sensitivity_of(own, list(parameters), comm, droppers=droppers))
+    with progress_shown(progress, comm):
+        found = sensitivity_of(own, list(parameters), comm, droppers=droppers, shows=progress)
+    return Derivatives(found)
 
 
 class Derivatives:

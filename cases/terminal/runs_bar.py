@@ -22,10 +22,15 @@ class RunsBar:
     n_runs : how many there are; 0 shows nothing
     say : writes a line
     stream : where to, standard error if not given
+    what : what is counted
     """
 
     def __init__(
-        self, n_runs: int, say: Callable[[str], None], stream: TextIO | None = None
+        self,
+        n_runs: int,
+        say: Callable[[str], None],
+        stream: TextIO | None = None,
+        what: str = "runs",
     ) -> None:
         stream = sys.stderr if stream is None else stream
         self._say = say
@@ -38,7 +43,7 @@ class RunsBar:
                 file=stream,
                 leave=False,
                 ncols=min(shutil.get_terminal_size().columns, 100),
-                bar_format="runs {percentage:3.0f}% |{bar}| {n} of {total}, left {remaining}",
+                bar_format=what + " {percentage:3.0f}% |{bar}| {n} of {total}, left {remaining}",
             )
 
     def say(self, line: str) -> None:
@@ -49,10 +54,10 @@ class RunsBar:
         if self._bar is not None:
             self._bar.refresh()
 
-    def ended(self) -> None:
-        """Count one more run."""
+    def ended(self, n_runs: int = 1) -> None:
+        """Count further runs, one if no number is given."""
         if self._bar is not None:
-            self._bar.update()
+            self._bar.update(n_runs)
 
     def __enter__(self) -> RunsBar:
         return self

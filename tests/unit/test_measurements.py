@@ -167,7 +167,7 @@ def test_places_that_count_against_the_train_are_turned(run: Path, table: pd.Dat
     alignment = found.overlays[0].alignment
     assert found.findings == [] and alignment is not None
     check("shift", alignment.shift.value, 0.0, within=5.0 * alignment.shift.deviation)
-    with pytest.raises(InputError, match="in ascending order"):
+    with pytest.raises(InputError, match="fall along the line"):
         found_in(run, posts, measured={**PLACES, "place": {**place, "direction": "with"}})
 
 

@@ -237,11 +237,11 @@ def stretch(force: str) -> str:
         (
             rows(1.0).replace("\n2,2", "\n2,"),
             ONE,
-            'in row 2 of column "pantograph_N"',
+            'has no number in column "pantograph_N", row 2 below',
         ),
-        (rows(1.0).replace("\n2,2", "\n2,nan"), ONE, "no finite number"),
+        (rows(1.0).replace("\n2,2", "\n2,nan"), ONE, "needs a finite number"),
         ("of,quantity\nline,max_uplift_mm\n", ONE, 'has no column "value"'),
-        ("of,quantity,value\nline,max_uplift_mm,nan\n", ONE, 'row 1 of column "value" no finite'),
+        ("of,quantity,value\nline,max_uplift_mm,nan\n", ONE, 'no number in column "value", row 1'),
         ("of,quantity,value\nline,max_uplift_mm,0.07\n", ONE, "gives 0.07 for max_uplift_mm"),
         (
             "of,quantity,value\nline,max_uplift_mm,70\nline,max_uplift_mm,71\n",

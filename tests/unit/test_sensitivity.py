@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import functools
+import io
 import sys
 from pathlib import Path
 from typing import Any
@@ -142,6 +143,18 @@ def test_what_is_printed_tells_how_often_contacts_and_droppers_switch() -> None:
     assert text.startswith("pantograph: mean ")
 
 
+def test_a_terminal_is_shown_how_far_it_is(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """Set-ups and tangents of two parameters are four."""
+    monkeypatch.setattr(sys, "stderr", stream := io.StringIO())
+    monkeypatch.setattr(stream, "isatty", lambda: True, raising=False)
+    with caplog.at_level("INFO", "catenary.progress"):
+        sensitivity_of(load_scene(CASE, TINY), KEYS, MPI.COMM_SELF, shows=True)
+    shown = stream.getvalue()
+    assert "set-ups and tangents   0% |" in shown and "100% |" in shown and "4 of 4, left" in shown
+
+
 def test_entries_lists_and_forces_by_speed_are_parameters() -> None:
     line = scenes(case="ac_simple")
     sag = line.parameter("line.dropper.pre_sag_mm")
@@ -225,6 +238,7 @@ def test_a_step_follows_from_the_size_of_a_value() -> None:
         ("line.n_spans", "is a whole number, by which a march has no derivative"),
         ("irregularities.dropper_lengths.3.44", "and 9 droppers in this one"),
         ("irregularities.dropper_lengths.99.4", "names no dropper: the line has 22 spans"),
+        ("contact.damping_N_s_per_m", "is at a bound of what is allowed, where a march has no"),
     ],
 )
 def test_a_wrong_parameter_is_told_in_one_sentence(key: str, told: str) -> None:

@@ -335,6 +335,7 @@ def test_the_verb_writes_what_it_says(
         words += ["--set", f"{key}={value}"]
     done = CliRunner().invoke(app, words)
     assert done.exit_code == 0, done.output
+    assert "speed +-40 km/h: 19 of 19 lines run, " in done.output
     record = json.loads((tmp_path / "out" / "tolerance.json").read_text())
     (row,) = record["tolerances"]
     assert row["linear"] == pytest.approx(20.0) and 20.0 < row["level"] < 30.0

@@ -175,7 +175,7 @@ def test_widths_are_right_in_repeated_linear_trials(tmp_path: Path) -> None:
     measurement = Measurement(
         read_table(file), "m", columns, problem.train.speed, 65.0, problem.evaluation
     )
-    march = FittedMarch(scenes, parameters, measurement, MPI.COMM_SELF, lambda line: None)
+    march = FittedMarch(scenes, parameters, measurement, MPI.COMM_SELF)
     by = march.derivatives([0.0] * len(parameters))
     step = int(round(np.diff(measurement.place)[0] / (problem.train.speed * problem.numerics.dt)))
     n = measurement.place.size

@@ -388,6 +388,105 @@ def test_tangents_are_differences_of_marches_of_cases(name: str) -> None:
     is_difference(*LONG[name])
 
 
+# Eight parameters of each of five kinds of line.
+FORTY: dict[str, tuple[str, list[str], list[str]]] = {
+    "simple": (
+        "en50318_2002",
+        [*SHORT, "irregularities.dropper_lengths.by_dropper=[[3,5,4.0]]"],
+        [
+            f"{HEAD}.static_force_N",
+            f"{HEAD}.dampings_N_s_per_m.1",
+            "contact.stiffness_N_per_m",
+            "line.contact_wire.tension_N",
+            "line.messenger_wire.mass_kg_per_m",
+            "line.dropper.stiffness_N_per_m",
+            "line.support.stiffness_N_per_m",
+            "irregularities.dropper_lengths.3.5",
+        ],
+    ),
+    "stitched": (
+        "re330_stitched",
+        [],
+        [
+            "line.stitch_wire.tension_N",
+            "line.stitch_wire.mass_kg_per_m",
+            "line.messenger_wire.tension_N",
+            "line.contact_wire.tension_N",
+            "line.dropper.messenger_clamp_kg",
+            "line.steady_arm.mass_kg_per_m",
+            "pantographs.three_masses.masses_kg.2",
+            "pantographs.three_masses.stiffnesses_N_per_m.0",
+        ],
+    ),
+    "twin": (
+        "dc_twin",
+        [],
+        [
+            "line.contact_wire.tension_N",
+            "line.contact_wire.mass_kg_per_m",
+            "line.messenger_wire.tension_N",
+            "line.dropper.pre_sag_mid_mm",
+            "line.steady_arm.mass_kg_per_m",
+            "line.damping.alpha_s",
+            "pantographs.three_masses.masses_kg.1",
+            "contact.stiffness_N_per_m",
+        ],
+    ),
+    "overlap": (
+        "overlap",
+        ["effects.dropper_slackening=false"],  # else one of 943 switches is 1e-7 away
+        [
+            "line.contact_wire.tension_N",
+            "line.messenger_wire.mass_kg_per_m",
+            "line.messenger_wire.bending_stiffness_N_m2",
+            "line.dropper.contact_clamp_kg",
+            "line.dropper.pre_sag_mm.3",
+            "line.steady_arm.length_m",
+            "pantographs.three_masses.static_force_N",
+            "pantographs.three_masses.masses_kg.0",
+        ],
+    ),
+    "three planes": (
+        "ac_simple_3d",
+        [],
+        [
+            "line.contact_wire.tension_N",
+            "line.messenger_wire.tension_N",
+            "line.dropper.pre_sag_mm",
+            "line.steady_arm.clamp_kg",
+            "line.damping.alpha_s",
+            "pantographs.three_masses.stiffnesses_N_per_m.2",
+            "pantographs.three_masses.dampings_N_s_per_m.0",
+            "contact.stiffness_N_per_m",
+        ],
+    ),
+}
+# Steps in parts of a parameter. Differences err by round-off of marches over the step and, from the
+# step on that moves a switch, by its kink; between both lies one where neither counts.
+PARTS = (1e-5, 1e-4, 1e-6, 1e-3, 1e-7, 2e-8)
+
+
+@pytest.mark.study
+@pytest.mark.timeout(1200)
+@pytest.mark.parametrize("name", FORTY)
+def test_forty_tangents_are_differences_within_a_millionth(name: str) -> None:
+    case, words, keys = FORTY[name]
+    own, again = marched_scene(case, words, keys)
+    for number, key in enumerate(keys):
+        error = dict.fromkeys(("force", "uplift", "head_height"), np.inf)
+        for part in PARTS:
+            high, low = again(key, part), again(key, -part)
+            for what in error:
+                found = getattr(own, f"by_{what}")[:, number]
+                by = (getattr(high, what) - getattr(low, what)) / (2.0 * part)
+                off = float(np.abs(found - by).max() / np.abs(by).max())
+                error[what] = min(error[what], off)
+            if max(error.values()) < 1e-6:
+                break
+        for what, least in error.items():
+            check(f"{what} by {key}, of its largest", least, 0.0, within=1e-6)
+
+
 def test_a_smooth_march_has_derivatives_by_speed_and_place() -> None:
     """Without switches; contacts cross nodes, where third derivatives of heights jump."""
     words = [*SHORT, "effects.contact_loss=false", "effects.dropper_slackening=false",

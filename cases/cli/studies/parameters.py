@@ -124,7 +124,7 @@ def sensitivity(
     scene = words.scene()
     if out is not None:
         refuse_table(out / SENSITIVITIES, force)
-    found = derivatives(scene, keys or [], droppers=droppers)
+    found = derivatives(scene, keys or [], droppers=droppers, progress=not console.is_quiet())
     console.say(str(found))
     if out is not None:
         console.say(f"\n{found.write(out)[0]}")
@@ -166,7 +166,7 @@ def identify(
     from catenary.cases.studies.identification.output import PARAMETERS
 
     refuse_table(out / PARAMETERS, force)
-    found = identified(scene, measured, wanted)
-    console.say(str(found))
+    found = identified(scene, measured, wanted, console.say)
+    console.say(f"\n{found}\n")
     console.say("\n".join(map(str, write_identified(found, out))))
     return console.DONE

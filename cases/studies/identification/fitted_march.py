@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -27,7 +27,6 @@ class FittedMarch:
     parameters : m of it
     measurement : which samples of a march are compared
     comm : mpi4py communicator of this process alone
-    progress : called with a line for each parameter and march
     """
 
     def __init__(
@@ -36,10 +35,9 @@ class FittedMarch:
         parameters: Sequence[Parameter],
         measurement: Measurement,
         comm: Any,
-        progress: Callable[[str], None],
     ) -> None:
         self._scenes, self._parameters = scenes, parameters
-        self._measurement, self._comm, self._progress = measurement, comm, progress
+        self._measurement, self._comm = measurement, comm
         self._kept: dict[str, Change] = {}
 
     def values(self, by: Sequence[float]) -> list[np.ndarray]:
@@ -52,7 +50,6 @@ class FittedMarch:
         RunBroken
             If the march breaks.
         """
-        self._progress("march")
         marched = march_with_tangents(self._comm, self._at_rest(by), [])
         return [
             self._measurement.of_march(marched.position[:, self._number], of_all, marched.dt)
@@ -72,7 +69,6 @@ class FittedMarch:
         changes = self._changes(by, at_rest, now)
         parts: list[list[np.ndarray]] = []
         for part in parts_of(changes, at_rest, now):
-            self._progress("march with tangents")
             marched = march_with_tangents(self._comm, at_rest, changes[part])
             position = marched.position[:, self._number]
             parts.append(
@@ -119,7 +115,6 @@ class FittedMarch:
             key = parameter.key
             change = self._kept.get(key)
             if change is None:
-                self._progress(key)
                 change = change_by(scenes.parameter(key), scenes, at_rest, now, self._comm)
                 if change.start.size or change.speed:
                     raise InputError(

@@ -130,20 +130,22 @@ class Measurement:
         end = stretch[1] if task.to_m is None else task.to_m
         within = np.flatnonzero((begin <= places) & (places <= end))
         margin = 0
+        if dt * 2.0 * task.filter_Hz >= 1.0:
+            raise InputError(
+                f"{path} has {1.0 / dt:.4g} samples a second at the train's {3.6 * speed:g} km/h; "
+                f"measured.filter_Hz = {task.filter_Hz:g} takes more than {2 * task.filter_Hz:g}"
+            )
         if not task.is_filtered:
-            if dt * 2.0 * task.filter_Hz >= 1.0:
-                raise InputError(
-                    f"{path} has {1.0 / dt:.4g} samples a second, too few for the filter of "
-                    f"measured.filter_Hz = {task.filter_Hz:g}"
-                )
             margin = int(np.ceil(_SETTLED / (task.filter_Hz * dt)))
             within = within[(within >= margin) & (within < len(places) - margin)]
         # A signal of this bandwidth is known from samples half a period of it apart.
         kept = within[:: max(1, int(0.5 / (task.filter_Hz * dt) + 1e-6))]
         if not LEAST_SAMPLES <= kept.size <= _MOST_SAMPLES:
             raise InputError(
-                f"{path} has {kept.size} samples between {begin:g} and {end:g} m, half a period of "
-                f"the filter apart; an identification takes {LEAST_SAMPLES} to {_MOST_SAMPLES}"
+                f"{path} reaches from {places[0]:.1f} to {places[-1]:.1f} m of the line and has "
+                f"{kept.size} samples, half a period of the filter apart, in the compared stretch "
+                f"from {begin:g} to {end:g} m; an identification takes {LEAST_SAMPLES} to "
+                f"{_MOST_SAMPLES}"
             )
         # Rows of the file from the first sample to the last, and of a filter's reach beside them.
         self._rows = slice(int(kept[0]) - margin, int(kept[-1]) + margin + 1)

@@ -30,7 +30,8 @@ def parameters_table(found: Identification) -> StudyTable:
         Column("prior_deviation", "+-", ".6g"),
         Column("shown", "found", ">", in_files=False),
         Column("found"),
-        Column("deviation", "+-", ".2g"),
+        Column("shown_deviation", "+-", ">", in_files=False),
+        Column("deviation"),
         Column("of_prior", "of prior", ".0%"),
     ]
     rows = [
@@ -41,6 +42,7 @@ def parameters_table(found: Identification) -> StudyTable:
             "prior_deviation": one.deviation,
             "shown": _rounded(float(value), float(width)),
             "found": float(value),
+            "shown_deviation": _rounded(float(width), float(width)),
             "deviation": float(width),
             "of_prior": float(width / one.deviation),
         }

@@ -36,6 +36,7 @@ from catenary.cases.studies.identification.task import Task
 from catenary.cases.studies.measured.passages import read_table
 from catenary.cases.studies.sensitivity.parameters import ChangedScenes, Parameter
 from catenary.postproc.evaluate.filters import check_sampling
+from catenary.postproc.evaluate.wording import counted
 
 # The search ends when a step makes the sum of squares, which is near the number n of samples, less
 # by less than this part. What is left of the sum is the squared distance to the best parameters in
@@ -43,6 +44,9 @@ from catenary.postproc.evaluate.filters import check_sampling
 _TOLERANCE = 1e-4
 _MOST_MARCHES = 60  # of a search
 _SEED = 0  # of the draws from which further searches start
+# Means of a signal and of its march differ by such a factor only if columns or units, whose factors
+# are 10 to 1000, are not as stated, or by a zero of so many deviations of its bias.
+_OTHER_UNIT, _LARGE_BIAS = 8.0, 5.0
 _SEARCHES_IN_DOUBT = 3  # where the task names no number and the first leaves an unlikely residual
 
 
@@ -115,36 +119,34 @@ class _Compared:
         signals: Sequence[Signal],
         unknowns: Sequence[Unknown],
         offsets: np.ndarray,
+        progress: Callable[[str], None],
     ) -> None:
         self._march, self._signals, self._offsets = march, signals, offsets
+        self._progress = progress
         self._deviations = np.array([one.deviation for one in unknowns[: offsets.size]])
         self._n = len(unknowns)
         self.n_marches, self.n_jacobians = 0, 0
-        self._latest: tuple[bytes, np.ndarray] | None = None
+        # The latest of each with its place, which searches ask for several times.
+        self._residual: tuple[bytes, np.ndarray] | None = None
+        self._jacobian: tuple[bytes, np.ndarray] | None = None
         self.expected: list[np.ndarray] = []  # the first march, with the priors' means
         self.modelled: list[np.ndarray] = []
 
     def residual(self, at: np.ndarray) -> np.ndarray:
         """Measured less modelled samples of all signals, made independent."""
-        self.n_marches += 1
-        self.modelled = self._march.values(self._by(at))
-        self.expected = self.expected or self.modelled
-        biases = iter(at[self._offsets.size :])
-        return np.concatenate(
-            [
-                one.whitening.of(
-                    one.values - modelled - (one.bias * next(biases) if one.bias else 0.0)
-                )
-                for one, modelled in zip(self._signals, self.modelled, strict=True)
-            ]
-        )
+        if self._residual is None or self._residual[0] != at.tobytes():
+            self.n_marches += 1
+            self._residual = at.tobytes(), self._made_residual(at)
+        return self._residual[1]
 
     def jacobian(self, at: np.ndarray) -> np.ndarray:
         """Derivatives of the modelled samples, made independent."""
-        if self._latest is None or self._latest[0] != at.tobytes():
+        if self._jacobian is None or self._jacobian[0] != at.tobytes():
             self.n_jacobians += 1
-            self._latest = at.tobytes(), self._made_jacobian(at)
-        return self._latest[1]
+            if self._offsets.size:
+                self._progress(f"derivatives by {counted(self._offsets.size, 'parameter')}")
+            self._jacobian = at.tobytes(), self._made_jacobian(at)
+        return self._jacobian[1]
 
     def judged(self, found: OptimizeResult) -> dict[str, Judged]:
         """Residuals of each signal and of "all" where a search came to."""
@@ -153,6 +155,23 @@ class _Compared:
         moved = innovations_of(found.fun[:n], -found.jac[:n], found.x)
         names = {one.name: slice(k * own, (k + 1) * own) for k, one in enumerate(self._signals)}
         return judge(moved, names)
+
+    def _made_residual(self, at: np.ndarray) -> np.ndarray:
+        self.modelled = self._march.values(self._by(at))
+        if not self.expected:
+            self.expected = self.modelled
+            _refuse_other_units(self._signals, self.expected)
+        biases = iter(at[self._offsets.size :])
+        found = np.concatenate(
+            [
+                one.whitening.of(
+                    one.values - modelled - (one.bias * next(biases) if one.bias else 0.0)
+                )
+                for one, modelled in zip(self._signals, self.modelled, strict=True)
+            ]
+        )
+        self._progress(f"march {self.n_marches}: sum of squares {found @ found + at @ at:.1f}")
+        return found
 
     def _made_jacobian(self, at: np.ndarray) -> np.ndarray:
         found = self._march.derivatives(self._by(at)) if self._offsets.size else []
@@ -187,7 +206,7 @@ def identify(
     measured : CSV file, or the table of one
     task : description of its columns, and the parameters to be identified
     comm : mpi4py communicator of this process alone
-    progress : called with a line for each parameter and march
+    progress : called with a line on each march and search
 
     Raises
     ------
@@ -209,8 +228,8 @@ def identify(
         if one.bias
     ]
     unknowns += biases
-    march = FittedMarch(scenes, parameters, measurement, comm, progress)
-    compared = _Compared(march, measurement.signals, unknowns, offsets)
+    march = FittedMarch(scenes, parameters, measurement, comm)
+    compared = _Compared(march, measurement.signals, unknowns, offsets, progress)
     searches = _searches(compared, len(unknowns), task.starts, progress)
     found = searches[0]
     compared.residual(found.x)  # the march that was found
@@ -265,6 +284,21 @@ def _search(compared: _Compared, start: np.ndarray) -> OptimizeResult:
         gtol=_TOLERANCE,
         max_nfev=_MOST_MARCHES,
     )
+
+
+def _refuse_other_units(signals: Sequence[Signal], expected: Sequence[np.ndarray]) -> None:
+    """Refuse signals that are so far from the march of the priors as ones in another unit are."""
+    for one, modelled in zip(signals, expected, strict=True):
+        own, by_priors = float(one.values.mean()), float(modelled.mean())
+        if by_priors / _OTHER_UNIT < own < by_priors * _OTHER_UNIT:
+            continue
+        if abs(own - by_priors) > _LARGE_BIAS * one.bias:
+            unit = UNITS[one.name]
+            raise InputError(
+                f"the measured {one.name} is {own:.4g} {unit} on average, and that of the march "
+                f"with the priors' means {by_priors:.4g} {unit}: check column, unit and zero of "
+                f"measured.{one.name.replace(' ', '_')}"
+            )
 
 
 def _measurement(scene: Scene, measured: Path | pd.DataFrame, task: Task) -> Measurement:

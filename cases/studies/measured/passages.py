@@ -27,7 +27,7 @@ _EVEN = 0.02
 
 
 def read_table(path: Path) -> pd.DataFrame:
-    """The table of a CSV file, with commas or with semicolons and decimal commas or points.
+    """The table of a CSV file, with commas or with semicolons or tabs and decimal commas or points.
 
     Raises
     ------
@@ -35,11 +35,12 @@ def read_table(path: Path) -> pd.DataFrame:
         If it is none.
     """
     text = read_text(path, str(path))
-    semicolons = any(";" in line.partition("#")[0] for line in text.splitlines())
+    lines = [line.partition("#")[0] for line in text.splitlines()]
+    separator = next((one for one in ";\t" if any(one in line.strip() for line in lines)), ",")
     try:
         return pd.read_csv(
-            io.StringIO(text.replace(",", ".") if semicolons else text),
-            sep=";" if semicolons else ",",
+            io.StringIO(text if separator == "," else text.replace(",", ".")),
+            sep=separator,
             comment="#",
             skipinitialspace=True,
         )
@@ -71,8 +72,11 @@ def column_of(table: pd.DataFrame, path: str, name: str, may_lack: bool = False)
     values = pd.to_numeric(table[name], errors="coerce").to_numpy(dtype=float, copy=True)
     wrong = np.flatnonzero(~np.isfinite(values))
     if wrong.size and not may_lack:
+        cell = table[name].iloc[wrong[0]]
+        has = "no number" if pd.isna(cell) else f'"{plain(str(cell), 40)}"'
         raise InputError(
-            f'{path} has in row {wrong[0] + 1} of column "{plain(name, 100)}" no finite number'
+            f'{path} has {has} in column "{plain(name, 100)}", row {wrong[0] + 1} below its names; '
+            "each row needs a finite number there"
         )
     values[wrong] = np.nan
     return np.asarray(values)
@@ -122,13 +126,19 @@ def evened_out(places: np.ndarray, path: str) -> np.ndarray:
         raise InputError(f"{path} has {len(places)} rows; at least {LEAST_SAMPLES} are needed")
     even = np.linspace(places[0], places[-1], len(places))
     spacing, spacings = even[1] - even[0], np.diff(places)
+    usual = float(np.median(spacings))
+    if usual < 0.0:
+        raise InputError(
+            f"{path} has places that fall along the line, from {places[0]:.1f} to {places[-1]:.1f} "
+            "m: rows must stand in the order of the passage; place.direction in a description says "
+            "whether places count with the train or against it"
+        )
     if spacing <= 0.0 or np.abs(spacings - spacing).max() > _EVEN * spacing + 1e-4:
-        usual = float(np.median(spacings))
         row = int(np.abs(spacings - usual).argmax()) + 2
         raise InputError(
-            f"{path} must have equidistant samples in ascending order, but row {row} stands "
-            f"{spacings[row - 2]:.4g} m behind the row before, and others {usual:.4g} m; resample "
-            "it at even steps of place or time, or cut it at gaps"
+            f"{path} must have equidistant samples in ascending order: from row {row - 1} to row "
+            f"{row} below its names the place goes on by {spacings[row - 2]:.4g} m, between others "
+            f"by {usual:.4g} m; resample it at even steps of place or time, or cut it at gaps"
         )
     return even
 

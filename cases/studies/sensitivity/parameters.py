@@ -212,7 +212,7 @@ class ChangedScenes:
         line, found = line_of(self.scene), []
         for span in dict.fromkeys(spans):
             if span > line.n_spans:
-                raise InputError(f"there is no span {span}: the line has {line.n_spans}")
+                raise InputError(f"droppers.spans names span {span}: the line has {line.n_spans}")
             for number in range(1, len(line.droppers_of_span(span - 1)) + 1):
                 found.append(self.parameter(f"{_LENGTHS}.{span}.{number}"))
         if not found:

@@ -13,6 +13,7 @@ from catenary.cases.run.prepared import rest_of, sound_rest
 from catenary.cases.scene.problem import problem_of
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.sensitivity.parameters import ChangedScenes, Parameter, parameters_of
+from catenary.cases.terminal.runs_bar import RunsBar
 from catenary.postproc.evaluate import derivatives, filters
 from catenary.postproc.evaluate.derivatives import ForceDerivatives
 from catenary.postproc.evaluate.statistics import covers
@@ -70,6 +71,7 @@ def sensitivity_of(
     comm: Any,
     *,
     droppers: bool = False,
+    shows: bool = False,
 ) -> Sensitivity:
     """Differentiate the statistics of a scene. Not collective: one process.
 
@@ -79,6 +81,7 @@ def sensitivity_of(
     keys : of the parameters; the usual ones if there are none and ``droppers`` is not set
     droppers : whether the length of each dropper in the evaluated stretch is a parameter
     comm : mpi4py communicator of this process alone
+    shows : whether a bar counts set-ups and tangents, if somebody looks on
 
     Raises
     ------
@@ -94,21 +97,25 @@ def sensitivity_of(
     now = set_up_of(comm, at_rest)
     changes: list[Change] = []
     kept, left_out = [], {}
-    for parameter in parameters:
-        try:
-            changes.append(change_by(parameter, scenes, at_rest, now, comm))
-        except InputError as error:
-            if keys or droppers:
-                raise
-            left_out[parameter.key] = str(error)
-        else:
-            kept.append(parameter)
     found: Sensitivity | None = None
-    for part in parts_of(changes, at_rest, now):
-        marched = march_with_tangents(comm, at_rest, changes[part])
-        if found is None:
-            found = _without_parameters(marched, at_rest)
-        _add(found, marched, at_rest, kept[part])
+    steps = 2 * len(parameters) if shows else 0
+    with RunsBar(steps, lambda line: None, what="set-ups and tangents") as bar:
+        for parameter in parameters:
+            try:
+                changes.append(change_by(parameter, scenes, at_rest, now, comm))
+            except InputError as error:
+                if keys or droppers:
+                    raise
+                left_out[parameter.key] = str(error)
+            else:
+                kept.append(parameter)
+            bar.ended()
+        for part in parts_of(changes, at_rest, now):
+            marched = march_with_tangents(comm, at_rest, changes[part])
+            if found is None:
+                found = _without_parameters(marched, at_rest)
+            _add(found, marched, at_rest, kept[part])
+            bar.ended(len(kept[part]))
     assert found is not None
     found.left_out = left_out
     return found
@@ -131,7 +138,14 @@ def change_by(
     """
 
     def set_up(by: float) -> SetUp:
-        changed, n_steps = scenes.changed(parameter, by), len(now.drives)
+        n_steps = len(now.drives)
+        try:
+            changed = scenes.changed(parameter, by)
+        except InputError as error:
+            raise InputError(
+                f"{parameter.key} is at a bound of what is allowed, where a march has no "
+                f"derivative to both sides: {error}"
+            ) from error
         if parameter.is_of_train:
             return set_up_of(comm, at_rest.under(problem_of(changed)), n_steps, now)
         return set_up_of(comm, rest_of(changed), n_steps)

@@ -23,6 +23,7 @@ from catenary.cases.studies.scene_sets import (
 )
 from catenary.cases.studies.tolerance.errors import Group, groups_of
 from catenary.cases.studies.tolerance.task import SamplesTable, ToleranceTask
+from catenary.postproc.evaluate.wording import counted
 
 # A row for each thing that is measured of a run, such as a pantograph: its criterion and margin.
 Margins = dict[str, list[float]]
@@ -196,7 +197,7 @@ def find_tolerances(
         for one in search.tolerances(varied):
             say(f"{one.error}, {one.criterion}: {one.level:.3g} {one.unit}")
             found.append(one)
-    say(f"{search.evaluation.n_runs} runs")
+    say(counted(search.evaluation.n_runs, "run"))
     return found
 
 
@@ -328,7 +329,7 @@ class _Search:
         """
         weak = self._weak.setdefault(varied.name, set())
         order = sorted(range(self.samples.n), key=lambda number: number not in weak)
-        failed = 0
+        failed, n_runs = 0, self.evaluation.n_runs
         for first in range(0, len(order), _PART):
             numbers = order[first : first + _PART]
             lines = self._margins([varied.values(level, varied.sample(i)) for i in numbers])
@@ -337,6 +338,12 @@ class _Search:
             ]
             weak.update(own)
             failed += len(own)
+            if self.evaluation.n_runs > n_runs:
+                n_runs = self.evaluation.n_runs
+                self.say(
+                    f"    {varied.name} +-{level:.3g} {varied.unit}: {first + len(numbers)} of "
+                    f"{len(order)} lines run, {failed} fail"
+                )
             if failed > enough:
                 break
         return failed

@@ -128,7 +128,7 @@ class ToleranceTask(Table):
     """Errors, criteria and the scenes over which these must be kept."""
 
     set: SetTable = Field(default_factory=SetTable, description="the scenes")
-    errors: list[ErrorKind] = Field(min_length=1, max_length=20, description="errors")
+    errors: list[ErrorKind] = Field(min_length=1, max_length=20, description="what may be off")
     criteria: list[BoundTable] = Field(
         default_factory=list,
         max_length=50,
