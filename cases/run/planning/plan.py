@@ -22,7 +22,6 @@ from catenary.meshgen.wires import Role
 from catenary.postproc.evaluate.wording import counted, duration
 from catenary.solver.effects import all_effects as effects
 from catenary.solver.effects.build_model import numbering_of
-from catenary.solver.effects.effect import Effect
 from catenary.solver.model.unknown_registry import Unknowns
 from catenary.solver.problem.problem import Problem, n_halvings
 from catenary.solver.window.choice import moving_share, window_sentence
@@ -90,16 +89,13 @@ def effect_rows(scene: Scene, problem: Problem) -> tuple[list[EffectRow], list[E
                 reason = "asked for by the scene" if name in scene.effects else "default"
             on.append(EffectRow(name, effect.title, reason))
         else:
-            off.append(_left_out(scene, problem, effect))
+            reason = effect.instead(problem) or _NO_DATA + effect.data
+            if scene.effects.get(name) is False:
+                reason = "left out by the scene"
+            elif effect.applies(problem):
+                reason = "off unless the scene asks for it"
+            off.append(EffectRow(name, effect.title, reason))
     return on, off
-
-
-def _left_out(scene: Scene, problem: Problem, effect: Effect) -> EffectRow:
-    if scene.effects.get(effect.name) is False:
-        return EffectRow(effect.name, effect.title, "left out by the scene")
-    if effect.applies(problem):
-        return EffectRow(effect.name, effect.title, "off unless the scene asks for it")
-    return EffectRow(effect.name, effect.title, effect.instead(problem) or _NO_DATA + effect.data)
 
 
 def make_plan(scene: Scene) -> Plan:
