@@ -111,11 +111,11 @@ class Plan:
         """
         import pandas as pd
 
-        own = self._own
+        own, needs = self._own, self._own.needs
         figures: dict[str, Any] = {
             "n_nodes": own.n_nodes,
             "n_unknowns": own.n_dofs,
-            "n_steps": own.n_steps,
+            "n_steps": needs.n_steps,
             "n_droppers": own.n_droppers,
             "n_steady_arms": own.n_arms,
             "n_pantographs": own.n_pantographs,
@@ -123,10 +123,10 @@ class Plan:
             "simulated_s": own.simulated,
             "speed_m_per_s": own.speed,
             "wave_speed_m_per_s": own.wave_speed,
-            "memory_B": own.memory,
-            "wall_s": own.march,
-            "result_B": own.files.result,
-            "film_B": own.files.film,
+            "memory_B": needs.memory,
+            "wall_s": needs.march,
+            "result_B": needs.files.result,
+            "film_B": needs.files.film,
         }
         return pd.Series(figures, dtype=float)
 
@@ -147,7 +147,7 @@ class Plan:
         return plan_text(self._own)
 
     def __repr__(self) -> str:
-        return f"<catenary.Plan {self._own.case}: {self._own.n_steps} steps>"
+        return f"<catenary.Plan {self._own.case}: {self._own.needs.n_steps} steps>"
 
 
 def plan(scene: SceneLike) -> Plan:

@@ -296,8 +296,7 @@ def _records(folder: Path) -> Records | None:
 
 def _shapes(folder: Path, records: Records | None) -> list[Shape] | None:
     """Shapes of the pantographs of a run, None if its scene is not one of this version."""
-    from catenary.cases.scene.input.faults import Origin
-    from catenary.cases.scene.load import scene_from
+    from catenary.cases.scene.load import recorded_scene
     from catenary.cases.scene.problem import problem_of
     from catenary.mbs.shape import shape_of
     from catenary.postproc.read.results import Results
@@ -305,7 +304,7 @@ def _shapes(folder: Path, records: Records | None) -> list[Shape] | None:
     with Results(folder, records) as results:
         config = results.attributes["config"]
     try:
-        problem = problem_of(scene_from(config, Origin(str(folder), recorded=True)))
+        problem = problem_of(recorded_scene(config, folder))
         return [shape_of(placement.data) for placement in problem.train.placements]
     except InputError as error:
         console.warn(f"pantographs are drawn as schematics: {error}")

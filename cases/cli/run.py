@@ -223,8 +223,8 @@ def submit(
         from catenary.cases.run.planning.plan import make_plan
         from catenary.cases.scene.load import load_scene
 
-        plan = make_plan(load_scene(words.case, chosen, words.shortened))
-        script = slurm_script(case_words, out, job, plan.march, plan.memory, options)
+        needs = make_plan(load_scene(words.case, chosen, words.shortened)).needs
+        script = slurm_script(case_words, out, job, needs.march, needs.memory, options)
     else:
         script = _array_script(words, case_words, out, job, array, vary, named, study)
     if only_print:

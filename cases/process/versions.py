@@ -16,6 +16,7 @@ def versions() -> dict[str, str]:
     """
     import h5py
     import mpi4py
+    import petsc4py
 
     from catenary.base.mpi import MPI
     from catenary.base.petsc import PETSc
@@ -26,19 +27,13 @@ def versions() -> dict[str, str]:
     library = MPI.Get_library_version().replace("\0", "").splitlines()[0].split(",")[0].strip()
     found = {
         "catenary": metadata.version("catenary"),
-        "PETSc": f"{petsc} (petsc4py {_petsc4py()})",
+        "PETSc": f"{petsc} (petsc4py {petsc4py.__version__})",
         "MPI": f"{standard}, {library} (mpi4py {mpi4py.__version__})",
         "HDF5": f"{hdf5} (h5py {h5py.__version__})",
     }
     found |= {name: metadata.version(name) for name in _PACKAGES}
     found["Python"] = platform.python_version()
     return found
-
-
-def _petsc4py() -> str:
-    import petsc4py
-
-    return str(petsc4py.__version__)
 
 
 def versions_text() -> str:

@@ -170,6 +170,17 @@ def scene_from(raw: dict[str, Any], origin: Origin, folder: Path | None = None) 
     return scene
 
 
+def recorded_scene(config: dict[str, Any], file: Path) -> Scene:
+    """The scene that a result ``file`` has recorded as ``config``.
+
+    Raises
+    ------
+    InputError
+        If it is not one of this version.
+    """
+    return scene_from(config, Origin(str(file), recorded=True))
+
+
 def _fill_in(raw: dict[str, Any], folder: Path | None, own_path: bool) -> None:
     if folder is None:
         return

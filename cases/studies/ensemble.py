@@ -182,7 +182,8 @@ class Marches:
                     del left[number]
                     by_themselves.append(Marched(number, str(error), {}))
                     continue
-                if line.moves_alike(at_rest):
+                assert line.shared is not None
+                if line.shared.takes(at_rest):  # with the matrices of the shared line
                     yield number, at_rest
                 else:
                     alone_from(number, at_rest)
@@ -218,8 +219,10 @@ class Marches:
     def _line_for(self, key: str, scenes: dict[int, Scene], problems: dict[int, Problem]) -> _Line:
         first = next(iter(problems))
         together = not why_alone(problems[first]) and (key == self._key or len(problems) > 1)
-        begin = min(map(_begin_of, problems.values()))
-        end = max(problem.train.end for problem in problems.values())
+        trains = [problem.train for problem in problems.values()]
+        # The last strip starts behind this place.
+        begin = min(one.start - max(place.behind for place in one.placements) for one in trains)
+        end = max(one.end for one in trains)
         if self._line is None or key != self._key or not self._line.serves(begin, end, together):
             self.destroy()
             range_of_run = (begin - _BEYOND, end + _BEYOND) if together else None
@@ -276,11 +279,6 @@ class _Line:
             return not together
         return self._range[0] <= begin and end <= self._range[1]
 
-    def moves_alike(self, at_rest: LineAtRest) -> bool:
-        """Whether a line at rest has the matrices of the shared one."""
-        assert self.shared is not None
-        return self.shared.takes(at_rest)
-
     def destroy(self) -> None:
         """Free all PETSc objects."""
         if self.shared is not None:
@@ -299,7 +297,8 @@ class _Line:
             refuse_lost_wire(at_rest.model, at_rest.form)
             self._errors, self._rest = problem.irregularities.lengths, at_rest
         hung = self._rest.problem
-        return self._rest._replace(problem=replace(hung, **_of_train(problem)))
+        of_train = {name: getattr(problem, name) for name in ("train", "contact", "evaluation")}
+        return self._rest._replace(problem=replace(hung, **of_train))
 
     def header(self, scene: Scene, problem: Problem, at_rest: LineAtRest) -> Header:
         """The head of the results of a scene, of its problem and its line at rest."""
@@ -337,11 +336,6 @@ class _Line:
         )
 
 
-def _of_train(problem: Problem) -> dict[str, Any]:
-    names = ("train", "contact", "evaluation")
-    return {name: getattr(problem, name) for name in names}
-
-
 def _is_unusual(history: SceneHistory) -> bool:
     """Whether a watch may have something to say of a march."""
     force = history.contact_force
@@ -350,12 +344,6 @@ def _is_unusual(history: SceneHistory) -> bool:
         or float(force.max()) > _FORCE
         or float((force <= 0.0).mean(axis=0).max()) > _LOST
     )
-
-
-def _begin_of(problem: Problem) -> float:
-    """Lower bound of the place at which the last strip starts [m]."""
-    train = problem.train
-    return float(train.start - max(place.behind for place in train.placements))
 
 
 def _tables(history: SceneHistory) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:

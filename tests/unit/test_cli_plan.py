@@ -30,10 +30,11 @@ def test_unknowns_are_the_nodes_of_the_mesh_times_the_unknowns_of_the_effects() 
     plan = make_plan(scene)
     # Per wire: 22 spans of 9 droppers make 10 gaps of 4 elements each, and one node more.
     assert plan.n_nodes == 2 * (22 * 10 * 4 + 1) == mesh_of(scene).n_nodes
-    assert plan.unknowns == ("w", "theta_y")
+    rows = dict(plan.rows)
+    assert rows["unknowns"].endswith("(w, theta_y)")
     assert plan.n_dofs == 2 * plan.n_nodes
     assert plan.n_droppers == 22 * 9
-    assert plan.element_lengths == pytest.approx((5.0 / 4, 6.5 / 4))
+    assert rows["mesh"].endswith(f"elements of {5.0 / 4:.2f} to {6.5 / 4:.2f} m")
 
 
 def test_steps_cover_the_run() -> None:
@@ -42,8 +43,8 @@ def test_steps_cover_the_run() -> None:
     )
     # 750 m at 250 km/h are 10.8 s.
     assert plan.simulated == pytest.approx(10.8, rel=1e-12)
-    assert plan.n_steps == 10800
-    assert plan.start == 90 and plan.end == 840
+    assert plan.needs.n_steps == 10800
+    assert dict(plan.rows)["runs"] == "from 90 to 840 m (leading pantograph)"
 
 
 def test_estimates_grow_with_size_steps_and_scheme() -> None:
@@ -93,14 +94,15 @@ def test_a_plan_says_how_much_of_a_line_moves() -> None:
     """The default window of the light line: 13 spans, and the one that the train is in."""
     light = "line.n_spans=100", "line.damping.alpha_s=0.00275", "train.end_m=4000"
     bounded = make_plan(load_scene("ambrosio2012", [*light, "window.mode=bounded"]))
-    found = re.search(r"^(\d+) of 100 spans .* (\d+) us a step in place of (\d+)", bounded.moving)
-    assert found, bounded.moving
+    moving = dict(bounded.rows)["moving"]
+    found = re.search(r"^(\d+) of 100 spans .* (\d+) us a step in place of (\d+)", moving)
+    assert found, moving
     spans, step, whole = map(int, found.groups())
     assert 12 <= spans <= 14 and 2 * step < whole
-    assert "grows" not in bounded.moving
+    assert "grows" not in moving
     exact = make_plan(load_scene("ambrosio2012", [*light, "window.mode=exact"]))
-    assert "grows with the waves" in exact.moving
-    assert make_plan(load_scene("ambrosio2012", light)).moving == ""
+    assert "grows with the waves" in dict(exact.rows)["moving"]
+    assert "moving" not in dict(make_plan(load_scene("ambrosio2012", light)).rows)
 
 
 def test_flushes_of_a_window_are_as_rare_as_what_moves_is_small() -> None:

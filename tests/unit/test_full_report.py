@@ -27,6 +27,7 @@ from catenary.cases.studies.accuracy.analysis import Row
 from catenary.cases.studies.accuracy.output import table_of
 from catenary.cases.studies.effect_cost.output import write
 from catenary.cases.studies.effect_cost.study import (
+    UNSWITCHED,
     CostOptions,
     Costs,
     Measured,
@@ -241,7 +242,7 @@ def test_a_scene_of_another_version_costs_the_data_sheets_alone(
     def refuse(*_: object) -> None:
         raise InputError("overhead is no key")
 
-    monkeypatch.setattr("catenary.cases.studies.full_report.scene_of_run.scene_from", refuse)
+    monkeypatch.setattr("catenary.cases.studies.full_report.scene_of_run.recorded_scene", refuse)
     said = invoke("report", str(tmp_path))
     assert "the report has no data sheets: overhead is no key" in said
     page = (tmp_path / "report.html").read_text()
@@ -337,9 +338,8 @@ def cost_study(folder: Path, case: str, on: bool) -> Path:
     size = Size(100, (4, 4), (4,))
     changed = [Measured(switch, "done", size, 0.8, [figures | {"std_N": 33.0}])]
     choice = SwitchableEffects([switch], [], {})
-    found = Costs(
-        case, CostOptions(case), choice, (0.0, 50.0), 10, size, 5.0, [figures], ["p"], changed
-    )
+    own = Measured(UNSWITCHED, "done", size, 1.0, [figures])
+    found = Costs(case, CostOptions(case), choice, (0.0, 50.0), 10, 5.0, ["p"], own, changed)
     write(found, folder)
     return folder
 

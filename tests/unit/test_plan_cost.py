@@ -23,6 +23,7 @@ from catenary.cases.scene.problem import problem_of
 from catenary.cases.studies.effect_cost import output
 from catenary.cases.studies.effect_cost.step_timing import RepeatedMarch, beside
 from catenary.cases.studies.effect_cost.study import (
+    UNSWITCHED,
     CostOptions,
     Costs,
     Measured,
@@ -103,7 +104,7 @@ def test_changes_are_those_of_two_runs(found: Costs) -> None:
         for left_out in ({}, *({effect: False} for effect in TWO))
     ]
     for figures, summary in zip(
-        (found.figures, *(row.figures for row in found.rows)), summaries, strict=True
+        (found.as_it_is.figures, *(row.figures for row in found.rows)), summaries, strict=True
     ):
         (own,) = figures
         assert own["std_N"] == summary["pantographs"][0]["std_N"]
@@ -163,7 +164,8 @@ def test_rounds_that_a_busy_machine_slows_down_do_not_change_a_ratio() -> None:
 def costs_of(row: Measured, as_it_is: list[dict[str, float | None]]) -> Costs:
     choice = SwitchableEffects([row.switch], ["vertical"], {"pre_sag": "a pre-sag"})
     size = Size(100, (4, 4), (4,))
-    return Costs("x", CostOptions("x"), choice, (0.0, 50.0), 10, size, 12.5, as_it_is, ["p"], [row])
+    own = Measured(UNSWITCHED, "done", size, 1.0, as_it_is)
+    return Costs("x", CostOptions("x"), choice, (0.0, 50.0), 10, 12.5, ["p"], own, [row])
 
 
 def figures(sigma: float | None, most: float = 200.0) -> list[dict[str, float | None]]:
@@ -201,10 +203,10 @@ def test_table_csv_and_json_hold_the_same(found: Costs, tmp_path: Path) -> None:
     change = record["rows"][2]["change_of_mean_N"]
     assert f"{change:+.2f}" in next(line for line in text.splitlines() if "arm_stiff" in line)
     assert f"without {TWO[1]}" in text and "evaluated from 90 to 120 m" in text
-    assert found.remarks and "; ".join(found.remarks) == rows[0]["remarks"]
+    assert found.as_it_is.remarks and "; ".join(found.as_it_is.remarks) == rows[0]["remarks"]
     for number, row in enumerate(found.rows, start=1):
         assert record["rows"][number]["remarks"] == row.remarks
-    both = [("as it is", found.remarks), *((f"without {r.switch.name}", r.remarks)
+    both = [("as it is", found.as_it_is.remarks), *((f"without {r.switch.name}", r.remarks)
             for r in found.rows)]  # fmt: skip
     for name, remarks in both:
         for remark in remarks:

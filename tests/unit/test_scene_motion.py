@@ -126,11 +126,12 @@ def test_plan_names_the_model_and_counts_its_cost_and_channel() -> None:
     assert "reduced to tables over its height" in plan_text(reduced_plan)
     told = "all bodies in the time loop in 2 substeps, joints kept by coordinate_partitioning"
     assert told in plan_text(plan)
-    n = plan.n_steps
-    more = plan.march - reduced_plan.march
+    n = plan.needs.n_steps
+    more = plan.needs.march - reduced_plan.needs.march
     expected = estimate_march(0, n, "one_solve", 2) - estimate_march(0, n, "one_solve")
     assert more == pytest.approx(expected, rel=1e-9)
     # 0.2 to 0.4 ms a substep.
     assert 2 * 2e-4 * n < more < 2 * 4e-4 * n
     # A number a row, in chunks that are kept whole, each with its entry in an index.
-    assert 8 * (n + 1) < plan.files.result - reduced_plan.files.result < 1.2 * 8 * (n + 1)
+    more = plan.needs.files.result - reduced_plan.needs.files.result
+    assert 8 * (n + 1) < more < 1.2 * 8 * (n + 1)

@@ -154,7 +154,7 @@ def test_what_is_planned_counts_shared_unknowns_once(topology: str, relative: bo
     assert size is not None and needs is not None
     assert size.unknowns == plan.n_dofs == numbering.n_unknowns
     assert size.nodes == plan.n_nodes == numbering.numbers.shape[0]
-    assert needs.march == pytest.approx(plan.march, rel=1e-9)
+    assert needs.march == pytest.approx(plan.needs.march, rel=1e-9)
     text = plan_text(plan)
     assert ("contact_wire_2 with those of contact_wire" in text) != relative
     assert f"{numbering.n_unknowns} " in text

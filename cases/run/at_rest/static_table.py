@@ -93,16 +93,12 @@ def rest_text(scene: Scene, table: Mapping[str, np.ndarray]) -> str:
     warmer than at its installation tensions along the section too. Not collective."""
     problem = problem_of(scene)
     defects = [fact["says"] for fact in defect_facts(scene, problem)]
-    lines = [*defects, _table_text(scene, table)]
+    strips = [scene.pantographs[place.name].strips.length_m for place in scene.train.pantographs]
+    half_head = min((0.5 * length for length in strips if length is not None), default=None)
+    lines = [*defects, static_text(table, problem.line, half_head)]
     if problem.along.warmer and {"axial_motion", "temperature"} <= problem.effects:
         lines += ["", temperatures(scene, [problem.along.warmer], None)]
     return "\n".join(lines)
-
-
-def _table_text(scene: Scene, table: Mapping[str, np.ndarray]) -> str:
-    lengths = [scene.pantographs[place.name].strips.length_m for place in scene.train.pantographs]
-    half_heads = [0.5 * length for length in lengths if length is not None]
-    return static_text(table, problem_of(scene).line, min(half_heads, default=None))
 
 
 class Checked(NamedTuple):

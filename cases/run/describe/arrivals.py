@@ -35,11 +35,6 @@ def end_sentences(problem: Problem) -> tuple[str, str]:
     return start, end
 
 
-def lets_waves_out(end: EndCondition) -> bool:
-    """Whether an end sends back so little that no wave from there is looked for."""
-    return isinstance(end, AbsorbingLayer | Periodic)
-
-
 def end_warnings(problem: Problem) -> list[str]:
     """Sentences on how the ends of the line may spoil a run."""
     line, train = problem.line, problem.train
@@ -187,7 +182,7 @@ def _traced(problem: Problem) -> Traced:
 
 def _without_let_out(found: Arrivals, ends: tuple[EndCondition, EndCondition]) -> Arrivals:
     """Drop waves from ends that let them out."""
-    start, end = map(lets_waves_out, ends)
+    start, end = (isinstance(kind, AbsorbingLayer | Periodic) for kind in ends)
     if start:
         found = found._replace(near_end=None)
     return found._replace(far_end=None, far_share=0.0) if end else found

@@ -16,11 +16,6 @@ if TYPE_CHECKING:
     from catenary.mbs.build import PantographData
 
 
-def model_of(data: PantographData) -> str:
-    """The model's name, as ``type`` has it in a scene."""
-    return "lumped" if isinstance(data, LumpedData) else "multibody"
-
-
 def description_of(data: PantographData, static_force: float) -> str:
     """A line about a pantograph."""
     if not isinstance(data, LumpedData):
@@ -30,16 +25,11 @@ def description_of(data: PantographData, static_force: float) -> str:
     masses = ", ".join(f"{mass:g}" for mass in data.masses)
     noun = "mass" if len(data.masses) == 1 else "masses"
     text = f"lumped: {len(data.masses)} {noun} of {masses} kg; static force {static_force:.1f} N"
-    return text + _strips_of(data.strips) + _tied_of(data)
-
-
-def _tied_of(data: LumpedData) -> str:
-    """Clause on the dependence of a chain's force on the height of the line, if it is tied to its
-    base."""
-    if not data.tied:
-        return ""
-    change = 1e-3 * data.height_stiffness
-    return f"; tied to its base: its force falls by {change:.3g} N with each mm that its head rises"
+    text += _strips_of(data.strips)
+    if data.tied:
+        change = f"{1e-3 * data.height_stiffness:.3g} N with each mm that its head rises"
+        text += f"; tied to its base: its force falls by {change}"
+    return text
 
 
 def _strips_of(strips: Strips) -> str:
@@ -89,7 +79,7 @@ def header_words(scene: Scene, problem: Problem) -> list[dict[str, str]]:
     return [
         {
             "kind": place.name,
-            "model": model_of(placement.data),
+            "model": "lumped" if isinstance(placement.data, LumpedData) else "multibody",
             "description": _description(placement, problem),
         }
         for place, placement in zip(scene.train.pantographs, problem.train.placements, strict=True)

@@ -156,6 +156,12 @@ def _matches(parts: list[str], pattern: list[str]) -> bool:
     )
 
 
+def meant(name: str, known: Sequence[str]) -> str:
+    """Words for who has given an unknown ``name``: the known one that comes near, or all."""
+    near = nearest(name, known)
+    return f"did you mean {near}?" if near else f"there are {', '.join(known)}"
+
+
 def nearest(key: str, known: Sequence[str]) -> str | None:
     """The known key that ``key`` most likely stands for, None if nothing comes near.
 

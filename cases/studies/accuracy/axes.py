@@ -283,12 +283,8 @@ def _fine_step(quick: bool) -> Reference:
     return Reference(step(dt), ((step(dt), step(2 * dt), step(4 * dt)),))
 
 
-def _own_mesh(scene: Scene) -> bool:
-    return scene.mesh.file is not None
-
-
 def _meshes(scene: Scene) -> list[Level]:
-    if _own_mesh(scene):
+    if scene.mesh.file is not None:
         return []
     return [mesh(n, n in _FEW_ELEMENTS, _FINEST_STEP) for n in _ELEMENTS]
 
@@ -312,7 +308,7 @@ _LONGEST_STEP = {8: 1e-3, 12: 5e-4, 16: 5e-4}
 
 
 def _grid(scene: Scene) -> list[Level]:
-    if _own_mesh(scene):
+    if scene.mesh.file is not None:
         return []
     return [
         step(dt, n, dt in (1e-3, 2e-3) and n in _FEW_ELEMENTS)

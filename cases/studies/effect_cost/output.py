@@ -7,14 +7,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from catenary.cases.studies.effect_cost.study import FIGURES, UPLIFT, Costs, Measured, Size, Switch
+from catenary.cases.studies.effect_cost.study import FIGURES, UPLIFT, Costs, Measured, Size
 from catenary.postproc.evaluate.wording import counted, fixed
 from catenary.postproc.report.study_table import Column, StudyTable, remark_lines, write_files
 
 TABLE, RECORD, TEXT = "cost.csv", "cost.json", "cost.txt"
 # In the column "simulated": the scene simulates the effect.
 LEFT_OUT = "left out"
-# Figures of a table for people.
+# Heads of the figures in a table, and their names in sentences.
 _HEADS = {"mean_N": "mean", "std_N": "sigma", "max_N": "max", "min_N": "min", UPLIFT: "uplift"}
 # A ratio of times that is none: what clocks and caches make of equal steps.
 _SAME_COST = 0.03
@@ -45,7 +45,8 @@ def changes(found: Costs, row: Measured) -> list[Change]:
     """Changes of all figures of all pantographs by the switch of a ``row``; unknown figures are
     left out."""
     result = []
-    for number, (before, after) in enumerate(zip(found.figures, row.figures, strict=False)):
+    pairs = zip(found.as_it_is.figures, row.figures, strict=False)
+    for number, (before, after) in enumerate(pairs):
         for name in (*FIGURES, UPLIFT):
             share = _share(before, after, name)
             if share is not None:
@@ -136,7 +137,7 @@ def as_text(found: Costs) -> str:
     lines += ["", leading.text(), "", "Advice:"]
     width = max(len(row.switch.name) for row in found.rows) if found.rows else 0
     lines += [f"  {row.switch.name:{width}}  {sentence(found, row)}" for row in found.rows]
-    remarks = remark_lines([("as it is", found.remarks), *map(_remarks_of, found.rows)])
+    remarks = remark_lines((_run(one), one.remarks) for one in (found.as_it_is, *found.rows))
     lines += ["", *remarks] if remarks else []
     if found.options.only:
         return "\n".join(lines)
@@ -167,25 +168,21 @@ def table_of(found: Costs) -> StudyTable:
         *(Column(f"shown_{name}", _HEADS[name], ">") for name in names),
     ]
     columns = [*map(Column, files), *(one._replace(in_files=False) for one in people)]
-    as_it_is = Measured(
-        Switch("", "", True, {}, ()), "done", found.size, 1.0, found.figures, found.remarks
-    )
-    rows = [row for one in (as_it_is, *found.rows) for row in _rows(found, one)]
+    rows = [row for one in (found.as_it_is, *found.rows) for row in _rows(found, one)]
     return StudyTable(columns, rows)
 
 
 def _rows(found: Costs, one: Measured) -> list[dict[str, Any]]:
     """The rows of a switch, or of the scene as it is, one of each pantograph."""
     switch, size, step = one.switch, one.size, found.step * one.ratio
-    run, remarks = _remarks_of(one)
     simulated = "as it is"
     if switch.name:
         simulated = LEFT_OUT if switch.on else "switched on"
     head: dict[str, Any] = {
-        "run": run,
-        "effect": "" if not switch.name else switch.name,
+        "run": _run(one),
+        "effect": switch.name,
         "simulated": simulated,
-        "together": [] if not switch.name else list(switch.together),
+        "together": list(switch.together),
         "outcome": one.outcome,
         "n_unknowns": None if size is None else size.n_unknowns,
         "unknowns_of_a_station": "" if size is None else width_text(size),
@@ -193,14 +190,14 @@ def _rows(found: Costs, one: Measured) -> list[dict[str, Any]]:
         "cost": None if not (switch.name and one.done) else one.cost,
         "from_m": found.stretch[0],
         "to_m": found.stretch[1],
-        "advice": "" if not switch.name else sentence(found, one),
-        "remarks": remarks,
+        "advice": sentence(found, one) if switch.name else "",
+        "remarks": one.remarks,
     }
     rows = []
     for number, own in enumerate(one.figures or [{}]):
         row = {**head, "pantograph": found.names[number] if one.figures else ""}
         for name in (*FIGURES, UPLIFT):
-            value, first = own.get(name), found.figures[number][name]
+            value, first = own.get(name), found.as_it_is.figures[number][name]
             change = None if value is None or first is None else value - first
             shown = None if change is None else f"{change:+.2f}"
             if not switch.name and value is not None:
@@ -210,11 +207,11 @@ def _rows(found: Costs, one: Measured) -> list[dict[str, Any]]:
     return rows
 
 
-def _remarks_of(row: Measured) -> tuple[str, list[str]]:
-    """A run's name as in the table, and its remarks."""
+def _run(row: Measured) -> str:
+    """A run's name as in the table."""
     if not row.switch.name:
-        return "as it is", row.remarks
-    return f"{'without' if row.switch.on else 'with'} {row.switch.name}", row.remarks
+        return "as it is"
+    return f"{'without' if row.switch.on else 'with'} {row.switch.name}"
 
 
 def sentence(found: Costs, row: Measured) -> str:

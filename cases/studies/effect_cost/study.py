@@ -55,6 +55,9 @@ class Switch:
         return [f"effects.{name}={str(on).lower()}" for name, on in self.keys.items()]
 
 
+UNSWITCHED = Switch("", "", True, {}, ())
+
+
 @dataclass(frozen=True)
 class SwitchableEffects:
     """Effects of a scene that can be switched, and why others cannot.
@@ -152,11 +155,11 @@ class Size:
 
 @dataclass(frozen=True)
 class Measured:
-    """A scene with one effect switched, beside the scene as it is.
+    """A scene with one effect switched, beside the scene as it is; or the latter.
 
     Attributes
     ----------
-    switch : the switched effect
+    switch : the switched effect, ``UNSWITCHED`` of the scene as it is
     outcome : "done", or the sentence of what is not possible or broke
     size : of the line
     ratio : time of a step over that of the scene as it is
@@ -192,9 +195,9 @@ class Costs:
     options, effects : the wanted effects, and those that can be switched
     stretch : evaluated, from and to [m]
     n_steps : of a timed round
-    size, figures, remarks : of the scene as it is, as in ``Measured``
-    step : least time of a step of it [us]
+    step : least time of a step of the scene as it is [us]
     names : of the pantographs
+    as_it_is : the scene as it is
     rows : one of each switch
     """
 
@@ -203,12 +206,10 @@ class Costs:
     effects: SwitchableEffects
     stretch: tuple[float, float]
     n_steps: int
-    size: Size
     step: float
-    figures: list[dict[str, float | None]]
     names: list[str]
+    as_it_is: Measured
     rows: list[Measured]
-    remarks: list[str] = field(default_factory=list)
 
 
 def jobs_of(options: CostOptions) -> tuple[SwitchableEffects, list[Job], dict[str, str]]:
@@ -329,12 +330,10 @@ def measure(
             rows.append(Measured(switch, "done", own, timed.ratio, figures, one.remarks))
             step = min(step, timed.least_of_other)
         size = size_of(as_it_is)
+    unchanged = Measured(UNSWITCHED, "done", size, 1.0, figures_of(whole.summary), whole.remarks)
     names = [one["name"] for one in whole.summary["pantographs"]]
-    stretch, figures = (scene.evaluation.from_m, scene.evaluation.to_m), figures_of(whole.summary)
-    return Costs(
-        scene.case.name, options, effects, stretch, n_steps, size, step, figures, names, rows,
-        whole.remarks,
-    )  # fmt: skip
+    stretch = scene.evaluation.from_m, scene.evaluation.to_m
+    return Costs(scene.case.name, options, effects, stretch, n_steps, step, names, unchanged, rows)
 
 
 def _round_of(problem: Problem) -> tuple[int, int]:

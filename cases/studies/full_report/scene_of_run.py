@@ -11,7 +11,7 @@ import tomli_w
 from catenary.base.errors import InputError
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.input.faults import Origin
-from catenary.cases.scene.load import scene_from
+from catenary.cases.scene.load import recorded_scene, scene_from
 from catenary.cases.scene.problem import problem_of, resolved
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.accuracy import output as accuracy
@@ -52,8 +52,7 @@ class SceneOfRun:
     """
 
     def __init__(self, results: Results) -> None:
-        origin = Origin(str(results.path), recorded=True)
-        self.scene = scene_from(results.attributes["config"], origin)
+        self.scene = recorded_scene(results.attributes["config"], results.path)
         self.problem: Problem = problem_of(self.scene)
         self.at_rest: LineAtRest = line_at_rest(self.problem, mesh_of(self.scene))
         # A line that a force or a blow excites has no train, though its scene has.

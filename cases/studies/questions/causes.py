@@ -281,7 +281,7 @@ class Causes:
     def _droppers_at_rest(self, start: float, end: float) -> Iterator[str]:
         """Droppers that carry much more or less at rest than those at the same place of a span."""
         x, force = self._results.line("dropper_x"), self._results.static("dropper_force")
-        likes = self._likes
+        likes = dropper_likes(self._results)
         first, last = self._results.evaluation
         for number in np.flatnonzero((x >= start) & (x <= end)):
             others = force[(likes == likes[number]) & (x >= first) & (x <= last)]
@@ -319,7 +319,3 @@ class Causes:
         for one, force in zip(self._passages, gust_forces(self._rest, when), strict=False):
             found.setdefault(one.pantograph, {})[one.span] = force
         return found
-
-    @cached_property
-    def _likes(self) -> np.ndarray:
-        return dropper_likes(self._results)

@@ -11,9 +11,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from matplotlib.figure import Figure
 
-from catenary.base.errors import InputError, RunBroken
+from catenary.base.errors import InputError
 from catenary.cases.scene.input.toml_input import parse_assignment
-from catenary.cases.studies.sweep.jobs import Ended, Job, RunOptions, all_ended, make_jobs
+from catenary.cases.studies.sweep.jobs import Ended, Job, RunOptions, all_done, all_ended, make_jobs
 from catenary.cases.studies.sweep.run_jobs import run_jobs
 from catenary.cases.studies.sweep.variants import Variant, check_keys
 from catenary.postproc.evaluate import filters
@@ -30,6 +30,7 @@ WORDS = {AS_IT_IS: "as it is", CHANGED: "changed"}
 PAGE = "what_if.html"
 _FORCE, _UPLIFT = "force", "uplift"
 _MOST_CHANGED = 3  # arms and droppers named on a terminal
+_VERDICTS = {None: "not judged", True: "passed", False: "failed"}
 # Arms and droppers are the same ones in both runs where they stand so close [m].
 _SAME_PLACE = 1e-6
 _OF_FORCE = (
@@ -94,11 +95,7 @@ def run(jobs: Sequence[Job], out: Path, comm: Any, options: RunOptions) -> list[
     RunBroken
         If one breaks; ``Interrupted`` if a signal came.
     """
-    ended = all_ended(run_jobs(jobs, out, comm, options))
-    for one in ended:
-        if not one.done:
-            raise RunBroken(f"the run {one.variant.name} broke: {one.outcome}")
-    return ended
+    return list(all_done(all_ended(run_jobs(jobs, out, comm, options))).values())
 
 
 def differences(changes: Sequence[str], ended: Sequence[Ended], out: Path) -> Differences:
@@ -210,7 +207,7 @@ def _criteria(before: dict[str, Any], after: dict[str, Any]) -> StudyTable:
             found = {"criterion": row["criterion"], "unit": row["unit"]}
             for name, one in ((AS_IT_IS, row), (CHANGED, other)):
                 found |= {f"value_{name}": one["value"], f"limit_{name}": one["limit"]}
-                found[f"verdict_{name}"] = _word(one["passed"])
+                found[f"verdict_{name}"] = _VERDICTS[one["passed"]]
             rows.append(found)
     for name, words in WORDS.items():
         columns += [
@@ -219,10 +216,6 @@ def _criteria(before: dict[str, Any], after: dict[str, Any]) -> StudyTable:
             Column(f"verdict_{name}", "verdict"),
         ]
     return StudyTable([*columns, Column("unit", "unit")], rows, "Verdicts")
-
-
-def _word(passed: bool | None) -> str:
-    return "not judged" if passed is None else "passed" if passed else "failed"
 
 
 def as_text(found: Differences) -> str:

@@ -8,8 +8,7 @@ from typing import Any, NamedTuple
 
 from catenary.base.errors import CatenaryError
 from catenary.cases.run.prepared import rest_of
-from catenary.cases.scene.input.faults import Origin
-from catenary.cases.scene.load import scene_from
+from catenary.cases.scene.load import recorded_scene
 from catenary.cases.studies.questions.causes import Causes
 from catenary.cases.studies.questions.worst import Passage, Spot, WorstPlaces, worst_places
 from catenary.postproc.read.results import Results
@@ -38,7 +37,11 @@ def answer_of(results: Results, count: int) -> Answer:
     places = worst_places(results)
     causes, unknown = _causes(results, places.passages)
     names = results.pantograph_names()
-    lines = [_head(results)]
+    start, end = results.evaluation
+    lines = [
+        f"{results.attributes['case']} at {3.6 * results.fact('speed'):.0f} km/h, evaluated from "
+        f"{start:.0f} to {end:.0f} m"
+    ]
     if not places.passages:
         lines.append("No span lies whole within the evaluated stretch and the record.")
     lines += _of_spans(places.passages, causes, names, count)
@@ -62,19 +65,10 @@ def answer_of(results: Results, count: int) -> Answer:
     )
 
 
-def _head(results: Results) -> str:
-    start, end = results.evaluation
-    return (
-        f"{results.attributes['case']} at {3.6 * results.fact('speed'):.0f} km/h, evaluated from "
-        f"{start:.0f} to {end:.0f} m"
-    )
-
-
 def _causes(results: Results, passages: Sequence[Passage]) -> tuple[Causes, str]:
     """Candidates by the scene that a run recorded, and why that gives no line at rest."""
     try:
-        origin = Origin(str(results.path), recorded=True)
-        scene = scene_from(results.attributes["config"], origin)
+        scene = recorded_scene(results.attributes["config"], results.path)
         return Causes(results, passages, rest_of(scene)), ""
     except CatenaryError as error:
         return Causes(results, passages, None), str(error)

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from catenary.base.errors import InputError
-from catenary.cases.scene.keys.keys import nearest
+from catenary.cases.scene.keys.keys import meant
 from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.scene import Scene
 
@@ -78,11 +78,7 @@ def configurations(names: Sequence[str] = ()) -> list[Configuration]:
     known = [*(one.name for one in every), *dict.fromkeys(one.model for one in every)]
     for name in names:
         if name not in known:
-            near = nearest(name, known)
-            raise InputError(
-                f"{name} is no reference model or configuration: "
-                + (f"did you mean {near}?" if near else f"there are {', '.join(known)}")
-            )
+            raise InputError(f"{name} is no reference model or configuration: {meant(name, known)}")
     return [one for one in every if not names or {one.name, one.model} & set(names)]
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
@@ -20,11 +19,10 @@ from catenary.cases.studies.reference.judgement import (
 from catenary.cases.studies.reference.others_results import Others
 from catenary.cases.studies.reference.validation import Step, Validation
 from catenary.postproc.evaluate.wording import UNCOMPARED_SAYS
-from catenary.postproc.files.disk import plain, write_all
 from catenary.postproc.report.page import page
 from catenary.postproc.report.pictures import figures, overlays
 from catenary.postproc.report.sections.section import Picture, Section, Text
-from catenary.postproc.report.study_table import StudyTable
+from catenary.postproc.report.study_table import Content, StudyTable, write_files
 
 JUDGED, VALIDATION = "judged", "validation"
 _BORROWED = (
@@ -69,11 +67,11 @@ def write_judged(folder: Path, others: Sequence[Others]) -> list[Path]:
         shown = [Picture(name, "Contact force, 20 Hz low-pass, along the track")]
         sections.append(Section(one.solution.configuration.words, blocks, shown))
     lead = f"{counts(rows)} {_BORROWED} {UNCOMPARED_SAYS}."
-    content: dict[str, bytes | str] = {f"{name}.png": data for name, data in pictures.items()}
-    content[f"{JUDGED}.csv"] = table.csv()
-    content[f"{JUDGED}.json"] = _json({"figures": table.records(), "summary": counts(rows)})
+    content: dict[str, Content] = {f"{name}.png": data for name, data in pictures.items()}
+    content[f"{JUDGED}.csv"] = table
+    content[f"{JUDGED}.json"] = {"figures": table.records(), "summary": counts(rows)}
     content[f"{JUDGED}.html"] = page("Beside the reference solutions", lead, sections, pictures)
-    return write_all(folder, content)
+    return write_files(folder, content)
 
 
 def validation_text(found: Validation) -> str:
@@ -106,22 +104,23 @@ def _closing(found: Validation) -> list[str]:
 
 def write_validation(folder: Path, found: Validation) -> list[Path]:
     """Write the statement as page, Markdown, CSV and JSON; returns the files. Not collective."""
-    table = table_of(found.rows, "")
+    table, closing = table_of(found.rows, ""), _closing(found)
     statement = {
         "installation": found.installation,
         "steps": [{"title": step.title, "said": _result_of(step)} for step in found.steps],
         "figures": table.records(),
-        "closing": _closing(found),
+        "closing": closing,
     }
-    content: dict[str, bytes | str] = {
-        f"{VALIDATION}.csv": table.csv(),
-        f"{VALIDATION}.json": _json(statement),
-        f"{VALIDATION}.md": _markdown(found),
-        f"{VALIDATION}.html": page(
-            "Validation by EN 50318", " ".join(_closing(found)), _sections(found), {}
-        ),
-    }
-    return write_all(folder, content)
+    html = page("Validation by EN 50318", " ".join(closing), _sections(found), {})
+    return write_files(
+        folder,
+        {
+            f"{VALIDATION}.csv": table,
+            f"{VALIDATION}.json": statement,
+            f"{VALIDATION}.md": _markdown(found),
+            f"{VALIDATION}.html": html,
+        },
+    )
 
 
 def _shown(step: Step) -> list[dict[str, Any]]:
@@ -144,7 +143,3 @@ def _markdown(found: Validation) -> str:
         if rows := _shown(step):
             parts.append(read_table(rows, "").markdown())
     return "\n\n".join(["# Validation by EN 50318", *parts, *_closing(found)]) + "\n"
-
-
-def _json(content: dict[str, Any]) -> str:
-    return json.dumps(plain(content), indent=1) + "\n"

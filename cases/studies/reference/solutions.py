@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
@@ -12,16 +11,15 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from catenary.base.errors import InputError, RunBroken
-from catenary.cases.scene.input.plain_text import plain as plain_text
-from catenary.cases.scene.keys.keys import nearest
+from catenary.base.errors import InputError
+from catenary.cases.scene.input.plain_text import plain
+from catenary.cases.scene.keys.keys import meant
 from catenary.cases.scene.problem import resolved
 from catenary.cases.studies.reference.configurations import Configuration, configurations, table
 from catenary.cases.studies.reference.convergence import FINEST, run_name, statistics
-from catenary.cases.studies.sweep.jobs import Ended
+from catenary.cases.studies.sweep.jobs import Ended, all_done
 from catenary.postproc.files.csv_text import csv_text
-from catenary.postproc.files.disk import plain, write_all
-from catenary.postproc.report.study_table import rows_csv
+from catenary.postproc.report.study_table import Content, write_files
 
 DATA = Path(__file__).parent / "data"
 STATISTICS, METADATA = "statistics.csv", "metadata.json"
@@ -42,16 +40,12 @@ def write(folder: Path, chosen: Sequence[Configuration], ended: Sequence[Ended])
     RunBroken
         If a run broke.
     """
-    for run in ended:
-        if not run.done:
-            raise RunBroken(f"the run {run.variant.name} broke: {run.outcome}")
-    runs = {run.variant.name: run for run in ended}
+    runs = all_done(ended)
     rows = [row for one in chosen for row in statistics(one, runs)]
-    content: dict[str, bytes | str] = {STATISTICS: rows_csv(rows)}
+    content: dict[str, Content] = {STATISTICS: rows, METADATA: _metadata(chosen)}
     for one in chosen:
         content[f"{one.name}.csv"] = _forces(one, runs[run_name(one, FINEST)])
-    content[METADATA] = json.dumps(plain(_metadata(chosen)), indent=1) + "\n"
-    return write_all(folder, content)
+    return write_files(folder, content)
 
 
 def _metadata(chosen: Sequence[Configuration]) -> dict[str, Any]:
@@ -125,12 +119,8 @@ def read(name: str) -> Solution:
     """
     one = next((own for own in configurations() if own.name == name), None)
     if one is None:
-        known = [own.name for own in configurations()]
-        near = nearest(name, known)
-        raise InputError(
-            f"{plain_text(name, 100)} is no reference configuration: "
-            + (f"did you mean {near}?" if near else f"there are {', '.join(known)}")
-        )
+        hint = meant(name, [own.name for own in configurations()])
+        raise InputError(f"{plain(name, 100)} is no reference configuration: {hint}")
     rows = pd.read_csv(DATA / STATISTICS)
     rows = rows[rows["configuration"] == name]
     figures = {

@@ -10,7 +10,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from catenary.base.errors import InputError, RunBroken
+from catenary.base.errors import InputError
 from catenary.cases.scene.input.case_files import find_case
 from catenary.cases.scene.load import load_scene
 from catenary.cases.studies.records import read_study
@@ -24,7 +24,7 @@ from catenary.cases.studies.reference.judgement import (
     limits,
 )
 from catenary.cases.studies.reference.solutions import read
-from catenary.cases.studies.sweep.jobs import Ended, Job
+from catenary.cases.studies.sweep.jobs import Ended, Job, all_done
 from catenary.cases.studies.sweep.variants import Variant
 from catenary.postproc.measurements.compared import LINE_TEST
 from catenary.postproc.measurements.output import SUMMARY
@@ -132,10 +132,7 @@ def validate(ended: Sequence[Ended], measured: Step) -> Validation:
     RunBroken
         If one broke.
     """
-    for run in ended:
-        if not run.done:
-            raise RunBroken(f"the run {run.variant.name} broke: {run.outcome}")
-    summaries = {run.variant.name: run.summary for run in ended}
+    summaries = {name: run.summary for name, run in all_done(ended).items()}
     rules = limits()
     references, elasticity, models = [], [], set()
     for one in configurations():

@@ -7,12 +7,12 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, TypeVar
 
-from catenary.base.errors import InputError
+from catenary.base.errors import InputError, RunBroken
 from catenary.base.options import option
 from catenary.cases.process.interrupts import Interrupted
 from catenary.cases.scene.input.faults import UnfitScene, shown
 from catenary.cases.scene.input.toml_input import Assigned
-from catenary.cases.scene.keys.keys import nearest
+from catenary.cases.scene.keys.keys import meant
 from catenary.cases.scene.load import Draft, load_scene, read_draft
 from catenary.cases.scene.scene import Scene
 from catenary.cases.scene.turned import BACKWARD, turned
@@ -62,9 +62,7 @@ def check_histories(names: Sequence[str]) -> None:
 def _check_names(names: Sequence[str], known: Mapping[str, Any], what: str) -> None:
     for name in names:
         if name not in known:
-            near = nearest(name, list(known))
-            hint = f"did you mean {near}?" if near else f"there are {', '.join(known)}"
-            raise InputError(f"{shown(name)[1:-1]} is no {what}; {hint}")
+            raise InputError(f"{shown(name)[1:-1]} is no {what}; {meant(name, list(known))}")
 
 
 @dataclass(frozen=True)
@@ -149,6 +147,20 @@ def all_ended(ended: Sequence[Ended], what: str = "study") -> list[Ended]:
     if interrupted(ended):
         raise Interrupted(f"the {what} was interrupted; the same command continues it")
     return list(ended)
+
+
+def all_done(ended: Sequence[Ended]) -> dict[str, Ended]:
+    """The runs of a study by name.
+
+    Raises
+    ------
+    RunBroken
+        If one broke.
+    """
+    for one in ended:
+        if not one.done:
+            raise RunBroken(f"the run {one.variant.name} broke: {one.outcome}")
+    return {one.variant.name: one for one in ended}
 
 
 def _assigned(variant: Variant) -> list[Assigned]:

@@ -61,10 +61,14 @@ def table_of(ended: Sequence[Ended]) -> StudyTable:
         verdict = "passed" if head["passed"] else "not judged"
         head["accepted"] = f"FAILED {', '.join(failed)}" if failed else verdict
         head["wall_s"] = one.wall
+        droppers = one.summary.get("droppers", {})
+        values = [one.summary.get("supports", {}).get("max_uplift_mm")]
+        values += [droppers.get(name) for name in ("n_slackened", "max_force_N", "min_force_N")]
+        of_line = {column.name: value for column, value in zip(OF_LINE, values, strict=True)}
         for pantograph in one.summary.get("pantographs", [{}]):
             row: dict[str, Any] = {**head, "pantograph": pantograph.get("name", "")}
             row |= {column.name: pantograph.get(column.name) for column in OF_PANTOGRAPH}
-            rows.append(row | _of_line(one.summary))
+            rows.append(row | of_line)
     columns = [
         Column("variant", "variant"),
         *map(Column, keys),
@@ -106,15 +110,6 @@ def _criteria(summary: Mapping[str, Any], verdicts: Sequence[bool]) -> list[str]
     rows = summary.get("acceptance", [])
     several = len({row.get("book") for row in rows}) > 1
     return list(dict.fromkeys(labelled(row, several) for row in rows if row["passed"] in verdicts))
-
-
-def _of_line(summary: dict[str, Any]) -> dict[str, Any]:
-    droppers = summary.get("droppers", {})
-    values = (
-        summary.get("supports", {}).get("max_uplift_mm"),
-        *(droppers.get(name) for name in ("n_slackened", "max_force_N", "min_force_N")),
-    )
-    return {column.name: value for column, value in zip(OF_LINE, values, strict=True)}
 
 
 def varied_keys(ended: Sequence[Ended]) -> list[str]:

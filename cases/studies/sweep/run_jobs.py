@@ -95,7 +95,7 @@ def run_jobs(
     places = [f"[{i}/{len(jobs)}] {job.variant.name}" for i, job in enumerate(jobs, start=1)]
     several = n_at_once > 1
     shows = several and comm.size == 1  # on ranks the first one shows what it does itself
-    work = _Work(out_dir, options._replace(progress=_silent), measure)
+    work = _Work(out_dir, options.petsc, options.force, measure)
     begin = time.perf_counter()
     with ExitStack() as stack:
         bar = stack.enter_context(RunsBar(len(left) if shows else 0, options.progress))
@@ -135,23 +135,43 @@ class _Work:
     """Makes a run; goes to the processes that make some."""
 
     out_dir: Path
-    options: RunOptions
+    petsc: Sequence[str]
+    force: bool
     measure: Measure | None
 
     def __call__(self, job: Job, comm: Any) -> tuple[Ended, set[str]]:
         """Outcome of the run, and options that PETSc never looked up. Collective."""
-        folder = self.out_dir / job.variant.name
-        return _run(job, folder, comm, self.options, self.measure), idle_names()
+        return self._run(job, self.out_dir / job.variant.name, comm), idle_names()
+
+    def _run(self, job: Job, folder: Path, comm: Any) -> Ended:
+        """Run one job and leave its record. Collective; raises only if that cannot be written."""
+        clock = time.perf_counter()
+        try:
+            result = run_case(
+                job.scene,
+                folder,
+                comm,
+                force=True,
+                petsc_options=self.petsc,
+                only_summary=not job.full_report,
+                large=self.force,
+            )
+            outcome, summary = result.outcome, result.summary
+        except Interrupted:
+            outcome, summary = INTERRUPTED, {}
+        except CatenaryError as error:  # the same on all ranks
+            outcome, summary = str(error), {}
+        wall = time.perf_counter() - clock
+        if outcome != DONE:
+            return Ended(job.variant, outcome, wall=wall)
+        measured = on_root(comm, lambda: _leave_record(job, folder, self.measure, wall))
+        return Ended(job.variant, DONE, summary, measured, wall)
 
 
 def as_json(table: Mapping[str, Any]) -> dict[str, Any]:
     """A table as JSON gives it back."""
     content: dict[str, Any] = json.loads(json.dumps(plain(table)))
     return content
-
-
-def _silent(line: str) -> None:
-    """Say nothing."""
 
 
 def _ended(job: Job, outcome: Outcome) -> Ended:
@@ -161,37 +181,6 @@ def _ended(job: Job, outcome: Outcome) -> Ended:
     ended, idle = outcome.get()
     look_up_all_but(idle)  # as its process did, whichever it was
     return ended
-
-
-def _run(
-    job: Job,
-    folder: Path,
-    comm: Any,
-    options: RunOptions,
-    measure: Measure | None,
-) -> Ended:
-    """Run one job and leave its record. Collective; raises only if that cannot be written."""
-    clock = time.perf_counter()
-    try:
-        result = run_case(
-            job.scene,
-            folder,
-            comm,
-            force=True,
-            petsc_options=options.petsc,
-            only_summary=not job.full_report,
-            large=options.force,
-        )
-        outcome, summary = result.outcome, result.summary
-    except Interrupted:
-        outcome, summary = INTERRUPTED, {}
-    except CatenaryError as error:  # the same on all ranks
-        outcome, summary = str(error), {}
-    if outcome != DONE:
-        return Ended(job.variant, outcome, wall=time.perf_counter() - clock)
-    wall = time.perf_counter() - clock
-    measured = on_root(comm, lambda: _leave_record(job, folder, measure, wall))
-    return Ended(job.variant, DONE, summary, measured, wall)
 
 
 def _leave_record(job: Job, folder: Path, measure: Measure | None, wall: float) -> dict[str, Any]:

@@ -175,19 +175,15 @@ def pieces_of_work(variants: Sequence[Variant], size: int) -> list[list[Variant]
     """
     whole, begun = list[list[Variant]](), dict[tuple[str, ...], list[Variant]]()
     for variant in variants:
-        own = begun.setdefault(_of_the_line(variant), [])
+        # What its line depends on.
+        changes = (one for one in variant.assignments if one.split(".")[0] not in OF_THE_TRAIN)
+        own = begun.setdefault((variant.direction, *changes), [])
         own.append(variant)
         if len(own) == size:
             whole.append(own.copy())
             own.clear()
     left = list(chain.from_iterable(begun.values()))
     return whole + [left[at : at + size] for at in range(0, len(left), size)]
-
-
-def _of_the_line(variant: Variant) -> tuple[str, ...]:
-    """The changes of a variant that its line depends on: its direction and assignments."""
-    changes = (one for one in variant.assignments if one.split(".")[0] not in OF_THE_TRAIN)
-    return (variant.direction, *changes)
 
 
 @dataclass

@@ -209,26 +209,20 @@ def product(
         count *= len(each.values)
     if count > MAX_VARIANTS:
         raise InputError(f"these variations make {count} runs; at most {MAX_VARIANTS} are allowed")
-    labels = _labels(keys)
+    last = [key.rsplit(".", 1)[-1] for key in keys]
+    # The last part of each key, the whole key where two share it.
+    labels = [name if last.count(name) == 1 else key for key, name in zip(keys, last, strict=True)]
     variants = []
     for name, assignments in (named or {"": ()}).items():
         for values in itertools.product(*(each.values for each in varied)):
             chosen = dict(zip(keys, values, strict=True))
             words = [name] if name else []
-            words += [f"{labels[key]}_{value}" for key, value in chosen.items()]
+            words += [f"{label}_{value}" for label, value in zip(labels, values, strict=True)]
             own = tuple(f"{key}={value}" for key, value in chosen.items())
             of_file = name if chosen else ""
             parts = "__".join(words), (*assignments, *own), chosen
             variants.append(Variant(*parts, named=of_file, where=where))
     return _with_own_folders(variants)
-
-
-def _labels(keys: Sequence[str]) -> dict[str, str]:
-    """The last part of each key, the whole key where two share it."""
-    last = [key.rsplit(".", 1)[-1] for key in keys]
-    return {
-        key: name if last.count(name) == 1 else key for key, name in zip(keys, last, strict=True)
-    }
 
 
 def slug(text: str) -> str:

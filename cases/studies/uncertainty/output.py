@@ -278,19 +278,15 @@ def as_text(found: Uncertainty) -> str:
             "Probability that a criterion fails, with 95 % bounds (Clopper-Pearson)\n"
             + _probabilities(found).text()
         )
-    shown = [row for row in found.sensitivity if "with" not in row and _is_shown(row)]
+    # Of columns that people read.
+    hidden = [name for name, column in STATISTICS.items() if not column.head]
+    shown = [r for r in found.sensitivity if "with" not in r and r["statistic"] not in hidden]
     if shown:
         parts.append(capital(found.method) + "\n" + _indices(shown).text())
     remarks = found.remarks[:_MOST_REMARKS]
     lines = [f"REMARK      {one['n']} of {found.n_runs} runs: {one['remark']}" for one in remarks]
     lines += [f"NOTE        {note}" for note in found.notes]
     return "\n\n".join([*parts, *(["\n".join(lines)] if lines else [])])
-
-
-def _is_shown(row: Row) -> bool:
-    """Whether a terminal shows a statistic's indices: of the columns that people read."""
-    known = STATISTICS.get(row["statistic"])
-    return known is None or bool(known.head)
 
 
 def _statistics(found: Uncertainty) -> StudyTable:

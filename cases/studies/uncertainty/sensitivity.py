@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from itertools import combinations
 from typing import Any
 
@@ -76,17 +76,11 @@ def _sobol(table: RunTable, sampling: SamplingTable) -> tuple[list[dict[str, Any
             for i, key in enumerate(sampling.columns):
                 row = {name: float(found[name][i]) for name in ("S1", "S1_conf", "ST", "ST_conf")}
                 rows.append({**here, "key": key, **_with_bounds(row)})
-            if sampling.second_order:
-                rows += _interactions(here, sampling, found)
+            pairs = combinations(enumerate(sampling.columns), 2) if sampling.second_order else ()
+            for (i, key), (j, other) in pairs:
+                row = {name: float(found[name][i, j]) for name in ("S2", "S2_conf")}
+                rows.append({**here, "key": key, "with": other, **_with_bounds(row)})
     return rows, list(notes)
-
-
-def _interactions(
-    here: dict[str, Any], sampling: SamplingTable, found: Any
-) -> Iterator[dict[str, Any]]:
-    for (i, key), (j, other) in combinations(enumerate(sampling.columns), 2):
-        row = {name: float(found[name][i, j]) for name in ("S2", "S2_conf")}
-        yield {**here, "key": key, "with": other, **_with_bounds(row)}
 
 
 def _with_bounds(row: dict[str, float]) -> dict[str, float]:

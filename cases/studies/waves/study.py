@@ -14,8 +14,7 @@ from catenary.cases.result_folder.output_folder import refuse_earlier, refuse_ta
 from catenary.cases.run.excited_run import ExcitedRun
 from catenary.cases.run.runner import run_case
 from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.input.faults import Origin
-from catenary.cases.scene.load import scene_from
+from catenary.cases.scene.load import recorded_scene
 from catenary.cases.scene.problem import problem_of
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.waves import obstacles, pictures
@@ -46,7 +45,7 @@ from catenary.cases.studies.waves.theory import (
 )
 from catenary.postproc.evaluate.error_indicators import indicate
 from catenary.postproc.evaluate.remarks import all_remarks
-from catenary.postproc.film.film_data import FilmData, film_data
+from catenary.postproc.film.film_data import film_data
 from catenary.postproc.film.snapshots import Snapshots
 from catenary.postproc.read.guard import examined
 from catenary.postproc.read.results import Results
@@ -84,13 +83,15 @@ def study_waves(folder: Path) -> Studied:
     """
     with Results(folder, examined(folder)) as results:
         data = film_data(results)
-        config = results.attributes["config"]
         with Snapshots(folder, len(data.points), until=float(data.time[-1])) as snapshots:
             snapshots.need_whole()
-            scene = scene_from(config, Origin(str(folder), recorded=True))
+            scene = recorded_scene(results.attributes["config"], folder)
             problem = problem_of(scene)
             rest = line_at_rest(problem, mesh_of(scene))
-            energy = EnergyMotion(rest, _numbers_in(data, rest))
+            numbers = np.empty(rest.mesh.n_nodes, dtype=np.int64)  # of the nodes in the run
+            for name, nodes in rest.mesh.wires.items():
+                numbers[nodes] = data.wires[name]
+            energy = EnergyMotion(rest, numbers)
             seen = waves_seen(data, snapshots, [energy])
         remarks = all_remarks(results, indicate(results))
     theory = wave_theory(problem, rest)
@@ -172,14 +173,6 @@ def study_obstacles(scene: Scene, folder: Path, force: bool) -> tuple[str, list[
         },
     )
     return "\n".join(lines), files
-
-
-def _numbers_in(data: FilmData, rest: LineAtRest) -> np.ndarray:
-    """For each node of a line's mesh its number in the run's."""
-    numbers = np.empty(rest.mesh.n_nodes, dtype=np.int64)
-    for name, nodes in rest.mesh.wires.items():
-        numbers[nodes] = data.wires[name]
-    return numbers
 
 
 def _write(
