@@ -13,7 +13,8 @@ import pytest
 from mpi4py import MPI
 from rank_histories import on_one
 
-from catenary.base.errors import NotConverged, RunBroken
+from catenary import RunBroken
+from catenary.base.errors import NotConverged
 from catenary.base.parallel import on_root
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.load import load_scene

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.cases.run.runner import RunOutcome, on_as_many, run_case
 from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.scene import Scene

@@ -28,7 +28,7 @@ from fuzzing import (
 from mpi4py import MPI
 from verb_runner import CliRunner
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.base.parallel import on_root
 from catenary.cases.cli.main import app
 from catenary.cases.scene.input.faults import SceneError

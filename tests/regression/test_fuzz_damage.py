@@ -23,7 +23,7 @@ from program import catenary, short_run
 from studies import few
 from verb_runner import CliRunner
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.cases.cli.main import app
 from catenary.postproc.evaluate import statistics as stats
 from catenary.postproc.evaluate import verdict

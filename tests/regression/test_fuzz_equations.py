@@ -12,7 +12,7 @@ from equations import residual_of
 from fuzzing import BASE, sound_scene, twin_scene
 from mpi4py import MPI
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.cases.scene.load import load_scene
 from catenary.cases.studies.hard import runs as hard_runs
 

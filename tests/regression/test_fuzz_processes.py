@@ -19,7 +19,7 @@ from fuzzing import N_STEPS, RandomScene, wide_scene
 from mpi4py import MPI
 from program import MPIRUN, Done, Program, assert_sound, catenary, catenary_started, n_rows
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.cases.scene.load import load_scene
 from catenary.cases.studies.hard import runs as hard_runs
 from catenary.cases.studies.hard.runs import RunHistories

@@ -13,7 +13,7 @@ import pytest
 from fuzzing import RandomScene, topology_scene
 from windowed import COMM, apart, largest, march, nudged
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.problem import problem_of
 from catenary.cases.scene.scene import Scene

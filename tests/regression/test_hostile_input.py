@@ -15,7 +15,7 @@ import pytest
 from program import catenary, short_run
 from verb_runner import CliRunner
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.cases.cli.main import app
 from catenary.cases.run import scene_mesh
 from catenary.cases.run.scene_mesh import mesh_of

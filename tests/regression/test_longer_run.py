@@ -11,8 +11,7 @@ import pytest
 from damaging import unseal
 from program import MPIRUN, assert_same_histories, assert_sound, catenary, short_run
 
-from catenary import restart
-from catenary.base.errors import InputError
+from catenary import InputError, restart
 from catenary.cases.run.continuing import extended_scene
 from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.problem import resolved

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 from program import SHORT_SCENE, catenary
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.cases.run.planning.needs import NeedsOfRuns, total_needs
 from catenary.cases.run.planning.slurm_script import Job, array_script
 from catenary.cases.scene.load import load_scene

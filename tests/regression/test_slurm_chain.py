@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from program import assert_same_histories, catenary
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.cases.run.planning.slurm_script import Job, limit_minutes, slurm_script
 from catenary.postproc.read.results import Results
 

@@ -8,7 +8,7 @@ import numpy as np
 from scipy import integrate, linalg
 from scipy.interpolate import CubicSpline
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.mbs.mechanism.reduced_pantograph import RaisingPantograph
 from catenary.mbs.mechanism.reduction import ReducedMechanism
 from catenary.mbs.rigid.arrays import ORIGIN, TimeLaw

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from verb_runner import CliRunner
 
-from catenary.base.errors import RunBroken
+from catenary import RunBroken
 from catenary.cases.cli.main import app
 from catenary.cases.scene.input.case_files import shipped
 from catenary.cases.scene.load import load_scene

@@ -13,7 +13,7 @@ from measuring import check
 from mpi4py import MPI
 from pydantic import TypeAdapter, ValidationError
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.cases.run.continuing import state_to_continue
 from catenary.cases.run.excited_run import ExcitedRun
 from catenary.cases.run.runner import run_case

@@ -9,7 +9,7 @@ import pytest
 import typer
 from mpi4py import MPI
 
-from catenary.base.errors import InputError, RunBroken
+from catenary import InputError, RunBroken
 from catenary.base.parallel import on_root
 from catenary.cases.run.planning.needs import (
     Kept,

@@ -15,7 +15,7 @@ import pytest
 from program import MPIRUN, catenary
 from verb_runner import CliRunner
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.cases.cli.main import app
 from catenary.cases.process import installation
 from catenary.cases.process.installation import BROKEN, MISSING, OK, Finding

@@ -18,7 +18,7 @@ import pytest
 from pixels import FIGURES, PAINTERS
 from verb_runner import CliRunner
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.cases.cli.main import app
 from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.problem import resolved

@@ -15,7 +15,7 @@ from mpi4py import MPI
 from verb_runner import CliRunner
 
 import catenary
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.cases.cli.main import app
 from catenary.cases.scene.load import load_scene, read_draft
 from catenary.cases.scene.problem import line_of

@@ -18,7 +18,7 @@ from twin_passages import filtered_noise, write_measurement
 from verb_runner import CliRunner
 
 import catenary
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.cases.cli.main import app
 from catenary.cases.scene.load import load_scene
 from catenary.cases.studies.identification.measurement import (

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from verb_runner import CliRunner
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.cases.cli.main import app
 from catenary.cases.scene.keys.usual_values import USUAL
 from catenary.cases.scene.load import load_scene

@@ -16,7 +16,7 @@ from mpi4py import MPI
 from scipy import signal, stats
 from verb_runner import CliRunner
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.cases.cli.main import app
 from catenary.cases.run.runner import run_case
 from catenary.cases.scene.load import load_scene

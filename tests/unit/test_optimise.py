@@ -13,7 +13,7 @@ import pytest
 from verb_runner import CliRunner
 
 import catenary
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.cases.cli.main import app
 from catenary.cases.result_folder.folder_lock import FolderLock
 from catenary.cases.run.at_rest.static_table import static_table

@@ -15,7 +15,7 @@ from verb_runner import CliRunner
 from word_scenes import with_words
 
 import catenary
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.cases.cli.main import app
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.load import load_scene

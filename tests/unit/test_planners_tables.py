@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.checks.mesh_size import size_of
 from catenary.cases.scene.input.faults import Origin

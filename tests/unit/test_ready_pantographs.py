@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from verb_runner import CliRunner
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.cases.cli.main import app
 from catenary.cases.scene.load import load_scene, scene_from
 from catenary.cases.scene.problem import problem_of

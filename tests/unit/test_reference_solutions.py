@@ -13,7 +13,7 @@ import pandas as pd
 import pytest
 from verb_runner import CliRunner
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.cases.cli.main import app
 from catenary.cases.scene.problem import problem_of
 from catenary.cases.studies.reference import validation

@@ -16,7 +16,7 @@ from verb_runner import CliRunner
 from work_items import die_at_275, measure_steps
 
 import catenary
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.cases.cli.main import app
 from catenary.cases.run.planning.needs import Kept, total_size
 from catenary.cases.studies.sweep.jobs import RunOptions, make_jobs

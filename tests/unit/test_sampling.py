@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.cases.scene.load import load_scene, read_draft
 from catenary.cases.scene.problem import line_of
 from catenary.cases.scene.scene import Scene

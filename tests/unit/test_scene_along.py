@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.problem import problem_of
 from catenary.solver.problem.ends import AlongTrack, Tensioner

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.cases.scene.input.case_files import find_case
 from catenary.cases.scene.input.faults import Origin
 from catenary.cases.scene.load import load_scene, scene_from

@@ -8,7 +8,7 @@ from dataclasses import fields
 
 import pytest
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.cases.run.planning.plan import effect_rows
 from catenary.cases.scene.input.faults import Origin
 from catenary.cases.scene.keys.keys import known_keys

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.cases.run.describe.arrivals import arrival_facts
 from catenary.cases.run.planning.plan import make_plan, plan_text
 from catenary.cases.scene.load import load_scene

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.cases.scene.checks.scene import MIN_SEPARATION
 from catenary.cases.scene.input.faults import Origin
 from catenary.cases.scene.load import load_scene, scene_from

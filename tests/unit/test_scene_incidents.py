@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.cases.run.describe.defects import incident_facts
 from catenary.cases.run.planning.plan import make_plan, plan_text
 from catenary.cases.scene.input.faults import Origin

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from free_tables import as_free
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.cases.run.planning.plan import effect_rows
 from catenary.cases.scene.input.faults import Origin
 from catenary.cases.scene.load import load_scene, scene_from

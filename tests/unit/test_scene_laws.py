@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.cases.run.describe.pantographs import kind_lines
 from catenary.cases.scene.input.faults import Origin
 from catenary.cases.scene.load import load_scene, scene_from

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.cases.scene.input.case_files import find_case, shipped
 from catenary.cases.scene.input.faults import Origin
 from catenary.cases.scene.keys.units import unit_of

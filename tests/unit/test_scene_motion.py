@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from catenary.base.errors import InputError, RunBroken
+from catenary import InputError, RunBroken
 from catenary.cases.run.planning.plan import make_plan, plan_text
 from catenary.cases.scene.cost_model import estimate_march
 from catenary.cases.scene.input.faults import Origin

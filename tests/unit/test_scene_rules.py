@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from verb_runner import CliRunner
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.cases.cli.main import app
 from catenary.cases.scene.input.faults import Origin
 from catenary.cases.scene.load import load_scene, read_draft, scene_from

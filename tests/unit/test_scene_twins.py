@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.cases.run.planning.needs import needs_before_meshing
 from catenary.cases.run.planning.plan import make_plan, plan_text
 from catenary.cases.run.scene_mesh import mesh_of

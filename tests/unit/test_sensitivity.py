@@ -14,7 +14,7 @@ from measuring import check
 from mpi4py import MPI
 from verb_runner import CliRunner
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.cases.cli.main import app
 from catenary.cases.run.prepared import sound_rest
 from catenary.cases.run.scene_mesh import mesh_of

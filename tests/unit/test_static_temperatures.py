@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 from verb_runner import CliRunner
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.cases.cli.main import app
 from catenary.cases.run.at_rest.temperatures import range_of, temperature_text
 from catenary.solver.model.wire_ends import WireEnd

@@ -13,7 +13,7 @@ import pytest
 from matplotlib.figure import Figure
 from verb_runner import CliRunner
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.cases.ambrosio2012.study import TABLE, variants
 from catenary.cases.cli.main import app
 from catenary.cases.scene.input.case_files import shipped

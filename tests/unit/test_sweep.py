@@ -17,7 +17,7 @@ from verb_runner import CliRunner
 from word_scenes import with_words
 
 import catenary
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.cases.cli.main import app
 from catenary.cases.result_folder import output_folder
 from catenary.cases.run.planning.needs import needs_before_meshing

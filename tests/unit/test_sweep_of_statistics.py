@@ -13,7 +13,7 @@ import pytest
 from mpi4py import MPI
 
 import catenary
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.cases.scene.load import Draft, read_draft
 from catenary.cases.studies import merged_sweeps
 from catenary.cases.studies.records import FOLDER

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from verb_runner import CliRunner
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.cases.cli.main import app
 from catenary.cases.run.at_rest.static_table import static_table
 from catenary.cases.scene.load import Draft, read_draft

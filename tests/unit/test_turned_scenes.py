@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.cases.run.at_rest.static_table import static_table
 from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.problem import line_of, resolved

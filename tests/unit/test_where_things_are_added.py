@@ -14,7 +14,7 @@ from measuring import march, registered
 from small_lines import HANGING, en50318_line, mesh_of, problem_of, train
 from verb_runner import CliRunner
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.cases.cli.app import Force, RunWords, SceneWords, app
 from catenary.cases.scene.load import load_scene
 from catenary.cases.terminal import console

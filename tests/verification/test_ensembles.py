@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import catenary
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.input.toml_input import REMOVED
 from catenary.cases.scene.load import read_draft

@@ -14,7 +14,7 @@ from seven_bodies import ARM, HEAD, at_rest, calibrated, pressed
 from variable_steps import integrate
 from verb_runner import CliRunner
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.cases.cli.main import app
 from catenary.cases.scene.input.toml_input import read_toml
 from catenary.mbs.build import raising_data

@@ -8,7 +8,7 @@ from measuring import check, print_table
 from scipy.special import ellipk
 from studies import few
 
-from catenary.base.errors import InputError, RunBroken
+from catenary import InputError, RunBroken
 from catenary.mbs.rigid.bodies import SPACE, Body, Motion
 from catenary.mbs.rigid.forces import BumpStop, Gravity, PointForce, SpringDamper
 from catenary.mbs.rigid.implicit_steps import Stepper

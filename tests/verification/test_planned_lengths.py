@@ -16,7 +16,7 @@ import pytest
 from measuring import check
 from verb_runner import CliRunner
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.cases.cli.main import app
 from catenary.cases.run.at_rest.planned_lengths import take_in_lengths
 from catenary.cases.run.scene_mesh import mesh_of

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from measuring import check, matrix_of, solve_free
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.problem import problem_of

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from measuring import check
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.input.case_files import shipped
 from catenary.cases.scene.load import load_scene

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from measuring import check
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.problem import problem_of
 from catenary.mbs.mechanism.pantograph_data import MultibodyData, reduced, stand

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.cases.scene.load import load_scene
 from catenary.cases.studies.sweep.variants import whole_numbers
 from catenary.cases.studies.waves import window_error

@@ -13,7 +13,7 @@ import pytest
 from mpi4py import MPI
 from windowed import apart, march
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.cases.scene.load import load_scene
 from catenary.cases.studies.hard import runs as hard_runs
 from catenary.solver.problem.problem import EXACT, WindowChoice

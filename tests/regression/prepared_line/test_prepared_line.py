@@ -17,7 +17,7 @@ from documents import blocks_of
 from mpi4py import MPI
 from studies import few
 
-from catenary.base.errors import InputError, RunBroken
+from catenary import InputError, RunBroken
 from catenary.cases.run.prepared import HEADER, LIBRARY, prepare_line
 from catenary.cases.scene.input.case_files import find_case
 from catenary.cases.scene.load import load_scene

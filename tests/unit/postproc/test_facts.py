@@ -14,7 +14,7 @@ import h5py
 import numpy as np
 import pytest
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.cases.scene.keys.keys import known_keys
 from catenary.cases.scene.keys.units import unit_of
 from catenary.cases.scene.scene import Scene

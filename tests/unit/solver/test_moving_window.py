@@ -10,7 +10,7 @@ import pytest
 from measuring import COMM, History, check, start_march
 from small_lines import ac_simple_line, mesh_of, numerics, problem_of, train
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.cases.run.scene_mesh import mesh_of as scene_mesh
 from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.problem import problem_of as scene_problem
