@@ -31,7 +31,7 @@ from documents import (
     numbers_agree,
     plain_words,
 )
-from program import catenary
+from program import ENTRY, catenary
 
 from catenary.cases.cli.main import app
 from catenary.cases.scene.input.case_files import shipped
@@ -58,7 +58,6 @@ LONGEST = {
     Path("docs/guide/uncertainty.md"),
     Path("docs/tutorials/long_line.md"),
 }
-_ENTRY = "from catenary.cases.cli.main import main; main()"
 
 
 def read(document: Path) -> str:
@@ -164,7 +163,7 @@ def workshop_in(folder: Path) -> Workshop:
     (folder / ".venv").symlink_to(sys.prefix)
     program = folder / "bin" / "catenary"
     program.parent.mkdir()
-    program.write_text(f'#!/bin/sh\nexec "{sys.executable}" -W error -c "{_ENTRY}" "$@"\n')
+    program.write_text(f'#!/bin/sh\nexec "{sys.executable}" -W error -c "{ENTRY}" "$@"\n')
     program.chmod(0o755)
     blocks = [block for document in DOCUMENTS for block in blocks_of(read(document))]
     shown = [one.command for block in blocks if block.has_prompt for one in block.shown()]

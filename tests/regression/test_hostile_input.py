@@ -13,10 +13,9 @@ from pathlib import Path
 
 import pytest
 from program import catenary, short_run
-from verb_runner import CliRunner
+from verb_runner import invoke
 
 from catenary import InputError
-from catenary.cases.cli.main import app
 from catenary.cases.run import scene_mesh
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.checks.mesh_size import size_of
@@ -141,7 +140,7 @@ def _own_hook_and_folder(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Non
 def refusal(*words: str) -> str:
     """The one sentence with which a command line is refused; nothing is written."""
     before = sorted(Path.cwd().iterdir())
-    result = CliRunner().invoke(app, list(words))
+    result = invoke(*words)
     assert result.exit_code == 2, result.output
     assert result.stdout == "", result.stdout
     sentence = result.stderr.rstrip("\n")
@@ -328,9 +327,9 @@ def test_a_program_beside_a_case_runs_only_with_study_and_is_named_before() -> N
     Path("case.toml").write_text(SOUND.read_text())
     Path("study.py").write_text("import pathlib\npathlib.Path('canary').touch()\n")
     for words in (["check", "."], ["plan", "."]):
-        assert CliRunner().invoke(app, words).exit_code == 0
+        assert invoke(*words).exit_code == 0
     assert not Path("canary").exists()
-    result = CliRunner().invoke(app, ["run", ".", "--study", "-o", "out"])
+    result = invoke("run", ".", "--study", "-o", "out")
     assert result.exit_code == 2 and "has no function" in result.stderr
     assert result.stdout.startswith("--study runs the program ")
     assert "study.py" in result.stdout.splitlines()[0]
@@ -339,7 +338,7 @@ def test_a_program_beside_a_case_runs_only_with_study_and_is_named_before() -> N
 
 def told_by_check(*words: str) -> list[str]:
     """The keys that ``check`` names, one sentence each."""
-    result = CliRunner().invoke(app, ["check", *words])
+    result = invoke("check", *words)
     assert result.exit_code == 2 and result.stdout == "", result.output
     sentences = result.stderr.splitlines()
     assert all(sentence.startswith("catenary: ") for sentence in sentences)

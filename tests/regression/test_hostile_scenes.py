@@ -14,9 +14,7 @@ from pathlib import Path
 
 import pytest
 from program import catenary
-from verb_runner import CliRunner
-
-from catenary.cases.cli.main import app
+from verb_runner import invoke
 
 FOLDER = Path(__file__).with_name("hostile_scenes")
 SCENES = sorted(path.stem for path in FOLDER.glob("*.toml"))
@@ -56,7 +54,7 @@ def test_a_hostile_scene_is_refused(name: str, verb: str, tmp_path: Path) -> Non
     before = sorted(os.listdir(FOLDER))
     begin = time.perf_counter(), time.process_time()
     words = [verb, str(FOLDER / f"{name}.toml"), *VERBS[verb]]
-    result = CliRunner().invoke(app, words)
+    result = invoke(*words)
     waited, worked = time.perf_counter() - begin[0], time.process_time() - begin[1]
     assert result.exit_code == 2, result.output
     assert result.stdout == ""

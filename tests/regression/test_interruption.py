@@ -14,6 +14,7 @@ import pytest
 from damaging import unseal
 from mpi4py import MPI
 from program import (
+    ENTRY,
     MPIRUN,
     assert_same_histories,
     assert_sound,
@@ -235,7 +236,7 @@ def test_a_full_disk_ends_the_run_with_a_sentence(room: str, ranks: int, tmp_pat
         '"$@"\n'
         f"code=$?; cp -r {out} {kept}; exit $code\n"
     )
-    program = python("-c", "from catenary.cases.cli.main import main; main()", *words)
+    program = python("-c", ENTRY, *words)
     if ranks > 1:
         program = [str(MPIRUN), "-n", str(ranks), "--oversubscribe", *program]
     with program_started(["unshare", "-rm", "sh", str(script), *program], tmp_path) as run:

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
-import typer
-from typer.testing import CliRunner as WholeRunner
-from typer.testing import Result
+from typer.testing import CliRunner, Result
 
 from catenary.cases.cli.app import narrowed
+from catenary.cases.cli.main import all_verbs
 
 
-class CliRunner(WholeRunner):
-    """Typer's runner, which makes the command of the verb that is called and no others."""
+def invoke(*words: str, **how: Any) -> Result:
+    """What a command line ends with; ``how`` is as of Typer's runner.
 
-    def invoke(self, app: typer.Typer, args: Sequence[str] = (), **how: Any) -> Result:  # type: ignore[override]
-        """What a command line ends with."""
-        return super().invoke(narrowed(app, args), args, **how)
+    The command of the verb that is called is made, and no others.
+    """
+    return CliRunner().invoke(narrowed(all_verbs(), words), words, **how)

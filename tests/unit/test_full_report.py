@@ -15,11 +15,10 @@ from unittest import mock
 import html5lib
 import pypdf
 import pytest
+import verb_runner
 from pixels import FIGURES, PAINTERS
-from verb_runner import CliRunner
 
 from catenary import InputError
-from catenary.cases.cli.main import app
 from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.problem import resolved
 from catenary.cases.scene.scene import Scene
@@ -51,7 +50,7 @@ CHANGES = ("train.speed_km_h=280", "line.contact_wire.tension_N=21e3")
 
 
 def invoke(*words: str) -> str:
-    done = CliRunner().invoke(app, list(words))
+    done = verb_runner.invoke(*words)
     assert done.exit_code == 0, done.output
     return done.output
 
@@ -278,7 +277,7 @@ def test_the_validation_of_the_installation(folder: Path, tmp_path: Path) -> Non
     beyond = said.index("Figures beyond their limits")
     assert said.index("31.25", beyond) < said.index("Judged figures (2)", beyond)
     assert "standard deviation" in said[beyond:] and "error bar" not in said[beyond:]
-    done = CliRunner().invoke(app, ["report", str(tmp_path), "--validation", str(folder)])
+    done = verb_runner.invoke("report", str(tmp_path), "--validation", str(folder))
     assert done.exit_code == 2
     assert "the record of `catenary validate`, cannot be read: no such file" in done.output
 

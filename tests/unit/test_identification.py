@@ -11,15 +11,14 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+import verb_runner
 from measuring import check
 from scipy import stats
 from scipy.optimize import least_squares
 from twin_passages import filtered_noise, write_measurement
-from verb_runner import CliRunner
 
 import catenary
 from catenary import InputError
-from catenary.cases.cli.main import app
 from catenary.cases.scene.load import load_scene
 from catenary.cases.studies.identification.measurement import (
     Measurement,
@@ -358,7 +357,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def invoke(files: Path, *words: str) -> Any:
     given = [CASE, str(files / "measured.csv"), str(files / "task.toml")]
-    return CliRunner().invoke(app, ["identify", *given, *words, "--set", *TINY])
+    return verb_runner.invoke("identify", *given, *words, "--set", *TINY)
 
 
 def test_the_verb_finds_a_force_and_writes_its_tables_once(files: Path) -> None:
@@ -463,7 +462,7 @@ def test_a_task_that_does_not_fit_is_told(
     wrong = tmp_path / "task.toml"
     wrong.write_text(task, encoding="utf-8")
     given = [CASE, str(files / "measured.csv"), str(wrong), "-o", str(tmp_path / "out")]
-    result = CliRunner().invoke(app, ["identify", *given, "--set", *TINY])
+    result = invoke("identify", *given, "--set", *TINY)
     assert result.exit_code == 2, result.output
     assert told in result.output and result.output.count("\n") == 1
     assert not (tmp_path / "out").exists()

@@ -11,13 +11,12 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+import verb_runner
 from measuring import check
 from mpi4py import MPI
 from scipy import signal, stats
-from verb_runner import CliRunner
 
 from catenary import InputError
-from catenary.cases.cli.main import app
 from catenary.cases.run.runner import run_case
 from catenary.cases.scene.load import load_scene
 from catenary.cases.studies.measured.description import Description
@@ -338,7 +337,7 @@ def test_three_runs_stand_side_by_side(run: Path, tmp_path: Path) -> None:
 
 
 def invoke(*words: str) -> Any:
-    return CliRunner().invoke(app, ["compare", *words])
+    return verb_runner.invoke("compare", *words)
 
 
 def test_a_validation_takes_a_comparison_as_its_line_test(

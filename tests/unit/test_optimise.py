@@ -10,11 +10,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from verb_runner import CliRunner
+from verb_runner import invoke
 
 import catenary
 from catenary import InputError
-from catenary.cases.cli.main import app
 from catenary.cases.result_folder.folder_lock import FolderLock
 from catenary.cases.run.at_rest.static_table import static_table
 from catenary.cases.scene.input.case_files import find_case
@@ -508,10 +507,6 @@ def test_what_gets_worse_is_told() -> None:
 @pytest.fixture
 def own_hook(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "excepthook", sys.excepthook)
-
-
-def invoke(*words: str) -> Any:
-    return CliRunner().invoke(app, list(words))
 
 
 @pytest.mark.usefixtures("own_hook")

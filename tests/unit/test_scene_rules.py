@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
 
 import pytest
-from verb_runner import CliRunner
+from verb_runner import invoke
 
 from catenary import InputError
-from catenary.cases.cli.main import app
 from catenary.cases.scene.input.faults import Origin
 from catenary.cases.scene.load import load_scene, read_draft, scene_from
 from catenary.cases.scene.problem import resolved
@@ -173,10 +171,6 @@ def test_what_is_refused(name: str) -> None:
         scene(*overrides)
     text = str(refused.value)
     assert says in text and "\n" not in text and "more:" not in text, text
-
-
-def invoke(*words: str) -> Any:
-    return CliRunner().invoke(app, list(words))
 
 
 def test_list_tells_books_and_their_criteria() -> None:

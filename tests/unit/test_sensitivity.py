@@ -10,12 +10,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+import verb_runner
 from measuring import check
 from mpi4py import MPI
-from verb_runner import CliRunner
 
 from catenary import InputError
-from catenary.cases.cli.main import app
 from catenary.cases.run.prepared import sound_rest
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.load import load_scene
@@ -54,7 +53,7 @@ def scenes(*words: str, case: str = CASE) -> ChangedScenes:
 
 
 def invoke(*words: str) -> Any:
-    return CliRunner().invoke(app, ["sensitivity", CASE, *words])
+    return verb_runner.invoke("sensitivity", CASE, *words)
 
 
 @functools.cache

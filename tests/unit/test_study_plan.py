@@ -6,16 +6,14 @@ import json
 import shutil
 import sys
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
-from verb_runner import CliRunner
+from verb_runner import invoke
 
 from catenary import InputError
 from catenary.cases.ambrosio2012.study import TABLE, variants
-from catenary.cases.cli.main import app
 from catenary.cases.scene.input.case_files import shipped
 from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.problem import resolved
@@ -41,10 +39,6 @@ pytestmark = pytest.mark.usefixtures("quick_reports")
 def own_hook(monkeypatch: pytest.MonkeyPatch) -> None:
     """The command line installs an exception hook; it goes with the test."""
     monkeypatch.setattr(sys, "excepthook", sys.excepthook)
-
-
-def invoke(*words: str) -> Any:
-    return CliRunner().invoke(app, list(words))
 
 
 def own_case(folder: Path, study: str) -> Path:

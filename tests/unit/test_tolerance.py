@@ -10,10 +10,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from verb_runner import CliRunner
+from verb_runner import invoke
 
 from catenary import InputError
-from catenary.cases.cli.main import app
 from catenary.cases.run.at_rest.static_table import static_table
 from catenary.cases.scene.load import Draft, read_draft
 from catenary.cases.scene.problem import line_of
@@ -333,7 +332,7 @@ def test_the_verb_writes_what_it_says(
     words = ["tolerance", "en50318_2002", str(file), "-o", str(tmp_path / "out")]
     for key, value in TINY.items():
         words += ["--set", f"{key}={value}"]
-    done = CliRunner().invoke(app, words)
+    done = invoke(*words)
     assert done.exit_code == 0, done.output
     record = json.loads((tmp_path / "out" / "tolerance.json").read_text())
     (row,) = record["tolerances"]
