@@ -32,10 +32,9 @@ from documents import (
     plain_words,
 )
 from program import ENTRY, catenary
+from scenes import load_scene, shipped
 
 from catenary.cases.cli.main import app
-from catenary.cases.scene.input.case_files import shipped
-from catenary.cases.scene.load import load_scene
 
 ROOT = Path(__file__).parents[2]
 DOCUMENTS = sorted(

@@ -26,13 +26,12 @@ from fuzzing import (
     wide_scene,
 )
 from mpi4py import MPI
+from scenes import Scene, load_scene
 from verb_runner import invoke
 
 from catenary import InputError
 from catenary.base.parallel import on_root
 from catenary.cases.scene.input.faults import SceneError
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.hard import runs as hard_runs
 from catenary.cases.studies.hard.runs import RunHistories
 from catenary.solver.problem.incidents import DropperBreak

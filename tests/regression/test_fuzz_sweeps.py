@@ -17,9 +17,9 @@ import pytest
 from fuzzing import N_STEPS, RandomScene, wide_scene
 from fuzzing_contact import law_variants
 from program import assert_sound
+from scenes import load_scene
 from verb_runner import invoke
 
-from catenary.cases.scene.load import load_scene
 from catenary.postproc.read.results import Results
 
 pytestmark = pytest.mark.study

@@ -13,16 +13,13 @@ from pathlib import Path
 
 import pytest
 from program import catenary, short_run
+from scenes import load_scene, mesh_of, problem_of, resolved, scene_from, shipped
 from verb_runner import invoke
 
 from catenary import InputError
 from catenary.cases.run import scene_mesh
-from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.checks.mesh_size import size_of
-from catenary.cases.scene.input.case_files import shipped
 from catenary.cases.scene.input.faults import Origin
-from catenary.cases.scene.load import load_scene, scene_from
-from catenary.cases.scene.problem import problem_of, resolved
 from catenary.cases.studies.sweep.variants import read_named
 from catenary.meshgen.mesh import CONTACT_WIRE
 from catenary.meshgen.topologies.all_topologies import second

@@ -12,11 +12,11 @@ from pathlib import Path
 
 import pytest
 from program import SHORT_SCENE, catenary
+from scenes import load_scene
 
 from catenary import InputError
 from catenary.cases.run.planning.needs import NeedsOfRuns, total_needs
 from catenary.cases.run.planning.slurm_script import Job, array_script
-from catenary.cases.scene.load import load_scene
 
 pytestmark = pytest.mark.process
 CASE, VARIED = "en50318_2002", "train.speed_km_h=230,250,270"

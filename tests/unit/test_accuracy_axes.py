@@ -6,11 +6,10 @@ import json
 from pathlib import Path
 
 import pytest
+from scenes import load_scene, resolved
 from verb_runner import invoke
 
 from catenary import InputError
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.problem import resolved
 from catenary.cases.studies.accuracy import axes as models
 from catenary.cases.studies.accuracy.axes import AXES, DISCRETISATION, parse_axes
 from catenary.cases.studies.accuracy.runs import Plan, make_plan

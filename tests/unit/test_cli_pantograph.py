@@ -10,11 +10,9 @@ import numpy as np
 import pytest
 import verb_runner
 from measuring import check
+from scenes import load_scene, problem_of, shipped
 
-from catenary.cases.scene.input.case_files import shipped
 from catenary.cases.scene.input.toml_input import read_toml
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.problem import problem_of
 from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.response.linearisation import of_chain
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 
 import pytest
+from scenes import load_scene, mesh_of, problem_of
 
 from catenary.cases.run.planning.needs import (
     LEAST_FLUSH,
@@ -13,15 +14,12 @@ from catenary.cases.run.planning.needs import (
     needs_before_meshing,
 )
 from catenary.cases.run.planning.plan import make_plan, plan_text
-from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.checks.mesh_size import Size, size_of
 from catenary.cases.scene.cost_model import (
     estimate_march,
     estimate_memory,
     estimate_start,
 )
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.problem import problem_of
 from catenary.solver.window.choice import moving_share
 
 

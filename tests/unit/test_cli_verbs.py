@@ -13,11 +13,10 @@ from typing import Any
 import numpy as np
 import pytest
 from program import ENTRY
+from scenes import load_scene, shipped
 from verb_runner import invoke
 
 from catenary import RunBroken
-from catenary.cases.scene.input.case_files import shipped
-from catenary.cases.scene.load import load_scene
 from catenary.cases.terminal import console
 from catenary.solver.effects import all_effects as effects
 

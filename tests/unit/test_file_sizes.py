@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import typer
 from mpi4py import MPI
+from scenes import Scene, load_scene, mesh_of
 
 from catenary import InputError, RunBroken
 from catenary.base.parallel import on_root
@@ -19,10 +20,7 @@ from catenary.cases.run.planning.needs import (
 )
 from catenary.cases.run.planning.plan import make_plan, plan_text
 from catenary.cases.run.runner import run_case
-from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.cost_model import estimate_memory
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.scene import Scene
 from catenary.cases.terminal import console
 from catenary.postproc.channels.line_record import GZIP
 from catenary.postproc.read.results import Results

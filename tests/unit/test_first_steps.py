@@ -12,14 +12,12 @@ from pathlib import Path
 
 import pytest
 from program import ENTRY, MPIRUN, catenary
+from scenes import line_data_of, load_scene, shipped
 from verb_runner import invoke
 
 from catenary import InputError
 from catenary.cases.process import installation
 from catenary.cases.process.installation import BROKEN, MISSING, OK, Finding
-from catenary.cases.scene.input.case_files import shipped
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.problem import line_data_of
 from catenary.cases.scene.starter import BEGINNINGS, write_case
 
 

@@ -17,11 +17,9 @@ import pypdf
 import pytest
 import verb_runner
 from pixels import FIGURES, PAINTERS
+from scenes import Scene, load_scene, resolved
 
 from catenary import InputError
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.problem import resolved
-from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.accuracy.analysis import Row
 from catenary.cases.studies.accuracy.output import table_of
 from catenary.cases.studies.effect_cost.output import write
@@ -214,7 +212,7 @@ def test_the_data_sheet_tells_the_wind() -> None:
 @pytest.mark.parametrize("case", ["ambrosio2012", "curve", "windy_viaduct", "conductor_rail"])
 def test_other_inputs_load_to_the_same_scene(case: str) -> None:
     """Effects that are on for want of a word, and those that were switched off, stay so."""
-    from catenary.cases.scene.input.case_files import find_case
+    from scenes import find_case
 
     recorded = resolved(load_scene(find_case(case)))
     scene = SceneOfRun(_Recorded(recorded))  # type: ignore[arg-type]

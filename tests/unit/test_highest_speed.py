@@ -12,12 +12,11 @@ import numpy as np
 import pandas as pd
 import pytest
 from mpi4py import MPI
+from scenes import line_of, load_scene, read_draft
 from verb_runner import invoke
 
 import catenary
 from catenary import InputError
-from catenary.cases.scene.load import load_scene, read_draft
-from catenary.cases.scene.problem import line_of
 from catenary.cases.scene.turned import BACKWARD, FORWARD, turned
 from catenary.cases.studies.questions.highest_speed import (
     ALL,

@@ -13,13 +13,13 @@ import pandas as pd
 import pytest
 import verb_runner
 from measuring import check
+from scenes import load_scene
 from scipy import stats
 from scipy.optimize import least_squares
 from twin_passages import filtered_noise, write_measurement
 
 import catenary
 from catenary import InputError
-from catenary.cases.scene.load import load_scene
 from catenary.cases.studies.identification.measurement import (
     Measurement,
     Signal,

@@ -9,10 +9,10 @@ from typing import Any
 
 import jsonschema
 import pytest
+from scenes import Scene
 from verb_runner import invoke
 
 from catenary.cases.scene.keys.keys import known_keys
-from catenary.cases.scene.scene import Scene
 from catenary.cases.terminal.lists import scene_schema
 
 ROOT = Path(__file__).parents[2]

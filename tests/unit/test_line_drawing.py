@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 from matplotlib.figure import Figure
 from PIL import Image
+from scenes import load_scene
 from verb_runner import invoke
 
 from catenary.cases.run.scene_mesh import draw_scene
-from catenary.cases.scene.load import load_scene
 
 
 @pytest.mark.parametrize(

@@ -14,11 +14,11 @@ import pytest
 import verb_runner
 from measuring import check
 from mpi4py import MPI
+from scenes import load_scene
 from scipy import signal, stats
 
 from catenary import InputError
 from catenary.cases.run.runner import run_case
-from catenary.cases.scene.load import load_scene
 from catenary.cases.studies.measured.description import Description
 from catenary.cases.studies.measured.passages import passage_of
 from catenary.cases.studies.reference.judgement import FAILED, NOT_JUDGED, PASSED, any_failed

@@ -10,15 +10,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scenes import Scene, find_case, read_draft
 from verb_runner import invoke
 
 import catenary
 from catenary import InputError
 from catenary.cases.result_folder.folder_lock import FolderLock
 from catenary.cases.run.at_rest.static_table import static_table
-from catenary.cases.scene.input.case_files import find_case
-from catenary.cases.scene.load import Draft, read_draft
-from catenary.cases.scene.scene import Scene
+from catenary.cases.scene.load import Draft
 from catenary.cases.studies import scene_sets
 from catenary.cases.studies.optimise import output, study
 from catenary.cases.studies.optimise.checks import (

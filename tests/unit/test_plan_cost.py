@@ -11,14 +11,12 @@ import numpy as np
 import pytest
 from measuring import registered
 from mpi4py import MPI
+from scenes import load_scene, mesh_of, problem_of
 from verb_runner import invoke
 from word_scenes import with_words
 
 import catenary
 from catenary import InputError
-from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.problem import problem_of
 from catenary.cases.studies.effect_cost import output
 from catenary.cases.studies.effect_cost.step_timing import RepeatedMarch, beside
 from catenary.cases.studies.effect_cost.study import (

@@ -7,11 +7,10 @@ from typing import get_args
 
 import numpy as np
 import pytest
+from scenes import load_scene, problem_of, scene_from
 from verb_runner import invoke
 
 from catenary import InputError
-from catenary.cases.scene.load import load_scene, scene_from
-from catenary.cases.scene.problem import problem_of
 from catenary.cases.scene.train.pantograph import Ready
 from catenary.mbs.library import READY
 from catenary.mbs.lumped_data import LumpedData

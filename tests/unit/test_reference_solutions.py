@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from scenes import problem_of
 from verb_runner import invoke
 
 from catenary import InputError
-from catenary.cases.scene.problem import problem_of
 from catenary.cases.studies.reference import validation
 from catenary.cases.studies.reference.configurations import configurations, table
 from catenary.cases.studies.reference.convergence import (

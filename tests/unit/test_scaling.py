@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 from mpi4py import MPI
 from program import MPIRUN, catenary
+from scenes import load_scene
 from verb_runner import invoke
 
-from catenary.cases.scene.load import load_scene
 from catenary.cases.studies import scaling
 from catenary.cases.studies.scaling import Sizes, Wire, Work, as_text, predict
 from catenary.solver.contact.line_response import Bounds, LineResponse

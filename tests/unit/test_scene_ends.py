@@ -5,12 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
+from scenes import load_scene, problem_of
 
 from catenary import InputError
 from catenary.cases.run.describe.arrivals import arrival_facts
 from catenary.cases.run.planning.plan import make_plan, plan_text
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.problem import problem_of
 from catenary.solver.problem.ends import AbsorbingLayer, Fixed, Periodic
 
 END = "line.ends.end"

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import pytest
+from scenes import Scene, load_scene, problem_of, recorded
 
 from catenary import InputError
 from catenary.cases.run.describe.defects import incident_facts
 from catenary.cases.run.planning.plan import make_plan, plan_text
-from catenary.cases.scene.input.faults import Origin
-from catenary.cases.scene.load import load_scene, scene_from
-from catenary.cases.scene.problem import problem_of, resolved
-from catenary.cases.scene.scene import Scene
 from catenary.mbs.lowering import Lowering
 from catenary.solver.problem.incidents import DropperBreak, TensionLoss
 
@@ -43,7 +40,7 @@ def test_incidents_are_converted_and_rounded_to_steps() -> None:
 
 def test_a_resolved_scene_is_the_same_again() -> None:
     first = scene()
-    again = scene_from(resolved(first), Origin("the result file", recorded=True))
+    again = recorded(first)
     assert problem_of(again) == problem_of(first)
     assert len(again.incidents) == 3
 

@@ -7,14 +7,12 @@ import string
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from scenes import Scene, load_scene, resolved, scene_from
 from verb_runner import invoke
 
 from catenary import InputError
 from catenary.cases.scene.input.faults import Origin
 from catenary.cases.scene.keys.keys import known_keys
-from catenary.cases.scene.load import load_scene, scene_from
-from catenary.cases.scene.problem import resolved
-from catenary.cases.scene.scene import Scene
 
 KEYS = [key.replace("*", "0") for key in known_keys(Scene)]
 NUMBERS = st.one_of(

@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scenes import Scene, load_scene, problem_of, recorded, resolved
 
 from catenary import InputError, RunBroken
 from catenary.cases.run.planning.plan import make_plan, plan_text
 from catenary.cases.scene.cost_model import estimate_march
-from catenary.cases.scene.input.faults import Origin
-from catenary.cases.scene.load import load_scene, scene_from
-from catenary.cases.scene.problem import problem_of, resolved
-from catenary.cases.scene.scene import Scene
 from catenary.mbs.build import has_joints
 from catenary.mbs.head.stepping import Stepping
 from catenary.mbs.lumped_data import LumpedData
@@ -71,7 +68,7 @@ def test_resolved_scene_is_the_same_again_and_holds_only_what_acts(overrides: li
     scene = load(*overrides)
     table = resolved(scene)["pantographs"]["seven_body"]
     assert OWN_KEYS & set(table) == (OWN_KEYS if overrides else set())
-    again = scene_from(resolved(scene), Origin("a result", recorded=True))
+    again = recorded(scene)
     assert problem_of(again) == problem_of(scene)
 
 

@@ -6,14 +6,12 @@ import json
 from pathlib import Path
 
 import pytest
+from scenes import Scene, load_scene, read_draft, recorded, resolved, scene_from
 from verb_runner import invoke
 
 from catenary import InputError
 from catenary.cases.scene.input.faults import Origin
-from catenary.cases.scene.load import load_scene, read_draft, scene_from
-from catenary.cases.scene.problem import resolved
 from catenary.cases.scene.run.case import LimitsTable, chosen_books, rule_entries
-from catenary.cases.scene.scene import Scene
 from catenary.postproc.standards.quantities import LIMIT_KEYS
 
 CASE = "en50318_2002"
@@ -91,7 +89,7 @@ def test_a_book_beside_the_case_judges_too(folder: Path, monkeypatch: pytest.Mon
     # The result keeps the book itself, and does not change with the file.
     (folder / "mine.toml").unlink()
     assert rule_entries(judged.evaluation)[1]["criteria"][0]["limit"] == {"value": 30}  # type: ignore[index]
-    assert books(scene_from(resolved(judged), Origin("run.h5", recorded=True))) == [
+    assert books(recorded(judged)) == [
         "en50367:2020",
         "mine",
     ]

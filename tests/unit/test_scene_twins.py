@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import pytest
+from scenes import load_scene, mesh_of, problem_of
 
 from catenary import InputError
 from catenary.cases.run.planning.needs import needs_before_meshing
 from catenary.cases.run.planning.plan import make_plan, plan_text
-from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.checks.effects import needs_relative_motion
 from catenary.cases.scene.checks.mesh_size import size_of
 from catenary.cases.scene.input.faults import SceneError
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.problem import problem_of
 from catenary.cases.studies.accuracy.axes import planes
 from catenary.cases.studies.effect_cost.study import switchable_effects
 from catenary.cases.studies.waves.excited import Settings, excitation_of

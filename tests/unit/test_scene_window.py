@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import pytest
+from scenes import load_scene, problem_of
 
 from catenary import InputError
 from catenary.cases.run.planning.plan import make_plan, plan_text
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.problem import problem_of
 from catenary.solver.problem.problem import WindowChoice
 from catenary.solver.window.choice import estimated_error
 

@@ -13,12 +13,10 @@ import pytest
 import verb_runner
 from measuring import check
 from mpi4py import MPI
+from scenes import load_scene, mesh_of, problem_of
 
 from catenary import InputError
 from catenary.cases.run.prepared import sound_rest
-from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.problem import problem_of
 from catenary.cases.studies.sensitivity.output import as_text, table_of
 from catenary.cases.studies.sensitivity.parameters import ChangedScenes, Parameter
 from catenary.cases.studies.sensitivity.study import Sensitivity, change_by, sensitivity_of

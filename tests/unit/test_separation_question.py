@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scenes import load_scene
 from verb_runner import invoke
 
 import catenary
-from catenary.cases.scene.load import load_scene
 from catenary.cases.studies.questions.separation import (
     Distances,
     Period,

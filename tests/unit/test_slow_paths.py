@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 from measuring import start_march
 from mpi4py import MPI
+from scenes import load_scene
+from scenes import mesh_of as mesh_of_scene
+from scenes import problem_of as problem_of_scene
 from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of, train
 
 from catenary.cases.run.planning.needs import needs_with_mesh
 from catenary.cases.run.planning.plan import make_plan, plan_text
-from catenary.cases.run.scene_mesh import mesh_of as mesh_of_scene
 from catenary.cases.scene.cost_model import (
     SEVERAL_TYPES,
     STATION_COST,
@@ -21,8 +23,6 @@ from catenary.cases.scene.cost_model import (
     cost_of_stations,
     estimate_march,
 )
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.problem import problem_of as problem_of_scene
 from catenary.solver.effects.build_model import numbering_of
 from catenary.solver.integrators import slow_path
 from catenary.solver.integrators.slow_path import PARTS, slow_path_of

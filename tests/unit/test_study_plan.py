@@ -10,14 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from scenes import Scene, load_scene, resolved, shipped
 from verb_runner import invoke
 
 from catenary import InputError
 from catenary.cases.ambrosio2012.study import TABLE, variants
-from catenary.cases.scene.input.case_files import shipped
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.problem import resolved
-from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.case_study import StudyVariant, make_plan
 from catenary.cases.studies.paper.runs import PaperStudy, changes_of
 from catenary.postproc.report.study_report import (

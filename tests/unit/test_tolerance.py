@@ -10,13 +10,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scenes import Scene, line_of, read_draft
 from verb_runner import invoke
 
 from catenary import InputError
 from catenary.cases.run.at_rest.static_table import static_table
-from catenary.cases.scene.load import Draft, read_draft
-from catenary.cases.scene.problem import line_of
-from catenary.cases.scene.scene import Scene
+from catenary.cases.scene.load import Draft
 from catenary.cases.studies import scene_sets
 from catenary.cases.studies.scene_sets import BROKE, BoundTable
 from catenary.cases.studies.task_files import read_task

@@ -11,12 +11,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from measuring import march, registered
+from scenes import load_scene
 from small_lines import HANGING, en50318_line, mesh_of, problem_of, train
 from verb_runner import invoke
 
 from catenary import InputError
 from catenary.cases.cli.app import Force, RunWords, SceneWords, app
-from catenary.cases.scene.load import load_scene
 from catenary.cases.terminal import console
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
 from catenary.meshgen.topologies.all_topologies import make_line

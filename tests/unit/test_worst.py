@@ -10,11 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 import verb_runner
+from scenes import find_case, load_scene, mesh_of, problem_of
 
-from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.input.case_files import find_case
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.problem import problem_of
 from catenary.cases.studies.questions import worst_output
 from catenary.cases.studies.questions.causes import Causes, elasticity_along, gust_forces
 from catenary.cases.studies.questions.worst import Passage, stands_out, worst_places

@@ -14,14 +14,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from measuring import check
+from scenes import Scene, line_data_of, load_scene, mesh_of, problem_of
 from verb_runner import invoke
 
 from catenary import InputError
 from catenary.cases.run.at_rest.planned_lengths import take_in_lengths
-from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.problem import line_data_of, problem_of
-from catenary.cases.scene.scene import Scene
 from catenary.cases.scene.starter import write_case
 from catenary.solver.statics.form_finding.equilibrium import lengths_to_cut
 

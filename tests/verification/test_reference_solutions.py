@@ -21,10 +21,10 @@ from force_history import ForceHistory
 from measuring import check, march
 from plain_line import PlainLine
 from plain_mesh import graded, mesh_on
+from scenes import problem_of as scene_problem
 from small_lines import WHOLE, ac_simple_line, mesh_of, numerics, problem_of, train
 from verb_runner import invoke
 
-from catenary.cases.scene.problem import problem_of as scene_problem
 from catenary.cases.studies.reference.convergence import rms
 from catenary.cases.studies.reference.solutions import DATA, Solution, read
 from catenary.mbs.lumped_data import LumpedData

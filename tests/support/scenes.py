@@ -1,0 +1,34 @@
+"""Scenes as command lines give them, and what the program makes of one.
+
+Tests take it from here: this is the only file of theirs that knows where it stands. What a user of
+Python has of a scene is ``catenary.load``.
+"""
+
+from __future__ import annotations
+
+from catenary.cases.run.scene_mesh import mesh_of
+from catenary.cases.scene.input.case_files import find_case, shipped
+from catenary.cases.scene.input.faults import Origin
+from catenary.cases.scene.load import load_scene, read_draft, scene_from
+from catenary.cases.scene.problem import line_data_of, line_of, problem_of, resolved
+from catenary.cases.scene.scene import Scene
+
+__all__ = [
+    "Scene",
+    "find_case",
+    "line_data_of",
+    "line_of",
+    "load_scene",
+    "mesh_of",
+    "problem_of",
+    "read_draft",
+    "recorded",
+    "resolved",
+    "scene_from",
+    "shipped",
+]
+
+
+def recorded(scene: Scene) -> Scene:
+    """The scene that a result which recorded this one gives again."""
+    return scene_from(resolved(scene), Origin("a result", recorded=True))
