@@ -8,7 +8,6 @@ a control character.
 from __future__ import annotations
 
 import os
-import sys
 import time
 from pathlib import Path
 
@@ -26,8 +25,7 @@ PROCESSES = ("petsc_line_in_value", "text_c1", "file_mesh_terminal", "file_cours
 
 
 @pytest.fixture(autouse=True)
-def _own_hook_and_folder(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(sys, "excepthook", sys.excepthook)  # run replaces it
+def _own_folder(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.chdir(tmp_path)
 
 

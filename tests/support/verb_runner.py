@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import sys
 from typing import Any
+from unittest import mock
 
 from typer.testing import CliRunner, Result
 
@@ -13,6 +15,8 @@ from catenary.cases.cli.main import all_verbs
 def invoke(*words: str, **how: Any) -> Result:
     """What a command line ends with; ``how`` is as of Typer's runner.
 
-    The command of the verb that is called is made, and no others.
+    The command of the verb that is called is made, and no others. The hook for exceptions that a
+    verb installs goes with it.
     """
-    return CliRunner().invoke(narrowed(all_verbs(), words), words, **how)
+    with mock.patch.object(sys, "excepthook", sys.excepthook):
+        return CliRunner().invoke(narrowed(all_verbs(), words), words, **how)

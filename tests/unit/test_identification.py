@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import sys
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -62,12 +61,6 @@ key = "{FORCE}"
 deviation = 4.0
 mean = 117.0
 """
-
-
-@pytest.fixture(autouse=True)
-def own_hook(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The command line installs an exception hook; it goes with the test."""
-    monkeypatch.setattr(sys, "excepthook", sys.excepthook)
 
 
 # --- noise --------------------------------------------------------------------------------------
@@ -462,7 +455,7 @@ def test_a_task_that_does_not_fit_is_told(
     wrong = tmp_path / "task.toml"
     wrong.write_text(task, encoding="utf-8")
     given = [CASE, str(files / "measured.csv"), str(wrong), "-o", str(tmp_path / "out")]
-    result = invoke("identify", *given, "--set", *TINY)
+    result = verb_runner.invoke("identify", *given, "--set", *TINY)
     assert result.exit_code == 2, result.output
     assert told in result.output and result.output.count("\n") == 1
     assert not (tmp_path / "out").exists()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -42,12 +41,6 @@ SCENE = (
     "evaluation.to_m=420", "output.field_every_s=0",
 )  # fmt: skip
 PLACES: dict[str, Any] = {"place": {"column": "place_m"}, "force": {"column": "force_N"}}
-
-
-@pytest.fixture(autouse=True)
-def own_hook(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The command line installs an exception hook; it goes with the test."""
-    monkeypatch.setattr(sys, "excepthook", sys.excepthook)
 
 
 @pytest.fixture(scope="module")

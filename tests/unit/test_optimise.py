@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -503,12 +502,6 @@ def test_what_gets_worse_is_told() -> None:
 # --- the verb ------------------------------------------------------------------------------------
 
 
-@pytest.fixture
-def own_hook(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sys, "excepthook", sys.excepthook)
-
-
-@pytest.mark.usefixtures("own_hook")
 def test_the_verb_writes_what_it_says(tmp_path: Path, evaluated: Any) -> None:
     evaluated(lambda scene: summary(20.0 + (masses(scene)[0] - 8.0) ** 2))
     file = tmp_path / "task.toml"
@@ -533,7 +526,6 @@ def test_the_verb_writes_what_it_says(tmp_path: Path, evaluated: Any) -> None:
     assert again.exit_code == 2 and "is there already" in again.output
 
 
-@pytest.mark.usefixtures("own_hook")
 def test_a_program_in_python_gets_what_the_verb_prints(
     tmp_path: Path, evaluated: Any, caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -559,7 +551,6 @@ def test_a_program_in_python_gets_what_the_verb_prints(
         assert (out / path.name).read_bytes() == path.read_bytes(), path.name
 
 
-@pytest.mark.usefixtures("own_hook")
 def test_a_wrong_task_is_one_sentence(tmp_path: Path) -> None:
     file = tmp_path / "task.toml"
     file.write_text("[[variables]]\nkey = 3\nchange = [-5.0, 5.0]\n")

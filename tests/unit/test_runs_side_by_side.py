@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import io
 import signal
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -40,12 +39,6 @@ TINY = (
     "output.field_every_s=0",
     "output.energy_every_s=0",
 )
-
-
-@pytest.fixture(autouse=True)
-def own_hook(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The command line installs an exception hook; it goes with the test."""
-    monkeypatch.setattr(sys, "excepthook", sys.excepthook)
 
 
 def figures(out: Path) -> list[dict[str, str]]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import functools
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -38,12 +37,6 @@ TINY = (
     "evaluation.to_m=220",
 )
 KEYS = ["pantographs.reference.static_force_N", "line.contact_wire.tension_N"]
-
-
-@pytest.fixture(autouse=True)
-def own_hook(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The command line installs an exception hook; it goes with the test."""
-    monkeypatch.setattr(sys, "excepthook", sys.excepthook)
 
 
 def scenes(*words: str, case: str = CASE) -> ChangedScenes:

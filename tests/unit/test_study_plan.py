@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import shutil
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -30,12 +29,6 @@ from catenary.postproc.report.study_report import (
 )
 
 pytestmark = pytest.mark.usefixtures("quick_reports")
-
-
-@pytest.fixture(autouse=True)
-def own_hook(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The command line installs an exception hook; it goes with the test."""
-    monkeypatch.setattr(sys, "excepthook", sys.excepthook)
 
 
 def own_case(folder: Path, study: str) -> Path:

@@ -55,12 +55,6 @@ def tiny(*variants: Variant) -> list[Job]:
     return make_jobs(CASE, variants or product([parse_vary(VARIED)], {}), TINY)
 
 
-@pytest.fixture(autouse=True)
-def own_hook(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The command line installs an exception hook; it goes with the test."""
-    monkeypatch.setattr(sys, "excepthook", sys.excepthook)
-
-
 @pytest.fixture(scope="module")
 def swept(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     """The folder of a sweep of two speeds and what the command line said."""

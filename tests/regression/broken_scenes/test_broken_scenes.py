@@ -277,8 +277,7 @@ EDITS = {
 
 
 @pytest.fixture(autouse=True)
-def _own_hook_and_folder(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(sys, "excepthook", sys.excepthook)  # run replaces it
+def _own_folder(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.chdir(tmp_path)
 
 
