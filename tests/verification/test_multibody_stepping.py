@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from body_mechanics import rod
 from measuring import check, print_table
 from scipy.special import ellipk
 from studies import few
@@ -29,12 +30,6 @@ each_method = pytest.mark.parametrize("method", METHODS)
 most_methods = pytest.mark.parametrize(
     "method", few(METHODS, "coordinate_partitioning", "baumgarte")
 )
-
-
-def rod(name: str, mass: float, length: float, x: float) -> Body:
-    """A thin rod along x."""
-    moment = mass * length**2 / 12
-    return Body(name, mass, (1e-3 * moment, moment, moment), (x, 0.0, 0.0))
 
 
 def pendulum(length: float) -> System:
