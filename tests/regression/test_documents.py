@@ -31,7 +31,7 @@ from documents import (
     numbers_agree,
     plain_words,
 )
-from program import ENTRY, catenary
+from program import catenary, write_program
 from scenes import load_scene, shipped
 
 from catenary.cases.cli.main import app
@@ -162,8 +162,7 @@ def workshop_in(folder: Path) -> Workshop:
     (folder / ".venv").symlink_to(sys.prefix)
     program = folder / "bin" / "catenary"
     program.parent.mkdir()
-    program.write_text(f'#!/bin/sh\nexec "{sys.executable}" -W error -c "{ENTRY}" "$@"\n')
-    program.chmod(0o755)
+    write_program(program)
     blocks = [block for document in DOCUMENTS for block in blocks_of(read(document))]
     shown = [one.command for block in blocks if block.has_prompt for one in block.shown()]
     run = [

@@ -16,6 +16,8 @@ from catenary import InputError, restart
 from catenary.cases.run.continuing import extended_scene
 from catenary.postproc.read.results import Results
 
+pytestmark = pytest.mark.usefixtures("examined_here")
+
 # Where the run ends at first, and where the long one and what goes on do [m].
 FIRST, LAST = "train.end_m=170", 200.0
 SCENE = ("evaluation.from_m=140", "evaluation.to_m=155")

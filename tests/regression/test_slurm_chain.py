@@ -5,11 +5,10 @@ from __future__ import annotations
 import os
 import stat
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
-from program import assert_same_histories, catenary
+from program import assert_same_histories, catenary, write_program
 
 from catenary import InputError
 from catenary import open as open_run
@@ -43,7 +42,7 @@ def stand_in(folder: Path) -> Path:
     for name, text in (("srun", SRUN), ("sbatch", NOTED), ("scancel", NOTED)):
         (folder / name).write_text(text)
         (folder / name).chmod(0o755 | stat.S_IXUSR)
-    (folder / "catenary").symlink_to(Path(sys.executable).with_name("catenary"))
+    write_program(folder / "catenary")
     return folder
 
 

@@ -10,6 +10,8 @@ from program import MPIRUN, assert_same_histories, catenary
 
 from catenary import open as open_run
 
+pytestmark = pytest.mark.usefixtures("examined_here")
+
 # Both run over both contact wires, the overlap from one to the other.
 RUNS = {
     "dc_twin": [

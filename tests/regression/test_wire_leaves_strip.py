@@ -8,9 +8,12 @@ import re
 from pathlib import Path
 
 import numpy as np
+import pytest
 from program import catenary
 
 from catenary import open as open_run
+
+pytestmark = pytest.mark.usefixtures("examined_here")
 
 # Strips that end a millimetre beyond the wire in still air, which is 200 mm beside their middle at
 # every mast; the wind blows it off.

@@ -6,6 +6,7 @@ Every process inherits a mark, by which those that outlive their launcher are fo
 from __future__ import annotations
 
 import os
+import shlex
 import shutil
 import signal
 import subprocess
@@ -173,6 +174,12 @@ def catenary_started(
     entry = ENTRY if pictures else _UNPAINTED
     with started(python("-c", entry, *words), cwd, ranks) as program:
         yield program
+
+
+def write_program(file: Path) -> None:
+    """Write a program that is the command line, for shells; it paints no pictures."""
+    file.write_text(f'#!/bin/sh\nexec {shlex.join(python("-c", _UNPAINTED))} "$@"\n')
+    file.chmod(0o755)
 
 
 def n_rows(result: Path) -> int:
