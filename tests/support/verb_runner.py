@@ -11,6 +11,8 @@ from typer.testing import CliRunner, Result
 from catenary.cases.cli.app import narrowed
 from catenary.cases.cli.main import all_verbs
 
+APP = all_verbs()
+
 
 def invoke(*words: str, **how: Any) -> Result:
     """What a command line ends with; ``how`` is as of Typer's runner.
@@ -19,4 +21,4 @@ def invoke(*words: str, **how: Any) -> Result:
     verb installs goes with it.
     """
     with mock.patch.object(sys, "excepthook", sys.excepthook):
-        return CliRunner().invoke(narrowed(all_verbs(), words), words, **how)
+        return CliRunner().invoke(narrowed(APP, words), words, **how)
