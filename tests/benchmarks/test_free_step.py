@@ -12,10 +12,8 @@ import time
 import numpy as np
 import pytest
 from mpi4py import MPI
+from scenes import load_scene, mesh_of, problem_of
 
-from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.problem import problem_of
 from catenary.solver.integrators.make_line import make_line
 from catenary.solver.model.partition import distribute
 from catenary.solver.statics.form_finding.equilibrium import find_form

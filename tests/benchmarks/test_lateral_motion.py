@@ -11,11 +11,9 @@ import numpy as np
 import pytest
 from measuring import registered
 from mpi4py import MPI
+from scenes import load_scene, mesh_of, problem_of
 from step_cost import room
 
-from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.problem import problem_of
 from catenary.cases.studies.effect_cost.step_timing import RepeatedMarch, in_turns
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
 from catenary.solver.effects.effect import Effect

@@ -16,9 +16,7 @@ import numpy as np
 import pytest
 from measuring import check
 from program import catenary_started
-
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.problem import problem_of
+from scenes import load_scene, problem_of
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402

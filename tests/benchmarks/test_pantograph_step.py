@@ -13,10 +13,8 @@ from typing import Any
 import numpy as np
 import pytest
 from mpi4py import MPI
+from scenes import load_scene, mesh_of, problem_of
 
-from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.problem import problem_of
 from catenary.mbs.build import Operation, PantographData, make_pantograph
 from catenary.mbs.head.stepping import Stepping
 from catenary.mbs.head.strips import Strips, Suspension, Turning

@@ -9,11 +9,9 @@ from typing import Any
 import pytest
 from mpi4py import MPI
 from petsc4py import PETSc
+from scenes import load_scene, mesh_of, problem_of
 
 from catenary.base.petsc import EVENTS
-from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.problem import problem_of
 from catenary.solver.statics.elasticity import elasticity, middle_span
 from catenary.solver.statics.form_finding.equilibrium import find_form
 from catenary.solver.time_loop.march import March

@@ -15,10 +15,8 @@ import pytest
 from floor import LIBRARIES
 from mpi4py import MPI
 from repeating_line import layout, line
+from scenes import load_scene, mesh_of, problem_of
 
-from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.problem import problem_of
 from catenary.solver.integrators.line_state import PredictedLineState, Steps
 from catenary.solver.integrators.make_line import NewmarkLine
 from catenary.solver.integrators.two_pass_step import StationPasses

@@ -17,11 +17,9 @@ import numpy as np
 import pytest
 from floor import LIBRARIES
 from mpi4py import MPI
+from scenes import load_scene, mesh_of, problem_of
 
 from catenary.cases.run.runner import run_case
-from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.problem import problem_of
 from catenary.postproc.read.results import Results
 from catenary.solver.integrators.make_line import NewmarkLine
 from catenary.solver.model.model import Model

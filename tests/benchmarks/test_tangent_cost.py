@@ -6,9 +6,9 @@ import time
 
 import pytest
 from mpi4py import MPI
+from scenes import load_scene
 
 from catenary.cases.run.prepared import sound_rest
-from catenary.cases.scene.load import load_scene
 from catenary.cases.studies.sensitivity.parameters import ChangedScenes
 from catenary.cases.studies.sensitivity.study import change_by
 from catenary.solver.statics.line_at_rest import LineAtRest

@@ -6,10 +6,8 @@ from __future__ import annotations
 
 import pytest
 from mpi4py import MPI
+from scenes import load_scene, mesh_of, problem_of
 
-from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.problem import problem_of
 from catenary.cases.studies.effect_cost.step_timing import RepeatedMarch, in_turns
 from catenary.solver.statics.line_at_rest import line_at_rest
 

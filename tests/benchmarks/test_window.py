@@ -13,10 +13,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from mpi4py import MPI
+from scenes import load_scene, mesh_of, problem_of
 
-from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.problem import problem_of
 from catenary.solver.problem.problem import Problem
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest
 from catenary.solver.time_loop.march import March

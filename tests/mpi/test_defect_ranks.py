@@ -9,11 +9,9 @@ from __future__ import annotations
 import numpy as np
 from mpi4py import MPI
 from rank_histories import on_one, watched
+from scenes import load_scene, mesh_of, problem_of
 
 from catenary.base.parallel import on_root
-from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.problem import problem_of
 from catenary.solver.statics.line_at_rest import line_at_rest_on_all
 
 WORLD = MPI.COMM_WORLD

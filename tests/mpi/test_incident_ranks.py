@@ -13,13 +13,11 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 from rank_histories import on_one
+from scenes import load_scene, mesh_of, problem_of
 from small_lines import bare_wires
 from studies import few
 
 from catenary.base.parallel import on_root
-from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.problem import problem_of
 from catenary.mbs.lowering import Lowering
 from catenary.meshgen.mesh import CONTACT_WIRE, LineMesh
 from catenary.meshgen.topologies.all_topologies import make_line

@@ -10,11 +10,9 @@ import numpy as np
 from measuring import registered
 from mpi4py import MPI
 from rank_histories import on_one, watched
+from scenes import load_scene, mesh_of, problem_of
 
 from catenary.base.parallel import on_root
-from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.problem import problem_of
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
 from catenary.solver.effects.effect import Effect
 from catenary.solver.model.builder import ModelBuilder

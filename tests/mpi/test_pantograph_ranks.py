@@ -12,12 +12,11 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 from rank_histories import on_one
+from scenes import load_scene, mesh_of, problem_of
 
-from catenary.base.errors import NotConverged, RunBroken
+from catenary import RunBroken
+from catenary.base.errors import NotConverged
 from catenary.base.parallel import on_root
-from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.problem import problem_of
 from catenary.meshgen.mesh import LineMesh
 from catenary.solver.problem.problem import Problem
 from catenary.solver.statics.line_at_rest import line_at_rest

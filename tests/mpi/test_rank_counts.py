@@ -12,11 +12,9 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 from rank_histories import Histories, relative
+from scenes import load_scene, mesh_of, problem_of
 
 from catenary.base.parallel import on_root
-from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.problem import problem_of
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest_on_all
 from catenary.solver.time_loop.march import March
 

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from catenary.base.errors import RunBroken
+from catenary import RunBroken
 from catenary.postproc.channels.header import Header
 from catenary.postproc.channels.line_record import LineRecord
 from catenary.postproc.files import result_file

@@ -12,12 +12,10 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 from rank_histories import largest_difference
+from scenes import load_scene, mesh_of, problem_of
 from small_lines import bare_wires
 
 from catenary.base.parallel import on_root
-from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.problem import problem_of
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE, LineMesh
 from catenary.meshgen.topologies.all_topologies import make_line
 from catenary.solver.model.partition import distribute

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from mpi4py import MPI
 
-from catenary.base.errors import InputError, RunBroken
+from catenary import InputError, RunBroken
 from catenary.cases.process.workers import each
 from catenary.cases.studies.sweep.jobs import RunOptions, make_jobs
 from catenary.cases.studies.sweep.run_jobs import run_jobs

@@ -8,7 +8,7 @@ import time
 import pytest
 from mpi4py import MPI
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.base.parallel import on_root
 
 COMM = MPI.COMM_WORLD

@@ -15,11 +15,10 @@ import h5py
 import numpy as np
 import pytest
 from mpi4py import MPI
+from scenes import Scene, load_scene
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.cases.run.runner import RunOutcome, on_as_many, run_case
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.scene import Scene
 
 COMM = MPI.COMM_WORLD
 SPANS = ("window.spans_ahead=2", "window.spans_behind=2")

@@ -12,13 +12,11 @@ day and the reason.
 from __future__ import annotations
 
 import csv
-import json
-import subprocess
 import sys
-import tempfile
 from datetime import date
 from pathlib import Path
 
+import catenary
 from catenary.cases.scene.input.case_files import shipped
 
 FILE = Path(__file__).with_name("golden.csv")
@@ -48,15 +46,10 @@ def write(rows: list[dict[str, str]]) -> None:
 
 def measure(case: str) -> list[dict[str, str]]:
     """Case, pantograph, mean and deviation of each pantograph of a shortened case."""
-    with tempfile.TemporaryDirectory() as folder:
-        entry = "from catenary.cases.cli.main import main; main()"
-        command = [sys.executable, "-c", entry, "run", case, "--short", "-o", folder]
-        subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
-        summary = json.loads((Path(folder) / "summary.json").read_text())
     return [
         {"case": case, "pantograph": found["name"]}
         | {name: f"{found[name]:.10g}" for name in ("mean_N", "std_N")}
-        for found in summary["pantographs"]
+        for found in catenary.run(catenary.load(case, short=True)).summary["pantographs"]
     ]
 
 

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 from program import catenary as called
+from scenes import shipped
 
 import catenary
-from catenary.cases.scene.input.case_files import shipped
 from catenary.postproc.evaluate.statistics import contact_statistics
 
 CASES = shipped()

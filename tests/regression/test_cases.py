@@ -11,9 +11,9 @@ from typing import Any
 import pytest
 from program import assert_sound
 from program import catenary as called
+from scenes import shipped
 
 import catenary
-from catenary.cases.scene.input.case_files import shipped
 
 CASES = shipped()
 # One of each kind of line is run with every test, all of them in whole studies.

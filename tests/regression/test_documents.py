@@ -31,11 +31,10 @@ from documents import (
     numbers_agree,
     plain_words,
 )
-from program import catenary
+from program import catenary, write_program
+from scenes import load_scene, shipped
 
 from catenary.cases.cli.main import app
-from catenary.cases.scene.input.case_files import shipped
-from catenary.cases.scene.load import load_scene
 
 ROOT = Path(__file__).parents[2]
 DOCUMENTS = sorted(
@@ -58,7 +57,6 @@ LONGEST = {
     Path("docs/guide/uncertainty.md"),
     Path("docs/tutorials/long_line.md"),
 }
-_ENTRY = "from catenary.cases.cli.main import main; main()"
 
 
 def read(document: Path) -> str:
@@ -164,8 +162,7 @@ def workshop_in(folder: Path) -> Workshop:
     (folder / ".venv").symlink_to(sys.prefix)
     program = folder / "bin" / "catenary"
     program.parent.mkdir()
-    program.write_text(f'#!/bin/sh\nexec "{sys.executable}" -W error -c "{_ENTRY}" "$@"\n')
-    program.chmod(0o755)
+    write_program(program)
     blocks = [block for document in DOCUMENTS for block in blocks_of(read(document))]
     shown = [one.command for block in blocks if block.has_prompt for one in block.shown()]
     run = [

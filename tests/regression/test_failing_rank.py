@@ -81,7 +81,7 @@ def test_an_error_of_ours_on_rank_0_is_raised_on_all_ranks(tmp_path: Path) -> No
     script = """
 import sys
 from mpi4py import MPI
-from catenary.base.errors import InputError, RunBroken
+from catenary import InputError, RunBroken
 from catenary.base.parallel import on_root
 
 def refuse():

@@ -26,14 +26,12 @@ from fuzzing import (
     wide_scene,
 )
 from mpi4py import MPI
-from verb_runner import CliRunner
+from scenes import Scene, load_scene
+from verb_runner import invoke
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.base.parallel import on_root
-from catenary.cases.cli.main import app
 from catenary.cases.scene.input.faults import SceneError
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.hard import runs as hard_runs
 from catenary.cases.studies.hard.runs import RunHistories
 from catenary.solver.problem.incidents import DropperBreak
@@ -381,7 +379,7 @@ def test_broken_incidents_and_numerics_are_refused(
     for seed in seeds:
         made = broken_happening(seed)
         told = f"{made.broken_by} in {replay(seed, made.assignments)}"
-        done = CliRunner().invoke(app, ["run", BASE, "-o", "out", "--set", *made.assignments])
+        done = invoke("run", BASE, "-o", "out", "--set", *made.assignments)
         assert done.exit_code == 2 and done.stdout == "", (told, done.output, done.exception)
         sentence = done.stderr.removesuffix("\n")
         assert sentence.startswith("catenary: ") and "\n" not in sentence, (told, sentence)

@@ -21,10 +21,9 @@ import pytest
 from damaging import as_json, flip, raw_ranges, spoil_chunk, unseal
 from program import catenary, short_run
 from studies import few
-from verb_runner import CliRunner
+from verb_runner import invoke
 
-from catenary.base.errors import InputError
-from catenary.cases.cli.main import app
+from catenary import InputError
 from catenary.postproc.evaluate import statistics as stats
 from catenary.postproc.evaluate import verdict
 from catenary.postproc.evaluate.compare import compare
@@ -205,7 +204,7 @@ def test_what_cannot_be_is_not_continued(how: str, runs: dict[str, Path], tmp_pa
         unseal(file)
         damage(file)
     before = (out / "run.h5").read_bytes()
-    done = CliRunner().invoke(app, ["restart", str(out)])
+    done = invoke("restart", str(out))
     assert done.exit_code == 2, done.output
     assert words in done.stderr.splitlines()[-1] and "Traceback" not in done.stderr
     assert (out / "run.h5").read_bytes() == before

@@ -11,9 +11,9 @@ import pytest
 from equations import residual_of
 from fuzzing import BASE, sound_scene, twin_scene
 from mpi4py import MPI
+from scenes import load_scene
 
-from catenary.base.errors import InputError
-from catenary.cases.scene.load import load_scene
+from catenary import InputError
 from catenary.cases.studies.hard import runs as hard_runs
 
 pytestmark = pytest.mark.study

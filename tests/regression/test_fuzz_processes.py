@@ -18,9 +18,9 @@ import pytest
 from fuzzing import N_STEPS, RandomScene, wide_scene
 from mpi4py import MPI
 from program import MPIRUN, Done, Program, assert_sound, catenary, catenary_started, n_rows
+from scenes import load_scene
 
-from catenary.base.errors import InputError
-from catenary.cases.scene.load import load_scene
+from catenary import InputError
 from catenary.cases.studies.hard import runs as hard_runs
 from catenary.cases.studies.hard.runs import RunHistories
 from catenary.postproc.read.results import Results

@@ -17,10 +17,9 @@ import pytest
 from fuzzing import N_STEPS, RandomScene, wide_scene
 from fuzzing_contact import law_variants
 from program import assert_sound
-from verb_runner import CliRunner
+from scenes import load_scene
+from verb_runner import invoke
 
-from catenary.cases.cli.main import app
-from catenary.cases.scene.load import load_scene
 from catenary.postproc.read.results import Results
 
 pytestmark = pytest.mark.study
@@ -53,7 +52,7 @@ def test_a_sweep_of_laws_has_a_row_for_each(
     file.write_text("".join(f"{name} = {json.dumps(words)}\n" for name, words in laws.items()))
     told = f"FUZZ_SEED={seed} FUZZ_SWEEPS=1 replays it: {' '.join(made.assignments)}, {laws}"
     words = ["sweep", made.base, "-o", str(out), "--variants", str(file), "--set"]
-    done = CliRunner().invoke(app, [*words, *made.assignments, *PLAIN])
+    done = invoke(*words, *made.assignments, *PLAIN)
     n = str(dict(word.split("=", 1) for word in made.assignments)["train.pantographs"])
     if done.exit_code == 1 and "would be slack at rest" in done.stderr:
         assert not list(out.glob("*/run.h5")), told  # of the line, and so of all laws

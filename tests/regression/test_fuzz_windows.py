@@ -11,12 +11,10 @@ import os
 import numpy as np
 import pytest
 from fuzzing import RandomScene, topology_scene
+from scenes import Scene, load_scene, problem_of
 from windowed import COMM, apart, largest, march, nudged
 
-from catenary.base.errors import InputError
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.problem import problem_of
-from catenary.cases.scene.scene import Scene
+from catenary import InputError
 from catenary.cases.studies.hard import runs as hard_runs
 from catenary.cases.studies.hard.runs import RunHistories
 from catenary.solver.linear.pieces import pieces

@@ -8,22 +8,17 @@ from __future__ import annotations
 import json
 import logging
 import os
-import sys
 from pathlib import Path
 
 import pytest
 from program import catenary, short_run
-from verb_runner import CliRunner
+from scenes import load_scene, mesh_of, problem_of, resolved, scene_from, shipped
+from verb_runner import invoke
 
-from catenary.base.errors import InputError
-from catenary.cases.cli.main import app
+from catenary import InputError
 from catenary.cases.run import scene_mesh
-from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.checks.mesh_size import size_of
-from catenary.cases.scene.input.case_files import shipped
 from catenary.cases.scene.input.faults import Origin
-from catenary.cases.scene.load import load_scene, scene_from
-from catenary.cases.scene.problem import problem_of, resolved
 from catenary.cases.studies.sweep.variants import read_named
 from catenary.meshgen.mesh import CONTACT_WIRE
 from catenary.meshgen.topologies.all_topologies import second
@@ -133,15 +128,14 @@ REPORTED = {
 
 
 @pytest.fixture(autouse=True)
-def _own_hook_and_folder(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(sys, "excepthook", sys.excepthook)  # run replaces it
+def _own_folder(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.chdir(tmp_path)
 
 
 def refusal(*words: str) -> str:
     """The one sentence with which a command line is refused; nothing is written."""
     before = sorted(Path.cwd().iterdir())
-    result = CliRunner().invoke(app, list(words))
+    result = invoke(*words)
     assert result.exit_code == 2, result.output
     assert result.stdout == "", result.stdout
     sentence = result.stderr.rstrip("\n")
@@ -328,9 +322,9 @@ def test_a_program_beside_a_case_runs_only_with_study_and_is_named_before() -> N
     Path("case.toml").write_text(SOUND.read_text())
     Path("study.py").write_text("import pathlib\npathlib.Path('canary').touch()\n")
     for words in (["check", "."], ["plan", "."]):
-        assert CliRunner().invoke(app, words).exit_code == 0
+        assert invoke(*words).exit_code == 0
     assert not Path("canary").exists()
-    result = CliRunner().invoke(app, ["run", ".", "--study", "-o", "out"])
+    result = invoke("run", ".", "--study", "-o", "out")
     assert result.exit_code == 2 and "has no function" in result.stderr
     assert result.stdout.startswith("--study runs the program ")
     assert "study.py" in result.stdout.splitlines()[0]
@@ -339,7 +333,7 @@ def test_a_program_beside_a_case_runs_only_with_study_and_is_named_before() -> N
 
 def told_by_check(*words: str) -> list[str]:
     """The keys that ``check`` names, one sentence each."""
-    result = CliRunner().invoke(app, ["check", *words])
+    result = invoke("check", *words)
     assert result.exit_code == 2 and result.stdout == "", result.output
     sentences = result.stderr.splitlines()
     assert all(sentence.startswith("catenary: ") for sentence in sentences)

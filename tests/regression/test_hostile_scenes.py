@@ -8,15 +8,12 @@ a control character.
 from __future__ import annotations
 
 import os
-import sys
 import time
 from pathlib import Path
 
 import pytest
 from program import catenary
-from verb_runner import CliRunner
-
-from catenary.cases.cli.main import app
+from verb_runner import invoke
 
 FOLDER = Path(__file__).with_name("hostile_scenes")
 SCENES = sorted(path.stem for path in FOLDER.glob("*.toml"))
@@ -28,8 +25,7 @@ PROCESSES = ("petsc_line_in_value", "text_c1", "file_mesh_terminal", "file_cours
 
 
 @pytest.fixture(autouse=True)
-def _own_hook_and_folder(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(sys, "excepthook", sys.excepthook)  # run replaces it
+def _own_folder(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.chdir(tmp_path)
 
 
@@ -56,7 +52,7 @@ def test_a_hostile_scene_is_refused(name: str, verb: str, tmp_path: Path) -> Non
     before = sorted(os.listdir(FOLDER))
     begin = time.perf_counter(), time.process_time()
     words = [verb, str(FOLDER / f"{name}.toml"), *VERBS[verb]]
-    result = CliRunner().invoke(app, words)
+    result = invoke(*words)
     waited, worked = time.perf_counter() - begin[0], time.process_time() - begin[1]
     assert result.exit_code == 2, result.output
     assert result.stdout == ""

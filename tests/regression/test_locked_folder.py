@@ -12,12 +12,13 @@ from program import MPIRUN, assert_sound, catenary, catenary_started, n_rows, sh
 LOCK = ".catenary.lock"
 # Two million steps, each by a correction, some minutes: the run goes on while others try to take
 # its folder, and has few rows to look at. Its line's channels are recorded whole, and not around
-# the train as their size would have it.
+# the train as their size would have it. Without snapshots a report works out no waves.
 LONG = (
     "numerics.dt_s=1e-6",
     "numerics.scheme=fixed_point",
     "output.flush_every_steps=500",
     "output.line_channels_every_s=5e-3",
+    "output.field_every_s=0",
 )
 
 

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 from damaging import unseal
 from program import MPIRUN, assert_same_histories, assert_sound, catenary, short_run
+from scenes import load_scene, resolved
 
-from catenary import restart
-from catenary.base.errors import InputError
+from catenary import InputError, restart
 from catenary.cases.run.continuing import extended_scene
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.problem import resolved
 from catenary.postproc.read.results import Results
+
+pytestmark = pytest.mark.usefixtures("examined_here")
 
 # Where the run ends at first, and where the long one and what goes on do [m].
 FIRST, LAST = "train.end_m=170", 200.0

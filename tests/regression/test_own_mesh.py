@@ -7,11 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from program import SHORT_SCENE
-from verb_runner import CliRunner
+from verb_runner import invoke
 from word_scenes import with_words
 
 import catenary
-from catenary.cases.cli.main import app
 
 # What another program may round coordinates to [m].
 ROUNDING = 1e-9
@@ -25,7 +24,7 @@ def line(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The mesh of the short scene's line."""
     out = tmp_path_factory.mktemp("mesh") / "line.msh"
     words = ["mesh", "en50318_2002", "-o", str(out), "--set", "line.n_spans=10"]
-    done = CliRunner().invoke(app, words)
+    done = invoke(*words)
     assert done.exit_code == 0, done.output
     return out
 

@@ -9,10 +9,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from verb_runner import CliRunner
+import verb_runner
 
 import catenary
-from catenary.cases.cli.main import app
 
 pytestmark = pytest.mark.usefixtures("quick_reports")
 
@@ -51,13 +50,7 @@ correlation_length_m = 20.0
 
 
 def invoke(*words: object) -> Any:
-    return CliRunner().invoke(app, [str(word) for word in words])
-
-
-@pytest.fixture(autouse=True)
-def own_hook(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The command line installs an exception hook; it goes with the test."""
-    monkeypatch.setattr(sys, "excepthook", sys.excepthook)
+    return verb_runner.invoke(*(str(word) for word in words))
 
 
 @pytest.fixture(scope="module")

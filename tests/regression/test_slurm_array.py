@@ -6,17 +6,16 @@ import csv
 import os
 import signal
 import subprocess
-import sys
 import time
 from pathlib import Path
 
 import pytest
-from program import SHORT_SCENE, catenary
+from program import SHORT_SCENE, catenary, write_program
+from scenes import load_scene
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.cases.run.planning.needs import NeedsOfRuns, total_needs
 from catenary.cases.run.planning.slurm_script import Job, array_script
-from catenary.cases.scene.load import load_scene
 
 pytestmark = pytest.mark.process
 CASE, VARIED = "en50318_2002", "train.speed_km_h=230,250,270"
@@ -40,7 +39,7 @@ def programs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     for name, text in (("srun", SRUN), ("sbatch", NOTED), ("scontrol", NOTED)):
         (folder / name).write_text(text)
         (folder / name).chmod(0o755)
-    (folder / "catenary").symlink_to(Path(sys.executable).with_name("catenary"))
+    write_program(folder / "catenary")
     monkeypatch.setenv("PATH", f"{folder}:{os.environ['PATH']}")
     monkeypatch.setenv("STAND_IN", str(folder))
     return folder

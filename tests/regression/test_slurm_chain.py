@@ -5,15 +5,14 @@ from __future__ import annotations
 import os
 import stat
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
-from program import assert_same_histories, catenary
+from program import assert_same_histories, catenary, write_program
 
-from catenary.base.errors import InputError
+from catenary import InputError
+from catenary import open as open_run
 from catenary.cases.run.planning.slurm_script import Job, limit_minutes, slurm_script
-from catenary.postproc.read.results import Results
 
 # Some four seconds of march, so that a signal meets it.
 SCENE = ["numerics.dt_s=5e-5"]
@@ -43,7 +42,7 @@ def stand_in(folder: Path) -> Path:
     for name, text in (("srun", SRUN), ("sbatch", NOTED), ("scancel", NOTED)):
         (folder / name).write_text(text)
         (folder / name).chmod(0o755 | stat.S_IXUSR)
-    (folder / "catenary").symlink_to(Path(sys.executable).with_name("catenary"))
+    write_program(folder / "catenary")
     return folder
 
 
@@ -71,8 +70,8 @@ def test_a_run_goes_on_in_the_next_job_to_the_same_end(tmp_path: Path) -> None:
     assert code == 1, "the run was interrupted"
     assert len(calls) == 1, "the next job stays"
     assert calls[0].startswith("sbatch left=8 ") and "--dependency=afternotok:41" in calls[0]
-    with Results(out) as results:
-        assert results.outcome == "interrupted" and results.n_steps > 0
+    with open_run(out) as run:
+        assert run.outcome == "interrupted" and run.force.time.size > 1
     code, calls = job(printed.stdout, programs, out, CATENARY_JOBS_LEFT="8")
     assert code == 0
     # When a job succeeds, SLURM takes away what waits for its failure; cancelling does no harm.

@@ -9,10 +9,9 @@ from pathlib import Path
 import pytest
 from mpi4py import MPI
 from program import SHORT_SCENE, catenary
+from scenes import read_draft, shipped
 from studies import few
 
-from catenary.cases.scene.input.case_files import shipped
-from catenary.cases.scene.load import read_draft
 from catenary.cases.studies.records import KeptRows
 from catenary.cases.studies.stability.map import Grid, make_map
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from program import catenary
 
-from catenary.postproc.read.results import Results
+from catenary import open as open_run
 
 pytestmark = pytest.mark.study
 
@@ -120,8 +120,8 @@ def test_only_the_readings_of_the_figures_keep_their_result_files(done: tuple[Pa
         for t in ("single", "31m")
     }
     for name in kept:
-        with Results(done[0] / "runs" / name) as results:
-            assert results.complete
+        with open_run(done[0] / "runs" / name) as run:
+            assert run.outcome == "done"
 
 
 def test_a_study_goes_on_where_it_was(done: tuple[Path, str]) -> None:

@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 from program import MPIRUN, assert_same_histories, catenary
 
-from catenary.postproc.read.results import Results
+from catenary import open as open_run
+
+pytestmark = pytest.mark.usefixtures("examined_here")
 
 # Both run over both contact wires, the overlap from one to the other.
 RUNS = {
@@ -51,10 +53,10 @@ def test_a_run_over_several_contact_wires_is_continued(
     done = catenary("restart", str(out), cwd=tmp_path)
     assert done.code == 0, done.stderr
     assert_same_histories(out, whole)
-    with Results(out) as found, Results(whole) as expected:
-        shares = expected.channel("contact_wire_force")
+    with open_run(out) as found, open_run(whole) as expected:
+        shares = expected.channel("contact_wire_force").values
         assert shares.shape[1] == 2
         # Of twin wires both carry all the time; in the overlap the other one does at the end.
         assert (shares.max(axis=0) > 1.0).all()
-        difference = np.abs(found.channel("contact_wire_force") - shares).max()
+        difference = np.abs(found.channel("contact_wire_force").values - shares).max()
         assert difference <= 1e-9 * np.abs(shares).max()

@@ -8,9 +8,12 @@ import re
 from pathlib import Path
 
 import numpy as np
+import pytest
 from program import catenary
 
-from catenary.postproc.read.results import Results
+from catenary import open as open_run
+
+pytestmark = pytest.mark.usefixtures("examined_here")
 
 # Strips that end a millimetre beyond the wire in still air, which is 200 mm beside their middle at
 # every mast; the wind blows it off.
@@ -34,9 +37,9 @@ def test_a_wire_that_leaves_a_strip_is_named_everywhere(tmp_path: Path) -> None:
     words = ("run", "ac_simple_3d", "-o", str(out), "--set", *SCENE)
     done = catenary(*words, cwd=tmp_path, pictures=True)
     assert done.code == 0, done.stderr
-    with Results(out) as results:
-        time, place = results.time, np.nan_to_num(results.channel("lateral_place")[:, 0])
-        x = results.channel("contact_position")[:, 0]
+    with open_run(out) as run:
+        place = np.nan_to_num(run.channel("lateral_place")[:, 0])
+        time, x = run.force.time.values, run.force.position.values[:, 0]
     beyond = np.abs(place) > HALF
     first = int(np.argmax(beyond))
     assert 0 < first and 0 < np.count_nonzero(beyond) < 0.5 * beyond.size

@@ -7,9 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from catenary.cases.scene.input.case_files import find_case
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.scene import Scene
+from scenes import Scene, find_case, load_scene
 
 _TESTS = Path(__file__).parents[1]
 _EXAMPLES = _TESTS.parent / "docs/examples"

@@ -8,11 +8,11 @@ import numpy as np
 from scipy import integrate, linalg
 from scipy.interpolate import CubicSpline
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.mbs.mechanism.reduced_pantograph import RaisingPantograph
 from catenary.mbs.mechanism.reduction import ReducedMechanism
 from catenary.mbs.rigid.arrays import ORIGIN, TimeLaw
-from catenary.mbs.rigid.bodies import Motion, Vector, normalised, quaternion_product
+from catenary.mbs.rigid.bodies import Body, Motion, Vector, normalised, quaternion_product
 from catenary.mbs.rigid.forces import BumpStop, Force, Gravity, SpringDamper
 from catenary.mbs.rigid.joints import unit
 from catenary.mbs.rigid.kinematics import Law, point
@@ -141,3 +141,9 @@ def tabulated(times: Vector, values: Vector) -> TimeLaw:
     """A prescribed number from a table, by a cubic spline with free ends."""
     spline = CubicSpline(times, values, bc_type="natural")
     return lambda time: Law(*(float(spline(time, k)) for k in range(3)))
+
+
+def rod(name: str, mass: float, length: float, x: float) -> Body:
+    """A thin rod along x."""
+    moment = mass * length**2 / 12
+    return Body(name, mass, (1e-3 * moment, moment, moment), (x, 0.0, 0.0))

@@ -16,7 +16,7 @@ import numpy as np
 from body_mechanics import place_rates
 from scipy import linalg
 
-from catenary.base.errors import InputError, RunBroken
+from catenary import InputError, RunBroken
 from catenary.mbs.rigid.bodies import Motion
 from catenary.mbs.rigid.kinematics import Quantity
 from catenary.mbs.rigid.system import System, independent_rows

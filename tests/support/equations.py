@@ -5,8 +5,11 @@ from __future__ import annotations
 import numpy as np
 from mpi4py import MPI
 
+from catenary.meshgen.mesh import CONTACT_WIRE
 from catenary.solver.contact.contact_wire import ContactWires
+from catenary.solver.model.beam import shape_values
 from catenary.solver.model.matrices import whole_matrix
+from catenary.solver.model.model import Model
 from catenary.solver.model.partition import distribute
 from catenary.solver.statics.line_at_rest import LineAtRest
 from catenary.solver.time_loop.march import March
@@ -79,3 +82,15 @@ def residual_of(rest: LineAtRest) -> float:
     with March(MPI.COMM_SELF, *rest) as march:
         march.run([seen])
     return seen.largest
+
+
+def press(residual: np.ndarray, model: Model, x: float, force: float) -> None:
+    """Take a contact force [N] off a residual, and what holds the anchors."""
+    nodes = model.mesh.wires[CONTACT_WIRE]
+    places = model.mesh.x(nodes)
+    e = int(np.searchsorted(places, x)) - 1
+    length = places[e + 1] - places[e]
+    own = nodes[e : e + 2]
+    unknowns = np.stack([model.dofs(own), model.dofs(own, "theta_y")], axis=1).ravel()
+    residual[unknowns] -= force * shape_values((x - places[e]) / length, length)
+    residual[model.constrained] = 0.0

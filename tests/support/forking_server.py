@@ -4,7 +4,7 @@ What is imported here, none of which starts MPI, is not imported again by every 
 most of what a short run costs. It is packages and half of the program's modules; the others, PETSc,
 MPI and HDF5 are imported by each. Of PETSc the libraries are loaded here, without being started,
 and the checks of scenes are put together. Pictures of reports are not painted, and drawn on
-panels that were made here, unless ``pictures`` is true.
+panels that were made here, unless ``pictures`` is true. Files are examined in forks, too.
 
 A request is a line of JSON on standard input: ``words``, ``folder``, ``environment``, ``pictures``
 and the files ``stdout`` and ``stderr``. It is answered with the number of the process, and with its
@@ -66,6 +66,7 @@ for line in sys.stdin:
     request = json.loads(line)
     child = os.fork()
     if child == 0:
+        importlib.import_module("forked_guard")
         if not request["pictures"]:
             importlib.import_module("unpainted")
         files = [os.devnull, request["stdout"], request["stderr"]]

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from catenary.cases.scene.problem import line_of, resolved
-from catenary.cases.scene.scene import Scene
+from scenes import Scene, line_of, resolved
+
 from catenary.meshgen.hardware import DropperKind, Droppers, SteadyArm
 from catenary.meshgen.line import Line
 from catenary.meshgen.wires import End, Profile, Wire

@@ -8,8 +8,9 @@ import random
 from functools import cache
 from typing import NamedTuple
 
+from scenes import Scene
+
 from catenary.cases.scene.keys.keys import known_keys
-from catenary.cases.scene.scene import Scene
 
 # No value of any key, whatever its type.
 _NO_VALUE = ("nan", "[nan]", "[[nan]]", "[[],3]", "{strange=nan}", "2026-01-01")

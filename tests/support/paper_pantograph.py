@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from functools import lru_cache
 
-from catenary.cases.scene.load import load_scene
+from scenes import load_scene
+
 from catenary.cases.scene.train.multibody import multibody_of
 from catenary.cases.scene.train.pantograph import CorrectionTable, MultibodyTable
 from catenary.mbs.mechanism.pantograph_data import MultibodyData, without_head

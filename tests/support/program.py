@@ -6,6 +6,7 @@ Every process inherits a mark, by which those that outlive their launcher are fo
 from __future__ import annotations
 
 import os
+import shlex
 import shutil
 import signal
 import subprocess
@@ -53,9 +54,10 @@ SHORT_SCENE = (
 )
 # Round-off of a solve, 1e-16, over 1e4 steps of a damped line; see tests/mpi/test_same_answers.py.
 SAME = 1e-9
-_ENTRY = "from catenary.cases.cli.main import main; main()"
+# The program as a script of Python.
+ENTRY = "from catenary.cases.cli.main import main; main()"
 _UNPAINTED = f"import sys; sys.path[0] = {str(Path(__file__).parent)!r}; import unpainted; "
-_UNPAINTED += f"sys.path[0] = ''; {_ENTRY}"
+_UNPAINTED += f"sys.path[0] = ''; {ENTRY}"
 _MARK = "CATENARY_TEST_MARK"
 _PROC = Path("/proc")
 
@@ -169,9 +171,15 @@ def catenary_started(
     *words: str, cwd: Path, ranks: int = 1, pictures: bool = False
 ) -> Iterator[Program]:
     """The command line, running; pictures are painted only if they are looked at."""
-    entry = _ENTRY if pictures else _UNPAINTED
+    entry = ENTRY if pictures else _UNPAINTED
     with started(python("-c", entry, *words), cwd, ranks) as program:
         yield program
+
+
+def write_program(file: Path) -> None:
+    """Write a program that is the command line, for shells; it paints no pictures."""
+    file.write_text(f'#!/bin/sh\nexec {shlex.join(python("-c", _UNPAINTED))} "$@"\n')
+    file.chmod(0o755)
 
 
 def n_rows(result: Path) -> int:

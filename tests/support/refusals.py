@@ -5,9 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from verb_runner import CliRunner
-
-from catenary.cases.cli.main import app
+from verb_runner import invoke
 
 # A scene of its own, so that a shipped case may change its numbers without a change here.
 SOUND = Path(__file__).parents[1] / "regression" / "broken_scenes" / "sound.toml"
@@ -25,7 +23,7 @@ def assert_refused(scene: Path, assignments: Sequence[str], expected: str, folde
     """
     words = [word for text in assignments for word in ("--set", text)]
     out = folder / "out"
-    result = CliRunner().invoke(app, ["run", str(scene), "-o", str(out), *words])
+    result = invoke("run", str(scene), "-o", str(out), *words)
     assert result.exit_code == 2, result.output
     assert result.stdout == ""
     assert_one_sentence(result.stderr, out, expected)

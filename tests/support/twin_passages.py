@@ -7,10 +7,8 @@ from pathlib import Path
 
 import numpy as np
 from mpi4py import MPI
+from scenes import Scene, mesh_of, problem_of
 
-from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.problem import problem_of
-from catenary.cases.scene.scene import Scene
 from catenary.postproc.evaluate import filters
 from catenary.solver.statics.line_at_rest import line_at_rest
 from catenary.solver.tangents.march import march_with_tangents

@@ -5,11 +5,11 @@ from __future__ import annotations
 
 import importlib.util
 import sys
-from importlib.machinery import ModuleSpec
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from on_import import on_import
 from pixels import FIGURES, PAINTERS
 
 
@@ -24,29 +24,14 @@ def _blank_panels() -> Any:
     return sys.modules[name]
 
 
-class _Finder:
-    """Changes the painter when the program imports it, and does not import it before."""
-
-    def find_spec(self, name: str, path: Any, target: Any = None) -> ModuleSpec | None:
-        if name != FIGURES:
-            return None
-        sys.meta_path.remove(self)
-        spec = importlib.util.find_spec(name)
-        assert spec is not None and spec.loader is not None
-        load = spec.loader.exec_module
-
-        def exec_module(module: ModuleType) -> None:
-            load(module)
-            for name, painter in PAINTERS.items():
-                assert callable(getattr(module, name))
-                setattr(module, name, painter)
-            blank = _blank_panels()
-            for name in ("stacked", "tidy", "legend_above"):
-                assert callable(getattr(module, name))
-                setattr(module, name, getattr(blank, name, blank.nothing))
-
-        setattr(spec.loader, "exec_module", exec_module)  # noqa: B010
-        return spec
+def _leave_unpainted(module: ModuleType) -> None:
+    for name, painter in PAINTERS.items():
+        assert callable(getattr(module, name))
+        setattr(module, name, painter)
+    blank = _blank_panels()
+    for name in ("stacked", "tidy", "legend_above"):
+        assert callable(getattr(module, name))
+        setattr(module, name, getattr(blank, name, blank.nothing))
 
 
-sys.meta_path.insert(0, _Finder())
+on_import(FIGURES, _leave_unpainted)

@@ -10,7 +10,7 @@ from body_mechanics import from_vector
 from constraint_handling import ConstraintHandling, project
 from scipy.integrate import solve_ivp
 
-from catenary.base.errors import InputError, RunBroken
+from catenary import InputError, RunBroken
 from catenary.mbs.rigid.bodies import Motion
 from catenary.mbs.rigid.system import System
 

@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import sys
 from typing import Any
+from unittest import mock
 
-import typer
-from typer.testing import CliRunner as WholeRunner
-from typer.testing import Result
+from typer.testing import CliRunner, Result
 
 from catenary.cases.cli.app import narrowed
+from catenary.cases.cli.main import all_verbs
+
+APP = all_verbs()
 
 
-class CliRunner(WholeRunner):
-    """Typer's runner, which makes the command of the verb that is called and no others."""
+def invoke(*words: str, **how: Any) -> Result:
+    """What a command line ends with; ``how`` is as of Typer's runner.
 
-    def invoke(self, app: typer.Typer, args: Sequence[str] = (), **how: Any) -> Result:  # type: ignore[override]
-        """What a command line ends with."""
-        return super().invoke(narrowed(app, args), args, **how)
+    The command of the verb that is called is made, and no others. The hook for exceptions that a
+    verb installs goes with it.
+    """
+    with mock.patch.object(sys, "excepthook", sys.excepthook):
+        return CliRunner().invoke(narrowed(APP, words), words, **how)

@@ -9,7 +9,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.cases.process.workers import each
 from catenary.postproc.read.results import Results
 

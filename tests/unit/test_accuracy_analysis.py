@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from measuring import check
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.cases.studies.accuracy.analysis import (
     HISTORY,
     Found,

@@ -6,12 +6,10 @@ import json
 from pathlib import Path
 
 import pytest
-from verb_runner import CliRunner
+from scenes import load_scene, resolved
+from verb_runner import invoke
 
-from catenary.base.errors import InputError
-from catenary.cases.cli.main import app
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.problem import resolved
+from catenary import InputError
 from catenary.cases.studies.accuracy import axes as models
 from catenary.cases.studies.accuracy.axes import AXES, DISCRETISATION, parse_axes
 from catenary.cases.studies.accuracy.runs import Plan, make_plan
@@ -211,8 +209,7 @@ def test_a_simple_line_has_no_part_to_do_without() -> None:
 
 def test_an_own_mesh_leaves_nothing_to_refine(tmp_path: Path) -> None:
     path = tmp_path / "line.msh"
-    runner = CliRunner()
-    made = runner.invoke(app, ["mesh", CASE, "-o", str(path)])
+    made = invoke("mesh", CASE, "-o", str(path))
     assert made.exit_code == 0, made.output
     own = (f"mesh.file={path}", "mesh.elements_per_gap=")
     with pytest.raises(InputError, match="nothing to vary"):
@@ -229,6 +226,6 @@ def test_an_own_mesh_leaves_nothing_to_refine(tmp_path: Path) -> None:
     ],
 )
 def test_bad_input_is_one_sentence(words: tuple[str, ...], said: str, tmp_path: Path) -> None:
-    done = CliRunner().invoke(app, ["accuracy", CASE, "-o", str(tmp_path / "out"), *words])
+    done = invoke("accuracy", CASE, "-o", str(tmp_path / "out"), *words)
     assert done.exit_code == 2
     assert said in done.stderr and not (tmp_path / "out").exists()

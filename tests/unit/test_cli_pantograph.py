@@ -8,20 +8,17 @@ from typing import Any
 
 import numpy as np
 import pytest
+import verb_runner
 from measuring import check
-from verb_runner import CliRunner
+from scenes import load_scene, problem_of, shipped
 
-from catenary.cases.cli.main import app
-from catenary.cases.scene.input.case_files import shipped
 from catenary.cases.scene.input.toml_input import read_toml
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.problem import problem_of
 from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.response.linearisation import of_chain
 
 
 def invoke(*words: str) -> Any:
-    return CliRunner().invoke(app, ["pantograph", *words])
+    return verb_runner.invoke("pantograph", *words)
 
 
 @pytest.fixture(scope="module")

@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.cases.process.petsc_options import as_arguments, split_extras
 
 

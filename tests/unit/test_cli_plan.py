@@ -5,23 +5,22 @@ from __future__ import annotations
 import re
 
 import pytest
+from scenes import given, load_scene, mesh_of, problem_of
 
+import catenary
 from catenary.cases.run.planning.needs import (
     LEAST_FLUSH,
     Needs,
     flush_cadence,
     needs_before_meshing,
 )
-from catenary.cases.run.planning.plan import make_plan, plan_text
-from catenary.cases.run.scene_mesh import mesh_of
+from catenary.cases.run.planning.plan import make_plan
 from catenary.cases.scene.checks.mesh_size import Size, size_of
 from catenary.cases.scene.cost_model import (
     estimate_march,
     estimate_memory,
     estimate_start,
 )
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.problem import problem_of
 from catenary.solver.window.choice import moving_share
 
 
@@ -38,13 +37,11 @@ def test_unknowns_are_the_nodes_of_the_mesh_times_the_unknowns_of_the_effects() 
 
 
 def test_steps_cover_the_run() -> None:
-    plan = make_plan(
-        load_scene("en50318_2002", ["train.start_m=90", "train.end_m=840", "numerics.dt_s=1e-3"])
-    )
+    words = ["train.start_m=90", "train.end_m=840", "numerics.dt_s=1e-3"]
+    figures = catenary.plan(given("en50318_2002", words)).figures
     # 750 m at 250 km/h are 10.8 s.
-    assert plan.simulated == pytest.approx(10.8, rel=1e-12)
-    assert plan.needs.n_steps == 10800
-    assert dict(plan.rows)["runs"] == "from 90 to 840 m (leading pantograph)"
+    assert figures["simulated_s"] == pytest.approx(10.8, rel=1e-12)
+    assert figures["n_steps"] == 10800
 
 
 def test_estimates_grow_with_size_steps_and_scheme() -> None:
@@ -118,35 +115,23 @@ def test_flushes_of_a_window_are_as_rare_as_what_moves_is_small() -> None:
 
 
 def test_the_text_tells_trains_of_several_pantographs() -> None:
-    text = plan_text(
-        make_plan(
-            load_scene(
-                "ac_simple",
-                [
-                    "train.start_m=310",
-                    "train.pantographs.1.name=three_masses",
-                    "train.pantographs.1.behind_m=200",
-                ],
-            )
-        )
-    )
+    second = ["train.pantographs.1.name=three_masses", "train.pantographs.1.behind_m=200"]
+    text = str(catenary.plan(given("ac_simple", ["train.start_m=310", *second])))
     assert "2 pantographs" in text
     simulated, _ = text.split("Not simulated:")
     assert "several_pantographs" in simulated
 
 
 def test_long_estimates_are_told_in_minutes() -> None:
-    scene = load_scene("en50318_2002", ["numerics.dt_s=1e-6"])
-    text = plan_text(make_plan(scene))
-    assert " min on one rank" in text
+    assert " min on one rank" in str(catenary.plan(given("en50318_2002", ["numerics.dt_s=1e-6"])))
 
 
 def test_steps_that_adapt_are_told_with_their_shortest() -> None:
     adapted = ["numerics.adaptive_tolerance_N=2", "numerics.smallest_dt_s=2e-4"]
     # 1 ms halved twice is 0.25 ms; a third time would be below the smallest.
-    told = plan_text(make_plan(load_scene("en50318_2002", adapted)))
+    told = str(catenary.plan(given("en50318_2002", adapted)))
     assert "wrong by more than 2 N" in told and "down to 0.25 ms" in told
-    assert "adapted" not in plan_text(make_plan(load_scene("en50318_2002", [])))
+    assert "adapted" not in str(catenary.plan("en50318_2002"))
 
 
 def test_the_law_of_a_slack_dropper_is_told() -> None:
@@ -158,8 +143,6 @@ def test_the_law_of_a_slack_dropper_is_told() -> None:
         (["line.dropper.slack_damping=kept"], "spring is released, damper goes on acting"),
         ([*residual, "line.dropper.slack_damping=kept"], "spring keeps 1 % of its force, damper"),
     ):
-        assert f"of a slack dropper, {told}" in plan_text(
-            make_plan(load_scene("en50318_2002", words))
-        )
-    linear = make_plan(load_scene("en50318_2002", ["effects.dropper_slackening=false"]))
-    assert "of a slack dropper" not in plan_text(linear)
+        assert f"of a slack dropper, {told}" in str(catenary.plan(given("en50318_2002", words)))
+    linear = catenary.plan(given("en50318_2002", ["effects.dropper_slackening=false"]))
+    assert "of a slack dropper" not in str(linear)

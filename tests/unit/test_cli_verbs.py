@@ -12,12 +12,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from verb_runner import CliRunner
+from program import ENTRY
+from scenes import load_scene, shipped
+from verb_runner import invoke
 
-from catenary.base.errors import RunBroken
-from catenary.cases.cli.main import app
-from catenary.cases.scene.input.case_files import shipped
-from catenary.cases.scene.load import load_scene
+from catenary import RunBroken
 from catenary.cases.terminal import console
 from catenary.solver.effects import all_effects as effects
 
@@ -53,10 +52,6 @@ SUMMARY = {
         {"criterion": "maximum contact force", "value": None, "limit": 350.0, "passed": None},
     ],
 }
-
-
-def invoke(*words: str) -> Any:
-    return CliRunner().invoke(app, list(words))
 
 
 @pytest.fixture
@@ -338,9 +333,8 @@ def test_restart_takes_no_assignments(tmp_path: Path, monkeypatch: pytest.Monkey
 
 @pytest.mark.process
 def test_the_reader_of_a_pipe_may_leave(tmp_path: Path) -> None:
-    script = "from catenary.cases.cli.main import main; main()"
     done = subprocess.run(
-        f"'{sys.executable}' -c '{script}' list --keys | head -n 1",
+        f"'{sys.executable}' -c '{ENTRY}' list --keys | head -n 1",
         shell=True,
         capture_output=True,
         text=True,

@@ -9,15 +9,12 @@ from typing import Any
 
 import pytest
 import typer
-from verb_runner import CliRunner
+from program import ENTRY
+from verb_runner import invoke
 
 from catenary.cases.cli.main import app
 
 pytestmark = pytest.mark.usefixtures("quick_reports")
-
-
-def invoke(*words: str) -> Any:
-    return CliRunner().invoke(app, list(words))
 
 
 def test_every_verb_can_be_quiet() -> None:
@@ -52,7 +49,7 @@ def test_version_names_the_libraries(library: str) -> None:
 def completed(typed: str) -> list[str]:
     """What zsh is offered for a command line, without the descriptions."""
     environment = {"_CATENARY_COMPLETE": "complete_zsh", "_TYPER_COMPLETE_ARGS": typed}
-    done = CliRunner().invoke(app, [], prog_name="catenary", env=environment)
+    done = invoke(prog_name="catenary", env=environment)
     return re.findall(r'^(?:_arguments .*?\(\()?"((?:[^":\\]|\\.)+)"', done.stdout, re.MULTILINE)
 
 
@@ -79,8 +76,7 @@ def test_the_shell_is_offered_what_fits(typed: str, offered: list[str]) -> None:
 @pytest.mark.process
 def test_too_low_a_limit_of_memory_is_one_sentence() -> None:
     """OpenBLAS would try for ever to get memory."""
-    program = "from catenary.cases.cli.main import main; main()"
-    bash = f"ulimit -v 450000; exec \"$0\" -c '{program}' report x"
+    bash = f"ulimit -v 450000; exec \"$0\" -c '{ENTRY}' report x"
     words = ["bash", "-c", bash, sys.executable]
     done = subprocess.run(words, capture_output=True, text=True, timeout=240, check=False)
     assert done.returncode == 2
@@ -88,12 +84,9 @@ def test_too_low_a_limit_of_memory_is_one_sentence() -> None:
     assert done.stderr.count("\n") == 1 and not done.stdout
 
 
-MAIN = "from catenary.cases.cli.main import main; main()"
-
-
 def in_shell(command: str) -> subprocess.CompletedProcess[str]:
     """A command line of the program, ``catenary``, with its redirections."""
-    program = f"{sys.executable} -c '{MAIN}'"
+    program = f"{sys.executable} -c '{ENTRY}'"
     shell = ["bash", "-c", command.replace("catenary", program)]
     return subprocess.run(shell, capture_output=True, text=True, timeout=200, check=False)
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from small_lines import BARE, bare_wires, mesh_of, problem_of, train
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.cases.studies.waves.excited import Settings, excitation_of, without_train
 from catenary.solver.effects.build_model import build
 from catenary.solver.model.loads import FieldLoad, ShapeLoad

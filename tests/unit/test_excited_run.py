@@ -12,13 +12,12 @@ from matplotlib.figure import Figure
 from measuring import check
 from mpi4py import MPI
 from pydantic import TypeAdapter, ValidationError
+from scenes import load_scene, problem_of
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.cases.run.continuing import state_to_continue
 from catenary.cases.run.excited_run import ExcitedRun
 from catenary.cases.run.runner import run_case
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.problem import problem_of
 from catenary.cases.studies.waves.excited import Settings, Watch, excitation_of, without_train
 from catenary.cases.studies.waves.seen import WavesSeen, WireMotion, course_of, waves_seen
 from catenary.postproc.files.run_schema import RunAttributes

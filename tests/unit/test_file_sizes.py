@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 import typer
 from mpi4py import MPI
+from scenes import Scene, given, load_scene, mesh_of
 
-from catenary.base.errors import InputError, RunBroken
+import catenary
+from catenary import InputError, RunBroken
 from catenary.base.parallel import on_root
 from catenary.cases.run.planning.needs import (
     Kept,
@@ -17,12 +19,8 @@ from catenary.cases.run.planning.needs import (
     needs_with_mesh,
     total_size,
 )
-from catenary.cases.run.planning.plan import make_plan, plan_text
 from catenary.cases.run.runner import run_case
-from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.cost_model import estimate_memory
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.scene import Scene
 from catenary.cases.terminal import console
 from catenary.postproc.channels.line_record import GZIP
 from catenary.postproc.read.results import Results
@@ -59,15 +57,15 @@ def scene_of(*overrides: str, case: str = "en50318_2002") -> Scene:
 @pytest.mark.parametrize("name", SCENES)
 def test_the_plan_tells_the_sizes_of_the_files(name: str, tmp_path: Path) -> None:
     scene = scene_of(*SCENES[name])
-    told = make_plan(scene).needs.files
+    told = catenary.plan(given("en50318_2002", SCENES[name])).figures
     run_case(scene, tmp_path, MPI.COMM_SELF, only_summary=True)
     result = (tmp_path / "run.h5").stat().st_size
     film = sum(path.stat().st_size for path in tmp_path.glob("fields.*"))
-    print(f"run.h5 {result} B, told {told.result / result:.3f} of it")
-    assert told.result == pytest.approx(result, rel=0.2)
+    print(f"run.h5 {result} B, told {told.result_B / result:.3f} of it")
+    assert told.result_B == pytest.approx(result, rel=0.2)
     if film:
-        print(f"film {film} B, told {told.film / film:.3f} of it")
-    assert told.film == pytest.approx(film, rel=0.2)
+        print(f"film {film} B, told {told.film_B / film:.3f} of it")
+    assert told.film_B == pytest.approx(film, rel=0.2)
 
 
 def test_a_scene_chooses_what_is_recorded_of_the_line(tmp_path: Path) -> None:
@@ -84,8 +82,8 @@ def test_a_scene_chooses_what_is_recorded_of_the_line(tmp_path: Path) -> None:
 
 def test_cadence_in_travel_is_that_in_time_over_the_speed() -> None:
     # 0.5 m at 250 km/h are 7.2 ms.
-    told = make_plan(scene_of("output.line_channels_every_m=0.5"))
-    assert "every 7 ms" in dict(told.rows)["recorded"]
+    told = catenary.plan(given("en50318_2002", ["output.line_channels_every_m=0.5"]))
+    assert "dropper forces recorded every 7 ms" in str(told)
 
 
 LONG = ("line.n_spans=200", "evaluation.to_m=10000")
@@ -93,23 +91,20 @@ LONG = ("line.n_spans=200", "evaluation.to_m=10000")
 
 def test_long_lines_are_thinned_by_their_size() -> None:
     """200 spans that the train runs, 2 GB of line channels if all were recorded."""
-    long = scene_of(*LONG, case="ambrosio2012")
-    thinned = make_plan(long)
-    text = plan_text(thinned)
+    thinned = catenary.plan(given("ambrosio2012", LONG))
+    text = str(thinned)
     assert "every 5 ms within 300 m behind and 200 m ahead of the train" in text
     assert "a snapshot of the line every" in text and text.count("(chosen by size)") == 2
-    whole = make_plan(
-        scene_of(*LONG, "output.line_channels_every_s=0", "output.field_every_s=0.05",
-                 case="ambrosio2012")
-    )  # fmt: skip
-    assert "dropper forces recorded at every step" in dict(whole.rows)["recorded"]
-    assert whole.needs.files.result > 1.5e9 > 30 * thinned.needs.files.result
-    assert thinned.needs.files.film < 510e6 < whole.needs.files.film
+    often = ["output.line_channels_every_s=0", "output.field_every_s=0.05"]
+    whole = catenary.plan(given("ambrosio2012", [*LONG, *often]))
+    assert "dropper forces recorded at every step" in str(whole)
+    assert whole.figures["result_B"] > 1.5e9 > 30 * thinned.figures["result_B"]
+    assert thinned.figures["film_B"] < 510e6 < whole.figures["film_B"]
 
 
 def test_short_lines_are_recorded_whole() -> None:
-    told = dict(make_plan(scene_of()).rows)["recorded"]
-    assert told.startswith("arm uplift and dropper forces recorded at every step; ")
+    told = str(catenary.plan("en50318_2002"))
+    assert "arm uplift and dropper forces recorded at every step" in told
 
 
 @pytest.mark.parametrize(

@@ -9,24 +9,16 @@ import subprocess
 import sys
 import tomllib
 from pathlib import Path
-from typing import Any
 
 import pytest
-from program import MPIRUN, catenary
-from verb_runner import CliRunner
+from program import ENTRY, MPIRUN, catenary
+from scenes import line_data_of, load_scene, shipped
+from verb_runner import invoke
 
-from catenary.base.errors import InputError
-from catenary.cases.cli.main import app
+from catenary import InputError
 from catenary.cases.process import installation
 from catenary.cases.process.installation import BROKEN, MISSING, OK, Finding
-from catenary.cases.scene.input.case_files import shipped
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.problem import line_data_of
 from catenary.cases.scene.starter import BEGINNINGS, write_case
-
-
-def invoke(*words: str) -> Any:
-    return CliRunner().invoke(app, list(words))
 
 
 @pytest.mark.parametrize("kind", BEGINNINGS)
@@ -100,7 +92,7 @@ def test_tables_of_a_planner_make_a_case(tmp_path: Path, kind: str, n: int) -> N
 @pytest.mark.process
 def test_a_terminal_is_asked_for_the_kind_of_line(tmp_path: Path) -> None:
     own, other = pty.openpty()
-    words = [sys.executable, "-c", "from catenary.cases.cli.main import main; main()", "new", "a"]
+    words = [sys.executable, "-c", ENTRY, "new", "a"]
     with subprocess.Popen(words, cwd=tmp_path, stdin=other, stdout=other, stderr=other) as asked:
         os.close(other)
         os.write(own, b"tramway\n")

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.cases.result_folder import folder_lock
 from catenary.cases.result_folder.folder_lock import (
     LOCK_FILE,

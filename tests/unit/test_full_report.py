@@ -15,14 +15,11 @@ from unittest import mock
 import html5lib
 import pypdf
 import pytest
+import verb_runner
 from pixels import FIGURES, PAINTERS
-from verb_runner import CliRunner
+from scenes import Scene, load_scene, resolved
 
-from catenary.base.errors import InputError
-from catenary.cases.cli.main import app
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.problem import resolved
-from catenary.cases.scene.scene import Scene
+from catenary import InputError
 from catenary.cases.studies.accuracy.analysis import Row
 from catenary.cases.studies.accuracy.output import table_of
 from catenary.cases.studies.effect_cost.output import write
@@ -52,7 +49,7 @@ CHANGES = ("train.speed_km_h=280", "line.contact_wire.tension_N=21e3")
 
 
 def invoke(*words: str) -> str:
-    done = CliRunner().invoke(app, list(words))
+    done = verb_runner.invoke(*words)
     assert done.exit_code == 0, done.output
     return done.output
 
@@ -216,7 +213,7 @@ def test_the_data_sheet_tells_the_wind() -> None:
 @pytest.mark.parametrize("case", ["ambrosio2012", "curve", "windy_viaduct", "conductor_rail"])
 def test_other_inputs_load_to_the_same_scene(case: str) -> None:
     """Effects that are on for want of a word, and those that were switched off, stay so."""
-    from catenary.cases.scene.input.case_files import find_case
+    from scenes import find_case
 
     recorded = resolved(load_scene(find_case(case)))
     scene = SceneOfRun(_Recorded(recorded))  # type: ignore[arg-type]
@@ -279,7 +276,7 @@ def test_the_validation_of_the_installation(folder: Path, tmp_path: Path) -> Non
     beyond = said.index("Figures beyond their limits")
     assert said.index("31.25", beyond) < said.index("Judged figures (2)", beyond)
     assert "standard deviation" in said[beyond:] and "error bar" not in said[beyond:]
-    done = CliRunner().invoke(app, ["report", str(tmp_path), "--validation", str(folder)])
+    done = verb_runner.invoke("report", str(tmp_path), "--validation", str(folder))
     assert done.exit_code == 2
     assert "the record of `catenary validate`, cannot be read: no such file" in done.output
 

@@ -6,9 +6,9 @@ import re
 import tomllib
 
 from fuzzing import topology_scene, wide_scene
+from scenes import Scene
 
 from catenary.cases.scene.keys.keys import known_keys
-from catenary.cases.scene.scene import Scene
 
 MOST_SEEDS = 4000
 # Left to tests of their own: texts, files, mechanisms as data, options of PETSc, what is written.

@@ -12,13 +12,11 @@ import numpy as np
 import pandas as pd
 import pytest
 from mpi4py import MPI
-from verb_runner import CliRunner
+from scenes import line_of, load_scene, read_draft
+from verb_runner import invoke
 
 import catenary
-from catenary.base.errors import InputError
-from catenary.cases.cli.main import app
-from catenary.cases.scene.load import load_scene, read_draft
-from catenary.cases.scene.problem import line_of
+from catenary import InputError
 from catenary.cases.scene.turned import BACKWARD, FORWARD, turned
 from catenary.cases.studies.questions.highest_speed import (
     ALL,
@@ -194,7 +192,7 @@ def test_a_line_without_mirror_image_is_judged_one_way(monkeypatch: pytest.Monke
     ],
 )
 def test_what_is_no_range_is_refused(words: list[str], told: str) -> None:
-    done = CliRunner().invoke(app, ["speed", CASE, *words])
+    done = invoke("speed", CASE, *words)
     assert done.exit_code == 2 and told in done.output
 
 
@@ -203,7 +201,7 @@ def test_the_command_agrees_with_runs_by_hand(tmp_path: Path) -> None:
     """The speed limit is 0.7 of the wave speed; other verdicts are those of runs."""
     words = ["speed", CASE, "--short", "--from", "300", "--to", "310", "--within", "2.5"]
     words += ["--set", ONE_SIDED]
-    done = CliRunner().invoke(app, [*words, "-o", str(tmp_path)])
+    done = invoke(*words, "-o", str(tmp_path))
     assert done.exit_code == 0, done.output
     rows = {
         row["criterion"]: row
@@ -237,7 +235,7 @@ def test_the_command_agrees_with_runs_by_hand(tmp_path: Path) -> None:
     assert float(rows[ALL]["holds_from_km_h"]) == min(held)
     assert float(rows[ALL]["highest_km_h"]) == max(held)
     assert (tmp_path / "speed.png").is_file() and not (tmp_path / "rows_so_far").exists()
-    again = CliRunner().invoke(app, [*words, "-o", str(tmp_path)])
+    again = invoke(*words, "-o", str(tmp_path))
     assert again.exit_code == 2 and "is there already" in again.output
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import sys
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -11,16 +10,15 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+import verb_runner
 from measuring import check
+from scenes import load_scene
 from scipy import stats
 from scipy.optimize import least_squares
 from twin_passages import filtered_noise, write_measurement
-from verb_runner import CliRunner
 
 import catenary
-from catenary.base.errors import InputError
-from catenary.cases.cli.main import app
-from catenary.cases.scene.load import load_scene
+from catenary import InputError
 from catenary.cases.studies.identification.measurement import (
     Measurement,
     Signal,
@@ -63,12 +61,6 @@ key = "{FORCE}"
 deviation = 4.0
 mean = 117.0
 """
-
-
-@pytest.fixture(autouse=True)
-def own_hook(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The command line installs an exception hook; it goes with the test."""
-    monkeypatch.setattr(sys, "excepthook", sys.excepthook)
 
 
 # --- noise --------------------------------------------------------------------------------------
@@ -366,7 +358,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def invoke(files: Path, *words: str) -> Any:
     given = [CASE, str(files / "measured.csv"), str(files / "task.toml")]
-    return CliRunner().invoke(app, ["identify", *given, *words, "--set", *TINY])
+    return verb_runner.invoke("identify", *given, *words, "--set", *TINY)
 
 
 def test_the_verb_finds_a_force_and_writes_its_tables_once(files: Path) -> None:
@@ -483,7 +475,7 @@ def test_a_task_that_does_not_fit_is_told(
     wrong = tmp_path / "task.toml"
     wrong.write_text(task, encoding="utf-8")
     given = [CASE, str(files / "measured.csv"), str(wrong), "-o", str(tmp_path / "out")]
-    result = CliRunner().invoke(app, ["identify", *given, "--set", *TINY])
+    result = verb_runner.invoke("identify", *given, "--set", *TINY)
     assert result.exit_code == 2, result.output
     *progress, sentence = result.output.splitlines()
     assert told in sentence and sentence.startswith("catenary: ")

@@ -13,12 +13,11 @@ from typing import Any
 import pytest
 from mpi4py import MPI
 from program import SHORT_SCENE
+from scenes import Scene, load_scene
 
 from catenary.cases.process import interrupts
 from catenary.cases.process.interrupts import STOPPING, Interrupted, Phase, Stopped, StopRequest
 from catenary.cases.run import runner
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.sweep.jobs import make_jobs
 from catenary.cases.studies.sweep.run_jobs import run_jobs
 from catenary.cases.studies.sweep.variants import parse_vary, product

@@ -9,11 +9,10 @@ from typing import Any
 
 import jsonschema
 import pytest
-from verb_runner import CliRunner
+from scenes import Scene
+from verb_runner import invoke
 
-from catenary.cases.cli.main import app
 from catenary.cases.scene.keys.keys import known_keys
-from catenary.cases.scene.scene import Scene
 from catenary.cases.terminal.lists import scene_schema
 
 ROOT = Path(__file__).parents[2]
@@ -83,7 +82,7 @@ def test_the_schema_has_every_key_with_its_unit() -> None:
 
 
 def test_list_prints_it() -> None:
-    told = CliRunner().invoke(app, ["list", "--schema"])
+    told = invoke("list", "--schema")
     assert json.loads(told.output) == SCHEMA
-    both = CliRunner().invoke(app, ["list", "--schema", "--keys"])
+    both = invoke("list", "--schema", "--keys")
     assert both.exit_code == 2 and "--keys and --schema" in both.output

@@ -2,22 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import pytest
-from verb_runner import CliRunner
+from scenes import load_scene
+from verb_runner import invoke
 
-from catenary.base.errors import InputError
-from catenary.cases.cli.main import app
+from catenary import InputError
 from catenary.cases.scene.keys.usual_values import USUAL
-from catenary.cases.scene.load import load_scene
 from catenary.cases.terminal.lists import key_details, key_table, keys_of_a_scene
 
 WIRES = ("contact", "messenger", "auxiliary", "stitch")
-
-
-def invoke(*words: str) -> Any:
-    return CliRunner().invoke(app, list(words))
 
 
 def first_words(text: str) -> list[str]:

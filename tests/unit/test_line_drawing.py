@@ -4,20 +4,14 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import Any
 
 import pytest
 from matplotlib.figure import Figure
 from PIL import Image
-from verb_runner import CliRunner
+from scenes import load_scene
+from verb_runner import invoke
 
-from catenary.cases.cli.main import app
 from catenary.cases.run.scene_mesh import draw_scene
-from catenary.cases.scene.load import load_scene
-
-
-def invoke(*words: str) -> Any:
-    return CliRunner().invoke(app, list(words))
 
 
 @pytest.mark.parametrize(

@@ -4,22 +4,20 @@ from __future__ import annotations
 
 import json
 import re
-import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
+import verb_runner
 from measuring import check
 from mpi4py import MPI
+from scenes import load_scene
 from scipy import signal, stats
-from verb_runner import CliRunner
 
-from catenary.base.errors import InputError
-from catenary.cases.cli.main import app
+from catenary import InputError
 from catenary.cases.run.runner import run_case
-from catenary.cases.scene.load import load_scene
 from catenary.cases.studies.measured.description import Description
 from catenary.cases.studies.measured.passages import passage_of
 from catenary.cases.studies.reference.judgement import FAILED, NOT_JUDGED, PASSED, any_failed
@@ -43,12 +41,6 @@ SCENE = (
     "evaluation.to_m=420", "output.field_every_s=0",
 )  # fmt: skip
 PLACES: dict[str, Any] = {"place": {"column": "place_m"}, "force": {"column": "force_N"}}
-
-
-@pytest.fixture(autouse=True)
-def own_hook(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The command line installs an exception hook; it goes with the test."""
-    monkeypatch.setattr(sys, "excepthook", sys.excepthook)
 
 
 @pytest.fixture(scope="module")
@@ -338,7 +330,7 @@ def test_three_runs_stand_side_by_side(run: Path, tmp_path: Path) -> None:
 
 
 def invoke(*words: str) -> Any:
-    return CliRunner().invoke(app, ["compare", *words])
+    return verb_runner.invoke("compare", *words)
 
 
 def test_a_validation_takes_a_comparison_as_its_line_test(

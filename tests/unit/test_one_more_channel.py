@@ -14,9 +14,9 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 from program import SHORT_SCENE
+from scenes import load_scene
 
 from catenary.cases.run.runner import run_case
-from catenary.cases.scene.load import load_scene
 from catenary.postproc.files.run_schema import FORMAT
 from catenary.postproc.read.results import Results
 from catenary.solver.time_loop import march as time_loop

@@ -25,7 +25,7 @@ from more_wires import (
 from numpy.polynomial.legendre import leggauss
 from small_lines import HANGING, mesh_of, problem_of
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.meshgen.build import make_mesh, use_mesh
 from catenary.meshgen.hardware import DropperKind, Droppers
 from catenary.meshgen.line import Line

@@ -3,23 +3,20 @@
 from __future__ import annotations
 
 import json
-import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from verb_runner import CliRunner
+from scenes import Scene, find_case, read_draft
+from verb_runner import invoke
 
 import catenary
-from catenary.base.errors import InputError
-from catenary.cases.cli.main import app
+from catenary import InputError
 from catenary.cases.result_folder.folder_lock import FolderLock
 from catenary.cases.run.at_rest.static_table import static_table
-from catenary.cases.scene.input.case_files import find_case
-from catenary.cases.scene.load import Draft, read_draft
-from catenary.cases.scene.scene import Scene
+from catenary.cases.scene.load import Draft
 from catenary.cases.studies import scene_sets
 from catenary.cases.studies.optimise import output, study
 from catenary.cases.studies.optimise.checks import (
@@ -505,16 +502,6 @@ def test_what_gets_worse_is_told() -> None:
 # --- the verb ------------------------------------------------------------------------------------
 
 
-@pytest.fixture
-def own_hook(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sys, "excepthook", sys.excepthook)
-
-
-def invoke(*words: str) -> Any:
-    return CliRunner().invoke(app, list(words))
-
-
-@pytest.mark.usefixtures("own_hook")
 def test_the_verb_writes_what_it_says(tmp_path: Path, evaluated: Any) -> None:
     evaluated(lambda scene: summary(20.0 + (masses(scene)[0] - 8.0) ** 2))
     file = tmp_path / "task.toml"
@@ -539,7 +526,6 @@ def test_the_verb_writes_what_it_says(tmp_path: Path, evaluated: Any) -> None:
     assert again.exit_code == 2 and "is there already" in again.output
 
 
-@pytest.mark.usefixtures("own_hook")
 def test_a_program_in_python_gets_what_the_verb_prints(
     tmp_path: Path, evaluated: Any, caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -565,7 +551,6 @@ def test_a_program_in_python_gets_what_the_verb_prints(
         assert (out / path.name).read_bytes() == path.read_bytes(), path.name
 
 
-@pytest.mark.usefixtures("own_hook")
 def test_a_wrong_task_is_one_sentence(tmp_path: Path) -> None:
     file = tmp_path / "task.toml"
     file.write_text("[[variables]]\nkey = 3\nchange = [-5.0, 5.0]\n")

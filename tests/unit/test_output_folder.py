@@ -9,7 +9,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.cases.result_folder import output_folder
 from catenary.cases.result_folder.folder_lock import FolderLock
 from catenary.cases.result_folder.output_folder import (

@@ -11,15 +11,12 @@ import numpy as np
 import pytest
 from measuring import registered
 from mpi4py import MPI
-from verb_runner import CliRunner
+from scenes import load_scene, mesh_of, problem_of
+from verb_runner import invoke
 from word_scenes import with_words
 
 import catenary
-from catenary.base.errors import InputError
-from catenary.cases.cli.main import app
-from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.problem import problem_of
+from catenary import InputError
 from catenary.cases.studies.effect_cost import output
 from catenary.cases.studies.effect_cost.step_timing import RepeatedMarch, beside
 from catenary.cases.studies.effect_cost.study import (
@@ -244,13 +241,13 @@ def test_an_effect_that_a_scene_refuses_to_leave_out_is_told() -> None:
     ],
 )
 def test_bad_options_are_refused_in_a_sentence(words: list[str], sentence: str) -> None:
-    ended = CliRunner().invoke(app, ["plan", CASE, *words])
+    ended = invoke("plan", CASE, *words)
     assert ended.exit_code == 2 and sentence in ended.stderr
 
 
 def test_costs_that_are_there_are_not_replaced(tmp_path: Path) -> None:
     (tmp_path / "cost.json").write_text("{}")
-    ended = CliRunner().invoke(app, ["plan", CASE, "--cost", "-o", str(tmp_path)])
+    ended = invoke("plan", CASE, "--cost", "-o", str(tmp_path))
     assert ended.exit_code == 2 and "is there already" in ended.stderr
     assert (tmp_path / "cost.json").read_text() == "{}"
 

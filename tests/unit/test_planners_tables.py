@@ -5,14 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from scenes import Scene, line_data_of, load_scene, mesh_of, problem_of, read_draft, recorded
 
-from catenary.base.errors import InputError
-from catenary.cases.run.scene_mesh import mesh_of
+from catenary import InputError
 from catenary.cases.scene.checks.mesh_size import size_of
-from catenary.cases.scene.input.faults import Origin
-from catenary.cases.scene.load import load_scene, read_draft, scene_from
-from catenary.cases.scene.problem import line_data_of, problem_of, resolved
-from catenary.cases.scene.scene import Scene
 
 WITHOUT = (
     "line.dropper.positions_m=",
@@ -88,7 +84,7 @@ def test_a_result_needs_the_files_no_more(tmp_path: Path) -> None:
     scene = load(tmp_path, {"spans.csv": alike(), "droppers.csv": droppers()})
     (tmp_path / "spans.csv").unlink()
     (tmp_path / "droppers.csv").unlink()
-    again = scene_from(resolved(scene), Origin("a result", recorded=True))
+    again = recorded(scene)
     assert problem_of(again) == problem_of(scene)
 
 

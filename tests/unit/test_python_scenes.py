@@ -11,12 +11,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scenes import find_case, load_scene, resolved
 
 import catenary
 from catenary.cases.run.at_rest.static_table import check_line
-from catenary.cases.scene.input.case_files import find_case
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.problem import resolved
 from catenary.scenes import checked
 
 CASE = "en50318_2002"

@@ -7,12 +7,10 @@ from typing import get_args
 
 import numpy as np
 import pytest
-from verb_runner import CliRunner
+from scenes import load_scene, problem_of, scene_from
+from verb_runner import invoke
 
-from catenary.base.errors import InputError
-from catenary.cases.cli.main import app
-from catenary.cases.scene.load import load_scene, scene_from
-from catenary.cases.scene.problem import problem_of
+from catenary import InputError
 from catenary.cases.scene.train.pantograph import Ready
 from catenary.mbs.library import READY
 from catenary.mbs.lumped_data import LumpedData
@@ -83,10 +81,10 @@ def test_what_cannot_be_is_one_sentence(words: list[str], said: str) -> None:
 
 
 def test_the_list_names_all_with_their_sources() -> None:
-    told = CliRunner().invoke(app, ["list", "--pantographs"])
+    told = invoke("list", "--pantographs")
     assert told.exit_code == 0
     for name, ready in READY.items():
         assert name in told.output.splitlines()
         assert ready.source in told.output
-    both = CliRunner().invoke(app, ["list", "--pantographs", "--keys"])
+    both = invoke("list", "--pantographs", "--keys")
     assert both.exit_code == 2

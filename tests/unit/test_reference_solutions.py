@@ -11,11 +11,10 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from verb_runner import CliRunner
+from scenes import problem_of
+from verb_runner import invoke
 
-from catenary.base.errors import InputError
-from catenary.cases.cli.main import app
-from catenary.cases.scene.problem import problem_of
+from catenary import InputError
 from catenary.cases.studies.reference import validation
 from catenary.cases.studies.reference.configurations import configurations, table
 from catenary.cases.studies.reference.convergence import (
@@ -194,7 +193,7 @@ def test_unfiltered_forces_are_filtered(tmp_path: Path) -> None:
 def test_a_table_of_statistics_is_judged(tmp_path: Path) -> None:
     out = tmp_path / "out"
     statistics_file = DATA / "statistics.csv"
-    done = CliRunner().invoke(app, ["judge", str(statistics_file), "-o", str(out), "--strict"])
+    done = invoke("judge", str(statistics_file), "-o", str(out), "--strict")
     assert done.exit_code == 0, done.output
     rows = list(csv.DictReader((out / "judged.csv").read_text().splitlines()))
     shipped = list(csv.DictReader(statistics_file.read_text().splitlines()))
@@ -205,7 +204,7 @@ def test_a_table_of_statistics_is_judged(tmp_path: Path) -> None:
     assert "not publicly known" in page and "not compared with the text" in page
     path = tmp_path / "other.csv"
     path.write_text(f"of,quantity,value\nline,{UPLIFT},70\n")
-    done = CliRunner().invoke(app, ["judge", str(path), "--of", ONE, "--strict"])
+    done = invoke("judge", str(path), "--of", ONE, "--strict")
     assert done.exit_code == 3 and FAILED in done.output
 
 

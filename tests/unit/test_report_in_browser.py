@@ -15,9 +15,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import pytest
-from typer.testing import CliRunner
-
-from catenary.cases.cli.main import app
+from verb_runner import invoke
 
 BROWSER = shutil.which("chromium") or shutil.which("google-chrome")
 pytestmark = [
@@ -121,7 +119,7 @@ def said(seen: Visit) -> list[dict[str, Any]]:
 def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("report")
     for words in (("run", "ac_simple", "--short", "-q", "-o"), ("report", "--interactive")):
-        done = CliRunner().invoke(app, [*words, str(out)])
+        done = invoke(*words, str(out))
         assert done.exit_code == 0, done.output
     return out
 

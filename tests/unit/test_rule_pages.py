@@ -7,7 +7,8 @@ import re
 import tomllib
 from pathlib import Path
 
-from catenary.cases.scene.load import read_draft
+from scenes import read_draft
+
 from catenary.cases.scene.run.case import chosen_books
 from catenary.postproc.standards.book import book_of
 from catenary.postproc.standards.library import shipped

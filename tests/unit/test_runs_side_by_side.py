@@ -5,19 +5,17 @@ from __future__ import annotations
 import csv
 import io
 import signal
-import sys
 from pathlib import Path
 from typing import Any
 
 import pytest
 from measuring import COMM
 from program import catenary_started, python, started
-from verb_runner import CliRunner
+from verb_runner import invoke
 from work_items import die_at_275, measure_steps
 
 import catenary
-from catenary.base.errors import InputError
-from catenary.cases.cli.main import app
+from catenary import InputError
 from catenary.cases.run.planning.needs import Kept, total_size
 from catenary.cases.studies.sweep.jobs import RunOptions, make_jobs
 from catenary.cases.studies.sweep.output import table_of
@@ -41,16 +39,6 @@ TINY = (
     "output.field_every_s=0",
     "output.energy_every_s=0",
 )
-
-
-def invoke(*words: str) -> Any:
-    return CliRunner().invoke(app, list(words))
-
-
-@pytest.fixture(autouse=True)
-def own_hook(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The command line installs an exception hook; it goes with the test."""
-    monkeypatch.setattr(sys, "excepthook", sys.excepthook)
 
 
 def figures(out: Path) -> list[dict[str, str]]:

@@ -12,12 +12,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scenes import Scene, line_of, load_scene, read_draft
 from scipy import stats
 
-from catenary.base.errors import InputError
-from catenary.cases.scene.load import load_scene, read_draft
-from catenary.cases.scene.problem import line_of
-from catenary.cases.scene.scene import Scene
+from catenary import InputError
 from catenary.cases.studies.sampling.samples import sample_name, samples
 from catenary.cases.studies.sampling.tables import SamplingTable, read_sampling, sampling_of
 from catenary.cases.studies.sweep.jobs import scene_of

@@ -7,10 +7,9 @@ from pathlib import Path
 import pytest
 from mpi4py import MPI
 from program import MPIRUN, catenary
-from verb_runner import CliRunner
+from scenes import load_scene
+from verb_runner import invoke
 
-from catenary.cases.cli.main import app
-from catenary.cases.scene.load import load_scene
 from catenary.cases.studies import scaling
 from catenary.cases.studies.scaling import Sizes, Wire, Work, as_text, predict
 from catenary.solver.contact.line_response import Bounds, LineResponse
@@ -64,7 +63,7 @@ def test_one_rank_exchanges_nothing_and_times_nothing() -> None:
     ],
 )
 def test_what_cannot_be_is_refused_in_a_sentence(words: list[str], says: str) -> None:
-    done = CliRunner().invoke(app, ["scaling", "ambrosio2012", *words])
+    done = invoke("scaling", "ambrosio2012", *words)
     assert done.exit_code == 2 and says in done.stderr and done.stderr.count("\n") == 1
 
 

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import pytest
+from scenes import load_scene, problem_of
 
-from catenary.base.errors import InputError
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.problem import problem_of
+from catenary import InputError
 from catenary.solver.problem.ends import AlongTrack, Tensioner
 
 ON = "effects.axial_motion=true"

@@ -8,11 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scenes import line_data_of, load_scene, mesh_of, problem_of, shipped
 
-from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.input.case_files import shipped
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.problem import line_data_of, problem_of
 from catenary.solver.statics.form_finding.equilibrium import find_form
 
 

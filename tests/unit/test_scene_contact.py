@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import pytest
+from scenes import load_scene, problem_of, recorded, resolved
 
-from catenary.base.errors import InputError
-from catenary.cases.scene.input.faults import Origin
-from catenary.cases.scene.load import load_scene, scene_from
-from catenary.cases.scene.problem import problem_of, resolved
+from catenary import InputError
 from catenary.solver.problem.contact_laws import HYSTERESIS, HertzLaw, KinematicLaw, LinearLaw
 
 CASE = "en50318_2002"
@@ -58,7 +56,7 @@ def test_kinematic_contact_has_no_loss_to_simulate() -> None:
 )
 def test_the_resolved_scene_is_the_same_again(overrides: list[str]) -> None:
     scene = load_scene(CASE, overrides)
-    again = scene_from(resolved(scene), Origin("a result", recorded=True))
+    again = recorded(scene)
     assert problem_of(again) == problem_of(scene)
 
 

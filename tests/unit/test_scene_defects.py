@@ -5,14 +5,10 @@ from __future__ import annotations
 import math
 
 import pytest
+from scenes import Scene, given, line_data_of, load_scene, mesh_of, problem_of, recorded
 
+import catenary
 from catenary.cases.run.describe.defects import defect_facts
-from catenary.cases.run.planning.plan import make_plan, plan_text
-from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.input.faults import Origin
-from catenary.cases.scene.load import load_scene, scene_from
-from catenary.cases.scene.problem import line_data_of, problem_of, resolved
-from catenary.cases.scene.scene import Scene
 from catenary.meshgen.hardware import Fittings
 from catenary.meshgen.topologies.all_topologies import make_line
 from catenary.solver.effects import all_effects
@@ -69,7 +65,7 @@ def test_defects_are_converted() -> None:
 
 def test_a_resolved_scene_is_the_same_again() -> None:
     first = scene()
-    again = scene_from(resolved(first), Origin("the result file", recorded=True))
+    again = recorded(first)
     assert problem_of(again) == problem_of(first)
     assert len(again.defects) == 6
 
@@ -84,9 +80,7 @@ def test_a_seed_is_a_key_of_its_own() -> None:
 
 
 def test_the_plan_tells_defects_and_what_each_effect_leaves_out() -> None:
-    plan = make_plan(scene("mesh.elements_per_gap=1"))
-    assert [label for label, _ in plan.rows].count("defect") == 10
-    text = plan_text(plan)
+    text = str(catenary.plan(given("en50318_2002", [*WORDS, "mesh.elements_per_gap=1"])))
     simulated, left_out = text.split("Not simulated:")
     names = (*KINDS, "contact_wire_height", "running_surface", "dropper_lengths", "fittings")
     assert all(f"  {name}" in simulated for name in names)

@@ -6,13 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scenes import Scene, find_case, load_scene, problem_of, recorded
 
-from catenary.base.errors import InputError
-from catenary.cases.scene.input.case_files import find_case
-from catenary.cases.scene.input.faults import Origin
-from catenary.cases.scene.load import load_scene, scene_from
-from catenary.cases.scene.problem import problem_of, resolved
-from catenary.cases.scene.scene import Scene
+from catenary import InputError
 
 NO_STIFFNESS = "line.dropper.stiffness_N_per_m="
 POINTS = [[0.0, 0.0], [5e-4, 15.0], [1e-3, 60.0], [3e-3, 400.0]]
@@ -44,7 +40,7 @@ def test_a_file_is_taken_in_and_the_resolved_scene_needs_it_no_more(tmp_path: Pa
     scene = load_scene(tmp_path / "case.toml")
     assert problem_of(scene) == problem_of(load(f"line.dropper.curve={POINTS}"))
     (tmp_path / "dropper.csv").unlink()
-    again = scene_from(resolved(scene), Origin("a result", recorded=True))
+    again = recorded(scene)
     assert problem_of(again) == problem_of(scene)
 
 

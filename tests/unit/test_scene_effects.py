@@ -7,14 +7,12 @@ from collections.abc import Iterator
 from dataclasses import fields
 
 import pytest
+from scenes import Scene, load_scene, problem_of, resolved, scene_from
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.cases.run.planning.plan import effect_rows
 from catenary.cases.scene.input.faults import Origin
 from catenary.cases.scene.keys.keys import known_keys
-from catenary.cases.scene.load import load_scene, scene_from
-from catenary.cases.scene.problem import problem_of, resolved
-from catenary.cases.scene.scene import Scene
 from catenary.solver.effects import all_effects as effects
 from catenary.solver.effects.effect import Effect, register, unregister
 

@@ -5,12 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
+from scenes import given, load_scene, problem_of
 
-from catenary.base.errors import InputError
+import catenary
+from catenary import InputError
 from catenary.cases.run.describe.arrivals import arrival_facts
-from catenary.cases.run.planning.plan import make_plan, plan_text
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.problem import problem_of
 from catenary.solver.problem.ends import AbsorbingLayer, Fixed, Periodic
 
 END = "line.ends.end"
@@ -91,15 +90,14 @@ def test_plan_and_arrivals_tell_how_the_line_ends() -> None:
     short = load_scene("en50318_2002", ["line.n_spans=16", "evaluation.to_m=900"])
     fixed = arrival_facts(short, problem_of(short))
     assert any("reflection from the end of the line" in text for text in fixed["warnings"])
-    scene = load_scene(
-        "en50318_2002", ["line.n_spans=16", "evaluation.to_m=700", LAYER, f"{END}.spans=4"]
-    )
+    words = ["line.n_spans=16", "evaluation.to_m=700", LAYER, f"{END}.spans=4"]
+    scene = load_scene("en50318_2002", words)
     facts = arrival_facts(scene, problem_of(scene))
     assert not any("reflection" in text for text in facts["warnings"])
     (inside,) = (text for text in facts["warnings"] if "inside the absorbing layer" in text)
     assert "begins at 720 m" in inside
     assert facts["pantographs"][0]["far_end_met_at_m"] is None
-    assert "end 4 spans that absorb waves" in plan_text(make_plan(scene))
+    assert "end 4 spans that absorb waves" in str(catenary.plan(given("en50318_2002", words)))
 
 
 def test_the_far_end_is_not_met_where_a_window_ends_before_it() -> None:

@@ -11,13 +11,10 @@ import numpy as np
 import pytest
 from free_tables import as_free
 from measuring import march
+from scenes import Scene, line_of, load_scene, mesh_of, problem_of, resolved, scene_from
 
-from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.input.faults import Origin, SceneError
 from catenary.cases.scene.input.toml_input import read_toml
-from catenary.cases.scene.load import load_scene, scene_from
-from catenary.cases.scene.problem import line_of, problem_of, resolved
-from catenary.cases.scene.scene import Scene
 from catenary.meshgen.topologies.all_topologies import make_line
 from catenary.meshgen.wires import End, Role
 from catenary.solver.statics.line_at_rest import line_at_rest
@@ -293,6 +290,6 @@ def test_tension_that_is_lost_is_lost_by_what_is_clamped() -> None:
 
 
 def make_line_of_example() -> Any:
-    from catenary.cases.scene.problem import line_data_of
+    from scenes import line_data_of
 
     return make_line(line_data_of(scene_of(example())))

@@ -7,13 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scenes import Scene, load_scene, problem_of, recorded, resolved, scene_from
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.cases.scene.checks.scene import MIN_SEPARATION
 from catenary.cases.scene.input.faults import Origin
-from catenary.cases.scene.load import load_scene, scene_from
-from catenary.cases.scene.problem import end_of, problem_of, resolved
-from catenary.cases.scene.scene import Scene
+from catenary.cases.scene.problem import end_of
 from catenary.mbs.head.strips import Flexure, Strips, Suspension, Turning
 from catenary.mbs.mechanism.pantograph_data import MultibodyData
 from catenary.mbs.vehicle.base_motion import Harmonic, Table, VehicleMotion
@@ -93,12 +92,12 @@ def test_files_are_taken_in_and_the_resolved_scene_needs_them_no_more(tmp_path: 
     assert scene.vehicle is not None and scene.vehicle.vertical is not None
     assert scene.vehicle.vertical.by_place == pairs
     file.unlink()
-    again = scene_from(resolved(scene), Origin("a result", recorded=True))
+    again = recorded(scene)
     assert problem_of(again) == problem_of(scene)
 
 
 def test_a_case_s_files_are_beside_it(tmp_path: Path) -> None:
-    from catenary.cases.scene.input.case_files import find_case
+    from scenes import find_case
 
     (tmp_path / "sway.csv").write_text("0,0\n10,0.01\n20,0\n30,0.01\n")
     case = find_case(CASE).read_text()

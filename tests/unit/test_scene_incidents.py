@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import pytest
+from scenes import Scene, given, load_scene, problem_of, recorded
 
-from catenary.base.errors import InputError
+import catenary
+from catenary import InputError
 from catenary.cases.run.describe.defects import incident_facts
-from catenary.cases.run.planning.plan import make_plan, plan_text
-from catenary.cases.scene.input.faults import Origin
-from catenary.cases.scene.load import load_scene, scene_from
-from catenary.cases.scene.problem import problem_of, resolved
-from catenary.cases.scene.scene import Scene
 from catenary.mbs.lowering import Lowering
 from catenary.solver.problem.incidents import DropperBreak, TensionLoss
 
@@ -43,7 +40,7 @@ def test_incidents_are_converted_and_rounded_to_steps() -> None:
 
 def test_a_resolved_scene_is_the_same_again() -> None:
     first = scene()
-    again = scene_from(resolved(first), Origin("the result file", recorded=True))
+    again = recorded(first)
     assert problem_of(again) == problem_of(first)
     assert len(again.incidents) == 3
 
@@ -53,8 +50,7 @@ def test_one_key_of_an_incident_is_changed() -> None:
 
 
 def test_the_plan_tells_incidents_in_order_of_time() -> None:
-    plan = make_plan(scene())
-    text = plan_text(plan)
+    text = str(catenary.plan(given("en50318_2002", [INCIDENTS])))
     simulated, _ = text.split("Not simulated:")
     assert all(kind in simulated for kind in KINDS)
     first, second, third = (line for line in text.splitlines() if line.startswith("  incident"))
@@ -67,12 +63,13 @@ def test_the_plan_tells_incidents_in_order_of_time() -> None:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_an_effect_that_is_left_out_is_not_told(kind: str) -> None:
-    found = scene(f"effects.{kind}=false")
+    words = [INCIDENTS, f"effects.{kind}=false"]
+    found = load_scene("en50318_2002", words)
     told = [fact["type"] for fact in incident_facts(found, problem_of(found))]
     assert sorted([*told, kind]) == sorted(KINDS)
-    plan = make_plan(found)
-    assert kind in [row.name for row in plan.off]
-    assert [label for label, _ in plan.rows].count("incident") == 2
+    plan = catenary.plan(given("en50318_2002", words))
+    assert plan.effects.simulated[kind] is False
+    assert str(plan).count("\n  incident") == 2
 
 
 def test_an_incident_that_cannot_be_is_told_beside_a_chosen_effect() -> None:
@@ -88,16 +85,15 @@ def test_a_dropper_that_breaks_has_its_place() -> None:
 
 
 def test_without_incidents_there_are_no_effects_of_them() -> None:
-    plan = make_plan(load_scene("en50318_2002"))
-    reasons = {row.name: row.reason for row in plan.off}
+    plan = catenary.plan("en50318_2002")
     for kind in KINDS:
-        assert reasons[kind] == (
+        assert plan.effects.reason[kind] == (
             f"the scene has no data for it: an entry of incidents of type {kind}"
         )
-    assert "incident" not in plan_text(plan).split("Simulated:")[0]
+    assert "incident" not in str(plan).split("Simulated:")[0]
 
 
 def test_a_lost_tension_may_make_a_train_supercritical() -> None:
     words = "incidents=[{type='tension_loss',at_s=2.0,wire='contact_wire',share=0.3}]"
-    found = load_scene("en50318_2002", [words, "effects.supercritical_speed=true"])
-    assert "supercritical_speed" in [row.name for row in make_plan(found).on]
+    found = given("en50318_2002", [words, "effects.supercritical_speed=true"])
+    assert catenary.plan(found).effects.simulated["supercritical_speed"] is True

@@ -7,15 +7,12 @@ import string
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from verb_runner import CliRunner
+from scenes import Scene, load_scene, resolved, scene_from
+from verb_runner import invoke
 
-from catenary.base.errors import InputError
-from catenary.cases.cli.main import app
+from catenary import InputError
 from catenary.cases.scene.input.faults import Origin
 from catenary.cases.scene.keys.keys import known_keys
-from catenary.cases.scene.load import load_scene, scene_from
-from catenary.cases.scene.problem import resolved
-from catenary.cases.scene.scene import Scene
 
 KEYS = [key.replace("*", "0") for key in known_keys(Scene)]
 NUMBERS = st.one_of(
@@ -90,7 +87,7 @@ def test_the_command_line_exits_with_0_or_with_2_and_one_line(key: str, value: f
     # Sizes are bounded by the schema, but a mesh of the largest allowed line takes minutes.
     if key in ("line.n_spans", "mesh.elements_per_gap", "mesh.support_refinement"):
         value = -abs(value)
-    result = CliRunner().invoke(app, ["check", "en50318_2002", "--set", f"{key}={value}"])
+    result = invoke("check", "en50318_2002", "--set", f"{key}={value}")
     assert result.exit_code in (0, 2), result.output
     if result.exit_code == 2:
         assert all(line.startswith("catenary: ") for line in result.output.splitlines())

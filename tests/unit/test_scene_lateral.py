@@ -5,12 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from free_tables import as_free
+from scenes import line_data_of, load_scene, problem_of, scene_from
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.cases.run.planning.plan import effect_rows
 from catenary.cases.scene.input.faults import Origin
-from catenary.cases.scene.load import load_scene, scene_from
-from catenary.cases.scene.problem import line_data_of, problem_of
 from catenary.solver.effects.all_effects import active
 
 ON = "effects.lateral_motion=true"

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import pytest
+from scenes import Scene, load_scene, problem_of, recorded
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.cases.run.describe.pantographs import kind_lines
-from catenary.cases.scene.input.faults import Origin
-from catenary.cases.scene.load import load_scene, scene_from
-from catenary.cases.scene.problem import problem_of, resolved
-from catenary.cases.scene.scene import Scene
 from catenary.mbs.control import Regulation
 from catenary.mbs.head.laws import Law
 from catenary.solver.effects import all_effects as effects
@@ -64,7 +61,7 @@ def test_a_regulation_is_data() -> None:
 
 def test_the_resolved_scene_is_the_same_again_and_names_what_acts() -> None:
     scene = load(f"{KIND}.laws=[{','.join(LAWS)}]", f"{KIND}.regulation={{{PI}}}")
-    again = scene_from(resolved(scene), Origin("a result", recorded=True))
+    again = recorded(scene)
     assert problem_of(again) == problem_of(scene)
     active = {effect.name for effect in effects.active(problem_of(scene))}
     assert {"pantograph_laws", "regulated_lift"} <= active

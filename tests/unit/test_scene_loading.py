@@ -7,14 +7,21 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scenes import (
+    Scene,
+    find_case,
+    line_data_of,
+    load_scene,
+    problem_of,
+    resolved,
+    scene_from,
+    shipped,
+)
 
-from catenary.base.errors import InputError
-from catenary.cases.scene.input.case_files import find_case, shipped
+from catenary import InputError
 from catenary.cases.scene.input.faults import Origin
 from catenary.cases.scene.keys.units import unit_of
-from catenary.cases.scene.load import load_scene, scene_from
-from catenary.cases.scene.problem import end_of, line_data_of, problem_of, resolved
-from catenary.cases.scene.scene import Scene
+from catenary.cases.scene.problem import end_of
 
 # Keys that other programs rely on.
 CONTRACT = [

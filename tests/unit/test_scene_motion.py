@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scenes import Scene, given, load_scene, problem_of, recorded, resolved
 
-from catenary.base.errors import InputError, RunBroken
-from catenary.cases.run.planning.plan import make_plan, plan_text
+import catenary
+from catenary import InputError, RunBroken
 from catenary.cases.scene.cost_model import estimate_march
-from catenary.cases.scene.input.faults import Origin
-from catenary.cases.scene.load import load_scene, scene_from
-from catenary.cases.scene.problem import problem_of, resolved
-from catenary.cases.scene.scene import Scene
 from catenary.mbs.build import has_joints
 from catenary.mbs.head.stepping import Stepping
 from catenary.mbs.lumped_data import LumpedData
@@ -71,7 +68,7 @@ def test_resolved_scene_is_the_same_again_and_holds_only_what_acts(overrides: li
     scene = load(*overrides)
     table = resolved(scene)["pantographs"]["seven_body"]
     assert OWN_KEYS & set(table) == (OWN_KEYS if overrides else set())
-    again = scene_from(resolved(scene), Origin("a result", recorded=True))
+    again = recorded(scene)
     assert problem_of(again) == problem_of(scene)
 
 
@@ -121,17 +118,17 @@ def test_a_wire_beyond_the_bodies_reach_breaks_the_start_in_one_sentence() -> No
 
 def test_plan_names_the_model_and_counts_its_cost_and_channel() -> None:
     flushes = "output.flush_every_steps=100"
-    reduced_plan = make_plan(load(flushes))
-    plan = make_plan(load(ALL, f"{KIND}.substeps=2", flushes))
-    assert "reduced to tables over its height" in plan_text(reduced_plan)
+    reduced_plan = catenary.plan(given(CASE, [flushes]))
+    plan = catenary.plan(given(CASE, [ALL, f"{KIND}.substeps=2", flushes]))
+    assert "reduced to tables over its height" in str(reduced_plan)
     told = "all bodies in the time loop in 2 substeps, joints kept by coordinate_partitioning"
-    assert told in plan_text(plan)
-    n = plan.needs.n_steps
-    more = plan.needs.march - reduced_plan.needs.march
+    assert told in str(plan)
+    n = plan.figures["n_steps"]
+    more = plan.figures["wall_s"] - reduced_plan.figures["wall_s"]
     expected = estimate_march(0, n, "one_solve", 2) - estimate_march(0, n, "one_solve")
     assert more == pytest.approx(expected, rel=1e-9)
     # 0.2 to 0.4 ms a substep.
     assert 2 * 2e-4 * n < more < 2 * 4e-4 * n
     # A number a row, in chunks that are kept whole, each with its entry in an index.
-    more = plan.needs.files.result - reduced_plan.needs.files.result
+    more = plan.figures["result_B"] - reduced_plan.figures["result_B"]
     assert 8 * (n + 1) < more < 1.2 * 8 * (n + 1)

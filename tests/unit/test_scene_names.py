@@ -5,11 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from measuring import matrix_of
+from scenes import line_of, load_scene, mesh_of, problem_of
 
-from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.input.faults import SceneError
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.problem import line_of, problem_of
 from catenary.meshgen.wires import Role
 from catenary.solver.model.switching_links import switching_links
 from catenary.solver.problem.incidents import TensionLoss

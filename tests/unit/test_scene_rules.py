@@ -4,18 +4,14 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
 
 import pytest
-from verb_runner import CliRunner
+from scenes import Scene, load_scene, read_draft, recorded, resolved, scene_from
+from verb_runner import invoke
 
-from catenary.base.errors import InputError
-from catenary.cases.cli.main import app
+from catenary import InputError
 from catenary.cases.scene.input.faults import Origin
-from catenary.cases.scene.load import load_scene, read_draft, scene_from
-from catenary.cases.scene.problem import resolved
 from catenary.cases.scene.run.case import LimitsTable, chosen_books, rule_entries
-from catenary.cases.scene.scene import Scene
 from catenary.postproc.standards.quantities import LIMIT_KEYS
 
 CASE = "en50318_2002"
@@ -93,7 +89,7 @@ def test_a_book_beside_the_case_judges_too(folder: Path, monkeypatch: pytest.Mon
     # The result keeps the book itself, and does not change with the file.
     (folder / "mine.toml").unlink()
     assert rule_entries(judged.evaluation)[1]["criteria"][0]["limit"] == {"value": 30}  # type: ignore[index]
-    assert books(scene_from(resolved(judged), Origin("run.h5", recorded=True))) == [
+    assert books(recorded(judged)) == [
         "en50367:2020",
         "mine",
     ]
@@ -173,10 +169,6 @@ def test_what_is_refused(name: str) -> None:
         scene(*overrides)
     text = str(refused.value)
     assert says in text and "\n" not in text and "more:" not in text, text
-
-
-def invoke(*words: str) -> Any:
-    return CliRunner().invoke(app, list(words))
 
 
 def test_list_tells_books_and_their_criteria() -> None:

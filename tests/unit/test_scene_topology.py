@@ -7,12 +7,10 @@ import re
 import numpy as np
 import pytest
 from measuring import check
+from scenes import line_of, load_scene, mesh_of, problem_of
 
 from catenary.cases.run.at_rest.static_table import static_table
-from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.input.faults import SceneError
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.problem import line_of, problem_of
 from catenary.cases.terminal.terminal_text import static_text
 from catenary.meshgen.wires import Role
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import pytest
+from scenes import given, load_scene, mesh_of, problem_of
 
-from catenary.base.errors import InputError
+import catenary
+from catenary import InputError
 from catenary.cases.run.planning.needs import needs_before_meshing
-from catenary.cases.run.planning.plan import make_plan, plan_text
-from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.checks.effects import needs_relative_motion
 from catenary.cases.scene.checks.mesh_size import size_of
 from catenary.cases.scene.input.faults import SceneError
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.problem import problem_of
 from catenary.cases.studies.accuracy.axes import planes
 from catenary.cases.studies.effect_cost.study import switchable_effects
 from catenary.cases.studies.waves.excited import Settings, excitation_of
@@ -144,18 +142,16 @@ def test_an_effect_that_nobody_has_looked_at_is_taken_to_move_them_apart() -> No
 def test_what_is_planned_counts_shared_unknowns_once(topology: str, relative: bool) -> None:
     """Before there is a mesh, and of it; so that memory and time are estimated for stations of
     four unknowns, not six or eight."""
-    scene = load_scene(
-        TWIN,
-        [f"line.topology={topology}", f"effects.relative_motion={str(relative).lower()}"],
-        shortened=True,
-    )
+    words = [f"line.topology={topology}", f"effects.relative_motion={str(relative).lower()}"]
+    scene = load_scene(TWIN, words, shortened=True)
     numbering = numbering_of(problem_of(scene), mesh_of(scene))
-    size, plan, needs = size_of(scene), make_plan(scene), needs_before_meshing(scene)
+    size, needs = size_of(scene), needs_before_meshing(scene)
+    plan = catenary.plan(given(TWIN, words, short=True))
     assert size is not None and needs is not None
-    assert size.unknowns == plan.n_dofs == numbering.n_unknowns
-    assert size.nodes == plan.n_nodes == numbering.numbers.shape[0]
-    assert needs.march == pytest.approx(plan.needs.march, rel=1e-9)
-    text = plan_text(plan)
+    assert size.unknowns == plan.figures["n_unknowns"] == numbering.n_unknowns
+    assert size.nodes == plan.figures["n_nodes"] == numbering.numbers.shape[0]
+    assert needs.march == pytest.approx(plan.figures["wall_s"], rel=1e-9)
+    text = str(plan)
     assert ("contact_wire_2 with those of contact_wire" in text) != relative
     assert f"{numbering.n_unknowns} " in text
     assert ("  relative_motion " in text[: text.index("Not simulated:")]) == relative

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import pytest
+from scenes import load_scene, problem_of
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.cases.run.describe.pantographs import kind_lines
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.problem import problem_of
 from catenary.solver.effects.all_effects import active
 
 CALM = "wind.speed_m_per_s=0"

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import pytest
+from scenes import given, load_scene, problem_of
 
-from catenary.base.errors import InputError
-from catenary.cases.run.planning.plan import make_plan, plan_text
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.problem import problem_of
+import catenary
+from catenary import InputError
 from catenary.solver.problem.problem import WindowChoice
 from catenary.solver.window.choice import estimated_error
 
@@ -71,10 +70,10 @@ def light_fading() -> float:
 
 
 def test_the_plan_says_what_moves() -> None:
-    assert "window" not in plan_text(make_plan(load_scene("en50318_2002")))
-    bounded = plan_text(make_plan(load_scene("en50318_2002", (BOUNDED, AHEAD, BEHIND))))
+    assert "window" not in str(catenary.plan("en50318_2002"))
+    bounded = str(catenary.plan(given("en50318_2002", (BOUNDED, AHEAD, BEHIND))))
     assert "6 spans move ahead of the train and 4 behind" in bounded
     assert "% of its standard deviation (estimate)" in bounded
     assert "what the line's own ends send back from beyond is left out" in bounded
-    exact = plan_text(make_plan(load_scene("en50318_2002", ("window.mode=exact",))))
+    exact = str(catenary.plan(given("en50318_2002", ["window.mode=exact"])))
     assert "whatever a wave has reached moves" in exact

@@ -11,16 +11,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+import verb_runner
 from measuring import check
 from mpi4py import MPI
-from verb_runner import CliRunner
+from scenes import load_scene, mesh_of, problem_of
 
-from catenary.base.errors import InputError
-from catenary.cases.cli.main import app
+from catenary import InputError
 from catenary.cases.run.prepared import sound_rest
-from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.problem import problem_of
 from catenary.cases.studies.sensitivity.output import as_text, table_of
 from catenary.cases.studies.sensitivity.parameters import ChangedScenes, Parameter
 from catenary.cases.studies.sensitivity.study import Sensitivity, change_by, sensitivity_of
@@ -44,18 +41,12 @@ TINY = (
 KEYS = ["pantographs.reference.static_force_N", "line.contact_wire.tension_N"]
 
 
-@pytest.fixture(autouse=True)
-def own_hook(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The command line installs an exception hook; it goes with the test."""
-    monkeypatch.setattr(sys, "excepthook", sys.excepthook)
-
-
 def scenes(*words: str, case: str = CASE) -> ChangedScenes:
     return ChangedScenes(load_scene(case, words))
 
 
 def invoke(*words: str) -> Any:
-    return CliRunner().invoke(app, ["sensitivity", CASE, *words])
+    return verb_runner.invoke("sensitivity", CASE, *words)
 
 
 @functools.cache

@@ -8,11 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from verb_runner import CliRunner
+from scenes import load_scene
+from verb_runner import invoke
 
 import catenary
-from catenary.cases.cli.main import app
-from catenary.cases.scene.load import load_scene
 from catenary.cases.studies.questions.separation import (
     Distances,
     Period,
@@ -48,7 +47,7 @@ def test_distances_are_even_and_end_in_the_range() -> None:
     ],
 )
 def test_what_is_no_range_is_refused(words: list[str], told: str) -> None:
-    done = CliRunner().invoke(app, ["separation", CASE, *words])
+    done = invoke("separation", CASE, *words)
     assert done.exit_code == 2 and told in done.output
 
 
@@ -121,7 +120,7 @@ def test_a_period_is_found_in_a_decaying_curve(period: float) -> None:
 def test_the_command_agrees_with_runs_by_hand(tmp_path: Path) -> None:
     """300 m is refused there: the leading one would start in the evaluated stretch."""
     words = ["separation", CASE, "--short", "--from", "60", "--to", "300", "--step", "120"]
-    done = CliRunner().invoke(app, [*words, "-o", str(tmp_path)])
+    done = invoke(*words, "-o", str(tmp_path))
     assert done.exit_code == 0, done.output
     assert "could not be run, the first is 300 m: evaluation.from_m" in done.output
     alone, near, far, refused = csv.DictReader(

@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 from measuring import start_march
 from mpi4py import MPI
+from scenes import given, load_scene
+from scenes import mesh_of as mesh_of_scene
+from scenes import problem_of as problem_of_scene
 from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of, train
 
+import catenary
 from catenary.cases.run.planning.needs import needs_with_mesh
-from catenary.cases.run.planning.plan import make_plan, plan_text
-from catenary.cases.run.scene_mesh import mesh_of as mesh_of_scene
 from catenary.cases.scene.cost_model import (
     SEVERAL_TYPES,
     STATION_COST,
@@ -21,8 +23,6 @@ from catenary.cases.scene.cost_model import (
     cost_of_stations,
     estimate_march,
 )
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.problem import problem_of as problem_of_scene
 from catenary.solver.effects.build_model import numbering_of
 from catenary.solver.integrators import slow_path
 from catenary.solver.integrators.slow_path import PARTS, slow_path_of
@@ -36,14 +36,14 @@ BY_COMPONENT = "line.damping.per_component={contact_wire={alpha_s=0.01,beta_per_
 
 def test_the_plan_says_what_makes_steps_slower_and_by_how_much() -> None:
     plain, damped, slow = (
-        make_plan(load_scene("en50318_2002", more))
+        catenary.plan(given("en50318_2002", more))
         for more in ([], [*HHT, BY_COMPONENT], ['numerics.coupling="explicit"'])
     )
     for plan in (plain, damped):
-        assert plan.needs.slow_path is None and "slower" not in plan_text(plan)
-    assert "numerics.coupling" in str(slow.needs.slow_path)
-    assert str(slow.needs.slow_path) in plan_text(slow)
-    assert slow.needs.march == pytest.approx(PARTS * plain.needs.march)
+        assert "slower" not in str(plan)
+    (told,) = (line for line in str(slow).splitlines() if "slower" in line)
+    assert "numerics.coupling" in told
+    assert slow.figures["wall_s"] == pytest.approx(PARTS * plain.figures["wall_s"])
 
 
 def test_log_and_outcome_of_a_march_say_the_same(

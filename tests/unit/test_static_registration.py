@@ -4,20 +4,13 @@ from __future__ import annotations
 
 import csv
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-from verb_runner import CliRunner
-
-from catenary.cases.cli.main import app
+from verb_runner import invoke
 
 SHORT = ["line.n_spans=5", "train.start_m=60", "evaluation.from_m=110", "evaluation.to_m=165"]
 RUN = [word for change in SHORT for word in ("--set", change)]
-
-
-def invoke(*words: str) -> Any:
-    return CliRunner().invoke(app, list(words))
 
 
 def rows_of(path: Path) -> list[dict[str, float]]:

@@ -7,10 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
-from verb_runner import CliRunner
+from verb_runner import invoke
 
-from catenary.base.errors import InputError
-from catenary.cases.cli.main import app
+from catenary import InputError
 from catenary.cases.run.at_rest.temperatures import range_of, temperature_text
 from catenary.solver.model.wire_ends import WireEnd
 from catenary.solver.statics.tension_along import LineAtTemperature, WireAtRest
@@ -44,7 +43,7 @@ def test_the_verb_prints_a_table_and_draws_it(tmp_path: Path) -> None:
     picture = tmp_path / "range.png"
     assigned = [word for key in SCENE for word in ("--set", key)]
     words = ["static", "en50318_2002", *assigned, "--temperatures=-20,20", "-o", str(picture)]
-    done = CliRunner().invoke(app, words)
+    done = invoke(*words)
     assert done.exit_code == 0, done.output
     rows = [line.split() for line in done.output.splitlines()]
     contact = {float(row[0]): row for row in rows if len(row) == 8 and row[1] == "contact_wire"}
@@ -63,7 +62,7 @@ def test_a_scene_at_a_temperature_has_the_table_of_it() -> None:
     assigned = [
         word for key in (*SCENE, "line.temperature.difference_K=15") for word in ("--set", key)
     ]
-    done = CliRunner().invoke(app, ["static", "en50318_2002", *assigned])
+    done = invoke("static", "en50318_2002", *assigned)
     assert done.exit_code == 0, done.output
     table = done.output[done.output.index("dT [K]") :]
     assert table.splitlines()[1].split()[:2] == ["15", "contact_wire"]
@@ -78,7 +77,7 @@ def test_a_scene_at_a_temperature_has_the_table_of_it() -> None:
     ],
 )
 def test_what_cannot_be_is_refused(words: list[str], sentence: str) -> None:
-    done = CliRunner().invoke(app, ["static", "en50318_2002", *words])
+    done = invoke("static", "en50318_2002", *words)
     assert done.exit_code == 2 and sentence in done.output, done.output
 
 

@@ -4,22 +4,16 @@ from __future__ import annotations
 
 import json
 import shutil
-import sys
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
-from verb_runner import CliRunner
+from scenes import Scene, load_scene, resolved, shipped
+from verb_runner import invoke
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.cases.ambrosio2012.study import TABLE, variants
-from catenary.cases.cli.main import app
-from catenary.cases.scene.input.case_files import shipped
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.problem import resolved
-from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.case_study import StudyVariant, make_plan
 from catenary.cases.studies.paper.runs import PaperStudy, changes_of
 from catenary.postproc.report.study_report import (
@@ -35,16 +29,6 @@ from catenary.postproc.report.study_report import (
 )
 
 pytestmark = pytest.mark.usefixtures("quick_reports")
-
-
-@pytest.fixture(autouse=True)
-def own_hook(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The command line installs an exception hook; it goes with the test."""
-    monkeypatch.setattr(sys, "excepthook", sys.excepthook)
-
-
-def invoke(*words: str) -> Any:
-    return CliRunner().invoke(app, list(words))
 
 
 def own_case(folder: Path, study: str) -> Path:

@@ -10,7 +10,7 @@ import pytest
 from measuring import check
 from small_lines import BARE, bare_wires, mesh_of, problem_of
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.cases.ambrosio2012.study import TABLE
 from catenary.cases.studies.paper import conclusion, statements
 from catenary.cases.studies.paper.runs import PaperStudy, Rows

@@ -13,12 +13,11 @@ from typing import Any
 import pytest
 from matplotlib.figure import Figure
 from measuring import COMM
-from verb_runner import CliRunner
+from verb_runner import invoke
 from word_scenes import with_words
 
 import catenary
-from catenary.base.errors import InputError
-from catenary.cases.cli.main import app
+from catenary import InputError
 from catenary.cases.result_folder import output_folder
 from catenary.cases.run.planning.needs import needs_before_meshing
 from catenary.cases.run.runner import run_case
@@ -54,16 +53,6 @@ SLACK = "line.dropper.pre_sag_mid_mm=-100"
 
 def tiny(*variants: Variant) -> list[Job]:
     return make_jobs(CASE, variants or product([parse_vary(VARIED)], {}), TINY)
-
-
-def invoke(*words: str) -> Any:
-    return CliRunner().invoke(app, list(words))
-
-
-@pytest.fixture(autouse=True)
-def own_hook(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The command line installs an exception hook; it goes with the test."""
-    monkeypatch.setattr(sys, "excepthook", sys.excepthook)
 
 
 @pytest.fixture(scope="module")

@@ -11,10 +11,11 @@ import numpy as np
 import pandas as pd
 import pytest
 from mpi4py import MPI
+from scenes import read_draft
 
 import catenary
-from catenary.base.errors import InputError
-from catenary.cases.scene.load import Draft, read_draft
+from catenary import InputError
+from catenary.cases.scene.load import Draft
 from catenary.cases.studies import merged_sweeps
 from catenary.cases.studies.records import FOLDER
 from catenary.cases.studies.sweep.force_histograms import force_histograms

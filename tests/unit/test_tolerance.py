@@ -10,14 +10,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from verb_runner import CliRunner
+from scenes import Scene, line_of, read_draft
+from verb_runner import invoke
 
-from catenary.base.errors import InputError
-from catenary.cases.cli.main import app
+from catenary import InputError
 from catenary.cases.run.at_rest.static_table import static_table
-from catenary.cases.scene.load import Draft, read_draft
-from catenary.cases.scene.problem import line_of
-from catenary.cases.scene.scene import Scene
+from catenary.cases.scene.load import Draft
 from catenary.cases.studies import scene_sets
 from catenary.cases.studies.scene_sets import BROKE, BoundTable
 from catenary.cases.studies.task_files import read_task
@@ -333,7 +331,7 @@ def test_the_verb_writes_what_it_says(
     words = ["tolerance", "en50318_2002", str(file), "-o", str(tmp_path / "out")]
     for key, value in TINY.items():
         words += ["--set", f"{key}={value}"]
-    done = CliRunner().invoke(app, words)
+    done = invoke(*words)
     assert done.exit_code == 0, done.output
     assert "speed +-40 km/h: 19 of 19 lines run, " in done.output
     record = json.loads((tmp_path / "out" / "tolerance.json").read_text())

@@ -6,12 +6,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scenes import Scene, line_of, load_scene, resolved
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.cases.run.at_rest.static_table import static_table
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.problem import line_of, resolved
-from catenary.cases.scene.scene import Scene
 from catenary.cases.scene.turned import has_mirrored_line, turned
 
 # Spans of two lengths in an order of their own, droppers that are no mirror image of themselves.

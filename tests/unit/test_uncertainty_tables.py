@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.cases.studies import merged_sweeps
 from catenary.cases.studies.sampling.tables import sampling_of
 from catenary.cases.studies.sweep.jobs import Ended

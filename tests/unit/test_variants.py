@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.cases.studies.sweep.variants import (
     Variant,
     check_keys,

@@ -6,9 +6,8 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
-from verb_runner import CliRunner
+from verb_runner import invoke
 
-from catenary.cases.cli.main import all_verbs
 from catenary.cases.cli.varied_words import each_varied
 
 CASE = "en50318_2002"
@@ -47,7 +46,7 @@ def test_all_combinations_of_keys_after_one_option_are_run(tmp_path: Path) -> No
     words = ["sweep", CASE, "--short", "--only-statistics"]
 
     def swept(name: str, *more: str) -> pd.DataFrame:
-        done = CliRunner().invoke(all_verbs(), [*words, "-o", str(tmp_path / name), *more])
+        done = invoke(*words, "-o", str(tmp_path / name), *more)
         assert done.exit_code == 0, done.output
         return pd.read_csv(tmp_path / name / "sweep.csv").drop(columns="wall_s", errors="ignore")
 
@@ -60,7 +59,7 @@ def test_all_combinations_of_keys_after_one_option_are_run(tmp_path: Path) -> No
 
 def test_submitted_sweeps_vary_them_too(tmp_path: Path) -> None:
     words = ["submit", CASE, "--short", "-o", str(tmp_path / "out"), "--array", "4", "--print"]
-    done = CliRunner().invoke(all_verbs(), [*words, "--vary", SPEEDS, LAWS, STEP])
+    done = invoke(*words, "--vary", SPEEDS, LAWS, STEP)
     assert done.exit_code == 0, done.output
     assert f"--set {STEP}" in done.output
     assert f"--vary {SPEEDS} --vary {LAWS}" in done.output
@@ -76,5 +75,5 @@ def test_submitted_sweeps_vary_them_too(tmp_path: Path) -> None:
     ],
 )
 def test_refusals_name_the_option(words: list[str], told: str, tmp_path: Path) -> None:
-    done = CliRunner().invoke(all_verbs(), ["sweep", CASE, "-o", str(tmp_path / "out"), *words])
+    done = invoke("sweep", CASE, "-o", str(tmp_path / "out"), *words)
     assert done.exit_code == 2 and told in done.stderr, done.output

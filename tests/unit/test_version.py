@@ -8,9 +8,7 @@ from datetime import date
 from importlib import metadata
 from pathlib import Path
 
-from verb_runner import CliRunner
-
-from catenary.cases.cli.main import app
+from verb_runner import invoke
 
 ROOT = Path(__file__).parents[2]
 VERSION = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
@@ -25,7 +23,7 @@ def citation() -> dict[str, str]:
 
 def test_the_installed_program_tells_it() -> None:
     assert metadata.version("catenary") == VERSION, "run make setup"
-    assert CliRunner().invoke(app, ["--version"]).stdout.splitlines()[0] == f"catenary {VERSION}"
+    assert invoke("--version").stdout.splitlines()[0] == f"catenary {VERSION}"
 
 
 def test_the_changelog_begins_with_unreleased_changes_and_then_has_it() -> None:

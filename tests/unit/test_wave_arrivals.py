@@ -8,6 +8,7 @@ import math
 import numpy as np
 import pytest
 from measuring import check
+from scenes import load_scene, problem_of
 
 from catenary.cases.run.describe.arrivals import arrival_facts, wave_line
 from catenary.cases.run.describe.wave_arrivals import (
@@ -21,8 +22,6 @@ from catenary.cases.run.describe.wave_arrivals import (
     run_in_for,
     start_share,
 )
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.problem import problem_of
 
 # One string, 1000 m, waves of 100 m/s.
 STRING = WaveLine(0.0, 1000.0, 50.0, 100.0, 100.0, 0.0, 0.0, 2.0 * math.pi)

@@ -7,10 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from verb_runner import CliRunner
+from verb_runner import invoke
 
 import catenary
-from catenary.cases.cli.main import app
 from catenary.cases.studies.questions.what_if import AS_IT_IS, CHANGED, _pairs
 from catenary.postproc.evaluate.statistics import slack_times
 from catenary.postproc.read.results import Results
@@ -25,7 +24,7 @@ CHANGE = "train.speed_km_h=320"
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """At 320 km/h the deviation and the speed fail, which pass as it is."""
     out = tmp_path_factory.mktemp("what_if")
-    done = CliRunner().invoke(app, ["what-if", CASE, "--short", "--set", CHANGE, "-o", str(out)])
+    done = invoke("what-if", CASE, "--short", "--set", CHANGE, "-o", str(out))
     assert done.exit_code == 0, done.output
     (out / "said.txt").write_text(done.output)
     return out
@@ -103,12 +102,12 @@ def test_places_are_paired_one_to_one() -> None:
     ],
 )
 def test_what_changes_nothing_or_is_wrong_is_refused(words: list[str], told: str) -> None:
-    done = CliRunner().invoke(app, ["what-if", CASE, *words])
+    done = invoke("what-if", CASE, *words)
     assert done.exit_code == 2 and told in done.output
 
 
 def test_without_a_folder_nothing_stays(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    done = CliRunner().invoke(app, ["what-if", CASE, "--short", "--set", "train.speed_km_h=240"])
+    done = invoke("what-if", CASE, "--short", "--set", "train.speed_km_h=240")
     assert done.exit_code == 0 and "Uplift at" in done.output
     assert not list(tmp_path.iterdir())

@@ -11,12 +11,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from measuring import march, registered
+from scenes import load_scene
 from small_lines import HANGING, en50318_line, mesh_of, problem_of, train
-from verb_runner import CliRunner
+from verb_runner import invoke
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.cases.cli.app import Force, RunWords, SceneWords, app
-from catenary.cases.scene.load import load_scene
 from catenary.cases.terminal import console
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
 from catenary.meshgen.topologies.all_topologies import make_line
@@ -122,11 +122,11 @@ def test_a_verb_is_a_command_of_the_application() -> None:
         console.say("a verb")
 
     try:
-        assert "hello" in CliRunner().invoke(app, ["--help"]).stdout
-        assert CliRunner().invoke(app, ["hello"]).stdout == "a verb\n"
+        assert "hello" in invoke("--help").stdout
+        assert invoke("hello").stdout == "a verb\n"
     finally:
         app.registered_commands.pop()
-    assert "hello" not in CliRunner().invoke(app, ["--help"]).stdout
+    assert "hello" not in invoke("--help").stdout
 
 
 CASE, SPEED = "en50318_2002", "train.speed_km_h"
@@ -150,20 +150,18 @@ def test_a_study_is_a_verb_with_a_scene_and_a_table() -> None:
         console.say(f"{words.case} {words.split()} {words.shortened}")
 
     def said(*words: str) -> list[str]:
-        return [line.split() for line in CliRunner().invoke(app, list(words)).stdout.splitlines()]
+        return [line.split() for line in invoke(*words).stdout.splitlines()]
 
     try:
         told = said("speeds", CASE, f"{SPEED}=210", "--set", f"{SPEED}=200", "--force")
         assert told == [["v", "[km/h]", "dt"], ["210.0", "0.002"]]
-        petsc = CliRunner().invoke(app, ["speeds", CASE, "--", "-log_view"])
+        petsc = invoke("speeds", CASE, "--", "-log_view")
         assert petsc.exit_code == 2 and "only run takes those" in petsc.stderr
-        without = CliRunner().invoke(app, ["speeds"])
+        without = invoke("speeds")
         assert without.exit_code == 2 and "Missing argument" in without.stderr
-        (both,) = (
-            CliRunner()
-            .invoke(app, ["split", "x", "--short", "--set", "a.b=1", "c=2", "--", "-log_view"])
-            .stdout.splitlines()
-        )
+        (both,) = invoke(
+            "split", "x", "--short", "--set", "a.b=1", "c=2", "--", "-log_view"
+        ).stdout.splitlines()
         assert both == "x (['a.b=1', 'c=2'], ['-log_view']) True"
     finally:
         del app.registered_commands[-2:]

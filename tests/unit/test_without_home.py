@@ -10,6 +10,7 @@ import tempfile
 from pathlib import Path
 
 import pytest
+from program import ENTRY
 
 NOBODY = ("setpriv", "--reuid=65534", "--regid=65534", "--clear-groups")
 
@@ -28,10 +29,9 @@ def test_a_user_without_home_and_without_write_access() -> None:
 
 
 def run_as_nobody(folder: Path) -> None:
-    program = "from catenary.cases.cli.main import main; main()"
     words = ["run", "en50318_2002", "--short", "--quiet", "-o", str(folder / "run")]
     done = subprocess.run(
-        [*NOBODY, sys.executable, "-c", program, *words],
+        [*NOBODY, sys.executable, "-c", ENTRY, *words],
         env={"HOME": "/nonexistent", "TMPDIR": str(folder)},
         cwd="/",
         capture_output=True,

@@ -17,7 +17,7 @@ import pytest
 from mpi4py import MPI
 from work_items import N_SLEEPERS, Count, sleep, sleepers, wait_for_end, work
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.cases.process.workers import Outcome, Pool, WorkerLost, at_once, cores, each, in_order
 
 pytestmark = pytest.mark.process

@@ -9,13 +9,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from verb_runner import CliRunner
+import verb_runner
+from scenes import find_case, load_scene, mesh_of, problem_of
 
-from catenary.cases.cli.main import app
-from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.input.case_files import find_case
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.problem import problem_of
 from catenary.cases.studies.questions import worst_output
 from catenary.cases.studies.questions.causes import Causes, elasticity_along, gust_forces
 from catenary.cases.studies.questions.worst import Passage, stands_out, worst_places
@@ -42,7 +38,7 @@ CHANGES = (
 
 
 def invoke(*words: str) -> str:
-    done = CliRunner().invoke(app, list(words))
+    done = verb_runner.invoke(*words)
     assert done.exit_code == 0, done.output
     return done.output
 
@@ -182,7 +178,7 @@ def test_the_pantograph_ahead_is_told_where_it_is_better() -> None:
 
 def test_what_is_no_run_is_refused(tmp_path: Path) -> None:
     for folder in (tmp_path / "nowhere", tmp_path):
-        done = CliRunner().invoke(app, ["worst", str(folder)])
+        done = verb_runner.invoke("worst", str(folder))
         assert done.exit_code == 2 and len(done.output.strip().splitlines()) == 1
 
 

@@ -6,12 +6,10 @@ import functools
 
 import numpy as np
 import pytest
+from scenes import load_scene, mesh_of, problem_of
 from studies import few
 
-from catenary.base.errors import InputError
-from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.problem import problem_of
+from catenary import InputError
 from catenary.cases.studies.waves.theory import WaveTheory, wave_theory
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest
 from catenary.solver.waves import bloch

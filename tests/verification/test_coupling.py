@@ -11,7 +11,7 @@ from scipy import signal
 from small_lines import HANGING, WHOLE, en50318_line, mesh_of, numerics, problem_of, train
 from studies import few
 
-from catenary.base.errors import RunBroken
+from catenary import RunBroken
 from catenary.mbs.head.stepping import Stepping
 from catenary.mbs.lumped import LumpedPantograph
 from catenary.mbs.lumped_data import LumpedData

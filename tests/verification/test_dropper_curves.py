@@ -14,17 +14,17 @@ from typing import Any
 import numpy as np
 import pytest
 from dense_line import DenseLine
+from equations import press
 from measuring import check, march, print_table
 from scipy import integrate, optimize
 from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of, train
 from studies import few
 
 from catenary.meshgen.hardware import DropperKind
-from catenary.meshgen.mesh import CONTACT_WIRE, LineMesh
+from catenary.meshgen.mesh import LineMesh
 from catenary.meshgen.topologies.line_data import LineData
 from catenary.solver.contact_problem.complementarity import Signs, System, room_for
 from catenary.solver.kernels import native
-from catenary.solver.model.beam import shape_values
 from catenary.solver.model.matrices import whole_matrix
 from catenary.solver.model.model import Model
 from catenary.solver.problem.defects import LooseClamp
@@ -226,18 +226,6 @@ def test_every_scheme_satisfies_the_law(name: str, way: dict[str, Any]) -> None:
     loose = steepest * (1e-13 + 2e-3 * 1e-10) if "scheme" in way else 0.0
     check("residual of motion [N]", left, 0.0, within=1e-7 + loose)
     check("forces of droppers [N]", shown, 0.0, within=1e-7 + loose)
-
-
-def press(residual: np.ndarray, model: Model, x: float, force: float) -> None:
-    """Take a contact force [N] off a residual, and what holds the anchors."""
-    nodes = model.mesh.wires[CONTACT_WIRE]
-    places = model.mesh.x(nodes)
-    e = int(np.searchsorted(places, x)) - 1
-    length = places[e + 1] - places[e]
-    own = nodes[e : e + 2]
-    unknowns = np.stack([model.dofs(own), model.dofs(own, "theta_y")], axis=1).ravel()
-    residual[unknowns] -= force * shape_values((x - places[e]) / length, length)
-    residual[model.constrained] = 0.0
 
 
 @pytest.mark.parametrize(

@@ -11,10 +11,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from mpi4py import MPI
+from scenes import load_scene
 from studies import few
 from ts_alpha2 import TS_ALPHA2
 
-from catenary.cases.scene.load import load_scene
 from catenary.cases.studies.hard import runs
 
 SHORT = (

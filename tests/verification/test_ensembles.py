@@ -11,14 +11,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scenes import Scene, mesh_of, problem_of, read_draft
 
 import catenary
-from catenary.base.errors import InputError
-from catenary.cases.run.scene_mesh import mesh_of
+from catenary import InputError
 from catenary.cases.scene.input.toml_input import REMOVED
-from catenary.cases.scene.load import read_draft
-from catenary.cases.scene.problem import problem_of
-from catenary.cases.scene.scene import Scene
 from catenary.cases.studies import ensemble as scenes_on_lines
 from catenary.cases.studies.ensemble import Marched, Marches
 from catenary.postproc.files.disk import plain

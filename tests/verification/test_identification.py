@@ -14,12 +14,10 @@ import numpy as np
 import pytest
 from measuring import check
 from mpi4py import MPI
+from scenes import Scene, load_scene, problem_of
 from scipy import stats
 from twin_passages import filtered_noise, write_measurement
 
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.problem import problem_of
-from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.identification.fitted_march import FittedMarch
 from catenary.cases.studies.identification.measurement import Measurement
 from catenary.cases.studies.identification.output import as_text, verdict

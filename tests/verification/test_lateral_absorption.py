@@ -15,11 +15,8 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from measuring import march, registered
+from scenes import load_scene, mesh_of, problem_of, shipped
 
-from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.input.case_files import shipped
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.problem import problem_of
 from catenary.postproc.evaluate.statistics import contact_statistics
 from catenary.solver.effects.effect import Effect
 from catenary.solver.effects.shipped import lateral_effects

@@ -14,7 +14,7 @@ from going_on import EN, heights, line_of
 from measuring import COMM, check
 from small_lines import HANGING, ac_simple_line, mesh_of, numerics, problem_of, train
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.solver.effects.build_model import build
 from catenary.solver.ends.half_lines import chain_at, half_lines
 from catenary.solver.ends.line_beyond import END, START, span_between

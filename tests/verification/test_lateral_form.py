@@ -14,7 +14,7 @@ from measuring import check
 from scipy import optimize
 from small_lines import HANGING, ac_simple_line, bare_wires, en50318_line, mesh_of, problem_of
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.meshgen.hardware import DropperKind, SteadyArm
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
 from catenary.meshgen.topologies.line_data import LineData

@@ -8,10 +8,8 @@ from functools import cache
 import numpy as np
 import pytest
 from measuring import check, line_alone, matrix_of, release, solve_free, start_march, step
+from scenes import load_scene, mesh_of, problem_of
 
-from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.problem import problem_of
 from catenary.meshgen.mesh import LineMesh
 from catenary.solver.model.model import Model
 from catenary.solver.problem.problem import Damping, Problem

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 import pytest
 from mpi4py import MPI
+from scenes import load_scene
 from scipy.sparse import csr_matrix
 
-from catenary.cases.scene.load import load_scene
 from catenary.cases.studies.hard import checks as hard_checks
 from catenary.cases.studies.hard import runs as hard_runs
 from catenary.cases.studies.hard.cases import HardCase, hard_cases

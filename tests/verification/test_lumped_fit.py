@@ -8,7 +8,7 @@ from measuring import check
 from seven_bodies import HEAD, at_rest, calibrated, pressed
 from studies import few
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.response.linearisation import linearise, of_chain
 from catenary.mbs.response.lumped_fit import BOUNDS, fit_chain

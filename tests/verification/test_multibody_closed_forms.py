@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from body_mechanics import energy, reaction
+from body_mechanics import energy, reaction, rod
 from constraint_handling import (
     AugmentedLagrangian,
     Baumgarte,
@@ -36,12 +36,6 @@ METHODS: list[ConstraintHandling] = [
     CoordinatePartitioning(),
 ]
 each_method = pytest.mark.parametrize("handling", METHODS, ids=lambda m: type(m).__name__)
-
-
-def rod(name: str, mass: float, length: float, x: float) -> Body:
-    """A thin rod along x."""
-    moment = mass * length**2 / 12
-    return Body(name, mass, (1e-3 * moment, moment, moment), (x, 0.0, 0.0))
 
 
 @each_method

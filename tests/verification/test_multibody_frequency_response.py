@@ -12,10 +12,9 @@ from constraint_handling import Baumgarte
 from measuring import check
 from seven_bodies import ARM, HEAD, at_rest, calibrated, pressed
 from variable_steps import integrate
-from verb_runner import CliRunner
+from verb_runner import invoke
 
-from catenary.base.errors import InputError
-from catenary.cases.cli.main import app
+from catenary import InputError
 from catenary.cases.scene.input.toml_input import read_toml
 from catenary.mbs.build import raising_data
 from catenary.mbs.head.stepping import Stepping
@@ -285,7 +284,7 @@ def test_pantograph_of_the_time_loop_answers_as_the_linearised_bodies(frequency:
 def test_verb_tells_how_the_seven_bodies_of_the_case_stand(tmp_path: Path) -> None:
     """The same figures from the scene's tables, at the command line; the fit loads as a table."""
     words = ("pantograph", "ambrosio2012", "--kind", "seven_body", "-o", str(tmp_path / "new"))
-    result = CliRunner().invoke(app, words)
+    result = invoke(*words)
     assert result.exit_code == 0, result.output
     figures = dict(
         re.findall(

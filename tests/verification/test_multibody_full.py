@@ -11,7 +11,7 @@ import pytest
 from measuring import check
 from seven_bodies import at_rest, calibrated, pressed
 
-from catenary.base.errors import CatenaryError, InputError, RunBroken
+from catenary import CatenaryError, InputError, RunBroken
 from catenary.mbs.build import raising_data
 from catenary.mbs.head.stepping import Stepping
 from catenary.mbs.head.strips import Strips, Suspension

@@ -18,7 +18,7 @@ from constraint_handling import (
 from measuring import check
 from variable_steps import integrate
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.mbs.rigid.forces import PointForce
 from catenary.mbs.rigid.joints import Constant, PrescribedPoint
 from catenary.mbs.rigid.kinematics import point

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from body_mechanics import rod
 from measuring import check, print_table
 from scipy.special import ellipk
 from studies import few
 
-from catenary.base.errors import InputError, RunBroken
+from catenary import InputError, RunBroken
 from catenary.mbs.rigid.bodies import SPACE, Body, Motion
 from catenary.mbs.rigid.forces import BumpStop, Gravity, PointForce, SpringDamper
 from catenary.mbs.rigid.implicit_steps import Stepper
@@ -29,12 +30,6 @@ each_method = pytest.mark.parametrize("method", METHODS)
 most_methods = pytest.mark.parametrize(
     "method", few(METHODS, "coordinate_partitioning", "baumgarte")
 )
-
-
-def rod(name: str, mass: float, length: float, x: float) -> Body:
-    """A thin rod along x."""
-    moment = mass * length**2 / 12
-    return Body(name, mass, (1e-3 * moment, moment, moment), (x, 0.0, 0.0))
 
 
 def pendulum(length: float) -> System:

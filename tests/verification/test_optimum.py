@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 from measuring import check
+from scenes import find_case, read_draft
 
 import catenary
-from catenary.cases.scene.input.case_files import find_case
-from catenary.cases.scene.load import Draft, read_draft
+from catenary.cases.scene.load import Draft
 from catenary.cases.scene.turned import BACKWARD
 from catenary.cases.studies.optimise import study as optimising
 from catenary.cases.studies.optimise.checks import AS_IS, FINER_MESH, SHORTER_STEP, UNSEEN, change

@@ -25,6 +25,9 @@ from measuring import (
     release,
     step,
 )
+from scenes import load_scene
+from scenes import mesh_of as mesh_of_scene
+from scenes import problem_of as problem_of_scene
 from scipy import linalg
 from small_lines import (
     EN_PANTOGRAPH,
@@ -36,9 +39,6 @@ from small_lines import (
     train,
 )
 
-from catenary.cases.run.scene_mesh import mesh_of as mesh_of_scene
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.problem import problem_of as problem_of_scene
 from catenary.meshgen.mesh import CONTACT_WIRE
 from catenary.postproc.evaluate import filters
 from catenary.solver.model.model import Model

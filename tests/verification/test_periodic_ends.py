@@ -19,7 +19,7 @@ from scipy.sparse.linalg import spsolve
 from small_lines import WHOLE, ac_simple_line, en50318_line, mesh_of, numerics, problem_of, train
 from studies import few
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.solver.effects.build_model import build
 from catenary.solver.ends import periodic_end
 from catenary.solver.ends.half_lines import Chain, half_lines

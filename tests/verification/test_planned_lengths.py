@@ -14,15 +14,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from measuring import check
-from verb_runner import CliRunner
+from scenes import Scene, line_data_of, load_scene, mesh_of, problem_of
+from verb_runner import invoke
 
-from catenary.base.errors import InputError
-from catenary.cases.cli.main import app
+from catenary import InputError
 from catenary.cases.run.at_rest.planned_lengths import take_in_lengths
-from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.problem import line_data_of, problem_of
-from catenary.cases.scene.scene import Scene
 from catenary.cases.scene.starter import write_case
 from catenary.solver.statics.form_finding.equilibrium import lengths_to_cut
 
@@ -67,7 +63,7 @@ def made(folder: Path, kind: str) -> Scene:
     """The case that ``new`` writes from these tables."""
     words = ["new", str(folder / "line"), "--topology", kind]
     words += ["--spans", str(folder / "spans.csv"), "--droppers", str(folder / "lengths.csv")]
-    done = CliRunner().invoke(app, words)
+    done = invoke(*words)
     assert done.exit_code == 0, done.output
     assert "the pre-sag found gives the lengths of the droppers within" in done.output
     return load_scene(folder / "line")
@@ -99,7 +95,7 @@ def test_a_longer_dropper_lets_the_contact_wire_hang_lower(tmp_path: Path) -> No
 def test_lengths_that_make_no_line_are_refused(tmp_path: Path) -> None:
     planned(tmp_path, "ac_simple", {(6, 5): 5.0})
     words = ["new", str(tmp_path / "line"), "--spans", str(tmp_path / "spans.csv")]
-    done = CliRunner().invoke(app, [*words, "--droppers", str(tmp_path / "lengths.csv")])
+    done = invoke(*words, "--droppers", str(tmp_path / "lengths.csv"))
     assert done.exit_code == 2
     assert "the table of droppers is droppers.csv; no pre-sag" in done.output
     assert not (tmp_path / "line").exists()

@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 import pytest
 from mpi4py import MPI
+from scenes import load_scene
 from scipy import signal
 
 from catenary.cases.run.runner import run_case
-from catenary.cases.scene.load import load_scene
 from catenary.cases.studies.measured.description import read_description
 from catenary.cases.studies.measured.passages import passage_of, read_table
 from catenary.postproc.measurements.compared import Comparison

@@ -21,11 +21,10 @@ from force_history import ForceHistory
 from measuring import check, march
 from plain_line import PlainLine
 from plain_mesh import graded, mesh_on
+from scenes import problem_of as scene_problem
 from small_lines import WHOLE, ac_simple_line, mesh_of, numerics, problem_of, train
-from verb_runner import CliRunner
+from verb_runner import invoke
 
-from catenary.cases.cli.main import app
-from catenary.cases.scene.problem import problem_of as scene_problem
 from catenary.cases.studies.reference.convergence import rms
 from catenary.cases.studies.reference.solutions import DATA, Solution, read
 from catenary.mbs.lumped_data import LumpedData
@@ -251,7 +250,7 @@ def test_plain_finite_differences_reach_a_march(stitch: Stitch | None) -> None:
 @pytest.mark.timeout(3600)
 def test_the_shipped_solutions_are_made_by_the_command(tmp_path: Path) -> None:
     name = "dc_simple_200_one"
-    done = CliRunner().invoke(app, ["reference", name, "-o", str(tmp_path), "-j", "0"])
+    done = invoke("reference", name, "-o", str(tmp_path), "-j", "0")
     assert done.exit_code == 0, done.output
     made, shipped = (pd.read_csv(folder / "statistics.csv") for folder in (tmp_path, DATA))
     shipped = shipped[shipped["configuration"] == name].reset_index(drop=True)

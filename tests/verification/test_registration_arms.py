@@ -13,11 +13,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from measuring import check, matrix_of, solve_free
+from scenes import load_scene, mesh_of, problem_of
 
-from catenary.base.errors import InputError
-from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.problem import problem_of
+from catenary import InputError
 from catenary.solver.model.model import Model
 from catenary.solver.model.rest_shape import Equilibrium
 from catenary.solver.statics.form_finding.equilibrium import find_form

@@ -14,13 +14,12 @@ import pytest
 from measuring import check, march
 from plain_line import History, PlainLine
 from plain_mesh import graded, mesh_on
+from scenes import load_scene, shipped
+from scenes import mesh_of as mesh_of_scene
+from scenes import problem_of as problem_of_scene
 from small_lines import WHOLE, ac_simple_line, en50318_line, mesh_of, problem_of, train
 from studies import few
 
-from catenary.cases.run.scene_mesh import mesh_of as mesh_of_scene
-from catenary.cases.scene.input.case_files import shipped
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.problem import problem_of as problem_of_scene
 from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import CONTACT_WIRE, LineMesh
 from catenary.meshgen.topologies.all_topologies import make_line

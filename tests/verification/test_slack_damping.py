@@ -12,15 +12,14 @@ from typing import Any
 import numpy as np
 import pytest
 from dense_line import DenseLine
+from equations import press
 from measuring import COMM, History, check, march, matrix_of, start_march
 from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of, train
 from studies import few_values
 from ts_alpha2 import TS_ALPHA2
 
-from catenary.meshgen.mesh import CONTACT_WIRE, LineMesh
+from catenary.meshgen.mesh import LineMesh
 from catenary.meshgen.topologies.line_data import LineData
-from catenary.solver.model.beam import shape_values
-from catenary.solver.model.model import Model
 from catenary.solver.model.partition import distribute
 from catenary.solver.problem.incidents import DropperBreak
 from catenary.solver.problem.problem import Damping, Problem
@@ -160,18 +159,6 @@ def off_by(problem: Problem, mesh: LineMesh) -> tuple[float, float, int, History
         shown = max(shown, np.abs(carries - seen["dropper_force"][step]).max())
         n_slack += int((elastic < 0.0).sum())
     return left, shown, n_slack, seen
-
-
-def press(residual: np.ndarray, model: Model, x: float, force: float) -> None:
-    """Take a contact force [N] off a residual, and what holds the anchors."""
-    nodes = model.mesh.wires[CONTACT_WIRE]
-    places = model.mesh.x(nodes)
-    e = int(np.searchsorted(places, x)) - 1
-    length = places[e + 1] - places[e]
-    own = nodes[e : e + 2]
-    unknowns = np.stack([model.dofs(own), model.dofs(own, "theta_y")], axis=1).ravel()
-    residual[unknowns] -= force * shape_values((x - places[e]) / length, length)
-    residual[model.constrained] = 0.0
 
 
 @pytest.mark.parametrize(

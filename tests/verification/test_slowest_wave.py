@@ -7,12 +7,9 @@ import functools
 import numpy as np
 import pytest
 from measuring import check
+from scenes import line_of, load_scene, mesh_of, problem_of, shipped
 
-from catenary.base.errors import InputError
-from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.input.case_files import shipped
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.problem import line_of, problem_of
+from catenary import InputError
 from catenary.meshgen.slowest_wave import slowest_phase_speed, slowest_wave, supported_wave
 from catenary.meshgen.wires import Role
 from catenary.solver.statics.elasticity import elasticity, middle_span

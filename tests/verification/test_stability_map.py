@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from measuring import check
 from mpi4py import MPI
+from scenes import read_draft
 from scipy import linalg
 from small_lines import EN_PANTOGRAPH, HANGING, en50318_line, mesh_of, problem_of
 
-from catenary.cases.scene.load import read_draft
 from catenary.cases.studies.records import KeptRows
 from catenary.cases.studies.stability import from_matrices as theory
 from catenary.cases.studies.stability import map as map_of_stability

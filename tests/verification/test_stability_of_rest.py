@@ -13,7 +13,7 @@ import pytest
 from measuring import free_matrices
 from small_lines import WHOLE, ac_simple_line, mesh_of, problem_of
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.solver.effects.build_model import build
 from catenary.solver.model.model import Model
 from catenary.solver.statics.form_finding.equilibrium import find_form

@@ -17,7 +17,7 @@ from small_lines import (
     problem_of,
 )
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.meshgen.hardware import Fittings
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
 from catenary.meshgen.topologies.all_topologies import make_line

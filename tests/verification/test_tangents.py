@@ -16,13 +16,13 @@ import pytest
 from dense_line import DenseLine
 from measuring import check
 from mpi4py import MPI
+from scenes import load_scene
+from scenes import mesh_of as mesh_of_scene
+from scenes import problem_of as problem_of_scene
 from small_lines import EN_CONTACT_WIRE, WHOLE, en50318_line, mesh_of, numerics, problem_of, train
 from studies import few
 
-from catenary.base.errors import InputError
-from catenary.cases.run.scene_mesh import mesh_of as mesh_of_scene
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.problem import problem_of as problem_of_scene
+from catenary import InputError
 from catenary.cases.studies.sensitivity.parameters import ChangedScenes
 from catenary.mbs.lumped_data import LumpedData
 from catenary.solver.kernels import native

@@ -20,7 +20,7 @@ from measuring import check, line_alone, march, matrix_of, release, step
 from scipy import optimize
 from small_lines import mesh_of, numerics, problem_of, train
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
 from catenary.meshgen.topologies.line_data import LineData
 from catenary.solver.model.model import Model

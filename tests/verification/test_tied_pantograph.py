@@ -13,13 +13,11 @@ from functools import cached_property
 import numpy as np
 import pytest
 from measuring import check, march
+from scenes import load_scene, mesh_of, problem_of
 from scipy import linalg, signal
 from ts_alpha2 import TS_ALPHA2
 
 import catenary
-from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.problem import problem_of
 
 SPAN, N_SPANS, MASS, BENDING, TENSION = 8.5, 30, 7.1, 2.7e5, 100.0
 SUPPORT, CLAMP, ALPHA, BETA = 6e5, 7.0, 1e-4, 0.0125

@@ -7,10 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from measuring import check
+from scenes import load_scene, problem_of
 
-from catenary.base.errors import InputError
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.problem import problem_of
+from catenary import InputError
 from catenary.mbs.mechanism.pantograph_data import MultibodyData, reduced, stand
 from catenary.mbs.rigid.forces import PointForce
 from catenary.mbs.rigid.reversed_system import turned_round

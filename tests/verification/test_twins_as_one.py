@@ -13,13 +13,11 @@ import numpy as np
 import pytest
 from measuring import History, march
 from mpi4py import MPI
+from scenes import load_scene, mesh_of, problem_of
 from studies import few
 from windowed import apart
 from windowed import march as march_in_window
 
-from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.problem import problem_of
 from catenary.cases.studies.hard import runs as hard_runs
 from catenary.solver.problem.problem import EXACT, WindowChoice
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 from measuring import check
+from scenes import load_scene
 from scipy import stats
 
-from catenary.cases.scene.load import load_scene
 from catenary.cases.studies.sampling.samples import samples
 from catenary.cases.studies.sampling.tables import SamplingTable, sampling_of
 from catenary.cases.studies.uncertainty.estimates import deviation, mean, quantile, share

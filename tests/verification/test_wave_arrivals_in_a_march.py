@@ -9,12 +9,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scenes import load_scene, problem_of
 
 import catenary
 from catenary.cases.run.describe.arrivals import arrival_facts, wave_line
 from catenary.cases.run.describe.wave_arrivals import Course, from_far_end
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.problem import problem_of
 
 # A contact force that differs by more is another one [N]: 4e-5 of the standard deviation, far above
 # round-off, which is 1e-9.

@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from scenes import load_scene
 
-from catenary.base.errors import InputError
-from catenary.cases.scene.load import load_scene
+from catenary import InputError
 from catenary.cases.studies.sweep.variants import whole_numbers
 from catenary.cases.studies.waves import window_error
 

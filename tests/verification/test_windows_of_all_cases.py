@@ -11,10 +11,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from mpi4py import MPI
+from scenes import load_scene
 from windowed import apart, march
 
-from catenary.base.errors import InputError
-from catenary.cases.scene.load import load_scene
+from catenary import InputError
 from catenary.cases.studies.hard import runs as hard_runs
 from catenary.solver.problem.problem import EXACT, WindowChoice
 

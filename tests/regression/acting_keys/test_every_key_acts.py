@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 from acting_scenes import SCENES, acting_scene
 from mpi4py import MPI
+from scenes import Scene
 
 from catenary.cases.scene.keys.keys import known_keys
-from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.hard import runs
 
 # What other tests look at, by why it is not here.

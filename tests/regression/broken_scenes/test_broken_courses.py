@@ -6,9 +6,7 @@ from pathlib import Path
 
 import pytest
 from refusals import SOUND
-from verb_runner import CliRunner
-
-from catenary.cases.cli.main import app
+from verb_runner import invoke
 
 # What stands in the file, and what the sentence must hold.
 CONTENTS = {
@@ -38,7 +36,7 @@ def test_a_course_that_cannot_be_is_told_with_its_file(name: str, tmp_path: Path
     file.write_bytes(content)
     words = [f"vehicle.vertical.by_time_file={file}", "effects.vehicle_motion=true"]
     words = [word for text in words for word in ("--set", text)]
-    result = CliRunner().invoke(app, ["check", str(SOUND), *words])
+    result = invoke("check", str(SOUND), *words)
     assert result.exit_code == 2, result.output
     assert result.stdout == ""
     sentence = result.stderr.strip()
@@ -49,7 +47,7 @@ def test_a_course_that_cannot_be_is_told_with_its_file(name: str, tmp_path: Path
 
 def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
     words = ["--set", f"vehicle.vertical.by_time_file={tmp_path / 'none.csv'}"]
-    result = CliRunner().invoke(app, ["check", str(SOUND), *words])
+    result = invoke("check", str(SOUND), *words)
     assert result.exit_code == 2
     assert "none.csv" in result.stderr and "no such file" in result.stderr
 
@@ -67,7 +65,7 @@ def test_an_empty_name_is_no_folder(
 ) -> None:
     """Such as that of a shell's variable that is not set."""
     monkeypatch.chdir(tmp_path)
-    result = CliRunner().invoke(app, words)
+    result = invoke(*words)
     assert result.exit_code == 2, result.output
     assert "it is empty; name a folder" in " ".join(result.stderr.split())
     assert list(tmp_path.iterdir()) == []

@@ -6,9 +6,7 @@ from pathlib import Path
 
 import pytest
 from refusals import SOUND, assert_refused
-from verb_runner import CliRunner
-
-from catenary.cases.cli.main import app
+from verb_runner import invoke
 
 # Sound tables, of which an entry is changed at a time.
 DEFECTS = """
@@ -156,5 +154,5 @@ def test_a_defect_that_cannot_be_is_refused(name: str, case: Path) -> None:
 
 
 def test_the_tables_themselves_are_sound(case: Path) -> None:
-    result = CliRunner().invoke(app, ["check", str(case)])
+    result = invoke("check", str(case))
     assert result.exit_code == 0, result.output

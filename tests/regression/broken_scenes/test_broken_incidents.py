@@ -6,9 +6,7 @@ from pathlib import Path
 
 import pytest
 from refusals import SOUND, assert_refused
-from verb_runner import CliRunner
-
-from catenary.cases.cli.main import app
+from verb_runner import invoke
 
 # A sound list, of which an entry is changed at a time.
 INCIDENTS = """
@@ -111,13 +109,13 @@ def test_an_incident_that_cannot_be_is_refused(name: str, case: Path) -> None:
 
 
 def test_the_list_itself_is_sound(case: Path) -> None:
-    result = CliRunner().invoke(app, ["check", str(case)])
+    result = invoke("check", str(case))
     assert result.exit_code == 0, result.output
 
 
 def test_a_mechanism_that_does_not_reach_down_is_told() -> None:
     words = "incidents=[{type='lowering',at_s=1.0,drop_m=4.0}]"
-    result = CliRunner().invoke(app, ["check", "ambrosio2012", "--set", words])
+    result = invoke("check", "ambrosio2012", "--set", words)
     assert result.exit_code == 2, result.output
     assert "incidents.0.drop_m is 4 m on the command line (--set)" in result.stderr
     assert "does not reach down so far" in result.stderr

@@ -6,9 +6,7 @@ from pathlib import Path
 
 import pytest
 from refusals import SOUND
-from verb_runner import CliRunner
-
-from catenary.cases.cli.main import app
+from verb_runner import invoke
 
 TELESCOPE = Path(__file__).parents[2] / "support" / "telescope.toml"
 KIND = "pantographs.telescope"
@@ -308,7 +306,7 @@ def scene(tmp_path: Path) -> Path:
 
 
 def test_the_scene_with_a_telescope_is_sound(scene: Path) -> None:
-    result = CliRunner().invoke(app, ["check", str(scene)])
+    result = invoke("check", str(scene))
     assert result.exit_code == 0, result.output
     assert "1 of 2 degrees of freedom is the raising" in result.stdout
     assert "guide 0.0 mm, slide 0.0 mm" in result.stdout
@@ -318,7 +316,7 @@ def test_the_scene_with_a_telescope_is_sound(scene: Path) -> None:
 def test_a_broken_pantograph_ends_in_one_sentence_and_code_2(name: str, scene: Path) -> None:
     assignments, expected = ASSIGNMENTS[name]
     words = [word for text in assignments for word in ("--set", text)]
-    result = CliRunner().invoke(app, ["check", str(scene), *words])
+    result = invoke("check", str(scene), *words)
     assert result.exit_code == 2, result.output
     assert result.stdout == ""
     sentences = result.stderr.splitlines()
@@ -330,7 +328,7 @@ def test_a_broken_pantograph_ends_in_one_sentence_and_code_2(name: str, scene: P
 def test_paper_does_not_reach_six_metres() -> None:
     """Its two arms together are below 4 m long."""
     words = ["check", "ambrosio2012", "--set", "pantographs.seven_body.working_height_m=6"]
-    result = CliRunner().invoke(app, words)
+    result = invoke(*words)
     assert result.exit_code == 2, result.output
     assert "'stabilisation_arm' does not reach its working height of 6 m" in result.stderr
     assert result.stderr.count("\n") == 1
@@ -339,7 +337,7 @@ def test_paper_does_not_reach_six_metres() -> None:
 def test_paper_as_published_names_the_joint_that_does_not_close() -> None:
     """0.200 - 0.020 m along and 5 mm across: 182 mm."""
     words = ["check", "ambrosio2012", "--set", "pantographs.seven_body.as_published=true"]
-    result = CliRunner().invoke(app, words)
+    result = invoke(*words)
     assert result.exit_code == 2, result.output
     assert "joint 'joint_1' misses by 182 mm" in result.stderr
     assert result.stderr.count("\n") == 1

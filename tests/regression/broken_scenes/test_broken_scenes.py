@@ -7,10 +7,9 @@ import sys
 from pathlib import Path
 
 import pytest
+from program import ENTRY
 from refusals import SOUND, assert_one_sentence, assert_refused
-from verb_runner import CliRunner
-
-from catenary.cases.cli.main import app
+from verb_runner import invoke
 
 # A car of [vehicle.suspension].
 CAR = (
@@ -278,8 +277,7 @@ EDITS = {
 
 
 @pytest.fixture(autouse=True)
-def _own_hook_and_folder(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(sys, "excepthook", sys.excepthook)  # run replaces it
+def _own_folder(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.chdir(tmp_path)
 
 
@@ -297,7 +295,7 @@ def test_a_broken_file_ends_in_one_sentence_that_names_it(name: str, tmp_path: P
     file = tmp_path / "case.toml"
     file.write_bytes(text.replace(old, new, 1).encode("utf-8", "surrogateescape"))
     out = tmp_path / "out"
-    result = CliRunner().invoke(app, ["run", str(file), "-o", str(out)])
+    result = invoke("run", str(file), "-o", str(out))
     assert result.exit_code == 2, result.output
     assert_one_sentence(result.stderr, out, expected)
     assert str(file) in result.stderr
@@ -316,33 +314,33 @@ def test_a_broken_file_ends_in_one_sentence_that_names_it(name: str, tmp_path: P
 )
 def test_a_case_that_is_not_there_is_named(case: str, expected: str, tmp_path: Path) -> None:
     out = tmp_path / "out"
-    result = CliRunner().invoke(app, ["run", case, "-o", str(out)])
+    result = invoke("run", case, "-o", str(out))
     assert result.exit_code == 2, result.output
     assert_one_sentence(result.stderr, out, expected)
 
 
 def test_the_sound_scene_is_sound() -> None:
-    result = CliRunner().invoke(app, ["check", str(SOUND)])
+    result = invoke("check", str(SOUND))
     assert result.exit_code == 0, result.output
 
 
 def test_an_empty_file_lacks_its_first_table(tmp_path: Path) -> None:
     (tmp_path / "case.toml").write_text("")
-    result = CliRunner().invoke(app, ["check", str(tmp_path)])
+    result = invoke("check", str(tmp_path))
     assert result.exit_code == 2
     assert result.stderr.count(" is missing in ") == len(result.stderr.splitlines()) == 4
 
 
 def test_a_line_whose_droppers_would_be_slack_at_rest_is_refused() -> None:
     words = ["check", str(SOUND), "--set", "line.dropper.pre_sag_mid_mm=500"]
-    result = CliRunner().invoke(app, words)
+    result = invoke(*words)
     assert result.exit_code == 2, result.output
     assert "would be slack at rest" in result.stderr
 
 
 def test_a_mesh_without_a_group_is_refused(tmp_path: Path) -> None:
     made = tmp_path / "line.msh"
-    assert CliRunner().invoke(app, ["mesh", str(SOUND), "-o", str(made)]).exit_code == 0
+    assert invoke("mesh", str(SOUND), "-o", str(made)).exit_code == 0
     made.write_text(made.read_text().replace('"steady_arms"', '"study_arms"'))
     words = [
         "check",
@@ -352,7 +350,7 @@ def test_a_mesh_without_a_group_is_refused(tmp_path: Path) -> None:
         "--set",
         "mesh.elements_per_gap=",
     ]
-    result = CliRunner().invoke(app, words)
+    result = invoke(*words)
     assert result.exit_code == 2, result.output
     assert "steady_arms" in result.stderr
 
@@ -374,9 +372,8 @@ def test_a_mesh_without_a_group_is_refused(tmp_path: Path) -> None:
     ],
 )
 def test_the_program_itself_exits_with_2(words: list[str], tmp_path: Path) -> None:
-    entry = "from catenary.cases.cli.main import main; main()"
     done = subprocess.run(
-        [sys.executable, "-c", entry, *words],
+        [sys.executable, "-c", ENTRY, *words],
         cwd=tmp_path,
         capture_output=True,
         text=True,

@@ -6,10 +6,8 @@ from pathlib import Path
 
 import pytest
 from refusals import SOUND, assert_refused
+from scenes import load_scene, recorded, resolved
 
-from catenary.cases.scene.input.faults import Origin
-from catenary.cases.scene.load import load_scene, scene_from
-from catenary.cases.scene.problem import resolved
 from catenary.cases.studies.accuracy.axes import AXES
 
 FREE = Path(__file__).parents[3] / "docs/examples/two_messengers.toml"
@@ -192,7 +190,7 @@ def test_where_something_reads_it_or_its_effect_is_off_it_is_taken(
 @pytest.mark.parametrize("case", [SOUND, FREE, OVERLAP])
 def test_a_recorded_scene_has_all_keys_and_is_read_again(case: Path) -> None:
     scene = load_scene(case)
-    again = scene_from(resolved(scene), Origin("result", recorded=True))
+    again = recorded(scene)
     assert resolved(again) == resolved(scene)
 
 

@@ -15,13 +15,11 @@ import pytest
 from acting_scenes import SCENES, acting_scene
 from documents import blocks_of
 from mpi4py import MPI
+from scenes import Scene, find_case, load_scene
 from studies import few
 
-from catenary.base.errors import InputError, RunBroken
+from catenary import InputError, RunBroken
 from catenary.cases.run.prepared import HEADER, LIBRARY, prepare_line
-from catenary.cases.scene.input.case_files import find_case
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.hard import runs
 from catenary.solver.kernels.native import Simulation
 

@@ -10,6 +10,8 @@ import pytest
 from documents import blocks_of
 from matplotlib.testing.compare import compare_images
 
+pytestmark = pytest.mark.usefixtures("examined_here")
+
 DOCS = Path(__file__).parents[3] / "docs"
 NOTEBOOK = DOCS / "tutorials/python.md"
 VARIANTS = ("300, 25)", "28e3, 20)")  # speeds and tensions, with their numbers

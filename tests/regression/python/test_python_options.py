@@ -8,11 +8,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from verb_runner import CliRunner
+from verb_runner import invoke
 
 import catenary
 from catenary.base.options import option
-from catenary.cases.cli.main import all_verbs
 
 pytestmark = pytest.mark.usefixtures("quick_reports")
 
@@ -122,7 +121,7 @@ def test_a_refusal_names_what_was_given(what: str, scene: catenary.Scene, done: 
         refused(scene, done)
     assert argument in str(found.value) and not OPTION.search(str(found.value)), found.value
     folders = {"DONE": str(done), "NONE": str(done / "none")}
-    told = CliRunner().invoke(all_verbs(), [folders.get(word, word) for word in words])
+    told = invoke(*(folders.get(word, word) for word in words))
     assert told.exit_code == 2 and flag in told.stderr.replace("\n", " "), told.output
     assert option("--force", "force=True") == "force=True"  # the verb has come to its end
 
@@ -134,5 +133,5 @@ def test_processes_of_a_program_name_its_arguments(tmp_path: Path) -> None:
     assert all("steps give force=True to run it" in text for text in table.outcome)
     words = ["sweep", CASE, "-o", str(tmp_path / "verb"), "-j", "2", "--set"]
     words += ["numerics.dt_s=1e-6", "case.accept_unusual=true"]
-    told = CliRunner().invoke(all_verbs(), [*words, "--vary", "train.speed_km_h=200,250"])
+    told = invoke(*words, "--vary", "train.speed_km_h=200,250")
     assert "steps give --force to run it" in told.output

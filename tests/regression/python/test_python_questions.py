@@ -8,10 +8,9 @@ from typing import Any
 
 import pandas as pd
 import pytest
-from verb_runner import CliRunner
+from verb_runner import invoke
 
 import catenary
-from catenary.cases.cli.main import all_verbs
 
 pytestmark = pytest.mark.usefixtures("quick_reports")
 
@@ -51,7 +50,7 @@ def test_a_folder_has_the_files_of_the_program(
     printed = capsys.readouterr()
     assert not printed.out and "about 0 s left" in printed.err
     assert {path.name for path in out.iterdir()} == files
-    done = CliRunner().invoke(all_verbs(), [verb, CASE, "--short", *words, "-o", str(of_verb)])
+    done = invoke(verb, CASE, "--short", *words, "-o", str(of_verb))
     assert done.exit_code == 0, done.output
     for name in files:
         assert (out / name).read_bytes() == (of_verb / name).read_bytes(), name

@@ -25,6 +25,8 @@ import catenary
 from catenary.cases.scene.input.toml_input import parse_assignment
 from catenary.postproc.read.results import Results
 
+pytestmark = pytest.mark.usefixtures("examined_here")
+
 WALL = {"march_wall_s", "march_cpu_s", "records_wall_s", "phase_wall_s"}
 WALL |= {"real_time_factor", "real_time_factor_with_records"}
 

@@ -7,7 +7,7 @@ import pytest
 from scipy import linalg
 from scipy.interpolate import CubicSpline
 
-from catenary.base.errors import RunBroken
+from catenary import RunBroken
 from catenary.mbs.head.stepping import Stepping
 from catenary.mbs.head.strips import Strips, Suspension, Turning, head_parts
 from catenary.mbs.head.wire_crossing import LateralPath

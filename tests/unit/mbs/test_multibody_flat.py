@@ -10,7 +10,7 @@ from body_mechanics import tabulated
 from measuring import check
 from scipy.interpolate import CubicSpline
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.mbs.rigid.arrays import Joint
 from catenary.mbs.rigid.bodies import SPACE, Body, Motion
 from catenary.mbs.rigid.forces import (

@@ -7,7 +7,7 @@ import pytest
 from body_mechanics import stored_energy
 from measuring import check
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.mbs.rigid.bodies import SPACE, Body, Motion, initial_motion
 from catenary.mbs.rigid.forces import (
     Actuator,

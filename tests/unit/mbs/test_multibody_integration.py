@@ -12,7 +12,7 @@ from constraint_handling import (
 from measuring import check
 from variable_steps import integrate
 
-from catenary.base.errors import InputError, RunBroken
+from catenary import InputError, RunBroken
 from catenary.mbs.rigid.bodies import SPACE, Body
 from catenary.mbs.rigid.forces import Gravity
 from catenary.mbs.rigid.joints import Prismatic, Revolute

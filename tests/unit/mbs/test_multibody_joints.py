@@ -8,7 +8,7 @@ from body_mechanics import from_vector, parameter_rates, tabulated
 from measuring import check
 from scipy.spatial.transform import Rotation
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.mbs.rigid.arrays import FlatRows, Joint
 from catenary.mbs.rigid.bodies import (
     SPACE,

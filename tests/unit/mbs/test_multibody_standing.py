@@ -10,7 +10,7 @@ import pytest
 from body_mechanics import static_force
 from measuring import check
 
-from catenary.base.errors import InputError, RunBroken
+from catenary import InputError, RunBroken
 from catenary.mbs.air import Airflow
 from catenary.mbs.build import Operation, make_pantograph, raising_data
 from catenary.mbs.head.stepping import Stepping

@@ -7,7 +7,7 @@ import pytest
 from body_mechanics import equivalent_mass, reaction
 from measuring import check
 
-from catenary.base.errors import InputError, RunBroken
+from catenary import InputError, RunBroken
 from catenary.mbs.rigid.bodies import SPACE, Body
 from catenary.mbs.rigid.forces import Actuator, Gravity, PointForce, SpringDamper
 from catenary.mbs.rigid.joints import (

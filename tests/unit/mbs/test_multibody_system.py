@@ -7,7 +7,7 @@ import pytest
 from body_mechanics import reaction
 from measuring import check
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.mbs.rigid.bodies import SPACE, Body, Motion
 from catenary.mbs.rigid.forces import Gravity, PointForce
 from catenary.mbs.rigid.joints import (

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from catenary.base.errors import NotConverged, RunBroken
+from catenary import RunBroken
+from catenary.base.errors import NotConverged
 from catenary.mbs.mechanism.reduction import ReducedMechanism
 from catenary.mbs.rigid.bodies import SPACE, Body
 from catenary.mbs.rigid.forces import Gravity

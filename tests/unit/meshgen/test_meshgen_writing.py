@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.meshgen.build import make_mesh
 from catenary.meshgen.gmsh_lines import write_mesh
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE

@@ -13,11 +13,11 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
+from scenes import Scene
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.cases.scene.keys.keys import known_keys
 from catenary.cases.scene.keys.units import unit_of
-from catenary.cases.scene.scene import Scene
 from catenary.mbs.head.strips import Strips, Suspension
 from catenary.mbs.lumped_data import LumpedData
 from catenary.meshgen.mesh import CONTACT_WIRE

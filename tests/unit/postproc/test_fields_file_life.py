@@ -12,7 +12,7 @@ import pytest
 import pyvista
 from watched_fields import BLOCKS, blocks_at, times_in, watch
 
-from catenary.base.errors import RunBroken
+from catenary import RunBroken
 from catenary.meshgen.mesh import CONTACT_WIRE
 from catenary.postproc.record.snapshots import fields_file, growing_xdmf
 from catenary.postproc.record.snapshots.blocks import MASTS

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from studies import few
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.postproc.film.snapshots import Snapshots
 from catenary.postproc.record.snapshots.field_layout import Course, FieldRecord
 from catenary.postproc.record.snapshots.fields import FieldRecorder

@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 from PIL import Image, ImageSequence
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.shape import HEAD, shape_of
 from catenary.postproc.files.hdf5.checked import seal_attributes, set_attribute

@@ -17,7 +17,7 @@ import pyvista
 from matplotlib.colors import to_rgb
 from studies import few
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.postproc.film.film_data import film_data
 from catenary.postproc.film.options import View
 from catenary.postproc.film.scenery import MOTIONS

@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 from damaging import attribute_mutations, dataset_mutations, flip, raw_ranges, unseal
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.postproc.evaluate.compare import compare
 from catenary.postproc.read.results import Results
 from catenary.postproc.report import report

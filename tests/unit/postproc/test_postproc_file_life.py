@@ -10,7 +10,7 @@ from typing import Any
 import h5py
 import pytest
 
-from catenary.base.errors import RunBroken
+from catenary import RunBroken
 from catenary.postproc.files.disk import broken_write
 from catenary.postproc.files.disk_errors import reason, remedy
 from catenary.postproc.files.own_files import (

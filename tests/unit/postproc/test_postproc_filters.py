@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.postproc.evaluate import filters
 
 DT = 1e-3

@@ -13,7 +13,7 @@ import h5py
 import numpy as np
 import pytest
 
-from catenary.base.errors import InputError, RunBroken
+from catenary import InputError, RunBroken
 from catenary.postproc.channels.header import Header
 from catenary.postproc.files import result_file
 from catenary.postproc.files.disk import NoRoom

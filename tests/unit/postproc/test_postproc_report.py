@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import catenary.postproc.report.page
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.postproc.evaluate.compare import compare
 from catenary.postproc.read.results import Results
 from catenary.postproc.report.pictures import line_pictures

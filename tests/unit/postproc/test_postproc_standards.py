@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.postproc.evaluate.observations import Observation
 from catenary.postproc.evaluate.verdict import (
     Criterion,

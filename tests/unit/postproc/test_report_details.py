@@ -13,7 +13,7 @@ import pytest
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.postproc.evaluate import statistics
 from catenary.postproc.evaluate.verdict import Criterion, criteria_of
 from catenary.postproc.read.results import Results

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.postproc.evaluate.observations import OBSERVED
 from catenary.postproc.standards.book import Conditions, book_of
 from catenary.postproc.standards.library import shipped

@@ -14,7 +14,7 @@ import pytest
 from h5py import h5d, h5p, h5s, h5t
 from studies import few
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.postproc.files import disk
 from catenary.postproc.files.committed_rows import fault_to_continue
 from catenary.postproc.files.hdf5.self_contained import open_own

@@ -13,7 +13,7 @@ from measuring import registered, start_march
 from small_lines import WHOLE, ac_simple_line, mesh_of, numerics, problem_of, train
 from studies import few
 
-from catenary.base.errors import RunBroken
+from catenary import RunBroken
 from catenary.mbs.air import Polynomial, Tunnel, Uplift
 from catenary.mbs.control import Regulation
 from catenary.mbs.head.laws import Law

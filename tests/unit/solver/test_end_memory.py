@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.solver.integrators.end_memory import NEAR
 from catenary.solver.integrators.line_loads import LineLoads
 from catenary.solver.integrators.line_state import LineState

@@ -22,7 +22,7 @@ from small_lines import (
     problem_of,
 )
 
-from catenary.base.errors import RunBroken
+from catenary import RunBroken
 from catenary.solver.effects.build_model import build
 from catenary.solver.integrators.line_integrator import LineIntegrator
 from catenary.solver.linear.decay_length import DECAY, reach

@@ -10,7 +10,7 @@ from measuring import History, registered, start_march
 from petsc4py import PETSc
 from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of, train
 
-from catenary.base.errors import InputError, RunBroken
+from catenary import InputError, RunBroken
 from catenary.meshgen.mesh import LineMesh
 from catenary.solver.effects.effect import Effect
 from catenary.solver.model.builder import ModelBuilder

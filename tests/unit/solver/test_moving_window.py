@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 from measuring import COMM, History, check, start_march
+from scenes import load_scene
+from scenes import mesh_of as scene_mesh
+from scenes import problem_of as scene_problem
 from small_lines import ac_simple_line, mesh_of, numerics, problem_of, train
 
-from catenary.base.errors import InputError
-from catenary.cases.run.scene_mesh import mesh_of as scene_mesh
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.problem import problem_of as scene_problem
+from catenary import InputError
 from catenary.meshgen.mesh import LineMesh
 from catenary.solver.kernels import native
 from catenary.solver.linear import station_factors

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import pytest
+from scenes import load_scene, mesh_of, problem_of
 
-from catenary.base.errors import InputError
-from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.problem import problem_of
+from catenary import InputError
 from catenary.solver.statics.line_at_rest import line_at_rest
 
 FIXED = (

@@ -10,7 +10,7 @@ import pytest
 from measuring import History, start_march
 from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of, train
 
-from catenary.base.errors import InputError
+from catenary import InputError
 
 PROBLEM = problem_of(en50318_line(4), WHOLE, train=train(70.0, 70.0, 77.0), numerics=numerics(1e-3))
 MESH = mesh_of(PROBLEM.line, 2)

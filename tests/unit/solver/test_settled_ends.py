@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.solver.statics.form_finding.repeated_ends import settled
 
 REST = np.array([7.5, -0.3])

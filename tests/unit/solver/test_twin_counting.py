@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from small_lines import WHOLE, ac_simple_line, mesh_of, problem_of
 
-from catenary.base.errors import InputError
+from catenary import InputError
 from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import CONTACT_WIRE, LineMesh
 from catenary.meshgen.topologies.all_topologies import make_line

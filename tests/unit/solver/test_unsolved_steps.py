@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 from small_lines import WHOLE, en50318_line, mesh_of, problem_of
 
-from catenary.base.errors import InputError, NotConverged, RunBroken
+from catenary import InputError, RunBroken
+from catenary.base.errors import NotConverged
 from catenary.solver.contact.followed_links import no_links
 from catenary.solver.contact.head_states import Heads
 from catenary.solver.contact.line_response import LineResponse

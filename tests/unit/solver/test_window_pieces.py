@@ -11,7 +11,7 @@ from measuring import History, check, start_march
 from small_lines import ac_simple_line, mesh_of, numerics, problem_of, train
 from stitched_line import stitched_line
 
-from catenary.base.errors import RunBroken
+from catenary import RunBroken
 from catenary.solver.linear import unit_responses
 from catenary.solver.linear.pieces import operator_pieces, pieces
 from catenary.solver.problem.problem import BOUNDED, Damping, Problem, WindowChoice

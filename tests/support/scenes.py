@@ -1,0 +1,45 @@
+"""Scenes as command lines give them, and what the program makes of one.
+
+Tests take it from here: this is the only file of theirs that knows where it stands. What a user of
+Python has of a scene is ``catenary.load``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import catenary
+from catenary.cases.run.scene_mesh import mesh_of
+from catenary.cases.scene.input.case_files import find_case, shipped
+from catenary.cases.scene.input.faults import Origin
+from catenary.cases.scene.load import load_scene, read_draft, scene_from
+from catenary.cases.scene.problem import line_data_of, line_of, problem_of, resolved
+from catenary.cases.scene.scene import Scene
+from catenary.scenes import Scene as SceneOfUsers
+
+__all__ = [
+    "Scene",
+    "find_case",
+    "given",
+    "line_data_of",
+    "line_of",
+    "load_scene",
+    "mesh_of",
+    "problem_of",
+    "read_draft",
+    "recorded",
+    "resolved",
+    "scene_from",
+    "shipped",
+]
+
+
+def given(case: str | Path, words: Sequence[str] = (), short: bool = False) -> catenary.Scene:
+    """A scene for the Python package, with what a command line gives it by ``--set``."""
+    return SceneOfUsers(read_draft(case, words, short))
+
+
+def recorded(scene: Scene) -> Scene:
+    """The scene that a result which recorded this one gives again."""
+    return scene_from(resolved(scene), Origin("a result", recorded=True))
