@@ -9,7 +9,7 @@ Limits that are no answer of a single case's are derived here:
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -131,7 +131,7 @@ def check_cases(
         return {"case": case.model_dump(), "scene": scene, "short": short, "ranks": comm.size}
 
     kept = KeptRows(None) if kept is None else kept
-    outcomes = kept.each(_Check(short), cases, depends_on, n_at_once, comm, initialise)
+    outcomes = kept.each(partial(_checked, short), cases, depends_on, n_at_once, comm, initialise)
     for case, outcome in zip(cases, outcomes, strict=True):
         if isinstance(outcome.error, WorkerLost):
             yield Checked([holds_or_not(case, "runs to its end", False, str(outcome.error))], {})
@@ -140,21 +140,15 @@ def check_cases(
             yield Checked([Criterion(*row) for row in found], remarks)
 
 
-@dataclass(frozen=True)
-class _Check:
-    """Measures a hard case; goes to the processes that do so."""
+def _checked(short: bool, case: HardCase, comm: Any) -> Checked:
+    """Measures of a hard case. Collective."""
+    from catenary.base.mpi import MPI
 
-    short: bool
-
-    def __call__(self, case: HardCase, comm: Any) -> Checked:
-        """Collective."""
-        from catenary.base.mpi import MPI
-
-        one = _OneCase(case, MPI.COMM_SELF, self.short)
-        checked: Checked = on_root(comm, one.checked, takes_long=True)
-        if comm.size > 1:
-            checked.found.append(one.by_ranks(comm))
-        return checked
+    one = _OneCase(case, MPI.COMM_SELF, short)
+    checked: Checked = on_root(comm, one.checked, takes_long=True)
+    if comm.size > 1:
+        checked.found.append(one.by_ranks(comm))
+    return checked
 
 
 class _OneCase:
