@@ -179,6 +179,10 @@ class KeptRows:
             shutil.rmtree(self._folder, ignore_errors=True)
 
 
+# Keeps nothing.
+NOTHING_KEPT = KeptRows(None)
+
+
 def _kept_work(
     kept: KeptRows, function: Callable[[Any, Any], Any], what: tuple[Any, Any], comm: Any
 ) -> Any:
@@ -207,7 +211,7 @@ def held_study(
     from catenary.cases.result_folder.folder_lock import held
 
     if out is None:
-        yield KeptRows(None), lambda write: []
+        yield NOTHING_KEPT, lambda write: []
         return
 
     def written(write: Callable[[Path], list[Path]]) -> list[Path]:

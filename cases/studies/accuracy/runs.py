@@ -18,7 +18,7 @@ from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.problem import resolved
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.accuracy.analysis import Found, Row, compare, separate, uncertainties
-from catenary.cases.studies.accuracy.axes import MODEL, Axis, Level, Reference
+from catenary.cases.studies.accuracy.axes import Axis, Level, Reference
 from catenary.cases.studies.sweep.jobs import AS_USUAL, Ended, Job, RunOptions, all_ended
 from catenary.cases.studies.sweep.run_jobs import run_jobs
 from catenary.cases.studies.sweep.variants import Variant, slug
@@ -160,7 +160,6 @@ def _planned(axis: Axis, scene: Scene, jobs: _Jobs, quick: bool) -> Iterator[Pla
                 step_alone[level.name] = jobs.add(axis.name, axis.step_alone(level))
         except InputError as error:
             refused[level.name] = str(error).replace(f" in {file}", "")
-    assert axis.kind == MODEL or chains
     yield PlannedAxis(axis, levels, runs, refused, reference, chains, step_alone)
 
 

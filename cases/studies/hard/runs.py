@@ -266,11 +266,6 @@ def rest_height(rest: LineAtRest, x: np.ndarray) -> np.ndarray:
     return wire.rest_height(x.ravel()).reshape(x.shape)
 
 
-def node_places(rest: LineAtRest) -> np.ndarray:
-    """Places of the contact wire's nodes [m]."""
-    return rest.model.contact_x
-
-
 def run(
     rest: LineAtRest, comm: Any, with_work: bool = False, self_watched: bool = False
 ) -> RunHistories:
