@@ -4,7 +4,7 @@ A case folder may hold a ``study.py`` with three functions:
 
 - ``variants(scene, shortened)`` gives the ``StudyVariant`` s; it loads no backend;
 - ``measure(results)`` takes plain figures from each run's result file;
-- ``conclude(runs)`` turns the runs by name into a ``postproc.study_report.Study``.
+- ``conclude(runs)`` turns the runs by name into a ``postproc.report.study_report.Study``.
 
 It is a program, unlike the scene: it runs with ``--study`` only, after a line that names it.
 """

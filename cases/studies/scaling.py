@@ -131,7 +131,7 @@ MOST_RANKS = 1_000_000
 # Times in the table of a prediction, and their heads.
 _PARTS = (("step", "us a step"), ("line", "line"), ("neighbours", "neighbours"), ("tree", "tree"),
           ("fixed", "rank 0"))  # fmt: skip
-# Ratio of times of steps taken one by one, as on several ranks, and in blocks: measured
+# Time that a step takes longer by itself, as on several ranks, than in a block of steps: measured
 # on lines of 25 to 1000 spans before and after there were blocks [s].
 _ONE_BY_ONE = 1e-5
 
@@ -188,9 +188,7 @@ def work_of(scene: Scene) -> Work:
     contacts = sum(len(place.data.strip_offsets) for place in problem.train.placements)
     share = _FLAGS + 2 * contacts * (1 + contacts)
     reply = _HEAD + contacts + 2 * _LINKS
-    sizes = Sizes(
-        _BYTES * math.ceil(n_unknowns / n_spans), _BYTES * share, _BYTES * reply
-    )  # fmt: skip
+    sizes = Sizes(_BYTES * math.ceil(n_unknowns / n_spans), _BYTES * share, _BYTES * reply)
     step = needs.march / needs.n_steps
     return Work(n_unknowns, n_spans, step, min(STEP_OVERHEAD, step), sizes)
 
@@ -229,7 +227,7 @@ def as_text(
     ranks : numbers of ranks
     measured_wire : whether latency and bandwidth are measured between ranks 0 and 1
     exchange : number of ranks that there are, and times of a step's messages on them as
-        `messages.time_of_exchange` gives them [s]; None on one rank
+        `time_of_exchange` gives them [s]; None on one rank
     """
     speed = 1e-9 / wire.per_byte if wire.per_byte > 0.0 else math.inf
     how = "between ranks 0 and 1 of this machine" if measured_wire else "as given"

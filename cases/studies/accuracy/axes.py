@@ -270,9 +270,8 @@ _STEPS = ((2e-4, False), (5e-4, False), (1e-3, True), (2e-3, True), (4e-3, False
 _ELEMENTS = (1, 2, 3, 4, 5, 6, 8, 12, 16)
 _FEW_ELEMENTS = (3, 5)
 # Step [s] and elements per gap, in the long form and the short one, of the reference for step and
-# mesh together. Meshes are compared at
-# this step: a fine mesh and a long step do not go together, see
-# ``solver/linear/unit_responses.py``.
+# mesh together. Meshes are compared at this step: a fine mesh and a long step do not go together,
+# see ``solver/linear/unit_responses.py``.
 _FINEST_STEP, _FINEST_MESH, _QUICK_MESH = 2e-4, 40, 24
 
 

@@ -163,12 +163,6 @@ def _planned(axis: Axis, scene: Scene, jobs: _Jobs, quick: bool) -> Iterator[Pla
     yield PlannedAxis(axis, levels, runs, refused, reference, chains, step_alone)
 
 
-def again(job: Job, number: int) -> Job:
-    """The job under a name of its own, to be timed once more."""
-    name = f"{job.variant.name}__again_{number}"
-    return replace(job, variant=Variant(name, job.variant.assignments))
-
-
 RUNS = "runs"
 # Distance at which histories are compared [m]: 20 Hz are waves of 0.25 m at 18 km/h.
 _SPACING = 0.25
@@ -256,8 +250,11 @@ def run(
         round_of = f"no. {number} of {plan.repeats}"
         options.progress(f"again, for their time, {round_of}: {len(short)} short runs")
         short.reverse()  # whatever else the machine does now and then meets others
-        runs = run_jobs([again(job, number) for job in short], folder, comm, alone)
-        repeated = all_ended(runs)
+        again = []
+        for job in short:
+            variant = Variant(f"{job.variant.name}__again_{number}", job.variant.assignments)
+            again.append(replace(job, variant=variant))
+        repeated = all_ended(run_jobs(again, folder, comm, alone))
         every += repeated
         for job, one in zip(short, repeated, strict=True):
             if one.done:

@@ -110,7 +110,7 @@ class RunHistories:
 
 
 class Watcher(Observer):
-    """Observer that keeps what `Watched` holds; wire and balance are needed for the work.
+    """Observer that keeps what `RunHistories` holds; wire and balance are needed for the work.
 
     With the work, dropper forces and displacements are kept after the steps ``keep``. Steps are
     then looked at one by one, otherwise in blocks of rows.
