@@ -11,7 +11,7 @@ each of two neighbours, m(k) = latency + k / bandwidth. Reductions and broadcast
 from __future__ import annotations
 
 import math
-import time
+import timeit
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
@@ -115,13 +115,8 @@ def time_of_exchange(comm: Any, sizes: Sizes) -> tuple[float, float]:
 
 def _fastest(work: Callable[[], None]) -> tuple[float, float]:
     """Time of ``work`` [s], in the fastest block and in half of the blocks."""
-    times = []
-    for _ in range(BLOCKS):
-        begin = time.perf_counter()
-        for _ in range(EXCHANGES):
-            work()
-        times.append((time.perf_counter() - begin) / EXCHANGES)
-    return min(times), float(np.median(times))
+    times = np.array(timeit.repeat(work, repeat=BLOCKS, number=EXCHANGES)) / EXCHANGES
+    return float(times.min()), float(np.median(times))
 
 
 # Bytes of a number; numbers before the answers in a share, before the forces in a reply, and links
