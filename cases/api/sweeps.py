@@ -241,9 +241,10 @@ class PlannedSweep:
 
         ended, sampling = run_part(self.own, part, self.folder, comm, options), self.sampling
         if sampling is not None:
-            from catenary.cases.studies.uncertainty.run_table import write_sampling
+            from catenary.cases.studies.uncertainty.run_table import sampling_file
+            from catenary.postproc.report.study_table import write_files
 
-            on_root(comm, lambda: write_sampling(self.folder / part.folder, sampling))
+            on_root(comm, lambda: write_files(self.folder / part.folder, sampling_file(sampling)))
         return ended
 
 

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from catenary.cases.scene.load import Draft
     from catenary.cases.scene.scene import Scene
     from catenary.cases.studies.sweep.jobs import RunOptions
+    from catenary.postproc.read.records import Records
 
     Command = Callable[..., int | None]
 
@@ -328,6 +329,21 @@ def begin(
 
     console.at_end(warn)
     return comm, what, arguments
+
+
+def records_of(folder: Path) -> Records | None:
+    """Content of the result file of a run's folder, None if a quick look is enough.
+
+    Raises
+    ------
+    InputError
+        If there is no such folder.
+    """
+    from catenary.postproc.read.guard import examined
+
+    if not folder.is_dir():
+        raise InputError(f"{folder} is no folder; name the folder of a run")
+    return examined(folder)
 
 
 def tell(text: str, files: Sequence[Path]) -> None:

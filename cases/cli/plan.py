@@ -13,7 +13,7 @@ from catenary.cases.cli.app import Force, Jobs, SceneWords, folder_option, seria
 from catenary.cases.terminal import console
 
 if TYPE_CHECKING:
-    from catenary.cases.studies.effect_cost.study import CostOptions, Costs
+    from catenary.cases.studies.effect_cost.study import CostOptions
 
 _RUNS = "runs"
 _MOST_ROUNDS = 1000
@@ -137,15 +137,10 @@ def _cost(options: CostOptions, out: Path | None, as_json: bool, n_jobs: int, fo
         again = "" if out is None else "; the same command continues it"
         console.complain(f"interrupted before all effects were run{again}")
         return console.BROKEN
-    _print(found, files, as_json)
-    return console.DONE
-
-
-def _print(found: Costs, files: list[Path], as_json: bool) -> None:
-    from catenary.cases.studies.effect_cost import output
-    from catenary.postproc.report.study_table import json_text
-
     if as_json:
+        from catenary.postproc.report.study_table import json_text
+
         console.say(json_text(output.record_of(found)).rstrip())
     else:
         tell(output.as_text(found), files)
+    return console.DONE

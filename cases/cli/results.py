@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from catenary.base.errors import CatenaryError, InputError
-from catenary.cases.cli.app import Force, RunFolder, folder_option, serial_verb
+from catenary.cases.cli.app import Force, RunFolder, folder_option, records_of, serial_verb
 from catenary.cases.terminal import console
 from catenary.postproc.film.options import View
 
@@ -72,7 +72,7 @@ def report(
     ] = None,
 ) -> None:
     """Serial."""
-    records = _records(folder)
+    records = records_of(folder)
     console.alone()  # starts MPI as one process, before anything imports it
     from catenary.cases.studies.full_report.scene_of_run import (
         SceneOfRun,
@@ -177,7 +177,7 @@ def _compare_measured(
     if wanted is None:
         wanted = usual_description(table, file)
     beside = (description or file).parent
-    with Results(folder, _records(folder)) as results:
+    with Results(folder, records_of(folder)) as results:
         found = compare_with(results, passage_of(table, file, wanted, beside, results))
     console.say(output.as_text(found))
     if out is not None:
@@ -229,7 +229,7 @@ def animate(
     from catenary.postproc.film.options import FilmOptions
 
     options = FilmOptions(start, end, rate, every, width, motion, view, camera)
-    records = _records(folder)
+    records = records_of(folder)
     shapes = _shapes(folder, records)
     film = make_film(folder, options, records, not console.is_quiet(), shapes)
     pace = (
@@ -267,7 +267,7 @@ def paraview(
     from catenary.postproc.paraview.open_in_paraview import write_script
     from catenary.postproc.paraview.state import PROGRAM, write_state
 
-    records = _records(folder)
+    records = records_of(folder)
     script, *others = write_script(folder, records, motion, _shapes(folder, records), view)
     console.say("\n".join(map(str, (script, *others))))
     if state and shutil.which(PROGRAM) is not None:
@@ -283,15 +283,6 @@ def paraview(
     console.say(f"Open it with: paraview --script={script}")
     if shutil.which("paraview") is None:
         console.warn("paraview is not on this machine (Debian, Ubuntu: apt-get install paraview)")
-
-
-def _records(folder: Path) -> Records | None:
-    """Content of the result file of a folder, None if a quick look is enough."""
-    from catenary.postproc.read.guard import examined
-
-    if not folder.is_dir():
-        raise InputError(f"{folder} is no folder; name the folder of a run")
-    return examined(folder)
 
 
 def _shapes(folder: Path, records: Records | None) -> list[Shape] | None:

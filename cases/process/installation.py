@@ -97,17 +97,10 @@ pc = ksp.getPC(); pc.setType("lu"); SOLVER
 ksp.solve(b, x)
 assert max(abs(x.array - [1.5, 2.0, 1.5])) < 1e-12, f"a system of three unknowns gave {x.array}"
 """
-_PETSC = (
-    _SYSTEM.replace("SOLVER", "pass")
-    + """
-print(".".join(map(str, PETSc.Sys.getVersion())), "solves a small system")
-"""
-)
-_MUMPS = (
-    _SYSTEM.replace("SOLVER", 'pc.setFactorSolverType("mumps")')
-    + """
-print("solves a small system")
-"""
+_SOLVES = 'print(".".join(map(str, PETSc.Sys.getVersion())), "solves a small system")'
+_PETSC = _SYSTEM.replace("SOLVER", "pass") + _SOLVES
+_MUMPS = _SYSTEM.replace("SOLVER", 'pc.setFactorSolverType("mumps")') + (
+    'print("solves a small system")'
 )
 _HDF5 = """
 import tempfile, h5py

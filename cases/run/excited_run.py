@@ -20,7 +20,8 @@ class ExcitedRun:
 
     Attributes
     ----------
-    problem : the scene's problem with a train that exerts no force, see `waves.excited`
+    problem : the scene's problem with a train that exerts no force, see
+        `cases.studies.waves.excited`
     excitation : excitation of the contact wire
     snapshot_every : time between snapshots unless the scene sets it [s]
     watching : returns the observers beside the recorder, for a line at rest

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from catenary.cases.process.versions import versions
 from catenary.cases.run.describe.arrivals import arrival_facts
@@ -24,6 +24,29 @@ if TYPE_CHECKING:
     from catenary.cases.run.excited_run import ExcitedRun
 
 
+def scene_attributes(scene: Scene, problem: Problem) -> dict[str, Any]:
+    """Attributes that follow from a scene and its problem alone. Not collective."""
+    on, off = effect_rows(scene, problem)
+    return {
+        "case": scene.case.name,
+        "title": scene.case.title,
+        "system": scene.evaluation.system,
+        "rules": rule_entries(scene.evaluation),
+        "limits": scene.evaluation.own_limits,
+        "defects": defect_facts(scene, problem),
+        "effects_on": [tuple(row) for row in on],
+        "effects_off": [tuple(row) for row in off],
+    }
+
+
+def train_attributes(scene: Scene, problem: Problem) -> dict[str, Any]:
+    """Attributes of a line that a train excites. Not collective."""
+    return {
+        "pantographs": header_words(scene, problem),
+        "arrivals": arrival_facts(scene, problem),
+    }
+
+
 def header_of(
     scene: Scene,
     problem: Problem,
@@ -40,31 +63,18 @@ def header_of(
     petsc_options : the options that PETSc was started with, for the record
     excited : excitation that sets the line into motion in place of the scene's train
     """
-    on, off = effect_rows(scene, problem)
     line, lengths = problem.line, lengths_to_cut(problem, at_rest.mesh)
-    if excited is not None:
-        by_what = excited.attributes()
-    else:
-        words, arrivals = header_words(scene, problem), arrival_facts(scene, problem)
-        by_what = {"pantographs": words, "arrivals": arrivals}
     return Header(
         attributes={
-            "case": scene.case.name,
-            "title": scene.case.title,
+            **scene_attributes(scene, problem),
+            **(train_attributes(scene, problem) if excited is None else excited.attributes()),
             "n_dofs": at_rest.model.n_unknowns,
-            "system": scene.evaluation.system,
-            "rules": rule_entries(scene.evaluation),
-            "limits": scene.evaluation.own_limits,
-            "defects": defect_facts(scene, problem),
             "incidents": incident_facts(scene, problem),
-            **by_what,
             "window": window_sentence(problem),
             "versions": versions(),
             "config": resolved(scene),
             "wires": wire_roles(line),
             "petsc_options": list(petsc_options),
-            "effects_on": [tuple(row) for row in on],
-            "effects_off": [tuple(row) for row in off],
         },
         datasets={
             **line_datasets(line, at_rest.mesh, problem.evaluation),

@@ -72,8 +72,7 @@ class Recording:
     fields : of the snapshots
     field_every, energy_every : steps between two records, None for none
     field_by_size : whether snapshots are rarer because of their size
-    arm_x, dropper_x : positions [m]
-    n_nodes, n_cells : of the snapshots
+    extent : recorded parts of the line
     n_steps : steps after step 0
     end_x : positions of ends of wires and sides of mid-points that are recorded [m]
     """
@@ -83,10 +82,7 @@ class Recording:
     field_every: int | None
     energy_every: int | None
     field_by_size: bool
-    arm_x: np.ndarray
-    dropper_x: np.ndarray
-    n_nodes: int
-    n_cells: int
+    extent: Extent
     n_steps: int
     end_x: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
@@ -150,7 +146,7 @@ def recording_of(
         field_every,
         cadence(output.energy_every_s, problem.numerics.dt),
         by_size,
-        *extent,
+        extent,
         n_steps,
         end_x,
     )

@@ -4,7 +4,7 @@ A case folder may hold a ``study.py`` with three functions:
 
 - ``variants(scene, shortened)`` gives the ``StudyVariant`` s; it loads no backend;
 - ``measure(results)`` takes plain figures from each run's result file;
-- ``conclude(runs)`` turns the runs by name into a ``postproc.study_report.Study``.
+- ``conclude(runs)`` turns the runs by name into a ``postproc.report.study_report.Study``.
 
 It is a program, unlike the scene: it runs with ``--study`` only, after a line that names it.
 """
@@ -15,6 +15,7 @@ import importlib.util
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -133,23 +134,18 @@ def run(
 
     begin = time.perf_counter()
     jobs = plan.jobs if part is None else part.of(plan.jobs)
-    ended = run_jobs(jobs, out_dir / RUNS, comm, options, measure=_Measure(plan.path))
+    ended = run_jobs(jobs, out_dir / RUNS, comm, options, measure=partial(_measured, plan.path))
     if part is not None or interrupted(ended):
         return None, ended
     text = on_root(comm, lambda: _conclude(plan, out_dir, ended, begin), takes_long=True)
     return text, ended
 
 
-@dataclass(frozen=True)
-class _Measure:
-    """``measure`` of a ``study.py``, which other processes load again: no package has it."""
-
-    path: Path
-
-    def __call__(self, results: Results) -> dict[str, Any]:
-        """Plain figures of a result file."""
-        measured: dict[str, Any] = _load(self.path).measure(results)
-        return measured
+def _measured(path: Path, results: Results) -> dict[str, Any]:
+    """What the ``measure`` of a ``study.py`` takes from a result file; other processes load the
+    program again, as no package has it."""
+    measured: dict[str, Any] = _load(path).measure(results)
+    return measured
 
 
 def _conclude(plan: Plan, out_dir: Path, ended: Sequence[Ended], begin: float) -> str:

@@ -16,15 +16,10 @@ import numpy as np
 
 from catenary.base.errors import CatenaryError
 from catenary.base.lone_process import alone
-from catenary.cases.run.describe.arrivals import arrival_facts
-from catenary.cases.run.describe.defects import defect_facts
-from catenary.cases.run.describe.pantographs import header_words
-from catenary.cases.run.header import header_of
-from catenary.cases.run.planning.plan import effect_rows
+from catenary.cases.run.header import header_of, scene_attributes, train_attributes
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.keys.keys import OF_THE_TRAIN
 from catenary.cases.scene.problem import problem_of, resolved
-from catenary.cases.scene.run.case import rule_entries
 from catenary.cases.scene.scene import Scene
 from catenary.postproc.channels.facts import facts_of
 from catenary.postproc.channels.header import Header, static_datasets
@@ -307,19 +302,11 @@ class _Line:
         points[:, 2] = form.height
         if form.lateral is not None:
             points[:, 1] = form.lateral.y
-        on, off = effect_rows(scene, problem)
-        of_scene = {
-            "case": scene.case.name,
-            "title": scene.case.title,
-            "system": scene.evaluation.system,
-            "rules": rule_entries(scene.evaluation),
-            "limits": scene.evaluation.own_limits,
-            "pantographs": header_words(scene, problem),
-            "arrivals": arrival_facts(scene, problem),
-            "defects": defect_facts(scene, problem),
+        attributes = {
+            **self._header.attributes,
+            **scene_attributes(scene, problem),
+            **train_attributes(scene, problem),
             "config": {},
-            "effects_on": [tuple(row) for row in on],
-            "effects_off": [tuple(row) for row in off],
         }
         lengths = self._cut + errors_of_length(problem, at_rest.model)
         own = {
@@ -330,7 +317,7 @@ class _Line:
             **static_datasets(problem.line, mesh, form, at_rest.lift, lengths),
         }
         return Header(
-            {**self._header.attributes, **of_scene},
+            attributes,
             {**self._header.datasets, **own},
             facts_of(problem, mesh, at_rest.model.dropper_lengths),
         )

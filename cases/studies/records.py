@@ -14,6 +14,7 @@ import shutil
 import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -141,7 +142,9 @@ class KeptRows:
         def come() -> Iterator[Outcome]:
             yield from (Outcome(i, rows) for i, rows in enumerate(there) if rows is not None)
             work = ((all_of[number], items[number]) for number in left)
-            for outcome in each(_Keeping(self, function), work, n_at_once, comm, initialise):
+            for outcome in each(
+                partial(_kept_work, self, function), work, n_at_once, comm, initialise
+            ):
                 yield outcome._replace(number=left[outcome.number])
 
         n_left = len(items)
@@ -176,18 +179,18 @@ class KeptRows:
             shutil.rmtree(self._folder, ignore_errors=True)
 
 
-class _Keeping:
-    """Work that leaves a record; goes to the processes that do some."""
+# Keeps nothing.
+NOTHING_KEPT = KeptRows(None)
 
-    def __init__(self, kept: KeptRows, function: Callable[[Any, Any], Any]) -> None:
-        self._kept, self._function = kept, function
 
-    def __call__(self, what: tuple[Any, Any], comm: Any) -> Any:
-        """Collective."""
-        depends_on, item = what
-        rows = self._function(item, comm)
-        on_root(comm, lambda: self._kept.keep(depends_on, rows))
-        return rows
+def _kept_work(
+    kept: KeptRows, function: Callable[[Any, Any], Any], what: tuple[Any, Any], comm: Any
+) -> Any:
+    """Work that leaves a record, as the processes do that do some. Collective."""
+    depends_on, item = what
+    rows = function(item, comm)
+    on_root(comm, lambda: kept.keep(depends_on, rows))
+    return rows
 
 
 @contextmanager
@@ -208,7 +211,7 @@ def held_study(
     from catenary.cases.result_folder.folder_lock import held
 
     if out is None:
-        yield KeptRows(None), lambda write: []
+        yield NOTHING_KEPT, lambda write: []
         return
 
     def written(write: Callable[[Path], list[Path]]) -> list[Path]:

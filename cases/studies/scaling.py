@@ -11,7 +11,7 @@ each of two neighbours, m(k) = latency + k / bandwidth. Reductions and broadcast
 from __future__ import annotations
 
 import math
-import time
+import timeit
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
@@ -115,13 +115,8 @@ def time_of_exchange(comm: Any, sizes: Sizes) -> tuple[float, float]:
 
 def _fastest(work: Callable[[], None]) -> tuple[float, float]:
     """Time of ``work`` [s], in the fastest block and in half of the blocks."""
-    times = []
-    for _ in range(BLOCKS):
-        begin = time.perf_counter()
-        for _ in range(EXCHANGES):
-            work()
-        times.append((time.perf_counter() - begin) / EXCHANGES)
-    return min(times), float(np.median(times))
+    times = np.array(timeit.repeat(work, repeat=BLOCKS, number=EXCHANGES)) / EXCHANGES
+    return float(times.min()), float(np.median(times))
 
 
 # Bytes of a number; numbers before the answers in a share, before the forces in a reply, and links
@@ -131,7 +126,7 @@ MOST_RANKS = 1_000_000
 # Times in the table of a prediction, and their heads.
 _PARTS = (("step", "us a step"), ("line", "line"), ("neighbours", "neighbours"), ("tree", "tree"),
           ("fixed", "rank 0"))  # fmt: skip
-# Ratio of times of steps taken one by one, as on several ranks, and in blocks: measured
+# Time that a step takes longer by itself, as on several ranks, than in a block of steps: measured
 # on lines of 25 to 1000 spans before and after there were blocks [s].
 _ONE_BY_ONE = 1e-5
 
@@ -188,9 +183,7 @@ def work_of(scene: Scene) -> Work:
     contacts = sum(len(place.data.strip_offsets) for place in problem.train.placements)
     share = _FLAGS + 2 * contacts * (1 + contacts)
     reply = _HEAD + contacts + 2 * _LINKS
-    sizes = Sizes(
-        _BYTES * math.ceil(n_unknowns / n_spans), _BYTES * share, _BYTES * reply
-    )  # fmt: skip
+    sizes = Sizes(_BYTES * math.ceil(n_unknowns / n_spans), _BYTES * share, _BYTES * reply)
     step = needs.march / needs.n_steps
     return Work(n_unknowns, n_spans, step, min(STEP_OVERHEAD, step), sizes)
 
@@ -229,7 +222,7 @@ def as_text(
     ranks : numbers of ranks
     measured_wire : whether latency and bandwidth are measured between ranks 0 and 1
     exchange : number of ranks that there are, and times of a step's messages on them as
-        `messages.time_of_exchange` gives them [s]; None on one rank
+        `time_of_exchange` gives them [s]; None on one rank
     """
     speed = 1e-9 / wire.per_byte if wire.per_byte > 0.0 else math.inf
     how = "between ranks 0 and 1 of this machine" if measured_wire else "as given"

@@ -159,9 +159,9 @@ def test_what_a_run_needs_is_known_before_it_is_meshed(case: str, more: tuple[st
         meshed.march,
         meshed.files,
     )
-    assert before.recording.n_cells == meshed.recording.n_cells
-    assert np.allclose(before.recording.dropper_x, meshed.recording.dropper_x)
-    assert np.allclose(before.recording.arm_x, meshed.recording.arm_x)
+    assert before.recording.extent.n_cells == meshed.recording.extent.n_cells
+    assert np.allclose(before.recording.extent.dropper_x, meshed.recording.extent.dropper_x)
+    assert np.allclose(before.recording.extent.arm_x, meshed.recording.extent.arm_x)
 
 
 def test_the_size_of_a_large_run_is_told_before_the_mesh_is_made(

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from catenary.base.errors import InputError
 from catenary.cases.cli.app import (
     RunFolder,
     RunWords,
     StudyRuns,
     folder_option,
+    records_of,
     serial_verb,
     tell,
     verb,
@@ -219,17 +219,14 @@ def worst(
     ] = None,
 ) -> None:
     """Serial."""
-    from catenary.postproc.read.guard import examined
-
-    if not folder.is_dir():
-        raise InputError(f"{folder} is no folder; name the folder of a run")
+    records = records_of(folder)
     if out is not None:
         refuse_impossible(out)
     console.alone()  # starts MPI as one process, before anything imports it
     from catenary.cases.studies.questions import worst_output
     from catenary.postproc.read.results import Results
 
-    with Results(folder, examined(folder)) as results:
+    with Results(folder, records) as results:
         answer = worst_output.answer_of(results, count)
     console.say(answer.text)
     if out is not None:

@@ -96,14 +96,14 @@ def sweep(
     runs: StudyRuns,
 ) -> int:
     """Collective."""
-    from catenary.cases.studies.sweep.jobs import check_statistics, parse_part
+    from catenary.cases.studies.sweep.jobs import STATISTICS, check_names, parse_part
     from catenary.sweeps import plan_sweep, samples_of
 
     own = None if part is None else parse_part(part)
 
     def read() -> tuple[PlannedSweep, list[str]]:
         draft, options = words.draft()
-        check_statistics(_names(plotted))
+        check_names(_names(plotted), STATISTICS, "statistic")
         sampling = None
         if sample is None:
             variants = read_variants(vary, named)

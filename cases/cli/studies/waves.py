@@ -130,7 +130,7 @@ def waves(
             raise InputError(f"{folder} is a run; --obstacles is for cases")
         if out is not None or words.changes or words.shortened or not train:
             raise InputError(f"{folder} is a run; -o, --set, --short and --excite are for cases")
-        studied = study.study_waves(folder)
+        text, files = study.study_waves(folder)
     else:
         if out is None:
             raise InputError("-o is missing; it names the folder of the run that shows the waves")
@@ -141,16 +141,13 @@ def waves(
         start_petsc([])
         if obstacles:
             text, files = study.study_obstacles(scene, out, force)
-            console.say(text + "\n" + "\n".join(map(str, files)))
-            return console.DONE
-        if train:
-            if not _run(scene, out, force):
-                return console.BROKEN
-            studied = study.study_waves(out)
+        elif not train:
+            text, files = study.study_excited(scene, excite, settings, out, force)
+        elif _run(scene, out, force):
+            text, files = study.study_waves(out)
         else:
-            studied = study.study_excited(scene, excite, settings, out, force)
-    text = study.as_text(studied.theory, studied.measured, studied.remarks)
-    console.say(text + "\n" + "\n".join(map(str, studied.files)))
+            return console.BROKEN
+    console.say(text + "\n" + "\n".join(map(str, files)))
     return console.DONE
 
 

@@ -1,9 +1,9 @@
 """Arrival of waves from the start of a run that the ends of the line reflect.
 
 Wires that droppers join carry long waves together, with c = sqrt(sum of tensions / sum of masses);
-a conductor rail carries them by bending.
-The start of the run sends such waves ahead of the train and behind it; the ends of the line, which
-are fixed, reflect them. docs/guide/line_length.md compares what follows with marches.
+a conductor rail carries them by bending. The start of the run sends such waves ahead of the train
+and behind it; the ends of the line, which are fixed, reflect them. docs/guide/line_length.md
+compares what follows with marches.
 """
 
 from __future__ import annotations

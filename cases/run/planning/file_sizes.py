@@ -14,7 +14,6 @@ import numpy as np
 
 from catenary.cases.run.recording import (
     THINNED_WINDOW,
-    Extent,
     Recording,
     shown_share,
     snapshot_bytes,
@@ -92,10 +91,11 @@ def estimate_files(
         _table_bytes(path, columns, shapes[path], problem, recording)
         for path, (_, columns) in tables.items()
     )
-    n_droppers, n_arms = recording.dropper_x.size, recording.arm_x.size
+    extent = recording.extent
+    n_droppers, n_arms = extent.dropper_x.size, extent.arm_x.size
     n_ends = len(GAUGES) * recording.end_x.size
     kept = 2 * (_STATE_ARRAYS * n_dofs + 2 * (n_droppers + n_arms + n_ends))
-    at_rest = _PER_NODE * recording.n_nodes + _PER_DROPPER * n_droppers
+    at_rest = _PER_NODE * extent.n_nodes + _PER_DROPPER * n_droppers
     filtered = _BYTES * len(problem.train.placements) * (recording.n_steps + 1)
     head = _EMPTY_FILE + len(json.dumps(resolved(scene)))
     film = 0.0
@@ -113,9 +113,9 @@ def _film_bytes(problem: Problem, recording: Recording, n_snapshots: int) -> flo
     """Size of ``fields.h5`` and ``.xdmf``, were all parts of the line in them [B]."""
     fields, line = recording.fields, problem.line
     share = shown_share(fields, problem, recording.n_steps)
-    extent = Extent(recording.arm_x, recording.dropper_x, recording.n_nodes, recording.n_cells)
+    extent = recording.extent
     n_blocks = len(line.wires) + 3 + bool(line.clamps)
-    n_points = recording.n_nodes + 2 * (extent.dropper_x.size + extent.arm_x.size)
+    n_points = extent.n_nodes + 2 * (extent.dropper_x.size + extent.arm_x.size)
     n_points += 2 * line.support_positions.size
     text = n_blocks * (_XDMF_BLOCK + _XDMF_FIELD * len(fields.kinds))
     values = share * snapshot_bytes(fields, extent)
@@ -138,8 +138,8 @@ def _tables(problem: Problem, recording: Recording) -> dict[str, tuple[Channel, 
 
 def _places(name: str, recording: Recording) -> np.ndarray:
     return {
-        channels.ARM: recording.arm_x,
-        channels.DROPPER: recording.dropper_x,
+        channels.ARM: recording.extent.arm_x,
+        channels.DROPPER: recording.extent.dropper_x,
         channels.WIRE_END: recording.end_x,
     }[channels.CHANNELS[name].per]
 

@@ -245,7 +245,8 @@ def flush_cadence(problem: Problem, n_dofs: int, recording: Recording) -> int:
 def _steps_in_memory(problem: Problem, recording: Recording) -> int:
     """Steps whose channels fit into memory."""
     of_train = _PER_PANTOGRAPH * len(problem.train.placements)
-    columns = recording.arm_x.size + recording.dropper_x.size + len(GAUGES) * recording.end_x.size
+    arm_x, dropper_x, *_ = recording.extent
+    columns = arm_x.size + dropper_x.size + len(GAUGES) * recording.end_x.size
     window, masts = recording.line.window, problem.line.support_positions
     if window is None or not problem.window.moves:
         return int(FLUSH_MEMORY / (_BYTES * (of_train + columns)))

@@ -66,7 +66,6 @@ class Axis:
     Attributes
     ----------
     name, title : for the option ``--axes`` and for headings
-    kind : ``DISCRETISATION`` or ``MODEL``
     levels : returns the levels for a scene; empty if the scene has nothing to vary
     reference : returns the reference of a discretisation axis; None for models, which are compared
         with the unchanged scene
@@ -78,11 +77,15 @@ class Axis:
 
     name: str
     title: str
-    kind: str
     levels: Callable[[Scene], Sequence[Level]]
     reference: Callable[[bool], Reference] | None = None
     refined: str = ""
     step_alone: Callable[[Level], Level] | None = None
+
+    @property
+    def kind(self) -> str:
+        """Whether its levels solve the same equations, ``DISCRETISATION``, or others, ``MODEL``."""
+        return MODEL if self.reference is None else DISCRETISATION
 
     def chosen(self, scene: Scene, quick: bool) -> list[Level]:
         """The levels of the axis for a scene, in the long or the short form."""
@@ -267,9 +270,8 @@ _STEPS = ((2e-4, False), (5e-4, False), (1e-3, True), (2e-3, True), (4e-3, False
 _ELEMENTS = (1, 2, 3, 4, 5, 6, 8, 12, 16)
 _FEW_ELEMENTS = (3, 5)
 # Step [s] and elements per gap, in the long form and the short one, of the reference for step and
-# mesh together. Meshes are compared at
-# this step: a fine mesh and a long step do not go together, see
-# ``solver/linear/unit_responses.py``.
+# mesh together. Meshes are compared at this step: a fine mesh and a long step do not go together,
+# see ``solver/linear/unit_responses.py``.
 _FINEST_STEP, _FINEST_MESH, _QUICK_MESH = 2e-4, 40, 24
 
 
@@ -413,24 +415,17 @@ def _adaptive(scene: Scene) -> list[Level]:
 
 
 _ALL = (
-    Axis("dt", "time step, on the case's mesh", DISCRETISATION, _steps, _fine_step, "dt"),
-    Axis("elements", "elements per gap, step 0.2 ms", DISCRETISATION, _meshes, _fine_both, "h"),
-    Axis(
-        "grid",
-        "time step and elements per gap",
-        DISCRETISATION,
-        _grid,
-        _fine_both,
-        step_alone=_at_the_finest_step,
-    ),
-    Axis("scheme", "scheme, at the case's step", DISCRETISATION, _schemes, _fine_step),
-    Axis("coupling", "coupling, at the case's step", DISCRETISATION, _couplings, _fine_step),
-    Axis("adaptive", "steps halved where a force is wrong", DISCRETISATION, _adaptive, _fine_step),
-    Axis("contact", "contact law and stiffness", MODEL, contacts),
-    Axis("dropper", "dropper model", MODEL, droppers),
-    Axis("pantograph", "pantograph model", MODEL, pantographs),
-    Axis("planes", "planes in which wires move", MODEL, planes),
-    Axis("lateral_damping", "damping of lateral motion", MODEL, lateral_dampings),
-    Axis("parts", "the line without one of its parts", MODEL, parts_of_the_line),
-)  # fmt: skip
+    Axis("dt", "time step, on the case's mesh", _steps, _fine_step, "dt"),
+    Axis("elements", "elements per gap, step 0.2 ms", _meshes, _fine_both, "h"),
+    Axis("grid", "time step and elements per gap", _grid, _fine_both, "", _at_the_finest_step),
+    Axis("scheme", "scheme, at the case's step", _schemes, _fine_step),
+    Axis("coupling", "coupling, at the case's step", _couplings, _fine_step),
+    Axis("adaptive", "steps halved where a force is wrong", _adaptive, _fine_step),
+    Axis("contact", "contact law and stiffness", contacts),
+    Axis("dropper", "dropper model", droppers),
+    Axis("pantograph", "pantograph model", pantographs),
+    Axis("planes", "planes in which wires move", planes),
+    Axis("lateral_damping", "damping of lateral motion", lateral_dampings),
+    Axis("parts", "the line without one of its parts", parts_of_the_line),
+)
 AXES = {axis.name: axis for axis in _ALL}

@@ -18,7 +18,7 @@ from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.problem import resolved
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.accuracy.analysis import Found, Row, compare, separate, uncertainties
-from catenary.cases.studies.accuracy.axes import MODEL, Axis, Level, Reference
+from catenary.cases.studies.accuracy.axes import Axis, Level, Reference
 from catenary.cases.studies.sweep.jobs import AS_USUAL, Ended, Job, RunOptions, all_ended
 from catenary.cases.studies.sweep.run_jobs import run_jobs
 from catenary.cases.studies.sweep.variants import Variant, slug
@@ -160,14 +160,7 @@ def _planned(axis: Axis, scene: Scene, jobs: _Jobs, quick: bool) -> Iterator[Pla
                 step_alone[level.name] = jobs.add(axis.name, axis.step_alone(level))
         except InputError as error:
             refused[level.name] = str(error).replace(f" in {file}", "")
-    assert axis.kind == MODEL or chains
     yield PlannedAxis(axis, levels, runs, refused, reference, chains, step_alone)
-
-
-def again(job: Job, number: int) -> Job:
-    """The job under a name of its own, to be timed once more."""
-    name = f"{job.variant.name}__again_{number}"
-    return replace(job, variant=Variant(name, job.variant.assignments))
 
 
 RUNS = "runs"
@@ -257,8 +250,11 @@ def run(
         round_of = f"no. {number} of {plan.repeats}"
         options.progress(f"again, for their time, {round_of}: {len(short)} short runs")
         short.reverse()  # whatever else the machine does now and then meets others
-        runs = run_jobs([again(job, number) for job in short], folder, comm, alone)
-        repeated = all_ended(runs)
+        again = []
+        for job in short:
+            variant = Variant(f"{job.variant.name}__again_{number}", job.variant.assignments)
+            again.append(replace(job, variant=variant))
+        repeated = all_ended(run_jobs(again, folder, comm, alone))
         every += repeated
         for job, one in zip(short, repeated, strict=True):
             if one.done:

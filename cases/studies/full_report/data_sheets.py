@@ -209,21 +209,15 @@ def pantographs(scene: SceneOfRun, run: EvaluatedRun) -> Section:
     words = header_words(scene.scene, scene.problem)
     for placement, kind in zip(scene.problem.train.placements, words, strict=True):
         kinds.setdefault(kind["kind"], (placement, kind["description"]))
-    pictures = [
-        Picture(
-            file,
-            f"Pantograph {_plain(name)}, {_how_drawn(one[0].data)}.",
-            partial(_drawn, one[0].data),
-        )
-        for file, (name, one) in zip(PICTURES["pantographs"], kinds.items(), strict=False)
-    ]
+    pictures = []
+    for file, (name, (placement, _)) in zip(PICTURES["pantographs"], kinds.items(), strict=False):
+        how = "drawn to scale from its joints"
+        if isinstance(placement.data, LumpedData):
+            how = "sketched from the side and from the front: "
+            how += "a head of its length, springs and arms"
+        text = f"Pantograph {_plain(name)}, {how}."
+        pictures.append(Picture(file, text, partial(_drawn, placement.data)))
     return Section("Data sheet of the pantographs", _pantograph_blocks(kinds), pictures)
-
-
-def _how_drawn(data: Any) -> str:
-    if isinstance(data, LumpedData):
-        return "sketched from the side and from the front: a head of its length, springs and arms"
-    return "drawn to scale from its joints"
 
 
 def _pantograph_blocks(

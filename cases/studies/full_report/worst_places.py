@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from catenary.cases.studies.full_report.scene_of_run import SceneOfRun
 from catenary.cases.studies.questions.causes import Causes
 from catenary.cases.studies.questions.worst import Passage, Spot, WorstPlaces, worst_places
-from catenary.cases.studies.questions.worst_output import candidates, out
+from catenary.cases.studies.questions.worst_output import candidates, scatter_words
 from catenary.postproc.evaluate import filters
 from catenary.postproc.read.results import Results
 from catenary.postproc.report.pictures.figures import (
@@ -52,7 +52,7 @@ def _blocks(results: Results, places: WorstPlaces, causes: Causes) -> Iterator[T
         yield Text(
             f"span {one.span + 1}, {one.start:.6g} to {one.end:.6g} m, {names[one.pantograph]}: "
             f"standard deviation {one.std:.1f} N (median of all spans {one.median:.1f} N), force "
-            f"{one.minimum:.0f} to {one.maximum:.0f} N{out(one.stands_out)}.",
+            f"{one.minimum:.0f} to {one.maximum:.0f} N{scatter_words(one.stands_out)}.",
             "note",
             "Worst span:",
             candidates(causes.of_passage(one), one.stands_out),
@@ -61,7 +61,7 @@ def _blocks(results: Results, places: WorstPlaces, causes: Causes) -> Iterator[T
         for spot in spots(places)[:1]:
             sentence = words.format(at=spot.place, v=spot.value, m=spot.median)
             items = candidates(causes.at(spot), spot.stands_out)
-            yield Text(f"{sentence}{out(spot.stands_out)}.", "note", first, items)
+            yield Text(f"{sentence}{scatter_words(spot.stands_out)}.", "note", first, items)
     everywhere = causes.of_line()
     if everywhere:
         yield Text("acts on all spans alike:", "note", "The line as a whole", everywhere)

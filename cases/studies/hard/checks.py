@@ -9,7 +9,7 @@ Limits that are no answer of a single case's are derived here:
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,8 +19,8 @@ from catenary.cases.process.workers import WorkerLost
 from catenary.cases.scene.problem import resolved
 from catenary.cases.studies.hard import runs as hard_runs
 from catenary.cases.studies.hard.cases import HardCase
-from catenary.cases.studies.hard.runs import RunHistories, cut_of, node_places, rest_height
-from catenary.cases.studies.records import KeptRows
+from catenary.cases.studies.hard.runs import RunHistories, cut_of, rest_height
+from catenary.cases.studies.records import NOTHING_KEPT, KeptRows
 from catenary.postproc.report.study_table import Column, StudyTable, remark_lines
 from catenary.solver.model.beam import shape_slopes
 from catenary.solver.problem.incidents import DropperBreak, LineIncident, in_steps
@@ -111,7 +111,7 @@ def check_cases(
     cases: Sequence[HardCase],
     comm: Any,
     short: bool = False,
-    kept: KeptRows | None = None,
+    kept: KeptRows = NOTHING_KEPT,
     n_at_once: int = 1,
     initialise: Callable[[], object] | None = None,
 ) -> Iterator[Checked]:
@@ -121,7 +121,7 @@ def check_cases(
     ----------
     comm : agreement of its ranks is measured if there are several
     short : the case's short form; steps are halved once only then
-    kept : results of earlier calls, None to keep nothing
+    kept : results of earlier calls
     n_at_once : cases that are run at the same time, 1 on several ranks
     initialise : called first in each further process
     """
@@ -130,8 +130,7 @@ def check_cases(
         scene = resolved(case.scene(short))
         return {"case": case.model_dump(), "scene": scene, "short": short, "ranks": comm.size}
 
-    kept = KeptRows(None) if kept is None else kept
-    outcomes = kept.each(_Check(short), cases, depends_on, n_at_once, comm, initialise)
+    outcomes = kept.each(partial(_checked, short), cases, depends_on, n_at_once, comm, initialise)
     for case, outcome in zip(cases, outcomes, strict=True):
         if isinstance(outcome.error, WorkerLost):
             yield Checked([holds_or_not(case, "runs to its end", False, str(outcome.error))], {})
@@ -140,21 +139,15 @@ def check_cases(
             yield Checked([Criterion(*row) for row in found], remarks)
 
 
-@dataclass(frozen=True)
-class _Check:
-    """Measures a hard case; goes to the processes that do so."""
+def _checked(short: bool, case: HardCase, comm: Any) -> Checked:
+    """Measures of a hard case. Collective."""
+    from catenary.base.mpi import MPI
 
-    short: bool
-
-    def __call__(self, case: HardCase, comm: Any) -> Checked:
-        """Collective."""
-        from catenary.base.mpi import MPI
-
-        one = _OneCase(case, MPI.COMM_SELF, self.short)
-        checked: Checked = on_root(comm, one.checked, takes_long=True)
-        if comm.size > 1:
-            checked.found.append(one.by_ranks(comm))
-        return checked
+    one = _OneCase(case, MPI.COMM_SELF, short)
+    checked: Checked = on_root(comm, one.checked, takes_long=True)
+    if comm.size > 1:
+        checked.found.append(one.by_ranks(comm))
+    return checked
 
 
 class _OneCase:
@@ -252,7 +245,7 @@ class _OneCase:
             yield self._below("share without contact", share, needs.lost_share_below)
         if needs.breaks_at_cut:
             far = float(np.abs(broken(rest, base) - cut_of(rest)).min(initial=np.inf))
-            longest = float(np.diff(node_places(rest)).max())
+            longest = float(np.diff(rest.model.contact_x).max())
             yield self._below("broken dropper to the boundary [m]", far, longest)
         if needs.energy_leaves is not None:
             left = energy_that_left(rest, base)
@@ -315,7 +308,7 @@ def _crossing(rest: LineAtRest, base: RunHistories) -> float:
 
 
 def _on_nodes(rest: LineAtRest, base: RunHistories) -> float:
-    far = np.abs(base.position.reshape(-1, 1) - node_places(rest)).min(axis=1)
+    far = np.abs(base.position.reshape(-1, 1) - rest.model.contact_x).min(axis=1)
     return float((far < 1e-9).sum())
 
 

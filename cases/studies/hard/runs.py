@@ -110,7 +110,7 @@ class RunHistories:
 
 
 class Watcher(Observer):
-    """Observer that keeps what `Watched` holds; wire and balance are needed for the work.
+    """Observer that keeps what `RunHistories` holds; wire and balance are needed for the work.
 
     With the work, dropper forces and displacements are kept after the steps ``keep``. Steps are
     then looked at one by one, otherwise in blocks of rows.
@@ -264,11 +264,6 @@ def rest_height(rest: LineAtRest, x: np.ndarray) -> np.ndarray:
     """Height of the contact wire at rest at places ``x`` [m], shape as ``x``."""
     wire = ContactWires(rest.model, rest.form, distribute(rest.model, 1, 0))
     return wire.rest_height(x.ravel()).reshape(x.shape)
-
-
-def node_places(rest: LineAtRest) -> np.ndarray:
-    """Places of the contact wire's nodes [m]."""
-    return rest.model.contact_x
 
 
 def run(

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from itertools import product
+from itertools import groupby, product
 from math import ceil, inf
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -280,19 +280,10 @@ def _stretches(
 ) -> tuple[Stretch, ...]:
     """Speeds at which each criterion holds in each direction, ascending."""
     speeds = _speeds(ended)
-    held = [_is_held(ended, speed, directions, names) for speed in speeds]
-    stretches: list[Stretch] = []
-    begin: float | None = None
-    for speed, holds, following, goes_on in zip(
-        speeds, held, [*speeds[1:], None], [*held[1:], False], strict=True
-    ):
-        if not holds:
-            continue
-        begin = speed if begin is None else begin
-        if not goes_on:
-            stretches.append(Stretch(begin, speed, following))
-            begin = None
-    return tuple(stretches)
+    following = dict(zip(speeds, [*speeds[1:], None], strict=True))
+    neighbours = groupby(speeds, key=lambda speed: _is_held(ended, speed, directions, names))
+    held = [list(own) for holds, own in neighbours if holds]
+    return tuple(Stretch(own[0], own[-1], following[own[-1]]) for own in held)
 
 
 def _holds(ended: _Marched, name: str, names: Sequence[str], directions: Sequence[str]) -> Holds:

@@ -17,6 +17,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import groupby
 from math import floor, inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -305,15 +306,8 @@ def _explained(period: Period) -> str:
 
 def _stretches(rows: Sequence[Row], name: str) -> str:
     """Distances at which a criterion fails, neighbouring ones joined: ``31-40, 75``."""
-    runs: list[list[float]] = []
-    fails_before = False
-    for row in rows:
-        fails = name in row["failed"]
-        if fails and not fails_before:
-            runs.append([])
-        if fails:
-            runs[-1].append(row[DISTANCE])
-        fails_before = fails
+    neighbours = groupby(rows, key=lambda row: name in row["failed"])
+    runs = [[row[DISTANCE] for row in own] for fails, own in neighbours if fails]
     return ", ".join(f"{run[0]:g}-{run[-1]:g}" if len(run) > 1 else f"{run[0]:g}" for run in runs)
 
 

@@ -57,12 +57,19 @@ def answer_of(results: Results, count: int) -> Answer:
     if unknown:
         lines += ["", f"Elasticity and gusts along the line are not known: {unknown}"]
     text = "\n".join([*lines, "", "Candidates are near in place or frequency; none is proved."])
-    return Answer(
-        _spans_table(places.passages, causes, names),
-        _supports_table(places.arms, causes),
-        _droppers_table(places, causes),
-        text,
+    of_span = ("std_N", "max_N", "min_N", "loss_percent", "median_std_N", "stands_out")
+    spans = _table(
+        ("span", "from_m", "to_m", "pantograph", *of_span, "causes"),
+        (
+            (p.span + 1, p.start, p.end, names[p.pantograph], *p[4:], causes.of_passage(p))
+            for p in places.passages
+        ),
     )
+    supports = _table(
+        ("x_m", "wire", "max_uplift_mm", "median_mm", "stands_out", "causes"),
+        ((*arm[1:], causes.at(arm)) for arm in places.arms),
+    )
+    return Answer(spans, supports, _droppers_table(places, causes), text)
 
 
 def _causes(results: Results, passages: Sequence[Passage]) -> tuple[Causes, str]:
@@ -87,7 +94,7 @@ def _of_spans(
         lines.append(
             f"  span {one.span + 1}, {one.start:.0f} to {one.end:.0f} m{who}: {one.std:.1f} N, "
             f"median {one.median:.1f} N, force {one.minimum:.0f} to {one.maximum:.0f} N"
-            f"{out(one.stands_out)}"
+            f"{scatter_words(one.stands_out)}"
         )
         lines += _cause_lines(causes.of_passage(one), one.stands_out)
     return lines
@@ -97,7 +104,7 @@ def _of_spots(title: str, spots: Sequence[Spot], words: str, causes: Causes) -> 
     lines = ["", title] if spots else []
     for one in spots:
         sentence = words.format(at=one.place, v=one.value, m=one.median)
-        lines.append(f"  {sentence}{out(one.stands_out)}")
+        lines.append(f"  {sentence}{scatter_words(one.stands_out)}")
         lines += _cause_lines(causes.at(one), one.stands_out)
     return lines
 
@@ -115,26 +122,11 @@ def _cause_lines(causes_found: Sequence[str], is_out: bool | None) -> list[str]:
     return [*lines, f"    and {more} more (-o)"] if more > 0 else lines
 
 
-def out(is_out: bool | None) -> str:
+def scatter_words(is_out: bool | None) -> str:
     """Whether a figure stands out among its likes, None if they are too few, in words."""
     if is_out is None:
         return "; too few others to compare"
     return "; stands out" if is_out else "; within the scatter of the others"
-
-
-def _spans_table(passages: Sequence[Passage], causes: Causes, names: Sequence[str]) -> StudyTable:
-    fields = ("std_N", "max_N", "min_N", "loss_percent", "median_std_N", "stands_out")
-    heads = ("span", "from_m", "to_m", "pantograph", *fields, "causes")
-    cells = (
-        (one.span + 1, one.start, one.end, names[one.pantograph], *one[4:], causes.of_passage(one))
-        for one in passages
-    )
-    return _table(heads, cells)
-
-
-def _supports_table(arms: Sequence[Spot], causes: Causes) -> StudyTable:
-    heads = ("x_m", "wire", "max_uplift_mm", "median_mm", "stands_out", "causes")
-    return _table(heads, ((*one[1:], causes.at(one)) for one in arms))
 
 
 def _droppers_table(places: WorstPlaces, causes: Causes) -> StudyTable:

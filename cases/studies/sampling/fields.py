@@ -14,6 +14,7 @@ from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.sampling.design import normal_rows
 from catenary.cases.studies.sampling.distributions import inverse
 from catenary.cases.studies.sampling.tables import ChanceField, FieldTable
+from catenary.cases.studies.sweep.variants import text_of
 from catenary.meshgen.line import Line
 
 # Correlated values of more places take minutes to make; so many numbers take about 1 GB as text.
@@ -202,13 +203,13 @@ def _spans(scene: Scene, line: Line, table: FieldTable) -> Carrier:
 def _defects(scene: Scene, line: Line, table: FieldTable) -> Carrier:
     assert isinstance(table, ChanceField)
     which, kind = _numbered_droppers(line), table.defect
-    own = [_inline(one.model_dump(exclude_none=True)) for one in scene.defects]
+    own = [text_of(one.model_dump(exclude_none=True)) for one in scene.defects]
     spared = {
         (getattr(one, "span", 0), getattr(one, "dropper", 0)) for one in scene.defects
     }  # a dropper has one defect
 
     entries = [
-        "" if one in spared else _inline({"type": kind, "span": one[0], "dropper": one[1]})
+        "" if one in spared else text_of({"type": kind, "span": one[0], "dropper": one[1]})
         for one in which
     ]
 
@@ -217,13 +218,6 @@ def _defects(scene: Scene, line: Line, table: FieldTable) -> Carrier:
         return f"[{', '.join([*own, *filter(None, found)])}]"
 
     return Carrier(_dropper_places(line), np.zeros(len(which)), text)
-
-
-def _inline(table: dict[str, object]) -> str:
-    """A flat table as TOML has it in one line."""
-    from catenary.cases.studies.sweep.variants import text_of
-
-    return text_of(table)
 
 
 def _filled(template: str) -> Callable[[np.ndarray], str]:

@@ -22,7 +22,7 @@ from catenary.cases.scene.problem import resolved
 from catenary.cases.scene.run.numerics import MAX_DT
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.hard.runs import at_rest
-from catenary.cases.studies.records import KeptRows
+from catenary.cases.studies.records import NOTHING_KEPT, KeptRows
 from catenary.cases.studies.stability import from_matrices as theory
 from catenary.cases.studies.stability.by_marching import (
     AGREED,
@@ -171,7 +171,7 @@ def make_map(
     comm: Any,
     grid: Grid,
     tell: Callable[[str], None] = lambda line: None,
-    kept: KeptRows | None = None,
+    kept: KeptRows = NOTHING_KEPT,
     n_at_once: int = 1,
 ) -> StabilityMap:
     """Find all limits that are not known yet. Not collective.
@@ -189,7 +189,6 @@ def make_map(
     find_all = _FindLimits(scene)
     bench, line = find_all.bench(comm)
     pairs, limits, config = grid.pairs(), [], resolved(scene)
-    kept = KeptRows(None) if kept is None else kept
 
     def depends_on(pair: tuple[float, float]) -> dict[str, Any]:
         return {"scene": config, "stiffness": pair[0], "head_mass": pair[1]}

@@ -2,8 +2,8 @@
 
 A piece of work leaves those of its variants in a file beside its record; when all are done they
 are joined, a variant at a time, and the files of the pieces go. Those of several sweeps are merged
-into one file of the same kind. Names, units and dimensions are
-those of netCDF-4 and CF, so that xarray opens the file by names.
+into one file of the same kind. Names, units and dimensions are those of netCDF-4 and CF, so that
+xarray opens the file by names.
 """
 
 from __future__ import annotations

@@ -49,17 +49,8 @@ HISTORIES = {
 }
 
 
-def check_statistics(names: Sequence[str]) -> None:
-    """Raise InputError if one of ``names`` is no statistic of a sweep's table."""
-    _check_names(names, STATISTICS, "statistic")
-
-
-def check_histories(names: Sequence[str]) -> None:
-    """Raise InputError if one of ``names`` is no history that an ensemble keeps."""
-    _check_names(names, HISTORIES, "history")
-
-
-def _check_names(names: Sequence[str], known: Mapping[str, Any], what: str) -> None:
+def check_names(names: Sequence[str], known: Mapping[str, Any], what: str) -> None:
+    """Raise InputError if one of ``names`` is none of ``known``, ``what`` being one of these."""
     for name in names:
         if name not in known:
             raise InputError(f"{shown(name)[1:-1]} is no {what}; {meant(name, list(known))}")

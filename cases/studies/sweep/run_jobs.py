@@ -90,7 +90,13 @@ def run_jobs(
     n_at_once = at_once(options.n_jobs, comm)
     earlier = on_root(comm, lambda: _earlier(jobs, out_dir, options.force, measure is not None))
     left = [number for number, found in enumerate(earlier) if found is None]
-    on_root(comm, lambda: _check_room([jobs[i] for i in left], out_dir, options.force, n_at_once))
+
+    def check_room() -> None:
+        kept = [Kept(jobs[i].scene, jobs[i].keep_results, jobs[i].full_report) for i in left]
+        folders = [out_dir / jobs[i].variant.name for i in left]
+        check_room_of_runs(out_dir, folders, total_size(kept, n_at_once), options.force)
+
+    on_root(comm, check_room)
     ended = {number: found for number, found in enumerate(earlier) if found is not None}
     places = [f"[{i}/{len(jobs)}] {job.variant.name}" for i, job in enumerate(jobs, start=1)]
     several = n_at_once > 1
@@ -210,14 +216,6 @@ def _earlier(jobs: Sequence[Job], out_dir: Path, force: bool, measured: bool) ->
     if force:
         return [None] * len(jobs)
     return [_found(job, out_dir / job.variant.name, measured) for job in jobs]
-
-
-def _check_room(jobs: Sequence[Job], out_dir: Path, force: bool, n_at_once: int) -> None:
-    """Refuse jobs whose files have no room together."""
-    kept = [Kept(job.scene, job.keep_results, job.full_report) for job in jobs]
-    size = total_size(kept, n_at_once)
-    folders = [out_dir / job.variant.name for job in jobs]
-    check_room_of_runs(out_dir, folders, size, force)
 
 
 def _found(job: Job, folder: Path, measured: bool) -> Ended | None:

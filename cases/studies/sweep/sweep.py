@@ -17,10 +17,11 @@ from catenary.cases.result_folder.output_folder import (
 )
 from catenary.cases.scene.load import Draft
 from catenary.cases.studies.sweep.jobs import (
+    HISTORIES,
     Ended,
     Job,
     RunOptions,
-    check_histories,
+    check_names,
     in_order,
     jobs_and_refused,
 )
@@ -98,7 +99,7 @@ def sweep_of(
         If one of ``histories`` is none, or whole runs are kept, which have them; as
         ``whole_runs_of``.
     """
-    check_histories(histories)
+    check_names(histories, HISTORIES, "history")
     if not only_statistics:
         if histories:
             raise InputError(

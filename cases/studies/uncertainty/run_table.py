@@ -13,7 +13,7 @@ from catenary.base.errors import InputError
 from catenary.cases.studies.sampling.tables import SamplingTable, sampling_of
 from catenary.cases.studies.sweep.jobs import OF_LINE
 from catenary.cases.studies.sweep.output import PARQUET, TABLE
-from catenary.postproc.report.study_table import Content, write_files
+from catenary.postproc.report.study_table import Content
 
 SAMPLING = "sampling.json"
 DONE = "done"
@@ -143,11 +143,6 @@ def read_run_table(path: Path) -> RunTable:
 def sampling_file(sampling: SamplingTable) -> dict[str, Content]:
     """File with the sampling of a table, which stands beside the table."""
     return {SAMPLING: sampling.model_dump(exclude_none=True)}
-
-
-def write_sampling(folder: Path, sampling: SamplingTable) -> None:
-    """Write the sampling of a table into the table's folder. Not collective."""
-    write_files(folder, sampling_file(sampling))
 
 
 def read_sampling_beside(folder: Path) -> SamplingTable | None:

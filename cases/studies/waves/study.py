@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -64,17 +64,9 @@ BLOW_EVERY = 0.004
 _BEHIND, _AHEAD = 300.0, 200.0
 
 
-class Studied(NamedTuple):
-    """Result of the study: theory, measured figures, files that show both, remarks on the run."""
-
-    theory: WaveTheory
-    measured: list[Row]
-    files: list[Path]
-    remarks: list[str]
-
-
-def study_waves(folder: Path) -> Studied:
-    """Analyse the waves in a run's folder and write pictures and tables there. Not collective.
+def study_waves(folder: Path) -> tuple[str, list[Path]]:
+    """Write pictures and tables of the waves into a run's folder; a text for terminals, and the
+    files. Not collective.
 
     Raises
     ------
@@ -103,8 +95,9 @@ def study_waves(folder: Path) -> Studied:
 
 def study_excited(
     scene: Scene, kind: str, settings: Settings, folder: Path, force: bool
-) -> Studied:
-    """Run a line without its train under an excitation, and write the waves that are seen. Serial.
+) -> tuple[str, list[Path]]:
+    """Run a line without its train under an excitation, and write the waves that are seen; a text
+    for terminals, and the files. Serial.
 
     The folder then has the files of a run.
 
@@ -184,8 +177,8 @@ def _write(
     supports: np.ndarray,
     what: str,
     remarks: list[str],
-) -> Studied:
-    """Pictures of the waves that are seen, and tables with theory beside them."""
+) -> tuple[str, list[Path]]:
+    """Text, and pictures of the waves that are seen, and tables with theory beside them."""
     moving, origin = ("pantographs", "first pantograph") if what == "train" else (what, what)
     reflections, spectra = reflections_of(rest), transmitted(theory, seen)
     measured = [
@@ -209,7 +202,7 @@ def _write(
         content["train_frame.png"] = lambda: pictures.train_frame(
             seen, theory, _BEHIND, _AHEAD, origin
         )
-    return Studied(theory, measured, write_files(folder, content), remarks)
+    return as_text(theory, measured, remarks), write_files(folder, content)
 
 
 def energy_rows(energy: EnergySeen, seen: WavesSeen) -> list[Row]:
@@ -252,7 +245,7 @@ def band_rows(theory: WaveTheory) -> list[Row]:
     ]
 
 
-def as_text(theory: WaveTheory, measured: list[Row], remarks: Sequence[str] = ()) -> str:
+def as_text(theory: WaveTheory, measured: list[Row], remarks: Sequence[str]) -> str:
     """Figures of theory and ``measured`` ones for a terminal, and ``remarks`` on the run that shows
     the waves."""
     rows = [*as_rows(theory), *measured]
