@@ -29,8 +29,9 @@ SCENE = (
     "train.raise_time_s=0.1",
     "evaluation.from_m=260",
     "evaluation.to_m=280",
+    "numerics.dt_s=2e-3",
 )
-KEPT = 300
+KEPT = 150
 
 
 # Long elements make the overlap of ranks long: several solve for what stands at an end.

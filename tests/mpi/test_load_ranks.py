@@ -24,11 +24,13 @@ from catenary.solver.wind.drag import along
 WORLD = MPI.COMM_WORLD
 # See test_same_answers.py.
 TOLERANCE = 1e-9
+KEPT = 150
 SCENE = (
     "line.n_spans=7",
     "train.start_m=120",
     "train.end_m=155",
     "train.raise_time_s=0.1",
+    "numerics.dt_s=2e-3",
     "evaluation.from_m=140",
     "evaluation.to_m=150",
 )
@@ -63,7 +65,7 @@ def test_loads_in_time_on_all_ranks() -> None:
     problem = problem.__class__(**{**problem.__dict__, **changed})
     with registered(Effect("loads", "loads", "loads", "test", False, build=blow)):
         rest = line_at_rest_on_all(problem, mesh, WORLD)
-        found = on_one(lambda comm: watched(comm, rest)), watched(WORLD, rest, kept=300)
+        found = on_one(lambda comm: watched(comm, rest)), watched(WORLD, rest, kept=KEPT)
         assert found[1].checkpoint is not None
         again = watched(WORLD, rest, since=found[1].checkpoint)
     alone, shared = (np.array(watching.rows) for watching in found)
@@ -73,4 +75,4 @@ def test_loads_in_time_on_all_ranks() -> None:
     own = slice(0 if WORLD.rank == 0 else 1, None)
     scale = np.abs(alone).max(axis=0)
     assert (np.abs(alone - shared).max(axis=0) < TOLERANCE * scale)[own].all()
-    assert np.array_equal(np.array(again.rows)[:, own], shared[300:, own])
+    assert np.array_equal(np.array(again.rows)[:, own], shared[KEPT:, own])

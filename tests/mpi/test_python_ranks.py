@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 from program import SHORT_SCENE
-from word_scenes import with_words
+from scenes import with_words
 
 import catenary
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import pytest
 from fuzzing_stability import extreme_scene
-from word_scenes import with_words
+from scenes import with_words
 
 import catenary
 

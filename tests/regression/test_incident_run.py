@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from program import MPIRUN, SHORT_SCENE, assert_same_histories, short_run
 from program import catenary as called
-from word_scenes import with_words
+from scenes import with_words
 
 import catenary
 from catenary.postproc.read.results import Results

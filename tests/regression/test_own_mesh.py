@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from program import SHORT_SCENE
+from scenes import with_words
 from verb_runner import invoke
-from word_scenes import with_words
 
 import catenary
 

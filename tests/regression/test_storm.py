@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from word_scenes import with_words
+from scenes import with_words
 
 import catenary
 

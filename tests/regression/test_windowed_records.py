@@ -13,8 +13,8 @@ import h5py
 import numpy as np
 import pytest
 from program import catenary as called
+from scenes import with_words
 from studies import few
-from word_scenes import with_words
 
 import catenary
 from catenary.postproc.film.snapshots import Snapshots

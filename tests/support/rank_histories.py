@@ -111,9 +111,15 @@ def relative(values: np.ndarray, reference: np.ndarray) -> float:
     return float(np.abs(values - reference).max() / np.abs(reference).max())
 
 
-def largest_difference(problem: Problem, mesh: LineMesh) -> dict[str, float]:
-    """Largest relative difference of each history between one rank and all, on all ranks."""
+def largest_difference(
+    problem: Problem, mesh: LineMesh, *, slackens: bool = False
+) -> dict[str, float]:
+    """Largest relative difference of each history between one rank and all, on all ranks.
+
+    Fails if no dropper ``slackens`` where one is to.
+    """
     alone = on_one(lambda comm: histories(comm, problem, mesh))
+    assert not slackens or (alone is not None and (alone["droppers"] <= 0.0).any())
     together = histories(MPI.COMM_WORLD, problem, mesh)
     found = {}
     if together is not None and alone is not None:

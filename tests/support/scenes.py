@@ -21,7 +21,6 @@ from catenary.scenes import Scene as SceneOfUsers
 __all__ = [
     "Scene",
     "find_case",
-    "given",
     "line_data_of",
     "line_of",
     "load_scene",
@@ -32,10 +31,11 @@ __all__ = [
     "resolved",
     "scene_from",
     "shipped",
+    "with_words",
 ]
 
 
-def given(case: str | Path, words: Sequence[str] = (), short: bool = False) -> catenary.Scene:
+def with_words(case: str | Path, words: Sequence[str] = (), short: bool = False) -> catenary.Scene:
     """A scene for the Python package, with what a command line gives it by ``--set``."""
     return SceneOfUsers(read_draft(case, words, short))
 

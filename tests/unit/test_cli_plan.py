@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 import pytest
-from scenes import given, load_scene, mesh_of, problem_of
+from scenes import load_scene, mesh_of, problem_of, with_words
 
 import catenary
 from catenary.cases.run.planning.needs import (
@@ -38,7 +38,7 @@ def test_unknowns_are_the_nodes_of_the_mesh_times_the_unknowns_of_the_effects() 
 
 def test_steps_cover_the_run() -> None:
     words = ["train.start_m=90", "train.end_m=840", "numerics.dt_s=1e-3"]
-    figures = catenary.plan(given("en50318_2002", words)).figures
+    figures = catenary.plan(with_words("en50318_2002", words)).figures
     # 750 m at 250 km/h are 10.8 s.
     assert figures["simulated_s"] == pytest.approx(10.8, rel=1e-12)
     assert figures["n_steps"] == 10800
@@ -116,20 +116,22 @@ def test_flushes_of_a_window_are_as_rare_as_what_moves_is_small() -> None:
 
 def test_the_text_tells_trains_of_several_pantographs() -> None:
     second = ["train.pantographs.1.name=three_masses", "train.pantographs.1.behind_m=200"]
-    text = str(catenary.plan(given("ac_simple", ["train.start_m=310", *second])))
+    text = str(catenary.plan(with_words("ac_simple", ["train.start_m=310", *second])))
     assert "2 pantographs" in text
     simulated, _ = text.split("Not simulated:")
     assert "several_pantographs" in simulated
 
 
 def test_long_estimates_are_told_in_minutes() -> None:
-    assert " min on one rank" in str(catenary.plan(given("en50318_2002", ["numerics.dt_s=1e-6"])))
+    assert " min on one rank" in str(
+        catenary.plan(with_words("en50318_2002", ["numerics.dt_s=1e-6"]))
+    )
 
 
 def test_steps_that_adapt_are_told_with_their_shortest() -> None:
     adapted = ["numerics.adaptive_tolerance_N=2", "numerics.smallest_dt_s=2e-4"]
     # 1 ms halved twice is 0.25 ms; a third time would be below the smallest.
-    told = str(catenary.plan(given("en50318_2002", adapted)))
+    told = str(catenary.plan(with_words("en50318_2002", adapted)))
     assert "wrong by more than 2 N" in told and "down to 0.25 ms" in told
     assert "adapted" not in str(catenary.plan("en50318_2002"))
 
@@ -143,6 +145,8 @@ def test_the_law_of_a_slack_dropper_is_told() -> None:
         (["line.dropper.slack_damping=kept"], "spring is released, damper goes on acting"),
         ([*residual, "line.dropper.slack_damping=kept"], "spring keeps 1 % of its force, damper"),
     ):
-        assert f"of a slack dropper, {told}" in str(catenary.plan(given("en50318_2002", words)))
-    linear = catenary.plan(given("en50318_2002", ["effects.dropper_slackening=false"]))
+        assert f"of a slack dropper, {told}" in str(
+            catenary.plan(with_words("en50318_2002", words))
+        )
+    linear = catenary.plan(with_words("en50318_2002", ["effects.dropper_slackening=false"]))
     assert "of a slack dropper" not in str(linear)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import typer
 from mpi4py import MPI
-from scenes import Scene, given, load_scene, mesh_of
+from scenes import Scene, load_scene, mesh_of, with_words
 
 import catenary
 from catenary import InputError, RunBroken
@@ -57,7 +57,7 @@ def scene_of(*overrides: str, case: str = "en50318_2002") -> Scene:
 @pytest.mark.parametrize("name", SCENES)
 def test_the_plan_tells_the_sizes_of_the_files(name: str, tmp_path: Path) -> None:
     scene = scene_of(*SCENES[name])
-    told = catenary.plan(given("en50318_2002", SCENES[name])).figures
+    told = catenary.plan(with_words("en50318_2002", SCENES[name])).figures
     run_case(scene, tmp_path, MPI.COMM_SELF, only_summary=True)
     result = (tmp_path / "run.h5").stat().st_size
     film = sum(path.stat().st_size for path in tmp_path.glob("fields.*"))
@@ -82,7 +82,7 @@ def test_a_scene_chooses_what_is_recorded_of_the_line(tmp_path: Path) -> None:
 
 def test_cadence_in_travel_is_that_in_time_over_the_speed() -> None:
     # 0.5 m at 250 km/h are 7.2 ms.
-    told = catenary.plan(given("en50318_2002", ["output.line_channels_every_m=0.5"]))
+    told = catenary.plan(with_words("en50318_2002", ["output.line_channels_every_m=0.5"]))
     assert "dropper forces recorded every 7 ms" in str(told)
 
 
@@ -91,12 +91,12 @@ LONG = ("line.n_spans=200", "evaluation.to_m=10000")
 
 def test_long_lines_are_thinned_by_their_size() -> None:
     """200 spans that the train runs, 2 GB of line channels if all were recorded."""
-    thinned = catenary.plan(given("ambrosio2012", LONG))
+    thinned = catenary.plan(with_words("ambrosio2012", LONG))
     text = str(thinned)
     assert "every 5 ms within 300 m behind and 200 m ahead of the train" in text
     assert "a snapshot of the line every" in text and text.count("(chosen by size)") == 2
     often = ["output.line_channels_every_s=0", "output.field_every_s=0.05"]
-    whole = catenary.plan(given("ambrosio2012", [*LONG, *often]))
+    whole = catenary.plan(with_words("ambrosio2012", [*LONG, *often]))
     assert "dropper forces recorded at every step" in str(whole)
     assert whole.figures["result_B"] > 1.5e9 > 30 * thinned.figures["result_B"]
     assert thinned.figures["film_B"] < 510e6 < whole.figures["film_B"]

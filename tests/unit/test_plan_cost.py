@@ -11,9 +11,8 @@ import numpy as np
 import pytest
 from measuring import registered
 from mpi4py import MPI
-from scenes import load_scene, mesh_of, problem_of
+from scenes import load_scene, mesh_of, problem_of, with_words
 from verb_runner import invoke
-from word_scenes import with_words
 
 import catenary
 from catenary import InputError

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import pytest
-from scenes import Scene, given, line_data_of, load_scene, mesh_of, problem_of, recorded
+from scenes import Scene, line_data_of, load_scene, mesh_of, problem_of, recorded, with_words
 
 import catenary
 from catenary.cases.run.describe.defects import defect_facts
@@ -80,7 +80,7 @@ def test_a_seed_is_a_key_of_its_own() -> None:
 
 
 def test_the_plan_tells_defects_and_what_each_effect_leaves_out() -> None:
-    text = str(catenary.plan(given("en50318_2002", [*WORDS, "mesh.elements_per_gap=1"])))
+    text = str(catenary.plan(with_words("en50318_2002", [*WORDS, "mesh.elements_per_gap=1"])))
     simulated, left_out = text.split("Not simulated:")
     names = (*KINDS, "contact_wire_height", "running_surface", "dropper_lengths", "fittings")
     assert all(f"  {name}" in simulated for name in names)

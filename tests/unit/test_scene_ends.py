@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from scenes import given, load_scene, problem_of
+from scenes import load_scene, problem_of, with_words
 
 import catenary
 from catenary import InputError
@@ -97,7 +97,7 @@ def test_plan_and_arrivals_tell_how_the_line_ends() -> None:
     (inside,) = (text for text in facts["warnings"] if "inside the absorbing layer" in text)
     assert "begins at 720 m" in inside
     assert facts["pantographs"][0]["far_end_met_at_m"] is None
-    assert "end 4 spans that absorb waves" in str(catenary.plan(given("en50318_2002", words)))
+    assert "end 4 spans that absorb waves" in str(catenary.plan(with_words("en50318_2002", words)))
 
 
 def test_the_far_end_is_not_met_where_a_window_ends_before_it() -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from scenes import Scene, given, load_scene, problem_of, recorded
+from scenes import Scene, load_scene, problem_of, recorded, with_words
 
 import catenary
 from catenary import InputError
@@ -50,7 +50,7 @@ def test_one_key_of_an_incident_is_changed() -> None:
 
 
 def test_the_plan_tells_incidents_in_order_of_time() -> None:
-    text = str(catenary.plan(given("en50318_2002", [INCIDENTS])))
+    text = str(catenary.plan(with_words("en50318_2002", [INCIDENTS])))
     simulated, _ = text.split("Not simulated:")
     assert all(kind in simulated for kind in KINDS)
     first, second, third = (line for line in text.splitlines() if line.startswith("  incident"))
@@ -67,7 +67,7 @@ def test_an_effect_that_is_left_out_is_not_told(kind: str) -> None:
     found = load_scene("en50318_2002", words)
     told = [fact["type"] for fact in incident_facts(found, problem_of(found))]
     assert sorted([*told, kind]) == sorted(KINDS)
-    plan = catenary.plan(given("en50318_2002", words))
+    plan = catenary.plan(with_words("en50318_2002", words))
     assert plan.effects.simulated[kind] is False
     assert str(plan).count("\n  incident") == 2
 
@@ -95,5 +95,5 @@ def test_without_incidents_there_are_no_effects_of_them() -> None:
 
 def test_a_lost_tension_may_make_a_train_supercritical() -> None:
     words = "incidents=[{type='tension_loss',at_s=2.0,wire='contact_wire',share=0.3}]"
-    found = given("en50318_2002", [words, "effects.supercritical_speed=true"])
+    found = with_words("en50318_2002", [words, "effects.supercritical_speed=true"])
     assert catenary.plan(found).effects.simulated["supercritical_speed"] is True

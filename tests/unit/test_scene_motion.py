@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scenes import Scene, given, load_scene, problem_of, recorded, resolved
+from scenes import Scene, load_scene, problem_of, recorded, resolved, with_words
 
 import catenary
 from catenary import InputError, RunBroken
@@ -118,8 +118,8 @@ def test_a_wire_beyond_the_bodies_reach_breaks_the_start_in_one_sentence() -> No
 
 def test_plan_names_the_model_and_counts_its_cost_and_channel() -> None:
     flushes = "output.flush_every_steps=100"
-    reduced_plan = catenary.plan(given(CASE, [flushes]))
-    plan = catenary.plan(given(CASE, [ALL, f"{KIND}.substeps=2", flushes]))
+    reduced_plan = catenary.plan(with_words(CASE, [flushes]))
+    plan = catenary.plan(with_words(CASE, [ALL, f"{KIND}.substeps=2", flushes]))
     assert "reduced to tables over its height" in str(reduced_plan)
     told = "all bodies in the time loop in 2 substeps, joints kept by coordinate_partitioning"
     assert told in str(plan)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from scenes import given, load_scene, mesh_of, problem_of
+from scenes import load_scene, mesh_of, problem_of, with_words
 
 import catenary
 from catenary import InputError
@@ -146,7 +146,7 @@ def test_what_is_planned_counts_shared_unknowns_once(topology: str, relative: bo
     scene = load_scene(TWIN, words, shortened=True)
     numbering = numbering_of(problem_of(scene), mesh_of(scene))
     size, needs = size_of(scene), needs_before_meshing(scene)
-    plan = catenary.plan(given(TWIN, words, short=True))
+    plan = catenary.plan(with_words(TWIN, words, short=True))
     assert size is not None and needs is not None
     assert size.unknowns == plan.figures["n_unknowns"] == numbering.n_unknowns
     assert size.nodes == plan.figures["n_nodes"] == numbering.numbers.shape[0]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from scenes import given, load_scene, problem_of
+from scenes import load_scene, problem_of, with_words
 
 import catenary
 from catenary import InputError
@@ -71,9 +71,9 @@ def light_fading() -> float:
 
 def test_the_plan_says_what_moves() -> None:
     assert "window" not in str(catenary.plan("en50318_2002"))
-    bounded = str(catenary.plan(given("en50318_2002", (BOUNDED, AHEAD, BEHIND))))
+    bounded = str(catenary.plan(with_words("en50318_2002", (BOUNDED, AHEAD, BEHIND))))
     assert "6 spans move ahead of the train and 4 behind" in bounded
     assert "% of its standard deviation (estimate)" in bounded
     assert "what the line's own ends send back from beyond is left out" in bounded
-    exact = str(catenary.plan(given("en50318_2002", ["window.mode=exact"])))
+    exact = str(catenary.plan(with_words("en50318_2002", ["window.mode=exact"])))
     assert "whatever a wave has reached moves" in exact

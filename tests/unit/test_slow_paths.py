@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from measuring import start_march
 from mpi4py import MPI
-from scenes import given, load_scene
+from scenes import load_scene, with_words
 from scenes import mesh_of as mesh_of_scene
 from scenes import problem_of as problem_of_scene
 from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of, train
@@ -36,7 +36,7 @@ BY_COMPONENT = "line.damping.per_component={contact_wire={alpha_s=0.01,beta_per_
 
 def test_the_plan_says_what_makes_steps_slower_and_by_how_much() -> None:
     plain, damped, slow = (
-        catenary.plan(given("en50318_2002", more))
+        catenary.plan(with_words("en50318_2002", more))
         for more in ([], [*HHT, BY_COMPONENT], ['numerics.coupling="explicit"'])
     )
     for plan in (plain, damped):

@@ -13,8 +13,8 @@ from typing import Any
 import pytest
 from matplotlib.figure import Figure
 from measuring import COMM
+from scenes import with_words
 from verb_runner import invoke
-from word_scenes import with_words
 
 import catenary
 from catenary import InputError

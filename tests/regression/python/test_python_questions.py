@@ -58,8 +58,18 @@ def test_a_folder_has_the_files_of_the_program(
     assert read.columns.tolist() == table.columns.tolist() and len(read) == len(table)
     with pytest.raises(catenary.InputError, match=r"is there already.* out, or give force=True"):
         ask(scene, *span, out, **options)
-    pd.testing.assert_frame_equal(ask(scene, *span, out, **options, force=True), table)
     assert not capsys.readouterr().err
+
+
+def test_the_files_of_an_earlier_answer_are_replaced_by_force(
+    scene: catenary.Scene, tmp_path: Path
+) -> None:
+    ask, span, options, _, files = QUESTIONS["speed"]
+    for name in files:
+        (tmp_path / name).write_text("earlier")
+    table = ask(scene, *span, tmp_path, **options, force=True)
+    assert not any((tmp_path / name).read_bytes() == b"earlier" for name in files)
+    assert len(pd.read_csv(tmp_path / "speed.csv")) == len(table)
 
 
 def test_a_search_that_was_stopped_goes_on_in_its_folder(

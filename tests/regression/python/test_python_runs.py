@@ -19,7 +19,7 @@ import pytest
 from acting_scenes import SCENES
 from program import SHORT_SCENE, catenary_started
 from program import catenary as program
-from word_scenes import with_words
+from scenes import with_words
 
 import catenary
 from catenary.cases.scene.input.toml_input import parse_assignment

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from acting_scenes import SCENES
-from word_scenes import with_words
+from scenes import with_words
 
 import catenary
 
