@@ -186,15 +186,17 @@ def bloch_waves(period: Period, highest: float) -> BlochWaves:
         period.mass_next[pick],
     )  # fmt: skip
     at = np.searchsorted(free, period.contact)
-    basis = spans.basis((2 * np.pi * _MODES_UP_TO * highest) ** 2)
+    reduced = spans.reduced((2 * np.pi * _MODES_UP_TO * highest) ** 2)
+    own, turned = reduced.own[at], reduced.turned[at]
     phase = np.linspace(0.0, np.pi, N_PHASES)
     above = (2 * np.pi * _MARGIN * highest) ** 2
     found = []
     for q in phase.tolist():
-        squares, shapes, slope = spans.waves(q, basis, above)
+        squares, weights, slope = reduced.waves(q, above)
         omega = np.sqrt(np.maximum(squares, 0.0))
         velocity = period.length * slope / np.maximum(2 * omega, 1e-9)
-        found.append((omega / (2 * np.pi), velocity, shapes[at]))
+        shapes = (own + np.exp(-1j * q) * turned) @ weights
+        found.append((omega / (2 * np.pi), velocity, shapes))
     n_all = min(row[0].size for row in found)
     frequency = np.array([row[0][:n_all] for row in found])
     n = int((frequency.min(axis=0) <= highest).sum())
@@ -210,18 +212,6 @@ def bloch_waves(period: Period, highest: float) -> BlochWaves:
     )
 
 
-class _Basis(NamedTuple):
-    """Shapes in which the waves of a span are sought (R. Craig, M. Bampton, AIAA J. 6, 1968).
-
-    Static shapes of a span under unit displacements at its start and at its end, (n, b) each, and
-    its modes with both held, (n, m).
-    """
-
-    start: np.ndarray
-    end: np.ndarray
-    modes: np.ndarray
-
-
 @dataclass(frozen=True)
 class _Spans:
     """K and M of a span and its coupling with the next, (n, n) each."""
@@ -231,37 +221,78 @@ class _Spans:
     m: np.ndarray
     m_next: np.ndarray
 
-    def basis(self, up_to: float) -> _Basis:
-        """Reduced basis with modes up to omega^2 ``up_to``."""
+    def reduced(self, up_to: float) -> _ReducedSpans:
+        """The spans with the modes up to omega^2 ``up_to`` (R. Craig, M. Bampton, AIAA J. 6, 1968).
+
+        A wave is a sum of static shapes of a span under unit displacements at its start, and
+        exp(-i q) times as much at its end, and of its modes with both held.
+        """
         n = self.k.shape[0]
         joined = self.k_next.any(axis=0) | self.m_next.any(axis=0)
         shared, inner = np.flatnonzero(joined), np.flatnonzero(~joined)
         stiffness, mass = (part[np.ix_(inner, inner)] for part in (self.k, self.m))
-        start, end = np.zeros((n, shared.size)), np.zeros((n, shared.size))
-        start[shared] = np.eye(shared.size)
+        _, modes = linalg.eigh(stiffness, mass, subset_by_value=(-np.inf, up_to))
+        own, turned = np.zeros((2, n, shared.size + modes.shape[1]))
+        at_start, at_modes = np.arange(shared.size), slice(shared.size, None)
+        own[shared, at_start] = 1.0
         beside = [self.k[np.ix_(inner, shared)], self.k_next[np.ix_(inner, shared)]]
-        start[inner], end[inner] = (-linalg.solve(stiffness, b, assume_a="pos") for b in beside)
-        _, shapes = linalg.eigh(stiffness, mass, subset_by_value=(-np.inf, up_to))
-        modes = np.zeros((n, shapes.shape[1]))
-        modes[inner] = shapes
-        return _Basis(start, end, modes)
+        for shapes, forces in zip((own, turned), beside, strict=True):
+            shapes[inner, : shared.size] = -linalg.solve(stiffness, forces, assume_a="pos")
+        own[inner, at_modes] = modes
+        return _ReducedSpans(
+            own,
+            turned,
+            _Reduced.of(self.k, self.k_next, own, turned),
+            _Reduced.of(self.m, self.m_next, own, turned),
+        )
 
-    def waves(
-        self, q: float, basis: _Basis, above: float
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """omega^2 (w,) up to ``above``, shapes (n, w) and d omega^2 / d q (w,) at a phase q."""
-        turn = np.exp(-1j * q)
-        shapes = np.hstack([basis.start + turn * basis.end, basis.modes])
-        joined = [turn * part for part in (self.k_next, self.m_next)]
-        k, m = (own + j + j.conj().T for own, j in zip((self.k, self.m), joined, strict=True))
+
+class _Reduced(NamedTuple):
+    """A matrix A + t B + B^T / t, with t = exp(-i q), in the shapes S_0 + t S_1, (r, r) each.
+
+    It is Y + Y^H with Y = still + t once + t^2 twice. ``coupling`` is S_0^T B S_0 + S_1^T B S_1,
+    ``back`` S_1^T B S_0.
+    """
+
+    still: np.ndarray
+    once: np.ndarray
+    twice: np.ndarray
+    coupling: np.ndarray
+    back: np.ndarray
+
+    @classmethod
+    def of(cls, a: np.ndarray, b: np.ndarray, own: np.ndarray, turned: np.ndarray) -> _Reduced:
+        """From A and B, (n, n) each, and S_0 and S_1, (n, r) each."""
+        coupling = own.T @ b @ own + turned.T @ b @ turned
+        back = turned.T @ b @ own
+        still = 0.5 * (own.T @ a @ own + turned.T @ a @ turned) + back
+        return cls(still, own.T @ a @ turned + coupling, own.T @ b @ turned, coupling, back)
+
+    def at(self, t: complex) -> np.ndarray:
+        """The matrix (r, r) at t."""
+        half = self.still + t * self.once + t**2 * self.twice
+        return half + half.conj().T
+
+    def by_phase(self, t: complex, weights: np.ndarray) -> np.ndarray:
+        """Derivatives (w,) by q of the matrix in waves of ``weights`` (r, w), which are kept."""
+        joined = self.coupling + t * self.twice + np.conj(t) * self.back
+        return 2.0 * np.einsum("iw,iw->w", weights.conj(), -1j * t * joined @ weights).real
+
+
+class _ReducedSpans(NamedTuple):
+    """Shapes of a span and shapes that turn by a phase, (n, r) each, and its matrices in them."""
+
+    own: np.ndarray
+    turned: np.ndarray
+    stiffness: _Reduced
+    mass: _Reduced
+
+    def waves(self, q: float, above: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """omega^2 (w,) up to ``above``, weights (r, w) of the shapes, and d omega^2 / d q (w,) at a
+        phase q."""
+        t = np.exp(-1j * q)
         squares, weights = linalg.eigh(
-            shapes.conj().T @ k @ shapes,
-            shapes.conj().T @ m @ shapes,
-            subset_by_value=(-np.inf, above),
+            self.stiffness.at(t), self.mass.at(t), subset_by_value=(-np.inf, above)
         )
-        waves = shapes @ weights
-        by_phase = [-1j * j + (-1j * j).conj().T for j in joined]
-        slope, of_mass = (
-            np.einsum("iw,iw->w", waves.conj(), part @ waves).real for part in by_phase
-        )
-        return squares, waves, slope - squares * of_mass
+        of_stiffness, of_mass = (part.by_phase(t, weights) for part in (self.stiffness, self.mass))
+        return squares, weights, of_stiffness - squares * of_mass
