@@ -15,7 +15,7 @@ from catenary.cases.scene.load import load_scene, scene_from
 from catenary.cases.scene.problem import end_of, problem_of, resolved
 from catenary.cases.scene.scene import Scene
 from catenary.mbs.head.strips import Flexure, Strips, Suspension, Turning
-from catenary.mbs.mechanism.pantograph_data import MultibodyData
+from catenary.mbs.mechanism.multibody_pantograph import MultibodyData
 from catenary.mbs.vehicle.base_motion import Harmonic, Table, VehicleMotion
 from catenary.mbs.vehicle.irregularity import Irregularity
 

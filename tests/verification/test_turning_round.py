@@ -11,7 +11,7 @@ from measuring import check
 from catenary.base.errors import InputError
 from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.problem import problem_of
-from catenary.mbs.mechanism.pantograph_data import MultibodyData, reduced, stand
+from catenary.mbs.mechanism.multibody_pantograph import MultibodyData, reduced, stand
 from catenary.mbs.rigid.forces import PointForce
 from catenary.mbs.rigid.reversed_system import turned_round
 
