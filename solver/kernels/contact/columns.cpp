@@ -1,3 +1,4 @@
+// Sums of influence functions, in windows.
 #include "contact/columns.hpp"
 
 #include <algorithm>
