@@ -104,6 +104,7 @@ void ScenePasses::step() {
 }
 
 void ScenePasses::after_stretch() {
+    part(tracked_.ranges.all(), 2 * n_followed_, 2 * n_followed_ + 4);
     const auto before = tracked_.ranges[n_followed_], now = tracked_.ranges[n_followed_ + 1];
     ++n_followed_;
     find_reserves(now[0], before[0]);

@@ -100,7 +100,7 @@ void remember(double time, std::span<double> values, const Memories& memories) {
             if (step <= n) {
                 for (int64_t i = 0; i < m; ++i) {
                     const int64_t at = memories.own[first + i];
-                    tables.past[end.past + i * n + step - 1] =
+                    numbers_from(tables.past, end.past + i * n + step - 1, 1)[0] =
                         memories.shares[0] * memories.latest[at] +
                         memories.shares[1] * memories.known[at];
                 }
@@ -110,7 +110,8 @@ void remember(double time, std::span<double> values, const Memories& memories) {
         }
         if (step < n)
             for (int64_t i = 0; i < m; ++i)
-                values[memories.into[first + i]] -= tables.sums[end.sums + i * n + step];
+                values[memories.into[first + i]] -=
+                    numbers_from(tables.sums, end.sums + i * n + step, 1)[0];
         first += m;
     }
 }

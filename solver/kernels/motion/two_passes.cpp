@@ -37,6 +37,9 @@ PassLine::PassLine(const PassParts& parts, int scenes)
     : line(kernels_for(parts, scenes), parts.station_types, scenes) {
     const PassArrays& arrays = parts.arrays;
     const Motion& m = arrays.motion;
+    const int64_t n = size(parts.factors.kinds), low = parts.factors.low;
+    if (low < 0 || low > n || m.spacing != scenes)
+        throw std::invalid_argument("a line has other stations or scenes than its steps");
     std::vector<Layout> rows, factors;
     for (const auto& [of_rows, of_factors] : parts.layouts) {
         rows.push_back(of_rows);
@@ -49,10 +52,11 @@ PassLine::PassLine(const PassParts& parts, int scenes)
     work.loads = in(arrays.loads);
     work.answer = in(arrays.answer);
     work.motion = {in(m.x), in(m.y), in(m.z), in(arrays.known), parts.changes};
-    line.set_runs(work, size(parts.factors.kinds), parts.factors.low);
-    auto holds = [](auto numbers, int64_t n) { return numbers.empty() || size(numbers) >= n; };
+    line.set_runs(work, n, low);
+    auto holds = [](auto numbers, int64_t most) {
+        return numbers.empty() || size(numbers) >= most;
+    };
     const Ends& ends = parts.factors.at();
-    const int64_t n = size(parts.factors.kinds);
     if (size(parts.rows.kinds) < n || ends.begin < 0 || ends.low < ends.begin ||
         ends.high < ends.low || ends.end < ends.high || n < ends.end)
         throw std::invalid_argument("a line has rows of other stations than factors");
@@ -92,6 +96,7 @@ void TwoPasses::before() {
 void TwoPasses::after_stretch() {
     const auto [links, reserve, ranges, stretch] = tracked_;
     const Motion& motion = parts_.arrays.motion;
+    part(ranges.all(), 2 * n_followed_, 2 * n_followed_ + 4);
     const auto before = ranges[n_followed_], now = ranges[n_followed_ + 1];
     ++n_followed_;
     reserves_within(motion, links, now[0], before[0], reserve);
