@@ -206,7 +206,8 @@ class Kernel {
     virtual ~Kernel() = default;
     virtual std::unique_ptr<Bound> bound(const py::args& first) const = 0;
     py::object call(const py::args& given) const { return bound(given)->call(py::args()); }
-    std::string name, shapes;  ///< shapes of the arguments as in shapes.hpp
+    std::string name;
+    const char* shapes = "";  ///< of the arguments as in shapes.hpp, not owned
 };
 
 template <class R, class... A>
@@ -256,7 +257,7 @@ class BoundFunction : public Bound {
 
     R (*function_)(A...);
     std::string name_;
-    std::string shapes_;
+    std::string_view shapes_;
     size_t n_bound_;
     Sizes sizes_;
     std::tuple<std::optional<std::decay_t<A>>...> values_;

@@ -46,6 +46,11 @@ class Sizes {
     /// Whether a size is that of a term, such as 3, n, 2n, n-1, n>1 or n..; makes its name known.
     bool fits(std::string_view term, int64_t size) {
         if (term == "*") return true;
+        if (term.size() == 1 && term[0] >= 'a') {  // of most arrays
+            const int64_t known = of(term);
+            if (known < 0) known_.at(n_++) = {term, size};
+            return known < 0 || known == size;
+        }
         const bool is_least = term.ends_with("..");
         if (is_least) term.remove_suffix(2);
         const int64_t factor = next_number(term, 1);
@@ -63,10 +68,11 @@ class Sizes {
         if (!is_least) known_.at(n_++) = {name, value};
         return true;
     }
-    /// All that are known, for people.
-    std::string text() const {
+    /// How many names are known, and the first n of them with their sizes, for people.
+    size_t n() const { return n_; }
+    std::string text(size_t n) const {
         std::string found;
-        for (size_t k = 0; k < n_; ++k)
+        for (size_t k = 0; k < n; ++k)
             found += (k ? ", " : ", with ") + std::string(known_[k].first) + " = " +
                      std::to_string(known_[k].second);
         return found;
@@ -87,16 +93,14 @@ class Sizes {
         if (std::ranges::count(shape, 0)) return;
         terms.remove_suffix(1);
     }
-    const Sizes before = sizes;
-    std::string given;
+    const size_t n_before = sizes.n();
     bool fits = true;
-    for (const int64_t size : shape) {
-        fits &= sizes.fits(next_word(terms, ' '), size);
-        given += (given.empty() ? "" : " ") + std::to_string(size);
-    }
-    if (!fits)
-        throw py::value_error(name + " has the shape (" + given + "), not (" + std::string(wanted) +
-                              ")" + before.text());
+    for (const int64_t size : shape) fits &= sizes.fits(next_word(terms, ' '), size);
+    if (fits) return;
+    std::string given;
+    for (const int64_t size : shape) given += (given.empty() ? "" : " ") + std::to_string(size);
+    throw py::value_error(name + " has the shape (" + given + "), not (" + std::string(wanted) +
+                          ")" + sizes.text(n_before));
 }
 /// Refuse a record unless its `own` sizes are the wanted ones.
 [[gnu::noinline]] inline void check_record(const Sizes& own, std::string_view wanted,
@@ -109,10 +113,10 @@ class Sizes {
         const std::string_view of = next_word(term, '=');
         const int64_t size = own.of(of);
         if (size < 0 || (may_be_empty && size == 0)) continue;
-        const Sizes before = sizes;
+        const size_t n_before = sizes.n();
         if (!sizes.fits(term, size))
             throw py::value_error(name + " has " + std::string(of) + " = " + std::to_string(size) +
-                                  ", not " + std::string(term) + before.text());
+                                  ", not " + std::string(term) + sizes.text(n_before));
     }
 }
 
