@@ -22,7 +22,7 @@ from catenary.mbs.lumped_data import LumpedData
 
 if TYPE_CHECKING:
     from catenary.mbs.mechanism.full_pantograph import FullPantograph
-    from catenary.mbs.mechanism.pantograph_data import MultibodyData
+    from catenary.mbs.mechanism.multibody_pantograph import MultibodyData
     from catenary.mbs.mechanism.reduced_pantograph import RaisingData, RaisingPantograph
 
 # Data that describe a pantograph.
@@ -106,7 +106,7 @@ def steady_forces(data: PantographData, speed: float) -> SteadyForces:
     if data.uplift is not None:
         on_head, on_frame = (float(force) for force in data.uplift.at(np.array(speed)))
     if not isinstance(data, LumpedData):
-        from catenary.mbs.mechanism.pantograph_data import arm_lift, head_lift
+        from catenary.mbs.mechanism.multibody_pantograph import arm_lift, head_lift
 
         on_head, on_frame = on_head + head_lift(data), on_frame + arm_lift(data)
     return SteadyForces(on_head, on_frame)
@@ -122,7 +122,7 @@ def actuator_force(data: PantographData) -> float | None:
     none that was calibrated."""
     if isinstance(data, LumpedData):
         return None
-    from catenary.mbs.mechanism.pantograph_data import stand
+    from catenary.mbs.mechanism.multibody_pantograph import stand
 
     return stand(data).actuator_force
 
@@ -134,7 +134,7 @@ def touching_mass(data: PantographData) -> float:
         return data.strips.suspension.mass
     if isinstance(data, LumpedData):
         return data.masses[0] / data.strips.number
-    from catenary.mbs.mechanism.pantograph_data import stand
+    from catenary.mbs.mechanism.multibody_pantograph import stand
 
     return stand(data).head.mass / data.strips.number
 
@@ -145,7 +145,7 @@ def raising_data(data: MultibodyData, pressing: float, nominal_height: float) ->
     Its arm is at the working height when the head, at ``nominal_height`` [m], is pressed down on
     the arm by ``pressing`` [N]: the static force, and what the air lifts the arm with.
     """
-    from catenary.mbs.mechanism.pantograph_data import (
+    from catenary.mbs.mechanism.multibody_pantograph import (
         PITCH,
         head_lift,
         head_turning,

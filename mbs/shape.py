@@ -17,7 +17,7 @@ from scipy.spatial.distance import cdist
 
 from catenary.base.errors import InputError
 from catenary.mbs.lumped_data import LumpedData
-from catenary.mbs.mechanism.pantograph_data import HOLDER, MultibodyData, stand
+from catenary.mbs.mechanism.multibody_pantograph import HOLDER, MultibodyData, stand
 from catenary.mbs.rigid.bodies import SPACE, Motion, rotation_matrix
 from catenary.mbs.rigid.joints import Constant, PrescribedPoint
 from catenary.mbs.rigid.statics import equilibrium

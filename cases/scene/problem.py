@@ -241,7 +241,7 @@ def static_force(name: str, table: PantographTable, speed_km_h: float) -> float 
     """
     if isinstance(table, MultibodyTable) and not table.calibrate:
         from catenary.cases.scene.train.multibody import multibody_of
-        from catenary.mbs.mechanism.pantograph_data import stand
+        from catenary.mbs.mechanism.multibody_pantograph import stand
 
         return stand(multibody_of(name, table, speed_km_h)).static_force
     return wanted_force(table, speed_km_h)

@@ -18,7 +18,7 @@ from catenary.cases.run.describe.pantographs import description_of
 from catenary.cases.scene.problem import pantograph_of, static_force
 from catenary.cases.scene.scene import Scene
 from catenary.mbs.build import PantographData
-from catenary.mbs.mechanism.pantograph_data import MultibodyData, stand
+from catenary.mbs.mechanism.multibody_pantograph import MultibodyData, stand
 from catenary.mbs.response.frequency_response import HeadResponse, head_response, peaks
 from catenary.mbs.response.lumped_fit import ChainFit, fit_chain
 from catenary.postproc.report.pictures.figures import (

@@ -18,7 +18,7 @@ from catenary.mbs.air import ON_FRAME, ON_HEAD, SQUARE, AirForces
 from catenary.mbs.head.newmark_head import Raising
 from catenary.mbs.head.stepping import Stepping
 from catenary.mbs.interface import HeadState
-from catenary.mbs.mechanism.pantograph_data import MultibodyData, stand
+from catenary.mbs.mechanism.multibody_pantograph import MultibodyData, stand
 from catenary.mbs.rigid.arrays import ORIGIN, body_products
 from catenary.mbs.rigid.bodies import SPACE, Motion
 from catenary.mbs.rigid.forces import Force, OffLine, PointForce

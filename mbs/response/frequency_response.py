@@ -11,7 +11,7 @@ from scipy.signal import find_peaks
 
 from catenary.base.errors import InputError, RunBroken
 from catenary.mbs.lumped_data import LumpedData
-from catenary.mbs.mechanism.pantograph_data import MultibodyData, reduced, stand
+from catenary.mbs.mechanism.multibody_pantograph import MultibodyData, reduced, stand
 from catenary.mbs.response.linearisation import LinearModel, linearise, of_chain, with_strips
 from catenary.mbs.rigid.bodies import Motion, Vector
 from catenary.mbs.rigid.forces import PointForce

@@ -6,7 +6,11 @@ from typing import Any
 import numpy as np
 
 class Kernel:
-    """A function over arrays and records; arrays are taken as they are, and written in place."""
+    """A function over arrays and records; arrays are taken as they are, and written in place.
+
+    Arrays of other types, or of shapes that do not fit each other, are refused by ``TypeError`` and
+    ``ValueError``. Places that stand in arrays are not checked.
+    """
 
     def __call__(self, *arguments: Any) -> Any: ...
     def bound(self, *first: Any) -> Bound:
@@ -332,8 +336,8 @@ class Simulation:
 
     Parameters
     ----------
-    path : of a file that ``catenary prepare`` wrote; numbers in it are believed, so that it is as
-        trustworthy as a program
+    path : of a file that ``catenary prepare`` wrote; numbers in it are not checked: trust it as far
+        as a program
 
     Raises
     ------

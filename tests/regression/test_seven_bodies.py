@@ -8,7 +8,7 @@ from measuring import check
 from paper_pantograph import data
 
 import catenary
-from catenary.mbs.mechanism.pantograph_data import reduced, stand
+from catenary.mbs.mechanism.multibody_pantograph import reduced, stand
 
 
 @pytest.mark.study

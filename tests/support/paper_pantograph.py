@@ -8,7 +8,7 @@ from scenes import load_scene
 
 from catenary.cases.scene.train.multibody import multibody_of
 from catenary.cases.scene.train.pantograph import CorrectionTable, MultibodyTable
-from catenary.mbs.mechanism.pantograph_data import MultibodyData, without_head
+from catenary.mbs.mechanism.multibody_pantograph import MultibodyData, without_head
 from catenary.mbs.rigid.system import System
 
 BASE, LOWER_ARM, UPPER_ARM = "base", "lower_arm", "upper_arm"

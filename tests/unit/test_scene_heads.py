@@ -14,7 +14,7 @@ from catenary.cases.scene.checks.scene import MIN_SEPARATION
 from catenary.cases.scene.input.faults import Origin
 from catenary.cases.scene.problem import end_of
 from catenary.mbs.head.strips import Flexure, Strips, Suspension, Turning
-from catenary.mbs.mechanism.pantograph_data import MultibodyData
+from catenary.mbs.mechanism.multibody_pantograph import MultibodyData
 from catenary.mbs.vehicle.base_motion import Harmonic, Table, VehicleMotion
 from catenary.mbs.vehicle.irregularity import Irregularity
 

@@ -13,7 +13,7 @@ from catenary.mbs.build import has_joints
 from catenary.mbs.head.stepping import Stepping
 from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.mechanism.full_pantograph import FullPantograph
-from catenary.mbs.mechanism.pantograph_data import AllBodies, MultibodyData, reduced
+from catenary.mbs.mechanism.multibody_pantograph import AllBodies, MultibodyData, reduced
 from catenary.mbs.mechanism.reduced_pantograph import RaisingPantograph
 from catenary.mbs.rigid.joints import Constant, PrescribedPoint
 

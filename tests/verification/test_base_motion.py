@@ -19,7 +19,7 @@ from catenary.mbs.head.stepping import Stepping
 from catenary.mbs.head.wire_crossing import LateralPath
 from catenary.mbs.lumped import LumpedPantograph
 from catenary.mbs.lumped_data import LumpedData
-from catenary.mbs.mechanism.pantograph_data import stand
+from catenary.mbs.mechanism.multibody_pantograph import stand
 from catenary.mbs.mechanism.reduced_pantograph import RaisingPantograph
 from catenary.mbs.rigid.forces import PointForce
 from catenary.mbs.rigid.joints import Constant, Fixed, PrescribedPoint, Prismatic

@@ -18,7 +18,7 @@ from catenary.mbs.head.strips import Strips, Suspension
 from catenary.mbs.head.wire_crossing import LateralPath
 from catenary.mbs.interface import Pantograph
 from catenary.mbs.mechanism.full_pantograph import FullPantograph
-from catenary.mbs.mechanism.pantograph_data import stand
+from catenary.mbs.mechanism.multibody_pantograph import stand
 from catenary.mbs.mechanism.reduced_pantograph import RaisingPantograph
 from catenary.mbs.response.linearisation import linearise
 from catenary.mbs.rigid.joints import PrescribedAngle

@@ -15,7 +15,7 @@ from catenary.cases.scene.problem import pantograph_of
 from catenary.cases.scene.train.pantograph import MultibodyTable
 from catenary.mbs.build import PantographData
 from catenary.mbs.lumped_data import LumpedData
-from catenary.mbs.mechanism.pantograph_data import MultibodyData, reduced, stand
+from catenary.mbs.mechanism.multibody_pantograph import MultibodyData, reduced, stand
 
 TELESCOPE = Path(__file__).parents[1] / "support" / "telescope.toml"
 

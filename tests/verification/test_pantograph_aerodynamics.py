@@ -17,7 +17,7 @@ from catenary.mbs.head.stepping import Stepping
 from catenary.mbs.head.strips import Strips, Suspension
 from catenary.mbs.interface import Pantograph
 from catenary.mbs.lumped_data import LumpedData
-from catenary.mbs.mechanism.pantograph_data import AllBodies, MultibodyData, reduced, stand
+from catenary.mbs.mechanism.multibody_pantograph import AllBodies, MultibodyData, reduced, stand
 from catenary.mbs.rigid.forces import PointForce
 from catenary.mbs.rigid.joints import Constant, PrescribedPoint
 from catenary.mbs.rigid.kinematics import point

@@ -18,7 +18,7 @@ from catenary.mbs.head.wire_crossing import LateralPath
 from catenary.mbs.lumped import LumpedPantograph
 from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.mechanism.full_pantograph import FullPantograph
-from catenary.mbs.mechanism.pantograph_data import stand
+from catenary.mbs.mechanism.multibody_pantograph import stand
 from catenary.mbs.mechanism.reduced_pantograph import RaisingPantograph
 from catenary.mbs.rigid.forces import PointForce
 from catenary.mbs.rigid.joints import Constant, PrescribedPoint

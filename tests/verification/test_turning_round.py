@@ -10,7 +10,7 @@ from measuring import check
 from scenes import load_scene, problem_of
 
 from catenary import InputError
-from catenary.mbs.mechanism.pantograph_data import MultibodyData, reduced, stand
+from catenary.mbs.mechanism.multibody_pantograph import MultibodyData, reduced, stand
 from catenary.mbs.rigid.forces import PointForce
 from catenary.mbs.rigid.reversed_system import turned_round
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 def description_of(data: PantographData, static_force: float) -> str:
     """A line about a pantograph."""
     if not isinstance(data, LumpedData):
-        from catenary.mbs.mechanism.pantograph_data import describe
+        from catenary.mbs.mechanism.multibody_pantograph import describe
 
         return describe(data) + _strips_of(data.strips)
     masses = ", ".join(f"{mass:g}" for mass in data.masses)
@@ -92,7 +92,7 @@ def kind_lines(scene: Scene, problem: Problem) -> dict[str, list[str]]:
     for place, placement in zip(scene.train.pantographs, problem.train.placements, strict=True):
         lines[place.name] = [_description(placement, problem)]
         if not isinstance(placement.data, LumpedData):
-            from catenary.mbs.mechanism.pantograph_data import describe_assembly, stand
+            from catenary.mbs.mechanism.multibody_pantograph import describe_assembly, stand
 
             lines[place.name].append(describe_assembly(stand(placement.data).missed))
     return lines

@@ -20,7 +20,7 @@ from catenary.mbs.rigid.bodies import SPACE
 from catenary.meshgen.topologies.line_data import LineData
 
 if TYPE_CHECKING:
-    from catenary.mbs.mechanism.pantograph_data import MultibodyData
+    from catenary.mbs.mechanism.multibody_pantograph import MultibodyData
 
 
 # A wave of an irregular track takes at least so many steps.
@@ -87,7 +87,7 @@ def _multibody_strips(scene: Scene) -> Iterator[Fault]:
         kind = scene.pantographs[name]
         if not isinstance(kind, MultibodyTable) or kind.strips.mass_kg is None:
             continue
-        from catenary.mbs.mechanism.pantograph_data import stand
+        from catenary.mbs.mechanism.multibody_pantograph import stand
 
         data = pantograph_of(name, kind, scene.train.speed_km_h)
         mass = stand(data).head.mass  # type: ignore[arg-type]
@@ -256,7 +256,7 @@ def reaches_below(scene: Scene, name: str, line: LineData, drop: float) -> bool:
 def _standing(scene: Scene, name: str, table: MultibodyTable) -> tuple[MultibodyData, float]:
     """A mechanism and the height of its arm above its base where it stands [m]."""
     from catenary.cases.scene.train.multibody import multibody_of
-    from catenary.mbs.mechanism.pantograph_data import stand
+    from catenary.mbs.mechanism.multibody_pantograph import stand
 
     data = multibody_of(name, table, scene.train.speed_km_h)
     return data, stand(data).working_height
@@ -264,7 +264,7 @@ def _standing(scene: Scene, name: str, table: MultibodyTable) -> tuple[Multibody
 
 def _reaches(data: MultibodyData, arm: float) -> bool:
     """Whether a mechanism can have its arm at a height above its base [m]."""
-    from catenary.mbs.mechanism.pantograph_data import HOLDER, reduced, stand
+    from catenary.mbs.mechanism.multibody_pantograph import HOLDER, reduced, stand
     from catenary.mbs.rigid.joints import Constant, PrescribedPoint
 
     if data.all_bodies is None:

@@ -14,7 +14,7 @@ from catenary.cases.scene.keys.units import angle_from_deg, speed_from_km_h
 from catenary.cases.scene.train import mechanism as schema
 from catenary.cases.scene.train.head import strips_of
 from catenary.cases.scene.train.pantograph import MultibodyTable, wanted_force
-from catenary.mbs.mechanism.pantograph_data import AllBodies, MultibodyData
+from catenary.mbs.mechanism.multibody_pantograph import AllBodies, MultibodyData
 from catenary.mbs.rigid.arrays import Joint
 from catenary.mbs.rigid.bodies import Body
 from catenary.mbs.rigid.forces import (

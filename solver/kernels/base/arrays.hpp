@@ -3,6 +3,7 @@
 // checked where _GLIBCXX_ASSERTIONS is defined, as by `make sanitize`.
 #include <cstdint>
 #include <span>
+#include <stdexcept>
 
 namespace catenary {
 
@@ -50,9 +51,11 @@ template <class T>
 int64_t size(std::span<T> array) {
     return static_cast<int64_t>(array.size());
 }
-/// The numbers from `begin` to before `end`.
+/// The numbers from `begin` to before `end`. Throws std::out_of_range if there are not as many.
 template <class T>
 std::span<T> part(std::span<T> array, int64_t begin, int64_t end) {
+    if (begin < 0 || end < begin || end > size(array))
+        throw std::out_of_range("a part of an array is beyond its numbers");
     return array.subspan(begin, end - begin);
 }
 

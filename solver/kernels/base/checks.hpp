@@ -1,5 +1,5 @@
 #pragma once
-// Checks besides bounds in builds that look for faults (`build_ext --sanitize`).
+// Checks besides bounds in builds that search for faults (`build_ext --sanitize`).
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>

@@ -1,6 +1,6 @@
 #pragma once
-// Curves with their derivatives: splines, sums of sines, polylines. Splines go on beyond their
-// ends.
+// Curves with their derivatives: splines, sums of sines, polylines. Splines are extrapolated beyond
+// their ends.
 #include <tuple>
 
 #include "base/arrays.hpp"
@@ -20,6 +20,7 @@ struct SplineTables {
     std::span<const double> breaks;
     Array3<const double> coefficients;
     CATENARY_RECORD(breaks, coefficients)
+    CATENARY_SHAPES("n>1, n-1 m 4")
 };
 /// Fill in values and slopes (m,) of splines at `x`.
 void tables_at(const SplineTables& tables, double x, std::span<double> values,

@@ -8,3 +8,16 @@
     auto members() {                                      \
         return std::tie(__VA_ARGS__);                     \
     }
+
+/// Shapes that arrays from Python must have, member by member, in the words of python/shapes.hpp.
+#define CATENARY_SHAPES(shapes) static constexpr const char* kShapes = shapes;
+
+namespace catenary {
+
+template <class T>
+concept RecordType = requires(T record) {
+    T::kMembers;
+    record.members();
+};
+
+}  // namespace catenary

@@ -10,6 +10,7 @@ namespace catenary {
 struct Across {
     std::span<double> place, rate, moved;
     CATENARY_RECORD(place, rate, moved)
+    CATENARY_SHAPES("n, n, n")
 };
 
 }  // namespace catenary

@@ -12,6 +12,7 @@ struct Affine {
     std::span<double> place, rate;
     Array2<double> by_force, rate_by_force;
     CATENARY_RECORD(place, rate, by_force, rate_by_force)
+    CATENARY_SHAPES("n, n, n n, n n")
 };
 
 }  // namespace catenary

@@ -1,3 +1,4 @@
+// Sums of influence functions, in windows.
 #include "contact/columns.hpp"
 
 #include <algorithm>
@@ -16,7 +17,8 @@ struct Pair {
 };
 
 Pair columns_of(const Node& node, std::span<const double> data, double height, double slope) {
-    const double* first = data.data() + node.at;
+    const int64_t n = 2 * std::max<int64_t>(0, node.width);
+    const double* first = n > 0 ? part(data, node.at, node.at + n).data() : nullptr;
     return {first, first + node.width, height, slope};
 }
 

@@ -1,5 +1,5 @@
 #pragma once
-// Sums of columns of A^-1, which vanish outside of windows.
+// Sums of columns of A^-1, the influence functions of unit forces, which vanish outside of windows.
 #include "base/arrays.hpp"
 #include "contact/touch.hpp"
 #include "motion/state.hpp"

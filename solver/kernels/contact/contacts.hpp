@@ -1,5 +1,6 @@
 #pragma once
-// Contacts of a rank's part of a line: their places, and answers to forces there.
+// Contacts of a rank's part of a line: their places, and answers to forces there (influence
+// functions, columns of A^-1).
 #include "base/record.hpp"
 #include "contact/across.hpp"
 #include "contact/touch.hpp"
@@ -20,6 +21,7 @@ struct Wires {
 struct Answers {
     Array2<double> by_force, slope;
     CATENARY_RECORD(by_force, slope)
+    CATENARY_SHAPES("n k, n k?")
 };
 
 /// Gains of answers within a step.
@@ -40,6 +42,7 @@ struct Followed {
     Dependents dependents;
     std::span<const int64_t> dependent_numbers;  ///< numbers of the dependents
     CATENARY_RECORD(numbers, links, reserve, moving, dependents, dependent_numbers)
+    CATENARY_SHAPES("n, n=n, n, 2, n=n, *")
 };
 
 /// Columns of A^-1 for compensations of all links of the line: that of link d is of the local
@@ -48,6 +51,7 @@ struct LinkColumns {
     std::span<const int64_t> start, at, width;
     std::span<const double> data;
     CATENARY_RECORD(start, at, width, data)
+    CATENARY_SHAPES("n, n, n")
 };
 
 /// Work of n contact forces on the line, summed step by step. With load vectors b of unit forces at
@@ -66,6 +70,7 @@ struct ContactWork {
     double share_before, share_after;  ///< p, q
     double dt;                         ///< h [s]
     CATENARY_RECORD(total, force, local, value, before, ahead, share_before, share_after, dt)
+    CATENARY_SHAPES("1, n, n 4, n 4, n, n")
 };
 
 /// Unknowns (v, theta_z) of the contact wires' nodes (n_nodes, 2): numbers on this rank, 0 where
@@ -76,6 +81,7 @@ struct Sideways {
     Array2<const bool> owned;
     Array2<const double> rest;
     CATENARY_RECORD(local, owned, rest)
+    CATENARY_SHAPES("n 2, n 2, n 2")
 };
 
 /// All that n contacts of a rank work on.
@@ -95,6 +101,7 @@ struct Contacts {
     Across across;
     CATENARY_RECORD(x, touches, wires, columns, answers, gains, motion, motion_gains, followed,
                     link_columns, work, sideways, across)
+    CATENARY_SHAPES("n, n, *, *, n=n, *, *, 3, *, *, n=n, *, n=n?")
 };
 
 /// Locate the `touches` at places `x` (n,) [m], each on its own wire. A node belongs to the element

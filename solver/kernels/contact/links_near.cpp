@@ -18,8 +18,7 @@ bool is_beyond(double reserve, double margin) {
 CATENARY_FOR_TARGETS
 bool any_beyond(std::span<const double> reserve, double margin) {
     int64_t count = 0;
-    for (const double one : reserve)
-        count += !(margin <= one && one < std::numeric_limits<double>::infinity());
+    for (const double one : reserve) count += is_beyond(one, margin);
     return count > 0;
 }
 
@@ -82,7 +81,7 @@ int64_t watch(const Contacts& contacts, const Share& share) {
     const auto far = std::ranges::upper_bound(laws, highest->x + reach, {}, &Reserve::place);
     const int64_t first = std::max<int64_t>(near - laws.begin(), moving[0]);
     const int64_t last = std::min<int64_t>(far - laws.begin(), moving[1]);
-    // Mostly none is near its margin by itself: then links beyond reach are not looked at.
+    // Mostly none is near its margin by itself: then links beyond reach are not tested.
     int64_t begin = first, end = last;
     if (any_beyond(part(reserve, moving[0], moving[1]), margin)) {
         begin = moving[0];

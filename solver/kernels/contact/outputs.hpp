@@ -11,6 +11,7 @@ namespace catenary {
 struct StripEnds {
     std::span<const int64_t> of_strip, of_pantograph;
     CATENARY_RECORD(of_strip, of_pantograph)
+    CATENARY_SHAPES("s+1, p+1")
 };
 
 /// Contact force [N], head height and wire height [m] of each pantograph, the force of each strip,
@@ -20,6 +21,7 @@ struct TrainOutputs {
     StripEnds ends;
     std::span<double> contact_force, head_height, wire_height, strip_force, contact_wire_force;
     CATENARY_RECORD(ends, contact_force, head_height, wire_height, strip_force, contact_wire_force)
+    CATENARY_SHAPES("s=s p=p, p, p, p, s, *")
 };
 
 /// Fill in the outputs from n contacts: `force` (n,) and `reported` force (n,) [N], `heads` as
@@ -36,6 +38,7 @@ struct Leads {
     std::span<const double> middle;    ///< of the strip along the track [m], ascending for each
     std::span<const double> lead;      ///< how far the contact is ahead of it [m]
     CATENARY_RECORD(contact, first, middle, lead)
+    CATENARY_SHAPES("m, m+1, k, k")
 };
 
 /// Contacts and then pantographs along the track [m]: at the start, now.
@@ -44,6 +47,7 @@ struct TrainPlaces {
     std::span<double> now;
     Leads leads;
     CATENARY_RECORD(start, now, leads)
+    CATENARY_SHAPES("n, n")
 };
 
 /// Move all a way [m] ahead of where they started.

@@ -47,6 +47,7 @@ void find_surface(double place, std::span<const Sample> surface, Touch& touch) {
 void locate_one(double place, const Wires& wires, Touch& touch) {
     const auto& nodes = wires.nodes;
     const int64_t first = touch.first, last = touch.end - 1;
+    part(nodes, first, touch.end);
     // Mostly the element of the step before, or the next one.
     int64_t e = touch.element;
     while (e < last - 1 && nodes[e + 1].x < place) ++e;
@@ -128,7 +129,7 @@ void heights(const Contacts& contacts, std::span<double> height, std::span<doubl
 
 void find_across(const Contacts& contacts) {
     const auto& [local, owned, rest] = contacts.sideways;
-    for (size_t i = 0; i < contacts.touches.size(); ++i) {
+    for (size_t i = 0; i < contacts.across.place.size(); ++i) {
         const Touch& touch = contacts.touches[i];
         double place = 0.0, rate = 0.0, moved = 0.0;
         for (int k = 0; touch.present != 0.0 && k < 4; ++k) {

@@ -1,3 +1,4 @@
+// Influence coefficients of contacts on each other.
 #include "contact/response.hpp"
 
 #include <algorithm>

@@ -33,6 +33,7 @@ struct LinkRows {
     double& lift(int64_t k, int64_t i) const { return numbers(k, 2 + n_contacts() + i); }
     double& rise(int64_t k, int64_t i) const { return numbers(k, 2 + 2 * n_contacts() + i); }
     CATENARY_RECORD(numbers)
+    CATENARY_SHAPES("m w")
 };
 
 /// Bounds of forces within which every link that switches has a row: contacts that all push up to
@@ -41,6 +42,7 @@ struct LinkRows {
 struct Bounds {
     std::span<double> push, pull, loss;
     CATENARY_RECORD(push, pull, loss)
+    CATENARY_SHAPES("n, n, 1")
 };
 
 /// Share of one rank, or the sum of all ranks: `flags` (1,), `present` (n,), 1 for a contact whose
@@ -52,6 +54,7 @@ struct Share {
     LinkRows rows;
     Bounds bounds;
     CATENARY_RECORD(flags, present, line, rows, bounds)
+    CATENARY_SHAPES("1, n, n=n, w=3n+2 m=m, n=n")
 };
 
 /// Fill in a rank's share; the motion is that without forces of contacts and of links that switch.

@@ -1,3 +1,4 @@
+// LU factors of the rows that act, and the active-set iteration.
 #include "contact_problem/active_set.hpp"
 
 #include <algorithm>
@@ -8,7 +9,7 @@ namespace catenary {
 
 namespace {
 
-/// Solve for two unknowns in the order of operations of more.
+/// Solve for two unknowns, with the operations in the same order as for more.
 void solve_two(const System& system, int64_t first, int64_t second) {
     const auto& [matrix, right, solution] = system;
     const bool swaps = std::abs(matrix(second, first)) > std::abs(matrix(first, first));

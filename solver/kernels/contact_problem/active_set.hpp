@@ -8,7 +8,8 @@ namespace catenary {
 struct System {
     Array2<double> matrix;
     std::span<double> right, solution;
-    CATENARY_RECORD(matrix, right, solution)
+    CATENARY_RECORD(right, solution, matrix)
+    CATENARY_SHAPES("m, m, m.. m..")
 };
 
 /// Signs of m unknowns: `always` whether one may have any sign; `behind` of a dependent's row how
@@ -17,6 +18,7 @@ struct Signs {
     std::span<bool> always;
     std::span<int64_t> behind;
     CATENARY_RECORD(always, behind)
+    CATENARY_SHAPES("m, m")
 };
 
 /// Solve the rows and columns that act by elimination with pivoting; the others are zero.
@@ -26,9 +28,9 @@ struct Signs {
 /// residual small beside the terms of each row (R. D. Skeel, Math. Comp. 35 (1980) 817-832).
 void solve_on(const System& system, std::span<const bool> acts, const Room& room);
 
-/// Active-set iteration for x = max(0, x - (matrix x - right)), freely for `always`, and freely
-/// with its leader for a row `behind` one. Returns the rounds needed, which are not positive if the
-/// set did not settle, or came back to one that it has had.
+/// Primal-dual active-set iteration (semismooth Newton) for x = max(0, x - (matrix x - right)),
+/// freely for `always`, and freely with its leader for a row `behind` one. Returns the rounds
+/// needed, which are not positive if the set did not settle, or came back to one that it has had.
 int64_t settle(const System& system, const Signs& signs, int64_t max_rounds, const Room& room);
 
 }  // namespace catenary

@@ -1,3 +1,4 @@
+// Contact forces and compensations of a step, by tangents of the contact law.
 #include "contact_problem/forces.hpp"
 
 #include <algorithm>
@@ -80,7 +81,6 @@ int64_t find_forces(double time, const SmallProblem& problem, const StepLaw& law
     const auto solution = problem.unknowns.solution;
     const int64_t n = size(problem.gap.place);
     if (flags.broken != 0.0 || flags.missing != 0.0) return kLeft;
-    if (n + static_cast<int64_t>(flags.rows) > size(solution)) return kLeft;
     const Solved solved = law.marched ? solve_by_tangents(problem, *law.marched) : solve(problem);
     if (solved.rounds <= 0 || !solved.finite) return kLeft;
     if (!solved.complete) return kTooSmall;

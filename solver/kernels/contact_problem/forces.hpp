@@ -31,6 +31,7 @@ struct StepLaw {
     std::optional<MarchedHertzLaw> marched;  ///< the law, unless it is linear
     ReportedForces reported;
     CATENARY_RECORD(marched, reported)
+    CATENARY_SHAPES("n=n, n=n")
 };
 
 /// Find contact forces and compensations of the step to `time` [s], into the solution of the

@@ -1,3 +1,4 @@
+// Tangents of Hertz's law with hysteresis, and reported forces.
 #include "contact_problem/laws.hpp"
 
 #include <algorithm>

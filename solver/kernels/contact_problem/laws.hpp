@@ -10,6 +10,7 @@ namespace catenary {
 struct Tangents {
     std::span<double> own, offset, by_depth, by_rate;
     CATENARY_RECORD(own, offset, by_depth, by_rate)
+    CATENARY_SHAPES("n, n, n, n")
 };
 
 /// f = K d^n (1 + chi d' / d0') with the rate d0' at which the gap closed.
@@ -25,6 +26,7 @@ struct MarchedHertzLaw {
     Tangents tangents;        ///< where the law was linearised last
     std::span<double> there;  ///< forces of the law there, not cut at zero [N], (n,)
     CATENARY_RECORD(law, speed, tangents, there)
+    CATENARY_SHAPES("*, n, n=n, n")
 };
 /// Linearise the law at depths [m] and rates [m/s], (n,) each.
 void linearise(const MarchedHertzLaw& marched, std::span<const double> depth,
@@ -40,6 +42,7 @@ struct ReportedForces {
     std::span<double> latest;    ///< forces of the latest step [N], (n,) if gamma is not 0
     std::span<double> reported;  ///< reported forces (n,) [N]
     CATENARY_RECORD(gamma, from_time, latest, reported)
+    CATENARY_SHAPES("*, *, n?, n")
 };
 /// Whether the contact law holds for forces (n,) at `time` [s]; if so they are remembered. A law
 /// with gamma > 0 reports their mean over the step.

@@ -1,3 +1,4 @@
+// Murty's least-index pivoting, and shares of dependents by simplicial paths.
 #include "contact_problem/pivoting.hpp"
 
 #include <algorithm>
@@ -17,8 +18,8 @@ constexpr double kFirstGrid = 0.25;
 constexpr double kRounding = 1e-12, kAgreement = 10.0 * kRounding;
 /// Rows of bends along one direction differ by this at most, of their largest number.
 constexpr double kAlike = 1e-9;
-/// Problems that one step may solve on its way to shares.
-constexpr int64_t kMostLooks = 100'000;
+/// Problems that one step may solve to find shares.
+constexpr int64_t kMostEvaluations = 100'000;
 
 double largest(std::span<const double> numbers) {
     double found = 0.0;
@@ -158,7 +159,7 @@ class Shares : public Map {
           signs_(signs),
           room_(room),
           n_(size(system.right)),
-          size_(1.0 + largest(system.right)) {
+          scale_(1.0 + largest(system.right)) {
         std::ranges::fill(is_sought_, false);
         for (int64_t t = circle.since; t < circle.n_turned; ++t)
             is_sought_[room_.pivoting.turned[t]] = true;
@@ -239,19 +240,19 @@ class Shares : public Map {
         }
         const Pivoted pivoted = pivot_from({partly, right_, solution}, {free_, none_}, room_);
         rounds_ += pivoted.rounds;
-        const bool is_known = pivoted.found && ++looks_ < kMostLooks;
+        const bool is_known = pivoted.found && ++n_evaluations_ < kMostEvaluations;
         for (int64_t leader : leaders()) {
             double left = -right[leader] - solution[leader];
             for (int64_t j = 0; j < n_; ++j) left += matrix(leader, j) * solution[j];
-            excess_[leader] = is_known ? left / size_ : std::numeric_limits<double>::quiet_NaN();
+            excess_[leader] = is_known ? left / scale_ : std::numeric_limits<double>::quiet_NaN();
         }
     }
 
     const System& system_;
     const Signs& signs_;
     const Room& room_;
-    int64_t n_, n_leaders_ = 0, rounds_ = 0, looks_ = 0;
-    double size_;  ///< of right-hand sides
+    int64_t n_, n_leaders_ = 0, rounds_ = 0, n_evaluations_ = 0;
+    double scale_;  ///< of right-hand sides
     std::span<double> shares_ = room_.pivoting.numbers[0].first(n_),
                       right_ = room_.pivoting.numbers[1].first(n_),
                       excess_ = room_.pivoting.numbers[2].first(n_),

@@ -12,6 +12,7 @@ struct PathRoom {
     Array2<int64_t> counts;  ///< (4, n + 1)
     std::span<bool> all;     ///< (n + 1,)
     CATENARY_RECORD(columns, numbers, counts, all)
+    CATENARY_SHAPES("n n, 7 n, 4 n, n")
 };
 
 /// Room to pivot with up to k unknowns.
@@ -24,6 +25,7 @@ struct PivotRoom {
     Array2<bool> marks;            ///< (3, k)
     PathRoom path;                 ///< of k / 2 dimensions
     CATENARY_RECORD(needs, excludes, turned, partly, numbers, counts, marks, path)
+    CATENARY_SHAPES("k k, k k, 20k+100, k k, 4 k, 2 k, 3 k")
 };
 
 /// Room to solve for up to k unknowns: `factors` (k, k), the others (k,).
@@ -34,6 +36,7 @@ struct Room {
     std::span<bool> acts, before;
     PivotRoom pivoting;
     CATENARY_RECORD(factors, acting, order, left, change, acts, before, pivoting)
+    CATENARY_SHAPES("k k, k, k, k, k, k, k, k=k")
 };
 
 }  // namespace catenary

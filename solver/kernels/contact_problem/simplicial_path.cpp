@@ -1,3 +1,4 @@
+// Merrill's path of simplices, grid after grid.
 #include "contact_problem/simplicial_path.hpp"
 
 #include <algorithm>
@@ -48,7 +49,7 @@ class Path {
           first_(path.counts[1].first(n_ + 1)),
           corner_(path.counts[2].first(n_ + 1)),
           held_(path.counts[3].first(n_ + 1)),
-          all_(path.all.first(n_ + 1)) {
+          all_(part(path.all, 0, n_ + 1)) {
         std::ranges::fill(all_, true);
         std::ranges::fill(zero_, 0.0);
         zero_[n_] = 1.0;
@@ -102,7 +103,8 @@ class Path {
     double at(int64_t axis) const {
         return origin_[axis] + width_ * static_cast<double>(corner_[axis]);
     }
-    /// Let the value at a corner enter, of like size in all rows, however fine the grid.
+    /// Put the value at a corner into the entering column, of like size in all rows, however fine
+    /// the grid.
     void put_column(int64_t number) {
         go_to(number);
         for (int64_t i = 0; i < n_; ++i) place_[i] = at(i);

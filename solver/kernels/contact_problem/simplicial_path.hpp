@@ -26,7 +26,7 @@ class Map {
 /// Find a zero of a map that is known to less than `small`, and for which (z - start) . of(z) > 0
 /// for all z that are far from the start.
 ///
-/// `z` holds where to begin, and then the last place looked at; the better, the shorter the path.
+/// `z` holds where to begin, and then the last place evaluated; the better, the shorter the path.
 /// `width` is that of the first grid, in units of z; a largest component of `small` counts as zero.
 /// Returns whether the place is a zero: not if the path is too long, or the map no number on it.
 /// `path` is for n dimensions, `room` for solves of n + 1 unknowns.

@@ -1,7 +1,9 @@
+// The matrix of the small problem from influence coefficients, and depths under its solution.
 #include "contact_problem/small_problem.hpp"
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 
 namespace catenary {
 
@@ -17,6 +19,12 @@ void press(const Affine& gap, const Tangents& tangents, const Unknowns& unknowns
             unknowns.matrix(i, j) = by_depth[i] * by_force(i, j) + by_rate[i] * rate_by_force(i, j);
         unknowns.matrix(i, i) += own[i];
     }
+}
+
+/// Throws std::out_of_range if the first `count` rows are not all of links.
+void check_numbers(const LinkRows& rows, int64_t count, const Coupled& coupled) {
+    if (count > rows.capacity()) throw std::out_of_range("there are fewer rows of links");
+    for (int64_t d = 0; d < count; ++d) part(coupled.released, rows.number(d), rows.number(d) + 1);
 }
 
 }  // namespace
@@ -41,6 +49,7 @@ bool subtract(const Affine& heads, const Affine& line, std::span<const double> p
 
 bool any_switched(const LinkRows& rows, int64_t count, const Coupled& coupled,
                   std::span<const double> force) {
+    check_numbers(rows, count, coupled);
     for (int64_t d = 0; d < count; ++d) {
         if (coupled.behind[rows.number(d)] > 0) continue;
         double value = rows.reserve(d);
@@ -56,6 +65,8 @@ void couple(const LinkRows& rows, int64_t count, const Coupled& coupled,
     const auto& band = coupled.band;
     const auto& matrix = unknowns.matrix;
     const int64_t n = size(by_depth), half = band.columns / 2;
+    part(unknowns.right, n, n + count);
+    check_numbers(rows, count, coupled);
     for (int64_t d = 0; d < count; ++d) {
         const int64_t row = n + d, number = rows.number(d);
         const double released = coupled.released[number];
@@ -126,6 +137,7 @@ Solved solve(const SmallProblem& problem) {
         problem;
     const auto& rows = share.rows;
     const int64_t n = size(gap.place), count = static_cast<int64_t>(share.flags[0].rows);
+    if (n + count > size(unknowns.solution) || count > rows.capacity()) return {};
     bool finite = subtract(heads, share.line, share.present, gap);
     for (int64_t i = 0; i < n; ++i) {
         unknowns.always[i] = pulls && share.present[i] != 0.0;

@@ -1,5 +1,6 @@
 #pragma once
-// The small dense problem of a step: contact forces and switching links. For the equations see
+// The small dense problem of a step: contact forces and switching links, a linear complementarity
+// problem of their influence matrix. For the equations see
 // solver/contact_problem/complementarity.py.
 #include "contact/response.hpp"
 #include "contact_problem/pivoting.hpp"
@@ -19,6 +20,7 @@ struct Coupled {
     std::span<const int64_t> behind;   ///< of a dependent how many numbers its leader is before it
     std::span<double> drop;            ///< room to work, all zero before and after
     CATENARY_RECORD(band, released, slackens, behind, drop)
+    CATENARY_SHAPES("n *, n, n, n, n")
 };
 
 /// Room for a problem with up to k unknowns: contact forces, then compensations.
@@ -34,12 +36,14 @@ struct Unknowns {
     System system(int64_t n) const { return {matrix, right.first(n), solution.first(n)}; }
     Signs signs(int64_t n) const { return {always.first(n), behind.first(n)}; }
     CATENARY_RECORD(always, behind, matrix, right, solution, room)
+    CATENARY_SHAPES("k, k, k k, k, k, k=k")
 };
 
 /// Depths [m] and rates [m/s] of the gap at n contacts under forces.
 struct Depths {
     std::span<double> depth, rate;
     CATENARY_RECORD(depth, rate)
+    CATENARY_SHAPES("n, n")
 };
 
 struct SmallProblem {
@@ -53,6 +57,7 @@ struct SmallProblem {
     Depths found;        ///< under the solution
     int64_t max_rounds;  ///< of the active-set iteration
     CATENARY_RECORD(heads, share, gap, pulls, tangents, coupled, unknowns, found, max_rounds)
+    CATENARY_SHAPES("n=n, n=n, n=n, *, n=n, *, k=k, n=n")
 };
 
 struct Solved {

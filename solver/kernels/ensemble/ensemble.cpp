@@ -1,12 +1,15 @@
+// Steps of all lanes, each as far as its scene goes.
 #include "ensemble/ensemble.hpp"
 
 #include <algorithm>
+#include <stdexcept>
 
 #include "base/flush_to_zero.hpp"
 
 namespace catenary {
 
 void Ensemble::begin(int lane, Steps& steps, int64_t n) {
+    if (n < 0 || n > steps.n_steps()) throw std::out_of_range("a block has not as many steps");
     marches_.at(lane) = {&steps, 0, n, false};
 }
 

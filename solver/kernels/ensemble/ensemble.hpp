@@ -20,7 +20,7 @@ class Ensemble {
         passes_.make_room(extremes_.droppers.law.size());
     }
 
-    /// Let a scene begin in a lane, whose line is at rest, with n steps of its block.
+    /// Begin a scene in a lane, whose line is at rest, with n steps of its block.
     void begin(int lane, Steps& steps, int64_t n);
     /// Take steps until a scene is at its end, or left, or until so many were taken.
     void take(int64_t most);

@@ -11,18 +11,6 @@ namespace catenary {
 
 namespace {
 
-Line line_of(const PassParts& parts) {
-    std::vector<std::unique_ptr<Kernels>> kernels;
-    for (const auto& [rows, factors] : parts.layouts) {
-        kernels.push_back(kernels_for_scenes(rows, factors));
-        if (!kernels.back())
-            throw std::invalid_argument("no kernels take several scenes of these layouts");
-    }
-    if (parts.station_types.size() < kernels.size())
-        throw std::invalid_argument("a station type is missing");
-    return Line(std::move(kernels), parts.station_types, kScenes);
-}
-
 /// Numbers of all scenes as a vector, aligned as doubles.
 typedef double Scenes __attribute__((vector_size(8 * kScenes), aligned(8), may_alias));
 
@@ -92,19 +80,9 @@ void take_uplift(const Motion& motion, std::span<const int64_t> unknowns, const 
 
 }  // namespace
 
-ScenePasses::ScenePasses(PassParts parts) : parts_(std::move(parts)), line_(line_of(parts_)) {
-    const PassArrays& arrays = parts_.arrays;
-    if (!arrays.known.empty())
+ScenePasses::ScenePasses(PassParts parts) : parts_(std::move(parts)), line_(parts_, kScenes) {
+    if (!parts_.arrays.known.empty())
         throw std::invalid_argument("scenes side by side take steps of Newmark's method only");
-    work_.product = parts_.rows.product();
-    work_.product.factor = arrays.factor.data();
-    work_.product.velocity = arrays.velocity.data();
-    work_.factored = parts_.factors.factored();
-    work_.loads = arrays.loads.empty() ? nullptr : arrays.loads.data();
-    work_.answer = arrays.answer.data();
-    const Motion& m = arrays.motion;
-    work_.motion = {m.x.data(), m.y.data(), m.z.data(), nullptr, parts_.changes};
-    line_.set_runs(work_, size(parts_.factors.kinds), parts_.factors.low);
 }
 
 void ScenePasses::track(const TrackedLinks& tracked, Array2<const double> rest,
@@ -122,10 +100,11 @@ void ScenePasses::make_room(size_t n_links) {
 }
 
 void ScenePasses::step() {
-    line_.step(work_, parts_.factors.at(), std::max<int64_t>(1, tracked_.stretch), *this);
+    line_.line.step(line_.work, parts_.factors.at(), std::max<int64_t>(1, tracked_.stretch), *this);
 }
 
 void ScenePasses::after_stretch() {
+    part(tracked_.ranges.all(), 2 * n_followed_, 2 * n_followed_ + 4);
     const auto before = tracked_.ranges[n_followed_], now = tracked_.ranges[n_followed_ + 1];
     ++n_followed_;
     find_reserves(now[0], before[0]);

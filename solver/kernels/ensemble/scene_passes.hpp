@@ -17,12 +17,13 @@ struct LineExtremes {
     Array2<double> uplift;          ///< (n_arms, kScenes) largest displacement [m]
     Array2<double> least, largest;  ///< (n_droppers, kScenes) forces [N]
     CATENARY_RECORD(arms, droppers, rest, uplift, least, largest)
+    CATENARY_SHAPES("a, n=d, d 4, a 4, d 4, d 4")
 };
 
 class ScenePasses : private Around {
   public:
-    /// Arrays of `parts` are for all scenes. Throws std::invalid_argument if no kernels were
-    /// compiled for a layout, or the method is not Newmark's.
+    /// Arrays of `parts` are for all scenes. Throws std::invalid_argument as `PassLine`, or if the
+    /// method is not Newmark's.
     explicit ScenePasses(PassParts parts);
 
     /// Fill the reserves (n,) of links in each scene in a free step; `tracked` as for one scene,
@@ -43,8 +44,7 @@ class ScenePasses : private Around {
     void find_reserves(int64_t begin, int64_t end);
 
     PassParts parts_;
-    Line line_;
-    Work work_;
+    PassLine line_;
     TrackedLinks tracked_{};
     Array2<const double> rest_{};
     std::vector<std::span<double>> reserves_;

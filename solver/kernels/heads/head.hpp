@@ -20,7 +20,7 @@ namespace catenary {
 struct LoweringMemory {
     double height;     ///< now [m]
     double caught_at;  ///< where it is caught [m], known from the lowering on
-    double phase;      ///< 0 before the lowering, 1 while it goes on, 2 when the head is caught
+    double phase;      ///< 0 before the lowering, 1 during it, 2 when the head is caught
 };
 
 struct Lowering {
@@ -28,6 +28,7 @@ struct Lowering {
     double drop;                       ///< of the head until it is caught [m]
     std::span<LoweringMemory> memory;  ///< (1,)
     CATENARY_RECORD(time, drop, memory)
+    CATENARY_SHAPES("*, *, 1")
 };
 
 /// Inputs of a head's step besides its state: the first numbers of a row that is known before the
@@ -79,6 +80,7 @@ struct HeadArrays {
     NewmarkFactors newmark;
     int64_t roll;  ///< coordinate of the head's roll, -1 without it
     CATENARY_RECORD(touch, state, out, newmark, roll)
+    CATENARY_SHAPES("2 s n, 3n")
 };
 
 /// Strips that bend, see mbs/head/flexure.py.
@@ -104,11 +106,11 @@ class Head {
     int64_t first() const { return first_; }
     void set_first(int64_t contact) { first_ = contact; }
 
-    /// Let strips bend.
+    /// Add bending of the strips.
     void bend(const Bending& bending);
-    /// Let the lift be regulated.
+    /// Add a regulation of the lift.
     void regulate(const Regulation& regulation) { regulation_ = regulation; }
-    /// Let the head be caught when it has been lowered.
+    /// Add a lowering, at whose end the head is caught.
     void lower(const Lowering& lowering) { lowering_ = lowering; }
     /// Force that the regulation now adds to the static force [N].
     double added_force() const {
@@ -174,7 +176,7 @@ class Head {
     bool is_held(const Drive& drive);
     /// Height of the strips' mean over the housing under contact forces (s,) [N], [m].
     double height_under(std::span<const double> contact_force) const;
-    /// Let the strips touch where wires are.
+    /// Put where wires are on the strips into `touch`.
     void aim(std::span<const double> drive);
     void bend_at(std::span<const double> place, std::span<const double> rate);
     double measured(std::span<const double> contact_force) const;

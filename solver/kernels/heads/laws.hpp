@@ -27,6 +27,7 @@ struct HeadLaws {
     std::span<const HeadLawPoint> points;  ///< of all laws
     std::span<double> pressed;             ///< (s,) contact forces of the latest step [N]
     CATENARY_RECORD(ways, law, points, pressed)
+    CATENARY_SHAPES("m n, m")
 };
 
 /// Start of a step: Newmark's predictors and the other variables of laws.

@@ -11,6 +11,7 @@ struct LinearStep {
     std::span<const double> by_head;   ///< (3 n,) of that on the head
     Array2<const double> inverse;      ///< (n, n) of the matrix that gives accelerations
     CATENARY_RECORD(matrix, by_drive, by_head, inverse)
+    CATENARY_SHAPES("k k, k, k")
 };
 
 class LinearChain : public Head {

@@ -36,6 +36,7 @@ struct Regulation {
     std::span<RegulationMemory> memory;            ///< (1,)
     std::span<double> waiting;                     ///< forces that wait, one a sample of delay [N]
     CATENARY_RECORD(settings, gains, memory, waiting)
+    CATENARY_SHAPES("1, g>0, 1")
 };
 
 /// Take in the value measured at the end of a step; put the added force of the next one. The

@@ -14,6 +14,7 @@ struct SprungMasses {
     std::span<const double> push;  ///< (n,) force on each coordinate by an upward unit force on the
                                    ///< strips' middle
     CATENARY_RECORD(masses, stiffness, damping, push)
+    CATENARY_SHAPES("n, n n, n n, n")
 };
 
 class SprungHead : public Head {

@@ -1,5 +1,6 @@
 #pragma once
-// Spans condensed to the unknowns that they share with their neighbours. See half_lines.py.
+// Dynamic condensation of spans, Schur complements at frequencies, to the unknowns that they share
+// with their neighbours. See half_lines.py.
 #include "base/arrays.hpp"
 #include "base/complex.hpp"
 

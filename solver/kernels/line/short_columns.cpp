@@ -40,8 +40,9 @@ double cut_out(Array2<const double> answers, const Cuts& cuts, std::span<double>
             const double leak = std::max(largest_of(row.first(low)), largest_of(row.subspan(high)));
             const double peak = std::max(leak, largest_of(part(row, low, high)));
             if (leak > worst * peak) worst = leak / peak;
-            const auto wanted = row.subspan(cuts.begin[i], cuts.width[i]);
-            std::copy(wanted.begin(), wanted.end(), data.begin() + cuts.at[i] + k * cuts.width[i]);
+            const int64_t width = cuts.width[i], at = cuts.at[i] + k * width;
+            std::ranges::copy(part(row, cuts.begin[i], cuts.begin[i] + width),
+                              part(data, at, at + width).begin());
         }
     return worst;
 }

@@ -11,6 +11,7 @@ struct Cuts {
     std::span<const int64_t> begin, width;  ///< part that is copied
     std::span<const int64_t> at;            ///< where it goes in `data`
     CATENARY_RECORD(low, high, begin, width, at)
+    CATENARY_SHAPES("n, n, n, n, n")
 };
 
 /// Copy the wanted part of each answer into `data`. `answers` (n k, m) has k rows for each place.

@@ -1,7 +1,9 @@
 // Fourier transforms by halves.
 #include "loads/fourier.hpp"
 
+#include <bit>
 #include <cstdint>
+#include <stdexcept>
 
 #include "base/targets.hpp"
 
@@ -14,11 +16,18 @@ double* parts_of(Complex* numbers) {
     return reinterpret_cast<double*>(numbers);
 }
 
+void check(std::span<const Complex> numbers, std::span<const Complex> turns) {
+    if (!std::has_single_bit(numbers.size()) || turns.size() < numbers.size())
+        throw std::invalid_argument(
+            "a Fourier transform has a power of two numbers, and as many turns");
+}
+
 }  // namespace
 
 CATENARY_FOR_TARGETS
 void fourier_forth(std::span<Complex> numbers, std::span<const Complex> turns) {
     const auto n = static_cast<int64_t>(numbers.size());
+    check(numbers, turns);
     for (int64_t half = n / 2; half >= 1; half /= 2)
         for (int64_t start = 0; start < n; start += 2 * half) {
             double* __restrict near = parts_of(&numbers[start]);
@@ -37,6 +46,7 @@ void fourier_forth(std::span<Complex> numbers, std::span<const Complex> turns) {
 CATENARY_FOR_TARGETS
 void fourier_back(std::span<Complex> numbers, std::span<const Complex> turns) {
     const auto n = static_cast<int64_t>(numbers.size());
+    check(numbers, turns);
     for (int64_t half = 1; 2 * half <= n; half *= 2)
         for (int64_t start = 0; start < n; start += 2 * half) {
             double* __restrict near = parts_of(&numbers[start]);

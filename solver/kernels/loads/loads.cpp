@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 
 namespace catenary {
 
@@ -67,6 +68,7 @@ void add_samples(double time, const Sampled& sampled, std::span<double> values) 
 
 void evaluate(const Loads& loads) {
     const double time = loads.clock[0];
+    if (!std::isfinite(time)) throw std::invalid_argument("the time of loads is no number");
     put_changing(time, loads.changing, loads.constant, loads.values);
     add_samples(time, loads.sampled, loads.values);
     remember(time, loads.values, loads.memories);

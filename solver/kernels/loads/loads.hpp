@@ -22,6 +22,7 @@ struct Changing {
     std::span<Factor> factors;
     std::span<const double> numbers;  ///< of all factors
     CATENARY_RECORD(places, begins, terms, forces, factors, numbers)
+    CATENARY_SHAPES("n, n+1, e, e")
 };
 
 /// A load made ahead in slices, linear in time between them. Its places are the ones from `first`
@@ -48,6 +49,7 @@ struct Loads {
     Sampled sampled;
     Memories memories;
     CATENARY_RECORD(clock, values, constant, changing, sampled, memories)
+    CATENARY_SHAPES("1, n, n")
 };
 
 /// Fill in `values` at the time of the clock.

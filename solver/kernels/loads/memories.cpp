@@ -11,6 +11,12 @@ namespace catenary {
 
 namespace {
 
+/// n numbers from a place on.
+template <class T>
+std::span<T> numbers_from(std::span<T> array, int64_t begin, int64_t n) {
+    return part(array, begin, begin + n);
+}
+
 CATENARY_FOR_TARGETS
 void add_scaled(std::span<double> into, const double* numbers, double factor) {
     double* const result = into.data();
@@ -30,10 +36,11 @@ void fold_near(const MemoryTables& tables, const EndMemory& end, int64_t step) {
     const int64_t m = end.width, n = end.n_steps;
     const int64_t coming = std::min(kNear - 1, n - step);
     for (int64_t i = 0; i < m; ++i) {
-        const auto into = tables.sums.subspan(end.sums + i * n + step, coming);
+        const auto into = numbers_from(tables.sums, end.sums + i * n + step, coming);
         for (int64_t j = 0; j < m; ++j) {
             const double latest = tables.past[end.past + j * n + step - 1];
-            const auto numbers = tables.near.subspan(end.near + (i * m + j) * kNear + 1, coming);
+            const auto numbers =
+                numbers_from(tables.near, end.near + (i * m + j) * kNear + 1, coming);
             add_scaled(into, numbers.data(), latest);
         }
     }
@@ -45,26 +52,26 @@ void fold_block(const MemoryTables& tables, const EndMemory& end, int64_t step, 
                 int64_t spectra) {
     const int64_t m = end.width, n = end.n_steps, size = 2 * length;
     for (int64_t j = 0; j < m; ++j) {
-        const auto row = tables.room[j].first(size);
-        const auto source = tables.past.subspan(end.past + j * n + step - length, length);
+        const auto row = numbers_from(tables.room[j], 0, size);
+        const auto source = numbers_from(tables.past, end.past + j * n + step - length, length);
         std::copy(source.begin(), source.end(), row.begin());
         std::fill(row.begin() + length, row.end(), Complex{});
         fourier_forth(row, tables.turns);
     }
-    const auto both = tables.room[m].first(size);
+    const auto both = numbers_from(tables.room[m], 0, size);
     const int64_t coming = std::min(size, n - step);
     for (int64_t first = 0; first < m; first += 2) {
         std::fill(both.begin(), both.end(), Complex{});
         for (int64_t j = 0; j < m; ++j) {
             const auto spectrum =
-                tables.spectra.subspan(spectra + (first / 2 * m + j) * size, size);
+                numbers_from(tables.spectra, spectra + (first / 2 * m + j) * size, size);
             add_products(both, spectrum.data(), tables.room[j].data());
         }
         fourier_back(both, tables.turns);
-        const auto sums = tables.sums.subspan(end.sums + first * n + step, coming);
+        const auto sums = numbers_from(tables.sums, end.sums + first * n + step, coming);
         for (int64_t k = 0; k < coming; ++k) sums[k] += both[k].real();
         if (first + 1 == m) continue;
-        const auto others = tables.sums.subspan(end.sums + (first + 1) * n + step, coming);
+        const auto others = numbers_from(tables.sums, end.sums + (first + 1) * n + step, coming);
         for (int64_t k = 0; k < coming; ++k) others[k] += both[k].imag();
     }
 }
@@ -93,7 +100,7 @@ void remember(double time, std::span<double> values, const Memories& memories) {
             if (step <= n) {
                 for (int64_t i = 0; i < m; ++i) {
                     const int64_t at = memories.own[first + i];
-                    tables.past[end.past + i * n + step - 1] =
+                    numbers_from(tables.past, end.past + i * n + step - 1, 1)[0] =
                         memories.shares[0] * memories.latest[at] +
                         memories.shares[1] * memories.known[at];
                 }
@@ -103,7 +110,8 @@ void remember(double time, std::span<double> values, const Memories& memories) {
         }
         if (step < n)
             for (int64_t i = 0; i < m; ++i)
-                values[memories.into[first + i]] -= tables.sums[end.sums + i * n + step];
+                values[memories.into[first + i]] -=
+                    numbers_from(tables.sums, end.sums + i * n + step, 1)[0];
         first += m;
     }
 }

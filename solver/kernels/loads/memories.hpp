@@ -39,6 +39,7 @@ struct Memories {
     std::span<const double> shares;         ///< (2,) of both
     MemoryTables tables;
     CATENARY_RECORD(into, own, latest, known, shares, tables)
+    CATENARY_SHAPES("n, n, *, *, 2")
 };
 
 /// Add the forces of all ends at a time [s], minus `sums`, to `values`. The accelerations are the

@@ -7,7 +7,7 @@ namespace catenary {
 
 namespace {
 
-/// Let `take` have the reserve of each link from `begin` to `end`.
+/// Call `take` with each link from `begin` to `end` and its reserve.
 template <class Take>
 void each_reserve(const Motion& motion, const Links& links, int64_t begin, int64_t end, Take take) {
     if (links.unknowns.columns != 2) {
@@ -68,6 +68,7 @@ double energy_of_switching(std::span<const double> displacement, const Links& li
         return stretch;
     };
     double energy = 0.0;
+    part(links.law, begin, end);
     for (int64_t link = begin; link < end; ++link) {
         const Reserve& law = links.law[link];
         if (law.stiffness == 0.0) continue;  // dampers store no energy

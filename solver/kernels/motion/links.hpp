@@ -19,6 +19,7 @@ struct Links {
     Array2<const double> weights;
     std::span<const Reserve> law;
     CATENARY_RECORD(unknowns, weights, law)
+    CATENARY_SHAPES("n m, n m, n")
 };
 
 /// Dependents of links: of link d the `links` from begin[d] to before begin[d + 1].
@@ -26,6 +27,7 @@ struct Dependents {
     Links links;
     std::span<const int64_t> begin;
     CATENARY_RECORD(links, begin)
+    CATENARY_SHAPES("*, n+1?")
 };
 
 /// Reserve of a link [N].

@@ -5,6 +5,7 @@ namespace catenary {
 
 void show(const Shown& shown, std::span<double> uplift, std::span<double> dropper_force,
           int64_t begin, int64_t end) {
+    for (const int64_t station : {begin, end}) part(shown.columns.starts, station, station + 1);
     const auto first = shown.columns.first[begin], last = shown.columns.last[end];
     for (int64_t i = first[kArms]; i < last[kArms]; ++i)
         uplift[i] = displacement_at(shown.arms[i], shown.motion);
@@ -18,7 +19,7 @@ void show(const Shown& shown, std::span<double> uplift, std::span<double> droppe
 
 bool keep(const KeptMotions& kept, int64_t number, const Motion& motion, const Columns& columns) {
     const int64_t begin = columns.starts[kept.moved[0]], end = columns.starts[kept.moved[1]];
-    const int64_t n = end - begin, at = kept.used[0];
+    const int64_t n = end - begin, at = part(kept.used, 0, 1)[0];
     if (at + 2 * n > size(kept.numbers)) return false;
     displacements(motion, begin, kept.numbers.subspan(at, n));
     velocities(motion, begin, kept.numbers.subspan(at + n, n));

@@ -13,6 +13,7 @@ struct Columns {
     std::span<const int64_t> starts;    ///< (n + 1,) first unknown of each station
     Array2<const int32_t> first, last;  ///< (n + 1, k)
     CATENARY_RECORD(ends, starts, first, last)
+    CATENARY_SHAPES("2.., n+1, n+1 3, n+1 3")
 };
 
 /// Columns of the tables, as ``Shown`` has them.
@@ -27,6 +28,7 @@ struct Shown {
     Columns columns;                ///< of arms, droppers and others
     CATENARY_RECORD(motion, arms, droppers, others, dropper_bends, other_bends, other_force,
                     columns)
+    CATENARY_SHAPES("*, a, n=d, *, n=d, *, *, *")
 };
 
 /// Displacement at arms [m] and forces of droppers and of other links [N], as far as they follow
@@ -34,13 +36,13 @@ struct Shown {
 void show(const Shown& shown, std::span<double> uplift, std::span<double> dropper_force,
           int64_t begin, int64_t end);
 
-/// Let a range of `stations`, first and last + 1, take in another one.
+/// Extend a range of `stations`, first and last + 1, by another one.
 inline void take_in(std::span<int64_t> stations, std::span<const int64_t> moving) {
     stations[0] = std::min(stations[0], moving[0]);
     stations[1] = std::max(stations[1], moving[1]);
 }
 
-/// Motions that are kept of steps that the line goes on from; see KeptMotions.
+/// Motions kept of steps from which a march may be resumed; see KeptMotions.
 struct KeptMotions {
     std::span<const int64_t> motion_of;  ///< number of the motion that keeps a step, -1 if none
     std::span<double> numbers;  ///< room for displacements and velocities, a motion after another
@@ -50,6 +52,7 @@ struct KeptMotions {
     std::vector<std::span<const double>> places;  ///< numbers that are kept with a motion
     Array2<double> kept_places;                   ///< (n_motions, n) room for these
     CATENARY_RECORD(motion_of, numbers, stations, used, moved, places, kept_places)
+    CATENARY_SHAPES("n, *, m 3, 1?, 2?, *, m *")
 };
 
 /// Keep the motion of a step as that of a number; whether there is room for it.
@@ -57,8 +60,11 @@ bool keep(const KeptMotions& kept, int64_t number, const Motion& motion, const C
 
 /// Copy arrays one after another.
 inline void copy_all(const std::vector<std::span<const double>>& arrays, std::span<double> result) {
-    auto at = result.begin();
-    for (const auto& array : arrays) at = std::ranges::copy(array, at).out;
+    int64_t at = 0;
+    for (const auto& array : arrays) {
+        std::ranges::copy(array, part(result, at, at + size(array)).begin());
+        at += size(array);
+    }
 }
 
 }  // namespace catenary

@@ -56,7 +56,8 @@ void displacements(const Motion& motion, int64_t begin, std::span<double> result
     const Motion m = motion;
     const double a = m.shares[0], b = m.shares[1], c = m.shares[2];
     const int64_t n = size(result);
-    const auto x = m.x.subspan(begin, n), y = m.y.subspan(begin, n), z = m.z.subspan(begin, n);
+    const auto x = part(m.x, begin, begin + n), y = part(m.y, begin, begin + n),
+               z = part(m.z, begin, begin + n);
     for (int64_t i = 0; i < n; ++i) result[i] = a * x[i] + b * y[i] + c * z[i];
 }
 
@@ -64,7 +65,7 @@ CATENARY_FOR_TARGETS
 void velocities(const Motion& motion, int64_t begin, std::span<double> result) {
     const double b = motion.shares[3], c = motion.shares[4];
     const int64_t n = size(result);
-    const auto y = motion.y.subspan(begin, n), z = motion.z.subspan(begin, n);
+    const auto y = part(motion.y, begin, begin + n), z = part(motion.z, begin, begin + n);
     for (int64_t i = 0; i < n; ++i) result[i] = b * y[i] + c * z[i];
 }
 

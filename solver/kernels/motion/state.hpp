@@ -13,6 +13,7 @@ struct Motion {
     std::span<const double> shares;
     int64_t spacing = 1;
     CATENARY_RECORD(x, y, z, shares, spacing)
+    CATENARY_SHAPES("n, n, n, 5")
 };
 
 inline double displacement_at(int64_t unknown, const Motion& motion) {
@@ -25,7 +26,8 @@ inline double velocity_at(int64_t unknown, const Motion& motion) {
     return motion.shares[3] * motion.y[at] + motion.shares[4] * motion.z[at];
 }
 
-/// Predictions of Newmark's method (eq. 2.5) in place; `work` becomes -(d + `c_work` v).
+/// Predictions of Newmark's method (eq. 2.5) in place; `work` becomes -(d +
+/// `work_velocity` v).
 struct Newmark {
     double dt, predict_position, predict_velocity, work_velocity;
     double position_factor, velocity_factor, damping_share;

@@ -10,21 +10,17 @@ namespace catenary {
 
 namespace {
 
-double* in(std::span<double> numbers) {
+/// The numbers, or null if there are none.
+template <class T>
+T* in(std::span<T> numbers) {
     return numbers.empty() ? nullptr : numbers.data();
 }
 
-Line line_of(const std::vector<std::pair<Layout, Layout>>& layouts,
-             const std::vector<std::vector<int>>& station_types) {
+std::vector<std::unique_ptr<Kernels>> kernels_for(const PassParts& parts, int scenes) {
     std::vector<std::unique_ptr<Kernels>> kernels;
-    for (const auto& [rows, factors] : layouts) {
-        kernels.push_back(kernels_of(rows, factors));
-        if (!kernels.back())
-            throw std::invalid_argument("no kernels take stations of these layouts");
-    }
-    if (station_types.size() < kernels.size())
-        throw std::invalid_argument("a station type is missing");
-    return Line(std::move(kernels), station_types);
+    for (const auto& [rows, factors] : parts.layouts)
+        kernels.push_back((scenes == 1 ? kernels_of : kernels_for_scenes)(rows, factors));
+    return kernels;
 }
 
 CATENARY_FOR_TARGETS
@@ -37,22 +33,44 @@ void add_up(std::span<double> result, const double* velocity, const double* late
 
 }  // namespace
 
-TwoPasses::TwoPasses(PassParts parts)
-    : parts_(std::move(parts)), line_(line_of(parts_.layouts, parts_.station_types)) {
-    const PassArrays& arrays = parts_.arrays;
-    work_.product = parts_.rows.product();
-    work_.product.factor = in(arrays.factor);
-    work_.product.velocity = in(arrays.velocity);
-    work_.factored = parts_.factors.factored();
-    work_.loads = arrays.loads.empty() ? nullptr : arrays.loads.data();
-    work_.answer = in(arrays.answer);
+PassLine::PassLine(const PassParts& parts, int scenes)
+    : line(kernels_for(parts, scenes), parts.station_types, scenes) {
+    const PassArrays& arrays = parts.arrays;
     const Motion& m = arrays.motion;
-    work_.motion = {in(m.x), in(m.y), in(m.z), in(arrays.known), parts_.changes};
-    line_.set_runs(work_, size(parts_.factors.kinds), parts_.factors.low);
+    const int64_t n = size(parts.factors.kinds), low = parts.factors.low;
+    if (low < 0 || low > n || m.spacing != scenes)
+        throw std::invalid_argument("a line has other stations or scenes than its steps");
+    std::vector<Layout> rows, factors;
+    for (const auto& [of_rows, of_factors] : parts.layouts) {
+        rows.push_back(of_rows);
+        factors.push_back(of_factors);
+    }
+    work.product = parts.rows.product(rows);
+    work.product.factor = in(arrays.factor);
+    work.product.velocity = in(arrays.velocity);
+    work.factored = parts.factors.factored(factors);
+    work.loads = in(arrays.loads);
+    work.answer = in(arrays.answer);
+    work.motion = {in(m.x), in(m.y), in(m.z), in(arrays.known), parts.changes};
+    line.set_runs(work, n, low);
+    auto holds = [](auto numbers, int64_t most) {
+        return numbers.empty() || size(numbers) >= most;
+    };
+    const Ends& ends = parts.factors.at();
+    if (size(parts.rows.kinds) < n || ends.begin < 0 || ends.low < ends.begin ||
+        ends.high < ends.low || ends.end < ends.high || n < ends.end)
+        throw std::invalid_argument("a line has rows of other stations than factors");
+    const int64_t own = line.start_of(work, ends.high) - line.start_of(work, ends.low);
+    if (size(arrays.factor) < line.n_read() || !holds(arrays.velocity, line.n_read()) ||
+        size(arrays.answer) < line.n_solved() || !holds(arrays.loads, line.n_solved()) ||
+        size(m.x) < own || !holds(arrays.known, own))
+        throw std::invalid_argument("arrays of a line have fewer numbers than its stations");
 }
 
+TwoPasses::TwoPasses(PassParts parts) : parts_(std::move(parts)), line_(parts_) {}
+
 void TwoPasses::step() {
-    line_.step(work_, parts_.factors.at(), std::max<int64_t>(1, tracked_.stretch), *this);
+    line_.line.step(line_.work, parts_.factors.at(), std::max<int64_t>(1, tracked_.stretch), *this);
 }
 
 void TwoPasses::predict_velocities(int64_t begin, int64_t end) {
@@ -68,7 +86,7 @@ void TwoPasses::before() {
     n_followed_ = 0;
     int64_t begin = 0, end = size(motion.x);
     if (window_) {
-        if (look(*window_, motion)) reserves(motion, tracked_.links, tracked_.reserve);
+        if (update(*window_, motion)) reserves(motion, tracked_.links, tracked_.reserve);
         begin = window_->starts[window_->at().begin];
         end = window_->starts[window_->at().end];
     }
@@ -78,6 +96,7 @@ void TwoPasses::before() {
 void TwoPasses::after_stretch() {
     const auto [links, reserve, ranges, stretch] = tracked_;
     const Motion& motion = parts_.arrays.motion;
+    part(ranges.all(), 2 * n_followed_, 2 * n_followed_ + 4);
     const auto before = ranges[n_followed_], now = ranges[n_followed_ + 1];
     ++n_followed_;
     reserves_within(motion, links, now[0], before[0], reserve);

@@ -1,6 +1,6 @@
 #pragma once
-// Free steps of a rank's part of a line in two passes, with links that are looked at on the way
-// back and a window that follows the train. See stations/line.hpp for the passes.
+// Free steps of a rank's part of a line in two passes, with reserves of links found on the way back
+// and a window that follows the train. See stations/line.hpp for the passes.
 #include <optional>
 
 #include "motion/links.hpp"
@@ -31,7 +31,17 @@ struct PassParts {
     CATENARY_RECORD(layouts, station_types, rows, factors, arrays, changes)
 };
 
-/// Links that are looked at on the way back, which is taken in stretches of so many pairs of
+/// A line with kernels that step so many scenes side by side, each with its part of the arrays, and
+/// what its passes work on. Throws std::invalid_argument if none were compiled for a layout, or if
+/// arrays have too few numbers.
+struct PassLine {
+    Line line;
+    Work work;
+
+    explicit PassLine(const PassParts& parts, int scenes = 1);
+};
+
+/// Links whose reserves are found on the way back, which is taken in stretches of so many pairs of
 /// stations: `ranges` (n + 1, 2) are the links behind each, see `left_behind`.
 struct TrackedLinks {
     Links links;
@@ -39,11 +49,12 @@ struct TrackedLinks {
     Array2<const int64_t> ranges;
     int64_t stretch = 1;
     CATENARY_RECORD(links, reserve, ranges, stretch)
+    CATENARY_SHAPES("n=n, n, r>1 2")
 };
 
 class TwoPasses : private Around {
   public:
-    /// Throws std::invalid_argument if there are no kernels for a layout.
+    /// Throws std::invalid_argument as `PassLine`.
     explicit TwoPasses(PassParts parts);
 
     void track(const TrackedLinks& tracked) { tracked_ = tracked; }
@@ -63,8 +74,7 @@ class TwoPasses : private Around {
     void predict_velocities(int64_t begin, int64_t end);
 
     PassParts parts_;
-    Line line_;
-    Work work_;
+    PassLine line_;
     TrackedLinks tracked_{};
     int64_t n_followed_ = 0;
     std::optional<Window> window_;

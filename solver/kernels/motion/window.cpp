@@ -8,7 +8,7 @@ namespace catenary {
 
 namespace {
 
-/// Searches for the largest motion are at every so many looks, and at each of the first so many.
+/// The largest motion is found at every so many updates, and at each of the first so many.
 constexpr int64_t kPeakEvery = 64;
 /// Shares of the parts of a window behind the train and ahead in which motion fades.
 constexpr double kBehind = 0.85, kAhead = 0.6;
@@ -104,7 +104,7 @@ double damping(double into) {
     return a * x - b * x * x * x + 4.0 / ((c - x) * (c - x)) - 4.0 / ((c + x) * (c + x));
 }
 
-/// Let the velocity of a station decay, by so much for little; it stays where it is.
+/// Reduce the velocity of a station, by the part `decay` if that is little; its place stays.
 void slow_down(const Window& window, const Motion& motion, int64_t station, double decay) {
     const double loss = decay / (1.0 + decay);
     const auto& shares = motion.shares;
@@ -119,7 +119,7 @@ void slow_down(const Window& window, const Motion& motion, int64_t station, doub
 ///
 /// Waves whose group velocity is nearly the train's stay there for long. In its frame their
 /// envelope obeys Schroedinger's equation, i a_t = -D / 2 a_xx, and damping that begins at once
-/// sends them back, however little it is: so it grows, by as much as the length lets it.
+/// sends them back, however little it is: so it grows, as slowly as the length allows.
 void fade(const Window& window, const Motion& motion, double first, double last) {
     const int64_t begin = window.at().begin, end = window.at().end;
     const auto &low = window.low, &high = window.high;
@@ -137,7 +137,7 @@ void fade(const Window& window, const Motion& motion, double first, double last)
 
 }  // namespace
 
-bool look(const Window& window, const Motion& motion) {
+bool update(const Window& window, const Motion& motion) {
     auto& state = *reinterpret_cast<WindowState*>(window.state.data());
     const int64_t step = state.step++;
     if (step % window.every) return false;
@@ -151,8 +151,9 @@ bool look(const Window& window, const Motion& motion) {
     Range range{not_below(window.high, first - window.margin),
                 above(window.low, last + window.margin)};
     if (window.by_motion > 0.0) {
-        const int64_t looks = step / window.every;
-        if (is_fresh || looks < kPeakEvery || looks % kPeakEvery == 0) find_peak(window, motion);
+        const int64_t updates = step / window.every;
+        if (is_fresh || updates < kPeakEvery || updates % kPeakEvery == 0)
+            find_peak(window, motion);
         range = follow_motion(window, motion, range);
     } else {
         const auto& masts = window.masts;
@@ -181,7 +182,7 @@ void turn_to(const Window& window, int64_t begin, int64_t end) {
     const int64_t first = window.links_before[inner], last = window.links_before[outer];
     window.links[0] = first;
     window.links[1] = last;
-    // The pass back looks at all links at its end.
+    // The pass back finds the reserves of all links at its end.
     std::ranges::fill(window.ranges.all(), first);
     window.ranges(1, 1) = last;
 }

@@ -14,10 +14,10 @@ struct WindowState {
 
 struct Window {
     std::span<int64_t> state;  ///< of `WindowState`
-    int64_t every, guard;      ///< steps between two looks, and stations that are looked at
+    int64_t every, guard;      ///< steps between two updates, and stations that are tested at one
     /// Share of the largest motion below which stations rest, 0 if spans decide; these spans.
     double by_motion, spans_behind, spans_ahead;
-    double fading;                      ///< how much fades at a look [m2], see `fade`
+    double fading;                      ///< how much fades at an update [m2], see `fade`
     bool is_exact;                      ///< whether stations at rest are zeroed, or stay in place
     std::span<double> peak;             ///< largest of x and y of the motion
     std::span<const double> contacts;   ///< where they are [m]
@@ -38,6 +38,8 @@ struct Window {
     CATENARY_RECORD(state, every, guard, by_motion, spans_behind, spans_ahead, fading, is_exact,
                     peak, contacts, loaded, margin, masts, low, high, starts, links_before, edges,
                     ends, kinds, turning, links, ranges, known)
+    CATENARY_SHAPES(
+        "2, *, *, *, *, *, *, *, 2, *, 2, *, *, n, n, n+1, n+1, 2 n+1, 5, *, *, 2, 2 2, *")
 
     int64_t n_stations() const { return size(low); }
     Ends& at() const { return *reinterpret_cast<Ends*>(ends.data()); }
@@ -46,9 +48,9 @@ struct Window {
 /// Stations of the smallest window.
 constexpr int64_t kLeastStations = 64;
 
-/// Let the window follow contacts and motion, at some steps; whether it was the first look.
-bool look(const Window& window, const Motion& motion);
-/// Let steps take on the stations from `begin` to `end`, and links between these move.
+/// Move the window after contacts and motion, at some steps; whether it was the first update.
+bool update(const Window& window, const Motion& motion);
+/// Make the window the stations from `begin` to `end`, and the links that may switch those in it.
 void turn_to(const Window& window, int64_t begin, int64_t end);
 
 }  // namespace catenary

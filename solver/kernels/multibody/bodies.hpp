@@ -29,6 +29,7 @@ struct BodyMotion {
     Array2<const double> velocity;  ///< (n + 1, 3) [m/s], in space axes
     Array2<const double> spin;      ///< (n + 1, 3) [rad/s], in body axes
     CATENARY_RECORD(position, rotation, velocity, spin)
+    CATENARY_SHAPES("n+1 3, n+1 3 3, n+1 3, n+1 3")
 
     int64_t n_bodies() const { return position.rows - 1; }
     /// A vector in body axes, in space axes.

@@ -21,6 +21,7 @@ struct BodyProducts {
     Array2<double> jacobian;  ///< (m, 6 n)
     std::span<double> rate, drift;
     CATENARY_RECORD(value, jacobian, rate, drift)
+    CATENARY_SHAPES("m, m 6n, m, m")
 };
 void body_products(const BodyMotion& motion, std::span<const BodyProduct> rows,
                    const BodyProducts& result);
@@ -36,6 +37,7 @@ struct BodyLines {
     std::span<double> length, rate;
     Array2<double> gradient;
     CATENARY_RECORD(length, rate, gradient)
+    CATENARY_SHAPES("m, m, m 6n")
 };
 void body_lines(const BodyMotion& motion, std::span<const BodyLine> lines, const BodyLines& result);
 

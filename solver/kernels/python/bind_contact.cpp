@@ -45,45 +45,39 @@ bool find_zero_of(const py::function& of, std::span<double> z, double width, dou
 }  // namespace
 
 void offer_contact(py::module_& module) {
-    PYBIND11_NUMPY_DTYPE(Node, x, y, rest, at, begin, width, local, owned, joined);
-    PYBIND11_NUMPY_DTYPE(Sample, x, height, slope);
-    PYBIND11_NUMPY_DTYPE(Touch, first, end, half_length, present, x, element, local, value, slope,
-                         whole_value, whole_slope, rest, samples, sample, surface, filled);
-    PYBIND11_NUMPY_DTYPE(Flags, rows, stop, broken, missing);
-    module.attr("NODE") = py::dtype::of<Node>();
-    module.attr("SAMPLE") = py::dtype::of<Sample>();
-    module.attr("TOUCH") = py::dtype::of<Touch>();
-    module.attr("FLAGS") = py::dtype::of<Flags>();
+    CATENARY_OFFER_TYPE(module, "NODE", Node, x, y, rest, at, begin, width, local, owned, joined);
+    CATENARY_OFFER_TYPE(module, "SAMPLE", Sample, x, height, slope);
+    CATENARY_OFFER_TYPE(module, "TOUCH", Touch, first, end, half_length, present, x, element, local,
+                        value, slope, whole_value, whole_slope, rest, samples, sample, surface,
+                        filled);
+    CATENARY_OFFER_TYPE(module, "FLAGS", Flags, rows, stop, broken, missing);
     module.attr("SLIP") = kSlip;
-    offer(module, "locate", locate, "Make touches those at some places.");
-    offer(module, "place", place, "Find places of contacts and the answers to forces there.");
-    offer(module, "heights", heights,
-          "Fill in wire heights [m] and total rates [m/s] at contacts.");
-    offer(module, "find_across", find_across, "Fill in where wires are across the track.");
-    offer(module, "respond", respond, "Fill in a rank's share of the small problem.");
-    offer(module, "superpose", superpose, "Add the answers to contact forces.");
-    offer(module, "compensate", compensate, "Add the answers to compensations of links.");
-    offer(module, "begin_work", begin_work, "Keep velocities at contacts before a step.");
-    offer(module, "add_work", add_work, "Add the work of contact forces in a step.");
-    offer(module, "move_contacts", move_contacts, "Move contacts and pantographs along the track.");
-    offer(module, "write_outputs", write_outputs,
-          "Fill in outputs of pantographs at the end of a step.");
+    offer(module, "locate", locate, "n, *, n");
+    offer(module, "place", place, "");
+    offer(module, "heights", heights, "n=n, n, n");
+    offer(module, "find_across", find_across, "");
+    offer(module, "respond", respond, "n=n, n=n");
+    offer(module, "superpose", superpose, "n=n, n");
+    offer(module, "compensate", compensate, "*, k, k");
+    offer(module, "begin_work", begin_work, "");
+    offer(module, "add_work", add_work, "n=n, n");
+    offer(module, "move_contacts", move_contacts, "");
+    offer(module, "write_outputs", write_outputs, "*, n, n, n=n, n");
 
     module.attr("NOWHERE") = kNowhere;
-    offer(module, "subtract", subtract, "Fill in the gap without forces.");
-    offer(module, "any_switched", any_switched, "Whether contact forces alone switch a link.");
-    offer(module, "couple", couple, "Put rows and columns of links beside those of contacts.");
-    offer(module, "under", under, "Fill in depths and rates under forces and compensations.");
-    offer(module, "leaves_out", leaves_out, "Whether a link without a row may have switched.");
-    offer(module, "solve", solve_problem,
-          "Contact forces and compensations: rounds, unknowns used, finite, complete, pivoted.");
-    offer(module, "find_solution", find_signed, "Active set, then pivoting: rounds, pivoted.");
-    offer(module, "pivot", pivot, "Least-index pivoting; rounds needed, else none above zero.");
-    offer(module, "find_zero", find_zero_of, "Find a zero of a map; whether there is one.");
+    offer(module, "subtract", subtract, "n=n, n=n, n, n=n");
+    offer(module, "any_switched", any_switched, "w=3n+2, *, *, n");
+    offer(module, "couple", couple, "w=3n+2, *, *, n, n, *");
+    offer(module, "under", under, "n=n, w=3n+2 m=m.., n, m, n=n");
+    offer(module, "leaves_out", leaves_out, "n, m, w=3n+2, n=n, *");
+    offer(module, "solve", solve_problem, "");
+    offer(module, "find_solution", find_signed, "m=m, m=m, *, k=m..");
+    offer(module, "pivot", pivot, "m=m, m=m, k=m..");
+    offer(module, "find_zero", find_zero_of, "");
     module.attr("MOST_TANGENTS") = kMostTangents;
-    offer(module, "linearise", linearise, "Linearise Hertz's law with hysteresis.");
-    offer(module, "remember", remember, "Remember how fast those come who do not touch.");
-    offer(module, "agrees", agrees, "Whether forces found with tangents are those of the law.");
+    offer(module, "linearise", linearise, "n=n, n, n");
+    offer(module, "remember", remember, "n=n, n, n");
+    offer(module, "agrees", agrees, "n=n, w=3n+2, n, m, n=n");
 }
 
 }  // namespace catenary::python

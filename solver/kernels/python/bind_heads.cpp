@@ -87,21 +87,17 @@ void extrapolate(Head& head, const py::object& drive, const py::object& early) {
 }  // namespace
 
 void offer_heads(py::module_& module) {
-    PYBIND11_NUMPY_DTYPE(Drive, time, force, part, base, base_velocity, base_acceleration, roof,
-                         roof_velocity, head_air, arm_air, bodies_air);
-    PYBIND11_NUMPY_DTYPE(HeadLaw, by_base, zero, of_rate, begin, end);
-    PYBIND11_NUMPY_DTYPE(HeadLawPoint, at, force);
-    PYBIND11_NUMPY_DTYPE(RegulationSettings, of_height, target, part, dt, sample, least, most);
-    PYBIND11_NUMPY_DTYPE(ControlGains, measured, of_error, of_integral, of_rate);
-    PYBIND11_NUMPY_DTYPE(RegulationMemory, time, next, filtered, integral, error, samples, acting);
-    PYBIND11_NUMPY_DTYPE(LoweringMemory, height, caught_at, phase);
-    module.attr("LOWERING_MEMORY") = py::dtype::of<LoweringMemory>();
-    module.attr("DRIVE") = py::dtype::of<Drive>();
-    module.attr("HEAD_LAW") = py::dtype::of<HeadLaw>();
-    module.attr("HEAD_LAW_POINT") = py::dtype::of<HeadLawPoint>();
-    module.attr("REGULATION") = py::dtype::of<RegulationSettings>();
-    module.attr("CONTROL_GAINS") = py::dtype::of<ControlGains>();
-    module.attr("REGULATION_MEMORY") = py::dtype::of<RegulationMemory>();
+    CATENARY_OFFER_TYPE(module, "DRIVE", Drive, time, force, part, base, base_velocity,
+                        base_acceleration, roof, roof_velocity, head_air, arm_air, bodies_air);
+    CATENARY_OFFER_TYPE(module, "HEAD_LAW", HeadLaw, by_base, zero, of_rate, begin, end);
+    CATENARY_OFFER_TYPE(module, "HEAD_LAW_POINT", HeadLawPoint, at, force);
+    CATENARY_OFFER_TYPE(module, "REGULATION", RegulationSettings, of_height, target, part, dt,
+                        sample, least, most);
+    CATENARY_OFFER_TYPE(module, "CONTROL_GAINS", ControlGains, measured, of_error, of_integral,
+                        of_rate);
+    CATENARY_OFFER_TYPE(module, "REGULATION_MEMORY", RegulationMemory, time, next, filtered,
+                        integral, error, samples, acting);
+    CATENARY_OFFER_TYPE(module, "LOWERING_MEMORY", LoweringMemory, height, caught_at, phase);
     py::class_<Head>(module, "Head")
         .def_property("first", &Head::first, &Head::set_first)
         .def_property("added_force", &Head::added_force, &Head::set_added_force)
@@ -156,21 +152,15 @@ void offer_heads(py::module_& module) {
                     std::move(kept), arrays, predict, advance));
             }));
 
-    PYBIND11_NUMPY_DTYPE(BodyProduct, body, start, end, between, normal, at_start, at_end);
-    PYBIND11_NUMPY_DTYPE(BodyLine, i, j, at_i, at_j);
-    module.attr("BODY_PRODUCT") = py::dtype::of<BodyProduct>();
-    module.attr("BODY_LINE") = py::dtype::of<BodyLine>();
-    offer(module, "rotation_matrices", rotation_matrices,
-          "Fill in matrices from body to space axes of unit Euler parameters.");
-    offer(module, "move_bodies", move_bodies, "Displace and turn bodies in place.");
-    offer(module, "add_gyroscopic_moments", add_gyroscopic_moments,
-          "Add -omega x J omega to generalised forces in place.");
-    offer(module, "body_products", body_products,
-          "Fill in scalar products of vectors of bodies with their derivatives.");
-    offer(module, "body_lines", body_lines,
-          "Fill in lengths between points of bodies, their rates and gradients.");
-    offer(module, "independent_rows", independent_rows,
-          "Numbers of rows that are not combinations of rows before them.");
+    CATENARY_OFFER_TYPE(module, "BODY_PRODUCT", BodyProduct, body, start, end, between, normal,
+                        at_start, at_end);
+    CATENARY_OFFER_TYPE(module, "BODY_LINE", BodyLine, i, j, at_i, at_j);
+    offer(module, "rotation_matrices", rotation_matrices, "n 4, n 3 3");
+    offer(module, "move_bodies", move_bodies, "n+1 3, n+1 4, 6n");
+    offer(module, "add_gyroscopic_moments", add_gyroscopic_moments, "6n, n 3, n+1 3");
+    offer(module, "body_products", body_products, "n=n, m, m=m n=n");
+    offer(module, "body_lines", body_lines, "n=n, m, m=m n=n");
+    offer(module, "independent_rows", independent_rows, "");
 }
 
 }  // namespace catenary::python

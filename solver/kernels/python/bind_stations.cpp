@@ -66,28 +66,30 @@ bool are_compiled(const Layout& rows, const Layout& factors) {
 using Layouts = std::vector<Layout>;
 using MakeUps = std::vector<std::vector<int>>;
 
-std::unique_ptr<Kernels> there(std::unique_ptr<Kernels> kernels) {
-    if (!kernels) throw py::value_error("no kernels take stations of these layouts");
-    return kernels;
+/// A line with kernels for the first station types, which have layouts.
+Line line_of(const Layouts& layouts, const MakeUps& station_types,
+             std::unique_ptr<Kernels> (*kernels_for)(const Layout&)) {
+    std::vector<std::unique_ptr<Kernels>> kernels;
+    for (const Layout& layout : layouts) kernels.push_back(kernels_for(layout));
+    return Line(std::move(kernels), station_types);
 }
 
-/// A line with kernels for the first `n` station types, which have layouts.
-template <class KernelsOf>
-Line line_of(size_t n, const MakeUps& station_types, KernelsOf kernels_of_type) {
-    std::vector<std::unique_ptr<Kernels>> kernels;
-    for (size_t k = 0; k < n; ++k) kernels.push_back(there(kernels_of_type(k)));
-    if (station_types.size() < n) throw py::value_error("a station type is missing");
-    return Line(std::move(kernels), station_types);
+/// At least `n` numbers that a call reads or fills.
+template <class T>
+T* numbers(const py::object& given, const char* name, int64_t n) {
+    Kept kept;
+    const auto found = From<std::span<T>>::convert(given, name, kept);
+    if (size(found) < n) throw py::value_error(std::string(name) + " has too few numbers");
+    return found.data();
 }
 
 /// Products with rows of K, and -C.
 class Products {
   public:
     Products(const Layouts& layouts, const MakeUps& station_types, const py::object& rows)
-        : line_(line_of(layouts.size(), station_types,
-                        [&](size_t k) { return kernels_of_rows(layouts[k]); })),
+        : line_(line_of(layouts, station_types, kernels_of_rows)),
           rows_(From<ProductArrays>::convert(rows, "rows", kept_)) {
-        work_.product = rows_.product();
+        work_.product = rows_.product(layouts);
         // Stations of the result stand as the stations of the operand.
         const int64_t n = size(rows_.kinds), first = rows_.first;
         if (!rows_.sections.starts.empty()) {
@@ -100,11 +102,10 @@ class Products {
     }
     void multiply(int64_t begin, int64_t end, const py::object& factor, const py::object& velocity,
                   const py::object& result) {
-        if (begin < 0 || end > size(rows_.kinds)) throw py::value_error("no such rows");
-        Kept kept;
-        work_.product.factor = numbers_of<const double>(factor, "factor", 1, kept);
-        work_.product.velocity = numbers_of<const double>(velocity, "velocity", 1, kept);
-        line_.multiply(work_, begin, end, numbers_of<double>(result, "result", 1, kept));
+        part(rows_.kinds, begin, end);
+        work_.product.factor = numbers<const double>(factor, "factor", line_.n_read());
+        work_.product.velocity = numbers<const double>(velocity, "velocity", line_.n_read());
+        line_.multiply(work_, begin, end, numbers<double>(result, "result", line_.n_solved()));
     }
 
   private:
@@ -119,16 +120,14 @@ class Products {
 class Solves {
   public:
     Solves(const Layouts& layouts, const MakeUps& station_types, const py::object& factors)
-        : line_(line_of(layouts.size(), station_types,
-                        [&](size_t k) { return kernels_of_factors(layouts[k]); })),
+        : line_(line_of(layouts, station_types, kernels_of_factors)),
           factors_(From<FactorArrays>::convert(factors, "factors", kept_)) {
-        work_.factored = factors_.factored();
+        work_.factored = factors_.factored(layouts);
         line_.set_runs(work_, size(factors_.kinds), 0);
     }
     void solve(const py::object& right, const py::object& answer) {
-        Kept kept;
-        work_.right = numbers_of<const double>(right, "right", 1, kept);
-        work_.answer = numbers_of<double>(answer, "answer", 1, kept);
+        work_.right = numbers<const double>(right, "right", line_.n_solved());
+        work_.answer = numbers<double>(answer, "answer", line_.n_solved());
         line_.solve(work_, size(factors_.kinds), factors_.at().middle);
     }
 
@@ -187,13 +186,11 @@ py::tuple eliminated(std::span<const int32_t> kinds, const StationBlocks& blocks
 
 void offer_stations(py::module_& m) {
     m.attr("MIDDLES") = kMiddles;
-    PYBIND11_NUMPY_DTYPE(Meeting, kind, before, after);
-    m.attr("MEETING") = py::dtype::of<Meeting>();
-    offer(m, "middle_of", middle_of, "A station where elimination may end, near a middle.");
-    offer(m, "turn", turn, "Let elimination end at another station.");
-    offer(m, "eliminate", eliminated,
-          "Factors of stations eliminated from one end, their kinds, and which each station has.");
-    offer(m, "join", join, "Fill in factors of stations where elimination from both ends meets.");
+    CATENARY_OFFER_TYPE(m, "MEETING", Meeting, kind, before, after);
+    offer(m, "middle_of", middle_of, "");
+    offer(m, "turn", turn, "");
+    offer(m, "eliminate", eliminated, "");
+    offer(m, "join", join, "m, b=b, * 2 b b, * 2 b b, m 2 b b");
     m.def("are_compiled", &are_compiled, py::arg("rows"), py::arg("factors"));
     py::class_<Layout>(m, "Layout")
         .def(py::init(&layout_of), py::arg("own"), py::arg("beside"), py::arg("damped"),
@@ -222,8 +219,7 @@ void offer_stations(py::module_& m) {
         .def(py::init(&HeldPasses::made))
         .def("track", &HeldPasses::track)
         .def("open", &HeldPasses::open);
-    offer(m, "left_behind", left_behind,
-          "Fill in which links the pass back has left behind with each stretch.");
+    offer(m, "left_behind", left_behind, "s>1, *, l m, r>1 2");
 }
 
 }  // namespace catenary::python

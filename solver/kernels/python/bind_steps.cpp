@@ -50,7 +50,7 @@ class HeldTangentSteps : public TangentSteps {
     Kept kept_;
 };
 
-/// A simulation, with arrays that look into it.
+/// A simulation, with arrays that are views of its numbers.
 class HeldSimulation : public Simulation {
   public:
     using Simulation::Simulation;
@@ -71,7 +71,7 @@ class HeldSimulation : public Simulation {
     }
 };
 
-/// An array that looks at numbers of `owner`.
+/// An array that is a view of numbers of `owner`.
 template <class T>
 py::array_t<std::remove_const_t<T>> view(std::span<T> numbers, const py::object& owner) {
     py::array_t<std::remove_const_t<T>> array(static_cast<py::ssize_t>(numbers.size()),
@@ -95,8 +95,7 @@ auto output(std::span<double> TrainOutputs::* which) {
 }  // namespace
 
 void offer_steps(py::module_& module) {
-    PYBIND11_NUMPY_DTYPE(Counts, steps, rounds, slack, repeated, pivoted);
-    module.attr("COUNTS") = py::dtype::of<Counts>();
+    CATENARY_OFFER_TYPE(module, "COUNTS", Counts, steps, rounds, slack, repeated, pivoted);
     py::class_<Taken>(module, "Taken")
         .def_readonly("begun", &Taken::begun)
         .def_readonly("is_full", &Taken::is_full);
@@ -116,8 +115,7 @@ void offer_steps(py::module_& module) {
         .def("take", [](HeldTangentSteps& steps, int64_t first, int64_t end) {
             return steps.take(first, end);
         });
-    PYBIND11_NUMPY_DTYPE(Tie, stiffness, damping);
-    module.attr("TIE") = py::dtype::of<Tie>();
+    CATENARY_OFFER_TYPE(module, "TIE", Tie, stiffness, damping);
     PYBIND11_NUMPY_DTYPE(Input, lift_force, head_force, base, base_velocity, base_acceleration);
     py::class_<HeldSimulation>(module, "Simulation")
         .def(py::init<const std::string&>())
@@ -136,11 +134,11 @@ void offer_steps(py::module_& module) {
         .def_property_readonly("wire_height", output(&TrainOutputs::wire_height))
         .def_property_readonly("strip_force", output(&TrainOutputs::strip_force));
 
-    offer(module, "step_error", step_error, "Largest error of a contact force by a step [N].");
-    offer(module, "accept_step", accept_step, "Append a step to those of the past.");
+    offer(module, "step_error", step_error, "n=n, n=n");
+    offer(module, "accept_step", accept_step, "n=n, n=n");
 
-    offer(module, "take_extremes", take_extremes, "Take columns of rows into extremes.");
-    offer(module, "take_points", take_points, "Fill in points of rows, one row after another.");
+    offer(module, "take_extremes", take_extremes, "m k, *, *, *, 2 n");
+    offer(module, "take_points", take_points, "m k, *, m, m");
 }
 
 }  // namespace catenary::python

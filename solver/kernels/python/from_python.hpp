@@ -15,13 +15,15 @@
 #include <vector>
 
 #include "base/arrays.hpp"
+#include "base/record.hpp"
+#include "python/shapes.hpp"
 
 namespace catenary::python {
 
-namespace py = pybind11;
-
 /// Owners of the memory that arrays and records point to, kept alive.
-using Kept = std::vector<py::object>;
+struct Kept : std::vector<py::object> {
+    Sizes sizes;  ///< of the record that was converted last
+};
 
 // Error messages are made here once, not in each function that is offered: they were most of
 // the compiled code.
@@ -75,24 +77,53 @@ struct Member {
     return {record.attr(own.c_str()), name + "." + own};
 }
 
+/// Sizes of an array.
 template <class T>
-concept Record = requires(T record) {
-    T::kMembers;
-    record.members();
-};
+std::array<int64_t, 1> shape_of(std::span<T> array) {
+    return {size(array)};
+}
+template <class T>
+std::array<int64_t, 2> shape_of(const Array2<T>& array) {
+    return {array.rows, array.columns};
+}
+template <class T>
+std::array<int64_t, 3> shape_of(const Array3<T>& array) {
+    return {array.n, array.rows, array.columns};
+}
+template <class T>
+std::array<int64_t, 4> shape_of(const Array4<T>& array) {
+    return {array.n, array.parts, array.rows, array.columns};
+}
+
+/// Refuse a value of a function or record with these sizes unless it has the wanted shape; `own`
+/// are the sizes of the record that was converted last.
+template <class T>
+void check_shape(const T& value, std::string_view wanted, const std::string& name, Sizes& sizes,
+                 const Sizes& own) {
+    if constexpr (requires { shape_of(value); })
+        check_array(shape_of(value), wanted, name, sizes);
+    else if constexpr (RecordType<T>)
+        check_record(own, wanted, name, sizes);
+    else if constexpr (requires { value.has_value(); })
+        if (value) check_shape(*value, wanted, name, sizes, own);
+}
 
 /// Conversion of a Python value to a T; `name` is its name in error messages.
 template <class T>
 struct From {
     static T convert(py::handle given, const std::string& name, Kept& kept) {
-        if constexpr (Record<T>) {
+        if constexpr (RecordType<T>) {
             T record{};
-            std::string_view names = T::kMembers;
+            std::string_view names = T::kMembers, shapes;
+            if constexpr (requires { T::kShapes; }) shapes = T::kShapes;
+            Sizes sizes;
             auto put = [&]<class M>(M& member) {
                 const Member own = next_member(given, names, name);
                 member = From<M>::convert(own.value, own.name, kept);
+                check_shape(member, next_word(shapes, ','), own.name, sizes, kept.sizes);
             };
             std::apply([&](auto&... member) { (put(member), ...); }, record.members());
+            kept.sizes = sizes;
             return record;
         } else {
             try {
@@ -103,37 +134,26 @@ struct From {
         }
     }
 };
-template <class T>
-struct From<std::span<T>> {
-    static std::span<T> convert(py::handle given, const std::string& name, Kept& kept) {
-        T* numbers = numbers_of<T>(given, name, 1, kept);
-        return {numbers, static_cast<size_t>(py::reinterpret_borrow<py::array>(given).size())};
+/// An array of N dimensions, over numbers of type T.
+template <class Array, class T, size_t N>
+struct FromArray {
+    static Array convert(py::handle given, const std::string& name, Kept& kept) {
+        T* const numbers = numbers_of<T>(given, name, N, kept);
+        const auto array = py::reinterpret_borrow<py::array>(given);
+        return [&]<size_t... I>(std::index_sequence<I...>) {
+            return Array{numbers, static_cast<Size>(array.shape(I))...};
+        }(std::make_index_sequence<N>());
     }
+    using Size = std::conditional_t<N == 1, size_t, int64_t>;
 };
 template <class T>
-struct From<Array2<T>> {
-    static Array2<T> convert(py::handle given, const std::string& name, Kept& kept) {
-        T* numbers = numbers_of<T>(given, name, 2, kept);
-        auto array = py::reinterpret_borrow<py::array>(given);
-        return {numbers, array.shape(0), array.shape(1)};
-    }
-};
+struct From<std::span<T>> : FromArray<std::span<T>, T, 1> {};
 template <class T>
-struct From<Array3<T>> {
-    static Array3<T> convert(py::handle given, const std::string& name, Kept& kept) {
-        T* numbers = numbers_of<T>(given, name, 3, kept);
-        auto array = py::reinterpret_borrow<py::array>(given);
-        return {numbers, array.shape(0), array.shape(1), array.shape(2)};
-    }
-};
+struct From<Array2<T>> : FromArray<Array2<T>, T, 2> {};
 template <class T>
-struct From<Array4<T>> {
-    static Array4<T> convert(py::handle given, const std::string& name, Kept& kept) {
-        T* numbers = numbers_of<T>(given, name, 4, kept);
-        auto array = py::reinterpret_borrow<py::array>(given);
-        return {numbers, array.shape(0), array.shape(1), array.shape(2), array.shape(3)};
-    }
-};
+struct From<Array3<T>> : FromArray<Array3<T>, T, 3> {};
+template <class T>
+struct From<Array4<T>> : FromArray<Array4<T>, T, 4> {};
 /// An object of a bound class, which is kept alive.
 template <class T>
 struct From<T*> {
@@ -168,6 +188,11 @@ struct From<std::vector<T>> {
     }
 };
 
+/// Offer the type of an array's numbers in a module, a struct with these members.
+#define CATENARY_OFFER_TYPE(module, name, type, ...) \
+    PYBIND11_NUMPY_DTYPE(type, __VA_ARGS__);         \
+    module.attr(name) = py::dtype::of<type>()
+
 /// A function with some of its arguments.
 class Bound {
   public:
@@ -181,22 +206,24 @@ class Kernel {
     virtual ~Kernel() = default;
     virtual std::unique_ptr<Bound> bound(const py::args& first) const = 0;
     py::object call(const py::args& given) const { return bound(given)->call(py::args()); }
-    std::string name, does;
+    std::string name;
+    const char* shapes = "";  ///< of the arguments as in shapes.hpp, not owned
 };
 
 template <class R, class... A>
 class BoundFunction : public Bound {
   public:
-    BoundFunction(R (*function)(A...), const std::string& name, const py::args& first)
-        : function_(function), name_(name), n_bound_(first.size()) {
+    BoundFunction(R (*function)(A...), const Kernel& of, const py::args& first)
+        : function_(function), name_(of.name), shapes_(of.shapes), n_bound_(first.size()) {
         if (n_bound_ > sizeof...(A)) throw py::type_error(too_many(n_bound_));
-        convert(first, 0, kept_, std::index_sequence_for<A...>());
+        convert(first, 0, kept_, sizes_, std::index_sequence_for<A...>());
     }
     py::object call(const py::args& later) override {
         if (n_bound_ + later.size() != sizeof...(A))
             throw py::type_error(too_many(n_bound_ + later.size()));
         Kept kept;
-        convert(later, n_bound_, kept, std::index_sequence_for<A...>());
+        Sizes sizes = sizes_;
+        convert(later, n_bound_, kept, sizes, std::index_sequence_for<A...>());
         auto run = [&](auto&... value) -> R { return function_(*value...); };
         if constexpr (std::is_void_v<R>) {
             std::apply(run, values_);
@@ -211,11 +238,17 @@ class BoundFunction : public Bound {
   private:
     /// Convert the given values, the arguments from `begin` on.
     template <size_t... I>
-    void convert(const py::args& given, size_t begin, Kept& kept, std::index_sequence<I...>) {
-        (..., (I >= begin && I < begin + given.size()
-                   ? (void)std::get<I>(values_).emplace(
-                         From<std::decay_t<A>>::convert(given[I - begin], numbered(I, name_), kept))
-                   : (void)0));
+    void convert(const py::args& given, size_t begin, Kept& kept, Sizes& sizes,
+                 std::index_sequence<I...>) {
+        std::string_view shapes = shapes_;
+        auto put = [&]<class Value>(std::optional<Value>& value, size_t i) {
+            const std::string_view shape = next_word(shapes, ',');
+            if (i < begin || i >= begin + given.size()) return;
+            const std::string name = numbered(i, name_);
+            value.emplace(From<Value>::convert(given[i - begin], name, kept));
+            check_shape(*value, shape, name, sizes, kept.sizes);
+        };
+        (..., put(std::get<I>(values_), I));
     }
     std::string too_many(size_t n) const {
         return name_ + " takes " + std::to_string(sizeof...(A)) + " arguments, not " +
@@ -224,7 +257,9 @@ class BoundFunction : public Bound {
 
     R (*function_)(A...);
     std::string name_;
+    std::string_view shapes_;
     size_t n_bound_;
+    Sizes sizes_;
     std::tuple<std::optional<std::decay_t<A>>...> values_;
     Kept kept_;
 };
@@ -234,19 +269,19 @@ class FunctionKernel : public Kernel {
   public:
     explicit FunctionKernel(R (*function)(A...)) : function_(function) {}
     std::unique_ptr<Bound> bound(const py::args& first) const override {
-        return std::make_unique<BoundFunction<R, A...>>(function_, name, first);
+        return std::make_unique<BoundFunction<R, A...>>(function_, *this, first);
     }
 
   private:
     R (*function_)(A...);
 };
 
-/// Let a module offer a function as a kernel; `does` is its docstring, one sentence.
+/// Offer a function in a module as a kernel whose arguments have these `shapes`.
 template <class R, class... A>
-void offer(py::module_& module, const char* name, R (*function)(A...), const char* does) {
+void offer(py::module_& module, const char* name, R (*function)(A...), const char* shapes) {
     auto kernel = std::make_unique<FunctionKernel<R, A...>>(function);
     kernel->name = name;
-    kernel->does = does;
+    kernel->shapes = shapes;
     module.attr(name) = py::cast(std::unique_ptr<Kernel>(std::move(kernel)));
 }
 

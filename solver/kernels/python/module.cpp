@@ -26,46 +26,40 @@ namespace {
 void offer_base(py::module_& module) {
     module.def("flush_subnormals", &flush_subnormals);
     module.def("restore_subnormals", &restore_subnormals, py::arg("before"));
-    offer(module, "spline_at", spline_at, "Value and two derivatives of a cubic spline.");
-    offer(module, "tables_at", tables_at, "Fill in values and slopes of splines over one axis.");
-    offer(module, "sines_at", sines_at, "Value and two derivatives of a sum of sines.");
-    offer(module, "polyline_at", polyline_at, "Fill in values and slopes of a line at places.");
+    offer(module, "spline_at", spline_at, "n>1, n-1 4");
+    offer(module, "tables_at", tables_at, "m=m, *, m, m");
+    offer(module, "sines_at", sines_at, "n, n, n");
+    offer(module, "polyline_at", polyline_at, "n>0, n, s, s, s");
 }
 
 void offer_line(py::module_& module) {
-    PYBIND11_NUMPY_DTYPE(Reserve, rest, stiffness, damping, place, released, carried);
-    module.attr("RESERVE") = py::dtype::of<Reserve>();
-    offer(module, "predict", predict, "Predictions of Newmark's method in place.");
-    offer(module, "correct", correct, "New displacement and velocity from predictions.");
-    offer(module, "predict_alpha", predict_alpha,
-          "Predictions of the generalized-alpha method in place.");
-    offer(module, "displacements", displacements, "Fill in displacements.");
-    offer(module, "velocities", velocities, "Fill in velocities.");
-    offer(module, "reserves", reserves, "Fill in the reserve of each link until it switches [N].");
-    offer(module, "energy_of_switching", energy_of_switching,
-          "Elastic energy that links add where they have switched [J].");
+    CATENARY_OFFER_TYPE(module, "RESERVE", Reserve, rest, stiffness, damping, place, released,
+                        carried);
+    offer(module, "predict", predict, "n, n, n, n");
+    offer(module, "correct", correct, "n, n, n");
+    offer(module, "predict_alpha", predict_alpha, "n, n, n, n, n");
+    offer(module, "displacements", displacements, "");
+    offer(module, "velocities", velocities, "");
+    offer(module, "reserves", reserves, "*, n=n, n");
+    offer(module, "energy_of_switching", energy_of_switching, "*, n=n, n=n");
     module.attr("LEAST_STATIONS") = kLeastStations;
-    offer(module, "turn_to", turn_to, "Let steps of a window take on some stations.");
-    offer(module, "take_in", take_in, "Let a range of stations take in another one.");
-    offer(module, "show", show, "Displacements at arms, and forces of links.");
+    offer(module, "turn_to", turn_to, "");
+    offer(module, "take_in", take_in, "2, 2..");
+    offer(module, "show", show, "a=a d=d, a, d");
 
-    PYBIND11_NUMPY_DTYPE(Factor, kind, begin, end, value);
-    PYBIND11_NUMPY_DTYPE(SampledLoad, first, last, times, samples, held);
-    PYBIND11_NUMPY_DTYPE(EndMemory, width, n_steps, levels, past, sums, near, spectra, done, dt);
-    module.attr("FACTOR") = py::dtype::of<Factor>();
-    module.attr("SAMPLED_LOAD") = py::dtype::of<SampledLoad>();
-    module.attr("END_MEMORY") = py::dtype::of<EndMemory>();
+    CATENARY_OFFER_TYPE(module, "FACTOR", Factor, kind, begin, end, value);
+    CATENARY_OFFER_TYPE(module, "SAMPLED_LOAD", SampledLoad, first, last, times, samples, held);
+    CATENARY_OFFER_TYPE(module, "END_MEMORY", EndMemory, width, n_steps, levels, past, sums, near,
+                        spectra, done, dt);
     module.attr("NEAR") = kNear;
-    offer(module, "evaluate", evaluate, "Make the values of loads those at the time of a clock.");
-    offer(module, "recall", recall, "Make up for steps whose accelerations are in the past.");
-    offer(module, "fourier_forth", fourier_forth,
-          "Fourier transform in place, numbers in the order of reversed bits.");
+    offer(module, "evaluate", evaluate, "");
+    offer(module, "recall", recall, "");
+    offer(module, "fourier_forth", fourier_forth, "n>0, n..");
 
-    offer(module, "condense_spans", condense_spans,
-          "Condense spans to the unknowns that they share, at frequencies.");
-    offer(module, "cut_out", cut_out, "Short columns out of answers to unit forces.");
-    offer(module, "bridge", bridge, "Fill in amplitudes of gusts between two posts.");
-    offer(module, "add_waves", add_waves, "Add waves times amplitudes.");
+    offer(module, "condense_spans", condense_spans, "z 3, 3 n b>0, 3 n k, z k k");
+    offer(module, "cut_out", cut_out, "");
+    offer(module, "bridge", bridge, "k, k, k, m+1, m k, m k");
+    offer(module, "add_waves", add_waves, "s k, k m, s m");
 }
 
 }  // namespace
@@ -77,7 +71,7 @@ PYBIND11_MODULE(native, module) {
     py::class_<Kernel>(module, "Kernel", "A function over arrays and records.")
         .def("__call__", &Kernel::call)
         .def("bound", &Kernel::bound)
-        .def("__repr__", [](const Kernel& kernel) { return kernel.name + ": " + kernel.does; });
+        .def("__repr__", [](const Kernel& kernel) { return kernel.name + ": " + kernel.shapes; });
     offer_base(module);
     offer_stations(module);
     offer_line(module);

@@ -11,6 +11,7 @@ struct PastSteps {
     Array2<double> depths;     ///< (3, n) [m]
     std::span<double> forces;  ///< (n,) at the end of the last [N]
     CATENARY_RECORD(times, depths, forces)
+    CATENARY_SHAPES("3, 3 n, n")
 };
 
 /// A step that is judged, (n,) each.
@@ -19,6 +20,7 @@ struct TriedStep {
     std::span<const double> stiffness;     ///< of the law's tangent [N/m]
     std::span<const double> compliance;    ///< decrease of depth in the step by a unit force [m/N]
     CATENARY_RECORD(depth, force, stiffness, compliance)
+    CATENARY_SHAPES("n, n, n, n")
 };
 
 /// Largest error of a contact force by a step to `time` [N].

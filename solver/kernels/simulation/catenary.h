@@ -2,7 +2,7 @@
  * co-simulation and environments to learn in. See docs/embedding.md.
  *
  * `catenary prepare CASE -o FILE` writes such a line. Forces are in N, lengths in m, times in s;
- * upward is positive. A step allocates nothing, locks nothing and asks the system for nothing.
+ * upward is positive. A step allocates nothing, locks nothing and makes no system call.
  * Different simulations may be stepped by different threads, one by one thread at a time. */
 #ifndef CATENARY_H
 #define CATENARY_H
@@ -30,7 +30,7 @@ typedef struct {
 enum {
     CATENARY_DONE = 0,
     CATENARY_NOT_FOUND = 1, /* its forces could not be found: nothing can be stepped further */
-    CATENARY_AT_END = 2     /* the file tells no further step what it depends on */
+    CATENARY_AT_END = 2     /* the file has no inputs for a further step */
 };
 
 /* Read a line; NULL if that fails: `error` then holds why, in up to n_error bytes. */
@@ -44,7 +44,7 @@ CATENARY_API double catenary_time(const catenary_simulation* simulation);
 CATENARY_API double catenary_time_step(const catenary_simulation* simulation);
 CATENARY_API int64_t catenary_steps_left(const catenary_simulation* simulation);
 /* Way of the train since time zero, and its speed; another one holds from the next step on. It is
- * refused, with a value other than 0, if the line tells where wires are across the track, which
+ * refused, with a value other than 0, if the file has the places of wires across the track, which
  * holds for one speed only. */
 CATENARY_API double catenary_way(const catenary_simulation* simulation);
 CATENARY_API double catenary_speed(const catenary_simulation* simulation);

@@ -15,7 +15,7 @@ struct Close {
 };
 using File = std::unique_ptr<std::FILE, Close>;
 
-/// FNV-1a, by words of eight bytes: it tells damaged files, not forged ones.
+/// FNV-1a, by words of eight bytes: it detects damaged files, not forged ones.
 class CheckSum {
   public:
     void take(const void* data, size_t n) {

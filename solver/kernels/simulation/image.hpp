@@ -21,15 +21,10 @@
 
 namespace catenary {
 
-template <class T>
-concept RecordType = requires(T record) {
-    T::kMembers;
-    record.members();
-};
-
 /// Pass all members of a value to a visitor: `bytes(T&)` for plain values, `array(T*&, n)` for
 /// arrays of n numbers, and `count(size_t&)` for lengths, upon which a reader resizes. Pointers to
-/// objects are left out. One with `scratch(bool)` is told where records are `kScratch`.
+/// objects are left out. `scratch(bool)` of one that has it is called around records that are
+/// `kScratch`.
 template <class Visitor, class T>
 void visit(Visitor& visitor, T& value);
 

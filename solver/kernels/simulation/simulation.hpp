@@ -15,7 +15,7 @@
 
 namespace catenary {
 
-/// A head in a file. The optional records that it has tell its model.
+/// A head in a file. Its model follows from the optional records that it has.
 struct HeadParts {
     HeadArrays arrays;
     int64_t first;
@@ -48,6 +48,7 @@ struct Ahead {
     bool one_speed;               ///< whether drives hold for the train's first speed only
     double longest_way;           ///< of the train, to where the line ends [m]
     CATENARY_RECORD(dt, n_done, drives, ties, one_speed, longest_way)
+    CATENARY_SHAPES("*, *, * h *, h")
 };
 
 /// All that a prepared line is.
@@ -76,7 +77,7 @@ struct Input {
 class Simulation {
   public:
     /// Throws std::runtime_error, with the path and why, if it is no whole file of this version.
-    /// Numbers of places in it are believed: it is as trustworthy as a program.
+    /// Numbers of places in it are not checked: trust it only as far as a program.
     explicit Simulation(const std::string& path);
 
     enum class Outcome {
@@ -91,7 +92,7 @@ class Simulation {
     double dt() const { return line_.ahead.dt; }
     double way() const { return steps_->way(time()); }  ///< of the train since it started [m]
     double speed() const { return steps_->course().speed; }
-    /// Let the train go on with another speed [m/s], if it can; whether it can.
+    /// Give the train another speed [m/s], if it can have one; whether it can.
     bool set_speed(double speed);
     std::span<Input> inputs() { return inputs_; }  ///< of each pantograph
     const TrainOutputs& outputs() const { return line_.steps.train_outputs; }

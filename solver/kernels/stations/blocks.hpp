@@ -27,8 +27,8 @@ struct KnownMasks {
     KnownMasks(const Layout&, const Layout&) {}
 };
 
-/// The same found at run time. Each square is asked for its nonzeros: a processor predicts the
-/// answer, as it is the same for the station before.
+/// The same found at run time. Kernels test which products each square has: a processor predicts
+/// the branch, as it is the same for the station before.
 struct GivenMasks {
     static constexpr bool is_known = false;
     int pitch;
@@ -51,8 +51,8 @@ struct GivenMasks {
 };
 
 // Vectors up to which a kernel that finds masks at run time adds each block in its place. Where
-// processors differ much the oldest is spared the code: compiling it took a sixth of all the time.
-// So are builds that check each access.
+// processors differ much, the oldest has no such code: compiling it took a sixth of all the time.
+// Nor have builds that check each access.
 #if defined(CATENARY_GENERAL_ONLY) || defined(CATENARY_CHECKS)
 constexpr int kInPlace = 1;
 #else
@@ -210,7 +210,7 @@ struct Blocks : Masks {
         });
     }
     /// Call a function with the kinds of products of a square. If masks are found at run time it
-    /// is compiled twice: for a square that has all of them, as most have, no more is asked.
+    /// is compiled twice: a square that has all of them, as most have, needs no further test.
     template <int I, int J, class F>
     CATENARY_INLINE static void with_kinds(int kinds, F&& function) {
         constexpr int all = all_kinds(kPieces, I, J);

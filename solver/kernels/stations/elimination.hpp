@@ -1,5 +1,6 @@
 #pragma once
-// Block elimination of a line, station by station. See elimination.py.
+// Block LU factors of a line, station by station, with Schur complements S as pivots. See
+// elimination.py.
 #include <vector>
 
 #include "base/arrays.hpp"
@@ -12,6 +13,7 @@ namespace catenary {
 struct StationBlocks {
     Array3<const double> before, own, after;
     CATENARY_RECORD(before, own, after)
+    CATENARY_SHAPES("k b b, k b b, k b b")
 };
 
 /// Stations after elimination from one end.

@@ -84,7 +84,7 @@ constexpr Shipped kShipped[] = {
     // Lines whose wires and droppers are damped each in its own way.
     shipped(2, {0, 1}, 2, true),
     shipped(4, {0, 1, 2}, 4, true),
-    shipped(4, {0, 1, 2, 3}, 4, true),  // and that go on behind an end
+    shipped(4, {0, 1, 2, 3}, 4, true),  // and that continue behind an end
     shipped(6, {0, 1, 2, 6}, 6, true),
     // Two wires that stretch, in their plane and in three.
     by_mass(shipped(6, {}, 6, false, kStretching)),

@@ -13,8 +13,8 @@
 //
 // So x is exchanged once for all rows, and sums once when all columns are added. Where the columns
 // are a piece of two, x holds them twice; where the rows are, both halves of the sum are added up
-// in the end: of both, kinds 0 and 1 are enough. The mask of a block tells which products it has:
-// the others are neither stored nor multiplied.
+// in the end: of both, kinds 0 and 1 are enough. The mask of a block lists its products: the
+// others are neither stored nor multiplied.
 #include <array>
 #include <cstdint>
 

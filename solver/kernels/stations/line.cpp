@@ -1,7 +1,8 @@
+// A line of stations: runs of one type, and the ways of both passes through them.
 #include "stations/line.hpp"
 
 #include <algorithm>
-#include <cstring>
+#include <stdexcept>
 
 namespace catenary {
 
@@ -9,6 +10,12 @@ Line::Line(std::vector<std::unique_ptr<Kernels>> kernels,
            std::vector<std::vector<int>> station_types, int scenes)
     : kernels_(std::move(kernels)), station_types_(std::move(station_types)), scenes_(scenes) {
     const size_t n = station_types_.size();
+    if (n < kernels_.size()) throw std::invalid_argument("a station type is missing");
+    for (const auto& one : kernels_)
+        if (!one)
+            throw std::invalid_argument(scenes == 1
+                                            ? "no kernels take stations of these layouts"
+                                            : "no kernels take several scenes of these layouts");
     place_.assign(n * n * kMostUnknowns, -1);
     for (size_t from = 0; from < n; ++from)
         for (size_t to = 0; to < n; ++to)
@@ -30,6 +37,8 @@ void Line::set_runs(const Work& work, int64_t n, int64_t low) {
         const int64_t pitch = kernels_[0]->rows.unknowns * scenes_;
         // There is one station more to be read at both ends.
         runs_.push_back({-1, n + 1, pitch * first, 0, -pitch * low});
+        n_solved_ = pitch * n;
+        n_read_ = pitch * (first + n + 1);
         return;
     }
     run_number_.resize(n);
@@ -42,6 +51,18 @@ void Line::set_runs(const Work& work, int64_t n, int64_t low) {
         const int64_t own = here - solved.starts[low];
         runs_.push_back({begin, end, by_read * scenes_, here * scenes_, own * scenes_});
     }
+    auto end_of = [&](const Places& places, int64_t last) {
+        const size_t unknowns = station_types_.at(places.station_type[last]).size();
+        return (places.starts[last] + static_cast<int64_t>(unknowns)) * scenes_;
+    };
+    n_solved_ = n > 0 ? end_of(solved, n - 1) : 0;
+    n_read_ = read.starts ? end_of(read, first + n) : 0;
+}
+
+int64_t Line::start_of(const Work& work, int64_t station) const {
+    if (!work.factored.places.starts) return kernels_[0]->rows.unknowns * scenes_ * station;
+    const bool is_end = station == static_cast<int64_t>(run_number_.size());
+    return is_end ? n_solved_ : work.factored.places.starts[station] * scenes_;
 }
 
 void Line::convert(int from, int to, Station& station) const {
@@ -73,7 +94,7 @@ void Line::outside(const Work& work, int64_t station, int station_type, Outside&
 
 /// Fill in displacement and velocity of the stations beside a chain for its products, where these
 /// are of other station types.
-void Line::look_outside(const Work& work, Chain& chain, int station_type, int step) const {
+void Line::put_outside(const Work& work, Chain& chain, int station_type, int step) const {
     const Run& run = *chain.run;
     if (work.right) return;
     const int64_t before = chain.first - step, after = chain.first + step * chain.n;
@@ -89,7 +110,7 @@ void Line::multiply(const Work& work, int64_t begin, int64_t end, double* result
         chain.run = &run_of(i);
         chain.first = i;
         chain.n = std::min(end, chain.run->end) - i;
-        look_outside(work, chain, station_type(work, i), 1);
+        put_outside(work, chain, station_type(work, i), 1);
         kernels_[station_type(work, i)]->multiply(work, chain, result + chain.run->solved);
     }
 }
@@ -121,7 +142,7 @@ void Line::take(const Work& work, bool forth, Way& one, Way* other) const {
         convert(way->station_type, here, way->beside);
         way->station_type = here;
         way->chain.beside = &way->beside;
-        if (forth) look_outside(work, way->chain, here, way->step);
+        if (forth) put_outside(work, way->chain, here, way->step);
     }
     const Kernels& kernels = *kernels_[one.station_type];
     if (other)

@@ -1,15 +1,17 @@
 #pragma once
 // A line's step without contacts in two passes over its state, for Newmark's family.
 //
-// The step operator A is block tridiagonal by stations. With S_i its diagonal blocks after
-// elimination and B_i what joins station i to the next one inwards, forth from both ends
+// The step operator A is block tridiagonal by stations: this is the block Thomas algorithm, begun
+// at both ends (a twisted block LU factorisation). With S_i the Schur complements, A's diagonal
+// blocks after elimination, and B_i the block between station i and the next one inwards, forth
+// from both ends
 //     r_i = f_i - B_(i-1)^T S_(i-1)^-1 r_(i-1),
 // and back from the middle, where both meet,
 //     a_i = S_i^-1 r_i - S_i^-1 B_i a_(i+1).
-// The pass forth makes f_i, a row of -K x - C v and of loads, at its station; the pass back takes
-// the motion on from one prediction to the next (Newmark; Chung and Hulbert, 1993). So the state is
-// read from memory once in each pass. Two chains go side by side, from both ends: each waits for
-// itself only.
+// The pass forth makes f_i, a row of -K x - C v and of loads, at its station; the pass back
+// advances the motion from one prediction to the next (Newmark; Chung and Hulbert, 1993). So the
+// state is read from memory once in each pass. Two chains go side by side, from both ends: each
+// waits for itself only.
 #include <array>
 #include <cstdint>
 #include <memory>
@@ -149,11 +151,17 @@ class Line {
     /// `station_types`: places in a cross-section of the stations of each type, of which
     /// the first `kernels.size()` have kernels; one that has all places if stations are alike.
     /// Numbers of each unknown in `scenes` scenes follow each other.
+    /// Throws std::invalid_argument if a kernel is null, or a station type is missing.
     Line(std::vector<std::unique_ptr<Kernels>> kernels, std::vector<std::vector<int>> station_types,
          int scenes = 1);
 
     /// Find the runs of the n stations of a solve. Arrays of motion begin at station `low`.
     void set_runs(const Work&, int64_t n, int64_t low);
+    /// Numbers that the vectors of a solve, and the operands of products, have at least.
+    int64_t n_solved() const { return n_solved_; }
+    int64_t n_read() const { return n_read_; }
+    /// The first number of a station in the vectors of a solve.
+    int64_t start_of(const Work&, int64_t station) const;
     void multiply(const Work&, int64_t begin, int64_t end, double* result) const;
     void solve(const Work&, int64_t n, int64_t middle) const;
     /// Both passes, the pass back in stretches of so many pairs of stations.
@@ -171,7 +179,7 @@ class Line {
     bool alike(int one, int other) const;
     void convert(int from, int to, Station&) const;
     void outside(const Work&, int64_t station, int station_type, Outside&) const;
-    void look_outside(const Work&, Chain&, int station_type, int step) const;
+    void put_outside(const Work&, Chain&, int station_type, int step) const;
     void begin(Way&, int64_t n) const;
     void take(const Work&, bool forth, Way& one, Way* other) const;
     void go_on(const Work&, bool forth, Way& a, Way& b, int64_t n) const;
@@ -184,6 +192,7 @@ class Line {
         place_;  ///< of each unknown of a station type in another, -1 if it has none
     std::vector<Run> runs_;
     std::vector<int32_t> run_number_;
+    int64_t n_solved_ = 0, n_read_ = 0;
 };
 
 }  // namespace catenary

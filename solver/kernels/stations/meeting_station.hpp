@@ -1,5 +1,5 @@
 #pragma once
-// Where elimination from both ends meets, and how it moves. See station_factors.py.
+// Where elimination from both ends meets, and how that station is moved. See station_factors.py.
 #include "base/arrays.hpp"
 #include "base/record.hpp"
 
@@ -13,11 +13,12 @@ constexpr int64_t kMiddles = 16;
 struct Turning {
     std::span<const int32_t> to_end, to_start, here;
     CATENARY_RECORD(to_end, to_start, here)
+    CATENARY_SHAPES("n, n, *")
 };
 
 /// A station where elimination may end, near the middle from `low` to `high`.
 int64_t middle_of(int64_t low, int64_t high);
-/// Let elimination end at `middle` in place of `before`.
+/// Move the end of elimination from `before` to `middle`.
 void turn(std::span<int32_t> kinds, const Turning& turning, int64_t before, int64_t middle);
 
 }  // namespace catenary

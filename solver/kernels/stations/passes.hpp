@@ -166,7 +166,7 @@ struct Chained {
         blocks.store(at, own);
         return own;
     }
-    /// Take a station from one prediction to the next. The solution is its acceleration but for
+    /// Advance a station from one prediction to the next. The solution is its acceleration but for
     /// damping on mass, and for its share of x if the right-hand side was made by M.
     template <class T>
     CATENARY_INLINE void go_on(int64_t i, X solution, T then) const {
@@ -287,8 +287,8 @@ void multiply_rows(const Blocks& blocks, const Work& work, const Chain& chain, d
     }
 }
 
-/// All kernels of one kind of blocks.
-template <class Blocks>
+/// All kernels of one kind of blocks; for predictions of Newmark's method only if `IsForSteps`.
+template <class Blocks, bool IsForSteps = false>
 class KernelsOf final : public Kernels {
   public:
     KernelsOf(const Layout& r, const Layout& f) : blocks_(r, f) {
@@ -299,11 +299,11 @@ class KernelsOf final : public Kernels {
         multiply_rows(blocks_, work, chain, result);
     }
     void forth(const Work& work, Chain& chain, int step) const override {
-        go_forth(blocks_, work, chain, step, work.right != nullptr);
+        go_forth(blocks_, work, chain, step, is_given(work));
     }
     void forth(const Work& work, Chain& from_start, Chain& from_end) const override {
         if constexpr (kSideBySide) {
-            go_forth(blocks_, work, from_start, from_end, work.right != nullptr);
+            go_forth(blocks_, work, from_start, from_end, is_given(work));
         } else {
             forth(work, from_start, 1);
             forth(work, from_end, -1);
@@ -313,14 +313,14 @@ class KernelsOf final : public Kernels {
         const Chained<Blocks> one(blocks_, work, run);
         const auto own = one.met(middle, blocks_.load(from_end.unknowns));
         blocks_.store(from_end.unknowns, own);
-        if (!work.right) one.go_on(middle, own, then_of(work));
+        if (!is_given(work)) one.go_on(middle, own, then(work));
     }
     void back(const Work& work, Chain& chain, int step) const override {
-        go_back(blocks_, work, chain, step, then_of(work));
+        go_back(blocks_, work, chain, step, then(work));
     }
     void back(const Work& work, Chain& to_start, Chain& to_end) const override {
         if constexpr (kSideBySide) {
-            go_back(blocks_, work, to_start, to_end, then_of(work));
+            go_back(blocks_, work, to_start, to_end, then(work));
         } else {
             back(work, to_start, -1);
             back(work, to_end, 1);
@@ -328,8 +328,22 @@ class KernelsOf final : public Kernels {
     }
 
   private:
-    /// Whether a station leaves the processor waiting for itself: a wide one has work enough.
-    static constexpr bool kSideBySide = sizeof(typename Blocks::X) <= 12 * sizeof(double);
+    /// Whether a station leaves the processor waiting for itself: wide ones, and those of several
+    /// scenes, have work enough.
+    static constexpr bool kSideBySide =
+        !IsForSteps && sizeof(typename Blocks::X) <= 12 * sizeof(double);
+    static auto is_given([[maybe_unused]] const Work& work) {
+        if constexpr (IsForSteps)
+            return IsProduct{};
+        else
+            return work.right != nullptr;
+    }
+    static auto then([[maybe_unused]] const Work& work) {
+        if constexpr (IsForSteps)
+            return Newmark{};
+        else
+            return then_of(work);
+    }
     Blocks blocks_;
 };
 

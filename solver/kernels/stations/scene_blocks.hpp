@@ -100,42 +100,6 @@ struct SceneBlocks : KnownMasks<K> {
     }
 };
 
-/// Kernels of such blocks.
-template <class Blocks>
-class SceneKernels final : public Kernels {
-  public:
-    SceneKernels(const Layout& r, const Layout& f) : blocks_(r, f) {
-        rows = r;
-        factors = f;
-    }
-    void multiply(const Work& work, const Chain& chain, double* result) const override {
-        multiply_rows(blocks_, work, chain, result);
-    }
-    void forth(const Work& work, Chain& chain, int step) const override {
-        go_forth(blocks_, work, chain, step, IsProduct{});
-    }
-    void forth(const Work& work, Chain& from_start, Chain& from_end) const override {
-        forth(work, from_start, 1);
-        forth(work, from_end, -1);
-    }
-    void meet(const Work& work, const Run& run, int64_t middle, Station& from_end) const override {
-        const Chained<Blocks> one(blocks_, work, run);
-        const auto own = one.met(middle, blocks_.load(from_end.unknowns));
-        blocks_.store(from_end.unknowns, own);
-        one.go_on(middle, own, Newmark{});
-    }
-    void back(const Work& work, Chain& chain, int step) const override {
-        go_back(blocks_, work, chain, step, Newmark{});
-    }
-    void back(const Work& work, Chain& to_start, Chain& to_end) const override {
-        back(work, to_start, -1);
-        back(work, to_end, 1);
-    }
-
-  private:
-    Blocks blocks_;
-};
-
 /// Kernels of L scenes that were compiled for rows and factors, or null.
 template <int L, int K = 0>
 std::unique_ptr<Kernels> make_for_scenes(const Layout& rows, const Layout& factors) {
@@ -143,7 +107,7 @@ std::unique_ptr<Kernels> make_for_scenes(const Layout& rows, const Layout& facto
         constexpr Shipped s = kShipped[K];
         if constexpr (is_checked(s) && s.rows.unknowns * L <= kMostNumbers && s.is_for_scenes)
             if (rows == s.rows && factors == s.factors)
-                return std::make_unique<SceneKernels<SceneBlocks<K, L>>>(rows, factors);
+                return std::make_unique<KernelsOf<SceneBlocks<K, L>, true>>(rows, factors);
         return make_for_scenes<L, K + 1>(rows, factors);
     }
     return nullptr;

@@ -1,13 +1,43 @@
 // Steps of the scheme `one_solve`.
 #include "steps/steps.hpp"
 
+#include <stdexcept>
+
 #include "base/checks.hpp"
 
 namespace catenary {
 
+Steps::Steps(StepParts parts, Block block)
+    : parts_(std::move(parts)), block_(std::move(block)), course_{parts_.speed} {
+    auto refuse_unless = [](bool agrees, const char* why) {
+        if (!agrees) throw std::invalid_argument(why);
+    };
+    const int64_t n = size(parts_.contacts.x), n_heads = static_cast<int64_t>(parts_.heads.size());
+    refuse_unless(size(parts_.strips) == 2 * n * (1 + n), "strips are of other contacts");
+    refuse_unless(block_.drives.rows == n_heads, "a block drives other heads than its steps have");
+    for (const Head* head : parts_.heads) {
+        refuse_unless(head && head->first() >= 0 && head->first() + head->n_strips() <= n,
+                      "a head has other contacts than the train");
+        refuse_unless(block_.drives.columns >= kDrive + 2 * head->n_strips(),
+                      "a row that drives a head has too few numbers");
+    }
+    if (block_.rows.rows == 0) return;
+    size_t width = parts_.outputs.size() + parts_.shown.arms.size();
+    width += parts_.shown.droppers.law.size();
+    for (const auto& channel : parts_.channels) width += channel.size();
+    refuse_unless(block_.rows.rows >= n_steps() && block_.behind.rows >= n_steps() &&
+                      block_.behind.columns == 2 &&
+                      block_.rows.columns == static_cast<int64_t>(width),
+                  "a block has no room for its outputs");
+}
+
 Taken Steps::take(int64_t first, int64_t end) {
     const KeptMotions& kept = block_.kept;
     const bool shows = block_.rows.rows > 0;
+    part(block_.times, first, end);
+    part(kept.moved, 0, 2);
+    if (shows) part(kept.motion_of, first, end);
+    if (!parts_.free) throw std::invalid_argument("these steps are taken by an ensemble");
     for (int64_t number = first; number < end; ++number) {
         set_off(number);
         parts_.free->step();
@@ -91,7 +121,7 @@ void Steps::finish(int64_t n_compensations) {
     check();
 }
 
-/// Check that the results of a step are finite, in builds that look for faults.
+/// Check that the results of a step are finite, in builds that search for faults.
 void Steps::check() const {
     const auto& [x, y, z, shares, spacing] = parts_.shown.motion;
     for (auto numbers : {x, y, z}) check_numbers(numbers, "the line's motion");

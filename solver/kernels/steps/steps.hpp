@@ -16,7 +16,7 @@ struct StepParts {
     double speed;              ///< of the train [m/s]
     TrainPlaces train;         ///< places of its contacts
     Contacts contacts;         ///< arrays of these contacts
-    TwoPasses* free;           ///< the line's step without contact
+    TwoPasses* free;           ///< the line's step without contact; null if others take it
     std::vector<Loads> loads;  ///< that change with time, or none
     std::vector<Head*> heads;  ///< of the pantographs
     std::span<double> strips;  ///< all strips as functions of the forces, see `Head::predict`
@@ -28,8 +28,9 @@ struct StepParts {
     std::span<const double> outputs;  ///< all outputs of pantographs
     Shown shown;                      ///< outputs of the line
     std::vector<std::span<const double>> channels;  ///< numbers of further channels
-    CATENARY_RECORD(speed, train, contacts, free, loads, heads, strips, problem, law, lateral_place,
+    CATENARY_RECORD(speed, contacts, train, free, loads, heads, strips, problem, law, lateral_place,
                     switched, train_outputs, outputs, shown, channels)
+    CATENARY_SHAPES("*, n=n, n=n.., *, *, *, *, n=n k=k, n=n, n?, k..")
 };
 
 /// Inputs and outputs of a block of steps.
@@ -42,6 +43,7 @@ struct Block {
     KeptMotions kept;
     std::span<Counts> counts;  ///< (1,)
     CATENARY_RECORD(times, drives, rows, now, behind, kept, counts)
+    CATENARY_SHAPES("n, n h w, *, 2, *, *, 1")
 };
 
 /// How far a block of steps has come.
@@ -59,19 +61,21 @@ struct Course {
 
 class Steps {
   public:
-    Steps(StepParts parts, Block block)
-        : parts_(std::move(parts)), block_(std::move(block)), course_{parts_.speed} {}
+    /// Throws std::invalid_argument if parts and block do not agree.
+    Steps(StepParts parts, Block block);
     /// Way of the train at a time [s] since time zero [m].
     double way(double time) const { return course_.way + course_.speed * (time - course_.since); }
     const StepParts& parts() const { return parts_; }
+    int64_t n_steps() const { return size(block_.times); }  ///< of the block
     const Course& course() const { return course_; }
     void set_course(const Course& course) {
         course_ = course;
         parts_.contacts.gains.train_speed = course.speed;
     }
-    /// Let the train go on with another speed [m/s] from a time [s] on.
+    /// Give the train another speed [m/s] from a time [s] on.
     void change_speed(double time, double speed) { set_course({speed, way(time), time}); }
-    /// Take the steps of the block from number `first` on up to before `end`.
+    /// Take the steps of the block from number `first` on up to before `end`. Throws
+    /// std::out_of_range if it has not as many.
     Taken take(int64_t first, int64_t end);
 
     /// The parts of a step before and after its free step, where others take the latter. `arrive`

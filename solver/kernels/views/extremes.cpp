@@ -23,11 +23,13 @@ void take_extremes(Array2<const double> rows, int64_t first, int64_t begin, int6
 void take_points(Array2<const double> rows, std::span<const int64_t> columns,
                  std::span<const int64_t> first, std::span<const int64_t> count,
                  std::span<double> result) {
-    size_t at = 0;
+    int64_t at = 0;
     for (int64_t i = 0; i < size(first); ++i) {
         const auto row = rows[i];
-        for (const int64_t column : columns.subspan(first[i], count[i]))
-            result[at++] = column >= 0 ? row[column] : 0.0;
+        const auto points = part(result, at, at + count[i]);
+        const auto of = part(columns, first[i], first[i] + count[i]);
+        for (int64_t k = 0; k < count[i]; ++k) points[k] = of[k] >= 0 ? row[of[k]] : 0.0;
+        at += count[i];
     }
 }
 

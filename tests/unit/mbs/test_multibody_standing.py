@@ -14,7 +14,7 @@ from catenary import InputError, RunBroken
 from catenary.mbs.air import Airflow
 from catenary.mbs.build import Operation, make_pantograph, raising_data
 from catenary.mbs.head.stepping import Stepping
-from catenary.mbs.mechanism.pantograph_data import MultibodyData, describe, reduced, stand
+from catenary.mbs.mechanism.multibody_pantograph import MultibodyData, describe, reduced, stand
 from catenary.mbs.mechanism.reduced_pantograph import RaisingPantograph
 from catenary.mbs.mechanism.reduction import Places, reduce_mechanism
 from catenary.mbs.rigid.bodies import SPACE, Body

@@ -7,7 +7,7 @@ import pytest
 from paper_pantograph import data as seven_bodies
 
 from catenary.mbs.lumped_data import LumpedData
-from catenary.mbs.mechanism.pantograph_data import stand
+from catenary.mbs.mechanism.multibody_pantograph import stand
 from catenary.mbs.shape import (
     BELOW_HEAD,
     BODY,
