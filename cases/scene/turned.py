@@ -176,6 +176,7 @@ def _turn_irregularities(tables: dict[str, Any], line: Line, length: float) -> N
         for span, dropper, error in table.get("by_dropper", []):
             place = int(span), int(dropper)
             errors[place] = errors.get(place, 0.0) + error
+        table.pop("by_dropper_file", None)
         # Along the track, so that lines which are mirror images of each other say so.
         table["by_dropper"] = sorted(
             [*_other_number(line, *place), error] for place, error in errors.items()

@@ -1,4 +1,4 @@
-"""Tables of spans and droppers as planners export them: what is read, and what is refused."""
+"""Tables of planners and of surveys of a line: what is read, and what is refused."""
 
 from __future__ import annotations
 
@@ -190,3 +190,59 @@ def test_patterns_that_contradict_each_other_are_refused(entries: list[str], sen
     with pytest.raises(InputError) as refused:
         load_scene("ac_simple", patterns(*entries))
     assert sentence in str(refused.value)
+
+
+SURVEY = {
+    "heights.csv": "# against plan\nplace_m;height_mm\n0,0;0\n330,0;12,5\n385;-8,0\n1650;0\n",
+    "errors.csv": "span,dropper,error_mm\n7,3,4.0\n7,4,-3.0\n",
+}
+SURVEYED = (
+    ("irregularities.contact_wire_height.by_place_file", "heights.csv"),
+    ("irregularities.dropper_lengths.by_dropper_file", "errors.csv"),
+)
+
+
+def surveyed(folder: Path, **changed: str) -> Scene:
+    """The case ac_simple as a survey found it; ``changed`` are contents by names of tables."""
+    for name, text in SURVEY.items():
+        (folder / name).write_text(changed.get(name.removesuffix(".csv"), text))
+    return load_scene("ac_simple", [f"{key}={folder / file}" for key, file in SURVEYED])
+
+
+def test_a_survey_is_the_line_of_its_numbers(tmp_path: Path) -> None:
+    scene = surveyed(tmp_path)
+    pairs = "[[0.0,0.0],[330.0,0.0125],[385.0,-0.008],[1650.0,0.0]]"
+    by_keys = load_scene(
+        "ac_simple",
+        [
+            f"irregularities.contact_wire_height.by_place={pairs}",
+            "irregularities.dropper_lengths.by_dropper=[[7,3,4.0],[7,4,-3.0]]",
+        ],
+    )
+    assert problem_of(scene) == problem_of(by_keys)
+    assert problem_of(scene) != problem_of(load_scene("ac_simple"))
+    for _, file in SURVEYED:
+        (tmp_path / file).unlink()
+    again = scene_from(resolved(scene), Origin("a result", recorded=True))
+    assert problem_of(again) == problem_of(scene)
+
+
+@pytest.mark.parametrize(
+    ("file", "text", "told"),
+    [
+        ("heights", "place_m,height_m\n0,0\n9,0.01\n", 'its column "height_m" is unknown'),
+        ("heights", "place_m,height_mm\n0,0\n330,ten\n", "its line 3 must hold a number for each"),
+        ("heights", "place_m,height_mm\n0,0\n330,1080\n", "within 0.5 m, but is 1.08"),
+        ("heights", "place_m,height_mm\n330,0\n0,10\n", "in ascending order"),
+        ("heights", "place_m,height_mm\n0,0\n1700,10\n", "the line runs from 0 to 1650 m"),
+        ("errors", "span,error_mm\n7,4.0\n", "it has no column dropper"),
+        ("errors", "span,dropper,error_mm\n7,30,4.0\n", "span 7 has 9 droppers"),
+        ("errors", "span,dropper,error_mm\n7.5,3,4.0\n", "line 2 must have a span from 1 on"),
+    ],
+)
+def test_a_survey_that_does_not_fit_is_told(
+    tmp_path: Path, file: str, text: str, told: str
+) -> None:
+    with pytest.raises(InputError) as raised:
+        surveyed(tmp_path, **{file: text})
+    assert told in str(raised.value) and f"{file}.csv" in str(raised.value)

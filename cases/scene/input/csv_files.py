@@ -1,8 +1,9 @@
 """Numbers that stand in CSV files, and rule books, put into the scene in place of the files' names.
 
 A result then holds the numbers themselves, and does not change with the file. Courses and curves
-are pairs of numbers. Tables of spans and of droppers have columns with names, as planners export
-them: separated by commas, or by semicolons with decimal points or decimal commas.
+are pairs of numbers. Tables of spans and of droppers, and surveys of a line, have columns with
+names, as planners export them: separated by commas, or by semicolons with decimal points or decimal
+commas.
 """
 
 from __future__ import annotations
@@ -111,6 +112,12 @@ def _places(raw: dict[str, Any]) -> Iterator[tuple[str, Any, str, str, _Read]]:
     for where, table in hung:
         yield where, table, "curve_file", "curve", _pairs
         yield where, table, "patterns_file", "patterns", _patterns
+    irregular = raw.get("irregularities")
+    for name in ("contact_wire_height", "running_surface"):
+        where = f"irregularities.{name}"
+        yield where, below(irregular, name), "by_place_file", "by_place", _heights
+    lengths = below(irregular, "dropper_lengths")
+    yield "irregularities.dropper_lengths", lengths, "by_dropper_file", "by_dropper", _lengths
 
 
 def _refuse_outside(path: Path, base: Path, where: str) -> None:
@@ -207,6 +214,26 @@ def _patterns(path: Path, where: str, raw: dict[str, Any]) -> list[dict[str, Any
         {"spans": spans} | {key: list(own) for key, own in zip(keys, columns, strict=False)}
         for columns, spans in like.items()
     ]
+
+
+def _heights(path: Path, where: str, raw: dict[str, Any]) -> list[list[float]]:
+    """Pairs of place and height [m] of a survey."""
+    rows = _rows(path, where, {"place_m": True, "height_mm": True})
+    return [[row["place_m"], row["height_mm"] / 1000.0] for _, row in rows]
+
+
+def _lengths(path: Path, where: str, raw: dict[str, Any]) -> list[list[float]]:
+    """Span, number of the dropper and error [mm] of a survey."""
+    found = []
+    for number, row in _rows(path, where, {"span": True, "dropper": True, "error_mm": True}):
+        for name in ("span", "dropper"):
+            if row[name] < 1 or row[name] != int(row[name]):
+                raise InputError(
+                    f"{where}; its line {number} must have a {name} from 1 on, a whole number, "
+                    f"and has {row[name]:g}"
+                )
+        found.append([row["span"], row["dropper"], row["error_mm"]])
+    return found
 
 
 def _rows(path: Path, where: str, columns: dict[str, bool]) -> list[tuple[int, dict[str, float]]]:

@@ -53,6 +53,12 @@ class HeightTable(Table):
         description="pairs of position along the track [m] and height [m], joined by a cubic "
         "spline; beyond them the height stays",
     )
+    by_place_file: str | None = Field(
+        None,
+        min_length=1,
+        description="by_place as a CSV file with columns place_m and height_mm, taken in when it "
+        "is read",
+    )
 
     @model_validator(mode="after")
     def _consistent(self) -> HeightTable:
@@ -99,6 +105,12 @@ class LengthsTable(Table):
         None,
         description="entries [span, number of the dropper in it, error in mm], both counted from "
         "1; on top of random errors",
+    )
+    by_dropper_file: str | None = Field(
+        None,
+        min_length=1,
+        description="by_dropper as a CSV file with columns span, dropper and error_mm, taken in "
+        "when it is read",
     )
 
     @model_validator(mode="after")
