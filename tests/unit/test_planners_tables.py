@@ -223,7 +223,7 @@ def test_a_survey_is_the_line_of_its_numbers(tmp_path: Path) -> None:
     assert problem_of(scene) != problem_of(load_scene("ac_simple"))
     for _, file in SURVEYED:
         (tmp_path / file).unlink()
-    again = scene_from(resolved(scene), Origin("a result", recorded=True))
+    again = recorded(scene)
     assert problem_of(again) == problem_of(scene)
 
 
