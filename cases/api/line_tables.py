@@ -9,9 +9,11 @@ import numpy as np
 from catenary.scenes import SceneLike, checked
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from pathlib import Path
 
     import pandas as pd
+    import xarray as xr
 
     from catenary.cases.run.planning import plan as planning
     from catenary.cases.scene.scene import Scene as CheckedScene
@@ -290,6 +292,60 @@ class AtRest:
                 "along_N": along,
                 "tension_N": table.tension,
             }
+        )
+
+    def sensitivity(
+        self, parameters: str | Sequence[str] = (), *, droppers: bool = False
+    ) -> xr.Dataset:
+        """What parameters change of the contact wires and the elasticity in the middle span.
+
+        Parameters
+        ----------
+        parameters : str or sequence of str
+            Keys as of ``catenary.sensitivity``; the usual ones of the line if there are none.
+        droppers : bool
+            Whether the length of each dropper in the evaluated stretch is a parameter, too: how
+            many millimetres it is too long.
+
+        Returns
+        -------
+        xarray.Dataset
+            ``height`` (wire, x) [m] and ``elasticity`` (x) [m/N]; per unit of each parameter
+            ``by_height`` (parameter, wire, x), ``by_elasticity`` (parameter, x) and
+            ``by_unevenness`` (parameter); ``unit`` (parameter) of its key.
+
+        Raises
+        ------
+        InputError
+            If a key is wrong or does not change the line, or if the line has no derivative by it.
+
+        Examples
+        --------
+        >>> found = catenary.static("en50318_2002").sensitivity("line.contact_wire.tension_N")
+        >>> bool((found.by_elasticity < 0.0).all())  # a tighter wire gives way less
+        True
+        """
+        import xarray as xr
+
+        from catenary.callers import listed
+        from catenary.cases.studies.sensitivity.at_rest import rest_sensitivity_of
+
+        found = rest_sensitivity_of(self._scene, listed(parameters), droppers=droppers)
+        along = {"units": "m"}
+        return xr.Dataset(
+            {
+                "height": (("wire", "x"), found.height.T, along),
+                "elasticity": ("x", found.elasticity, {"units": "m/N"}),
+                "by_height": (("parameter", "wire", "x"), found.by_height.transpose(0, 2, 1)),
+                "by_elasticity": (("parameter", "x"), found.by_elasticity),
+                "by_unevenness": ("parameter", found.by_unevenness),
+                "unit": ("parameter", [one.unit for one in found.parameters]),
+            },
+            {
+                "parameter": [one.key for one in found.parameters],
+                "wire": found.wires,
+                "x": ("x", found.x, along),
+            },
         )
 
     def __str__(self) -> str:

@@ -13,9 +13,10 @@ from catenary.scenes import SceneLike, checked
 if TYPE_CHECKING:
     import pandas as pd
 
+    from catenary.cases.studies.sensitivity.at_rest import RestSensitivity
     from catenary.cases.studies.sensitivity.study import Sensitivity
 
-SENSITIVITIES = "sensitivity.csv"
+SENSITIVITIES, AT_REST = "sensitivity.csv", "sensitivity_at_rest.csv"
 
 
 def sensitivity(
@@ -123,3 +124,44 @@ class Derivatives:
         from catenary.cases.studies.sensitivity.output import as_text
 
         return as_text(self._own)
+
+
+class RestDerivatives:
+    """Derivatives of the line of a scene at rest. As text what the program prints."""
+
+    def __init__(self, own: RestSensitivity) -> None:
+        self._own = own
+
+    def write(self, folder: Path) -> list[Path]:
+        """Write ``sensitivity_at_rest.csv`` into a folder; returns the files. Not collective."""
+        from catenary.cases.studies.sensitivity.at_rest import along_span
+        from catenary.postproc.report.study_table import write_files
+
+        return write_files(folder, {AT_REST: along_span(self._own)})
+
+    def __str__(self) -> str:
+        from catenary.cases.studies.sensitivity.at_rest import rest_text
+
+        return rest_text(self._own)
+
+
+def rest_derivatives(
+    scene: SceneLike, parameters: Sequence[str] = (), *, droppers: bool = False
+) -> RestDerivatives:
+    """What ``AtRest.sensitivity`` gives, for the program. Not collective.
+
+    Parameters
+    ----------
+    scene : Scene, str, Path or mapping
+        The scene, or whatever ``load`` takes for one.
+    parameters, droppers
+        As of ``AtRest.sensitivity``.
+
+    Raises
+    ------
+    InputError
+        As ``AtRest.sensitivity``.
+    """
+    from catenary.cases.studies.sensitivity.at_rest import rest_sensitivity_of
+
+    return RestDerivatives(rest_sensitivity_of(checked(scene), parameters, droppers=droppers))

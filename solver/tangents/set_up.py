@@ -8,7 +8,7 @@ further approximation.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -32,7 +32,7 @@ from catenary.solver.problem.problem import Numerics, steps_of
 from catenary.solver.statics.line_at_rest import LineAtRest
 
 # Weights of a derivative of the fourth order by values at -2, -1, 1 and 2 steps.
-_STENCIL = {-2: 1.0 / 12.0, -1: -8.0 / 12.0, 1: 8.0 / 12.0, 2: -1.0 / 12.0}
+STENCIL = {-2: 1.0 / 12.0, -1: -8.0 / 12.0, 1: 8.0 / 12.0, 2: -1.0 / 12.0}
 # Numbers that differ by so many roundings of themselves are equal.
 _ROUNDINGS = 64.0 * float(np.finfo(float).eps)
 # Damping is proportional if no more than such a part of it is not.
@@ -244,7 +244,7 @@ def differentiate(set_up: Callable[[float], SetUp], now: SetUp, step: float, wha
     InputError
         If the parameter changes a part of the set-up without derivative, such as the mesh.
     """
-    found = {number: set_up(number * step) for number in _STENCIL}
+    found = {number: set_up(number * step) for number in STENCIL}
     for other in found.values():
         for name, values in now.fixed.items():
             mine = other.fixed[name]
@@ -254,12 +254,7 @@ def differentiate(set_up: Callable[[float], SetUp], now: SetUp, step: float, wha
                 )
 
     def of(part: Callable[[SetUp], Any]) -> np.ndarray:
-        values = {number: np.asarray(part(found[number])) for number in _STENCIL}
-        total = sum(_STENCIL[number] * value for number, value in values.items()) / step
-        largest = max(float(np.abs(value).max(initial=0.0)) for value in values.values())
-        if float(np.abs(total).max(initial=0.0)) <= _ROUNDINGS * largest / step:
-            return np.zeros_like(total)
-        return np.asarray(total)
+        return derivative({n: np.asarray(part(own)) for n, own in found.items()}, step)
 
     def or_none(values: np.ndarray) -> np.ndarray:
         """Without rows where nothing changes."""
@@ -267,7 +262,7 @@ def differentiate(set_up: Callable[[float], SetUp], now: SetUp, step: float, wha
 
     def of_head(number: int) -> StepChange:
         if not isinstance(now.heads[number], LinearStep):
-            models = [found[side].heads[number] for side in _STENCIL]
+            models = [found[side].heads[number] for side in STENCIL]
             beside = [model for model in models if isinstance(model, SteppedHead)]
             return StepChange(_NO_STEP, beside, step)
         parts = [
@@ -310,6 +305,29 @@ def differentiate(set_up: Callable[[float], SetUp], now: SetUp, step: float, wha
     )
 
 
+def derivative(values: Mapping[int, np.ndarray], step: float) -> np.ndarray:
+    """A derivative of the fourth order.
+
+    Parameters
+    ----------
+    values : mapping of int to ndarray
+        What is differentiated, with the parameter changed by each multiple of the step in
+        ``STENCIL``; all of one shape.
+    step : float
+        Step of the parameter.
+
+    Returns
+    -------
+    ndarray
+        Of the same shape; zero if the values differ by round-off only.
+    """
+    total = sum(STENCIL[number] * value for number, value in values.items()) / step
+    largest = max(float(np.abs(value).max(initial=0.0)) for value in values.values())
+    if float(np.abs(total).max(initial=0.0)) <= _ROUNDINGS * largest / step:
+        return np.zeros_like(total)
+    return np.asarray(total)
+
+
 def _matrices(
     found: Sequence[dict[int, sparse.csc_matrix]], now: Sequence[sparse.csc_matrix], step: float
 ) -> list[MatrixTerm]:
@@ -335,7 +353,7 @@ def _matrices(
 
 def _derivative(matrices: dict[int, sparse.csc_matrix], step: float) -> sparse.csc_matrix:
     """Derivative of a matrix, zero where its change is round-off of the entry."""
-    total = sum(_STENCIL[number] * matrix for number, matrix in matrices.items()) / step
+    total = sum(STENCIL[number] * matrix for number, matrix in matrices.items()) / step
     changed = abs(total) > abs(matrices[1]) * (_ROUNDINGS / abs(step))
     derivative = total.multiply(changed).tocsc()
     derivative.eliminate_zeros()

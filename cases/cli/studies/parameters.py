@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -20,6 +20,9 @@ from catenary.cases.cli.app import (
     serial_verb,
 )
 from catenary.cases.terminal import console
+
+if TYPE_CHECKING:
+    from catenary.sensitivities import Derivatives, RestDerivatives
 
 
 @serial_verb(
@@ -112,19 +115,33 @@ def sensitivity(
             help="The length of each dropper in the evaluated stretch, besides what -p names.",
         ),
     ] = False,
+    at_rest: Annotated[
+        bool,
+        typer.Option(
+            "--at-rest",
+            help="Shape and elasticity of the span in the middle of the line, without a march.",
+        ),
+    ] = False,
     out: Annotated[
-        Path | None, folder_option("Folder for sensitivity.csv; without it nothing is written.")
+        Path | None,
+        folder_option(
+            "Folder for sensitivity.csv, or sensitivity_at_rest.csv; without it nothing is written."
+        ),
     ] = None,
     force: Force = False,
 ) -> int:
     """Serial."""
     from catenary.cases.result_folder.output_folder import refuse_table
-    from catenary.sensitivities import SENSITIVITIES, derivatives
+    from catenary.sensitivities import AT_REST, SENSITIVITIES, derivatives, rest_derivatives
 
     scene = words.scene()
     if out is not None:
-        refuse_table(out / SENSITIVITIES, force)
-    found = derivatives(scene, keys or [], droppers=droppers, progress=not console.is_quiet())
+        refuse_table(out / (AT_REST if at_rest else SENSITIVITIES), force)
+    found: Derivatives | RestDerivatives
+    if at_rest:
+        found = rest_derivatives(scene, keys or [], droppers=droppers)
+    else:
+        found = derivatives(scene, keys or [], droppers=droppers, progress=not console.is_quiet())
     console.say(str(found))
     if out is not None:
         console.say(f"\n{found.write(out)[0]}")
