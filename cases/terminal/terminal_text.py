@@ -153,7 +153,6 @@ def static_text(table: Mapping[str, Any], line: Line, half_head: float | None = 
     half_head : half of the length of the shortest strip, None if no scene says it [m]
     """
     data = {name: np.asarray(value) for name, value in table.items()}
-    lift, place = 1e3 * data["elasticity"], data["elasticity_x"]
     lines = [
         *_dropper_table(data, line),
         "",
@@ -161,12 +160,18 @@ def static_text(table: Mapping[str, Any], line: Line, half_head: float | None = 
         *_contact_wires_text(data, line, half_head),
     ]
     lines += _registration_text(data, [wire.name for wire in line.wires])
-    lines += [
-        f"Elasticity from {place.min():g} to {place.max():g} m: {lift.min():.3f} to "
-        f"{lift.max():.3f} mm/N, mean {lift.mean():.3f} mm/N, unevenness "
-        f"{100 * (lift.max() - lift.min()) / (lift.max() + lift.min()):.1f} %",
-    ]
+    lines.append(elasticity_text(data["elasticity_x"], data["elasticity"]))
     return "\n".join(lines)
+
+
+def elasticity_text(x: np.ndarray, elasticity: np.ndarray) -> str:
+    """Sentence on elasticities (n,) [m/N] at places (n,) along the track [m]."""
+    lift = 1e3 * elasticity
+    return (
+        f"Elasticity from {x.min():g} to {x.max():g} m: {lift.min():.3f} to "
+        f"{lift.max():.3f} mm/N, mean {lift.mean():.3f} mm/N, unevenness "
+        f"{100 * (lift.max() - lift.min()) / (lift.max() + lift.min()):.1f} %"
+    )
 
 
 def _dropper_table(data: Mapping[str, np.ndarray], line: Line) -> list[str]:

@@ -11,6 +11,7 @@ from catenary.base.errors import InputError
 from catenary.cases.run.prepared import rest_of, sound_rest
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.sensitivity.parameters import ChangedScenes, Parameter, parameters_of
+from catenary.cases.terminal.terminal_text import elasticity_text
 from catenary.meshgen.wires import Role
 from catenary.postproc.report.study_table import Column, StudyTable
 from catenary.solver.statics.line_at_rest import LineAtRest
@@ -44,14 +45,8 @@ class RestSensitivity:
     left_out: dict[str, str] = field(default_factory=dict)
 
     @property
-    def unevenness(self) -> float:
-        """Range of the elasticity over twice its middle, as EN 50119 has it [-]."""
-        least, most = self.elasticity.min(), self.elasticity.max()
-        return float((most - least) / (most + least))
-
-    @property
     def by_unevenness(self) -> np.ndarray:
-        """Derivatives (m,) of it per unit of each parameter's key."""
+        """Derivatives (m,) of the unevenness (max - min) / (max + min) of the elasticity."""
         low, high = self.elasticity.argmin(), self.elasticity.argmax()
         least, most = self.elasticity[low], self.elasticity[high]
         by_least, by_most = self.by_elasticity[:, low], self.by_elasticity[:, high]
@@ -201,11 +196,8 @@ def summary(found: RestSensitivity) -> StudyTable:
 
 def rest_text(found: RestSensitivity) -> str:
     """Text for the terminal: the span as it is, and what each parameter changes."""
-    lift = _MM * found.elasticity
     lines = [
-        f"Span from {found.x[0]:g} to {found.x[-1]:g} m: elasticity {lift.min():.3f} to "
-        f"{lift.max():.3f} mm/N, mean {lift.mean():.3f} mm/N, unevenness "
-        f"{100 * found.unevenness:.1f} %",
+        elasticity_text(found.x, found.elasticity),
         "",
         "Changes under a change of each parameter; of the height the largest:",
         summary(found).text(),
