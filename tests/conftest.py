@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import contextlib
 import gc
+import getpass
 import io
 import logging
 import os
 import signal
 import subprocess
 import sys
+import tempfile
 from collections.abc import Iterator
 from contextlib import redirect_stdout
 from pathlib import Path
@@ -44,6 +46,16 @@ sys.path.insert(0, str(Path(__file__).with_name("support")))
 # The linear algebra of tests is small: threads would wait for each other.
 for threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
     os.environ.setdefault(threads, "1")
+
+
+# Ranks of one job end at the same time, and each clears what earlier runs of pytest left: in a
+# shared folder, one would fail over what another has just removed.
+if "mpi4py.run" in sys.modules:
+    from mpi4py import MPI
+
+    ranks_own = f"pytest-rank-{MPI.COMM_WORLD.rank}-of-{getpass.getuser()}"
+    os.environ["PYTEST_DEBUG_TEMPROOT"] = os.path.join(tempfile.gettempdir(), ranks_own)
+    os.makedirs(os.environ["PYTEST_DEBUG_TEMPROOT"], mode=0o700, exist_ok=True)
 
 
 # A signal that is ignored, as under nohup or in the background of a script, is ignored by every
