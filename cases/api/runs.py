@@ -24,6 +24,7 @@ def run(
     out: str | Path | None = None,
     *,
     force: bool = False,
+    report: bool = True,
     progress: bool = False,
     comm: Any = None,
 ) -> Run:
@@ -39,6 +40,10 @@ def run(
     force : bool
         Whether results that are in ``out`` are replaced, and whether a run may be larger than
         memory and disk have room for.
+    report : bool
+        Whether ``out`` gets a report with its pictures and tables, which takes half of the time of
+        a short run. Without it there are results and ``summary.json``, and ``catenary report``
+        makes the rest later.
     progress : bool
         Whether phases and time left are shown on standard error, as the program does.
     comm : mpi4py communicator, optional
@@ -68,7 +73,8 @@ def run(
     tables, comm = checked(scene), communicator(comm)
     with _set_up(tables, progress, comm) as options:
         if out is not None:
-            return _returned(run_into(Path(out), tables, comm, options, force=force), comm)
+            made = run_into(Path(out), tables, comm, options, force=force, only_summary=not report)
+            return _returned(made, comm)
         with temporary_folder(comm, "run") as folder:
             made = run_into(folder, tables, comm, options, force=force, only_summary=True)
             return _returned(made, comm, in_memory=True)
@@ -80,6 +86,7 @@ def restart(
     evaluate: Sequence[float] | None = None,
     *,
     force: bool = False,
+    report: bool = True,
     progress: bool = False,
     comm: Any = None,
 ) -> Run:
@@ -97,7 +104,7 @@ def restart(
         With ``until_m``: begin and end of the stretch to evaluate [m].
     force : bool
         Whether to continue even without room for all results.
-    progress, comm
+    report, progress, comm
         As for ``run``.
 
     Returns
@@ -130,7 +137,9 @@ def restart(
     tables = on_root(comm, read, takes_long=True)
     with _set_up(tables, progress, comm) as options:
         extends = until_m is not None
-        made = go_on(own, tables, comm, options, force=force, extends=extends)
+        made = go_on(
+            own, tables, comm, options, force=force, extends=extends, only_summary=not report
+        )
         return _returned(made, comm)
 
 
@@ -225,13 +234,14 @@ def go_on(
     *,
     force: bool = False,
     extends: bool = False,
+    only_summary: bool = False,
     tell: Callable[[str], None] = lambda outcome: None,
 ) -> Run:
     """A run that goes on, as of ``run_into``. Collective.
 
     Parameters
     ----------
-    folder, comm, force, extends, tell
+    folder, comm, force, extends, only_summary, tell
         As of ``cases.run.runner.restart_case``.
     scene : Scene
         What ``scene_to_continue`` gave.
@@ -251,6 +261,7 @@ def go_on(
             tell=tell,
             force=force,
             extends=extends,
+            only_summary=only_summary,
         ),
     )
     from catenary.results import Run

@@ -222,6 +222,12 @@ NamedVariants = Annotated[
         help='TOML file of named variants, each a line name = ["key=value", ...].',
     ),
 ]
+NoReport = Annotated[
+    bool,
+    typer.Option(
+        "--no-report", help="Write results and summary.json alone; catenary report does the rest."
+    ),
+]
 Verbose = Annotated[bool, typer.Option("-v", "--verbose", help="Print the time of each phase.")]
 
 

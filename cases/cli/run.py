@@ -11,6 +11,7 @@ import typer
 from catenary.base.errors import InputError
 from catenary.cases.cli.app import (
     NamedVariants,
+    NoReport,
     Out,
     PartOfRuns,
     PetscOptions,
@@ -43,6 +44,7 @@ def run(
     words: RunWords,
     out: Out,
     strict: Strict = False,
+    no_report: NoReport = False,
     study: Annotated[
         bool, typer.Option("--study", help="Run the case's study: variants, figures, verdicts.")
     ] = False,
@@ -58,6 +60,8 @@ def run(
 
         if strict:
             raise InputError("a study is not judged as a whole: give --study without --strict")
+        if no_report:
+            raise InputError("a study has a page of its own: give --study without --no-report")
         return run_study(words, out, runs, part)
     if runs.n_jobs != 1 or part is not None:
         raise InputError("-j and --part belong to --study; mpirun shares a single run among ranks")
@@ -75,7 +79,16 @@ def run(
         for text in arrival_warnings(scene):
             console.warn(text)
 
-    made = run_into(out, scene, comm, arguments, force=runs.force, tell=_teller(out), ready=warn)
+    made = run_into(
+        out,
+        scene,
+        comm,
+        arguments,
+        force=runs.force,
+        only_summary=no_report,
+        tell=_teller(out),
+        ready=warn,
+    )
     return _end(made, strict)
 
 
@@ -98,6 +111,7 @@ def restart(
         typer.Option(metavar="FROM:TO", help="With --until-m: the stretch to evaluate [m]."),
     ] = None,
     strict: Strict = False,
+    no_report: NoReport = False,
     force: Annotated[
         bool, typer.Option("--force", help="Continue even without room for all results.")
     ] = False,
@@ -117,8 +131,16 @@ def restart(
     comm, scene, arguments = begin(read, verbose, lambda scene: scene)
     from catenary.runs import go_on
 
-    tell, extends = _teller(folder), until_m is not None
-    made = go_on(folder, scene, comm, arguments, force=force, extends=extends, tell=tell)
+    made = go_on(
+        folder,
+        scene,
+        comm,
+        arguments,
+        force=force,
+        extends=until_m is not None,
+        only_summary=no_report,
+        tell=_teller(folder),
+    )
     return _end(made, strict)
 
 

@@ -167,7 +167,7 @@ def run_case(
     tell : called with the outcome on all ranks when the result file is closed, before the report
         is drawn: an MPI launcher that is interrupted leaves its processes a second
     ready : called on all ranks when folder and size of the run have been judged
-    only_summary : of the report write ``summary.json`` alone, which costs no time
+    only_summary : write ``summary.json`` in place of the report, which costs no time
     large : whether a run may pass the bounds on its size; as ``force`` if not given
     excited : excitation that sets the line into motion in place of the scene's train
 
@@ -198,13 +198,14 @@ def restart_case(
     tell: Callable[[str], None] = lambda outcome: None,
     force: bool = False,
     extends: bool = False,
+    only_summary: bool = False,
 ) -> RunOutcome:
     """Continue an interrupted or broken run from its last checkpoint. Collective.
 
     ``scene`` must be the one that the run was started with; any number of ranks may continue.
     With ``extends`` it may have a later end and another evaluated stretch, and the run may be done.
-    ``petsc_options`` and ``tell`` are those of ``run_case``; with ``force`` the room on the disk
-    is not looked at.
+    ``petsc_options``, ``tell`` and ``only_summary`` are those of ``run_case``; with ``force`` the
+    room on the disk is not looked at.
 
     Raises
     ------
@@ -216,7 +217,9 @@ def restart_case(
 
     with held(out_dir, comm, f"catenary restart {out_dir}"):
         state = on_root(comm, lambda: state_to_continue(out_dir / RESULT, extends))
-        order = _Order(scene, out_dir, comm, petsc_options, tell, state, False, extends=extends)
+        order = _Order(
+            scene, out_dir, comm, petsc_options, tell, state, only_summary, extends=extends
+        )
         return _run(order, lambda size: check_room_to_continue(out_dir, size, force))
 
 

@@ -163,6 +163,8 @@ def write_report(
 def write_summary(result_path: Path | str, out_dir: Path | str) -> bool | None:
     """Write ``summary.json`` of a run alone; returns the verdict as ``Report``. Not collective.
 
+    Files of an earlier report are removed: they may tell of a run that has gone on since.
+
     Parameters
     ----------
     result_path : Path or str
@@ -181,6 +183,7 @@ def write_summary(result_path: Path | str, out_dir: Path | str) -> bool | None:
         text = as_json(summarise(results, statistics, criteria))
         verdict = acceptance.verdict(criteria) if results.complete else None
     write_into(Path(out_dir), {"summary.json": text})
+    remove_stale(Path(out_dir), set(REPORT_FILES).difference(["summary.json"]))
     return verdict
 
 

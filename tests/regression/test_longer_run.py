@@ -59,7 +59,7 @@ def test_a_run_goes_on_to_a_later_end(whole: Path, begun: Path, tmp_path: Path) 
 
 
 def test_a_program_in_python_prolongs_a_run(whole: Path, begun: Path, tmp_path: Path) -> None:
-    """What is refused first leaves the run as it is."""
+    """What is refused first leaves the run as it is. A report of its earlier end does not stay."""
     out = tmp_path / "run"
     shutil.copytree(begun, out)
     for given, says in (
@@ -73,11 +73,14 @@ def test_a_program_in_python_prolongs_a_run(whole: Path, begun: Path, tmp_path: 
             restart(out, **given)
     with pytest.raises(InputError, match="is no folder"):
         restart(tmp_path / "nowhere", until_m=LAST)
-    with restart(out, until_m=LAST, evaluate=(150, 190)) as run:
+    assert (out / "report.html").exists() and (out / "contact_force.png").exists()
+    with restart(out, until_m=LAST, evaluate=(150, 190), report=False) as run:
         assert run.outcome == "done" and run.summary["evaluation_m"] == [150.0, 190.0]
         assert "report" in run.phase_wall and run.folder == out
         with Results(whole) as expected:
             assert np.array_equal(run.force, expected.channel("contact_force"))
+    left = {path.name for path in out.iterdir() if not path.name.startswith(".")}
+    assert left == {"run.h5", "fields.h5", "fields.xdmf", "summary.json"}
     assert_same_histories(out, whole)
 
 

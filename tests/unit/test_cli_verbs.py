@@ -284,13 +284,14 @@ def test_run_hands_everything_over(runner: types.SimpleNamespace, tmp_path: Path
     runner.result = outcome("done", True)
     words = ["--set", "train.speed_km_h=300", "petsc.march_ksp_type=cg", "--force", "--short"]
     out = tmp_path / "out"
-    result = invoke("run", "en50318_2002", "-o", str(out), *words, "--", "-march_ksp_type", "gmres")
+    words += ["--no-report", "--", "-march_ksp_type", "gmres"]
+    result = invoke("run", "en50318_2002", "-o", str(out), *words)
     assert result.exit_code == 0, result.output
     ((scene, folder, options),) = runner.calls
     assert folder == out
     assert scene.train.speed_km_h == 300
     assert scene.line.n_spans == load_scene("en50318_2002", shortened=True).line.n_spans
-    assert options["force"] is True
+    assert options["force"] is True and options["only_summary"] is True
     assert options["petsc_options"] == ["-march_ksp_type", "cg", "-march_ksp_type", "gmres"]
 
 

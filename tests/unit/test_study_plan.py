@@ -46,10 +46,11 @@ def test_a_case_without_a_study_says_so(tmp_path: Path) -> None:
     assert not (tmp_path / "out").exists()
 
 
-def test_a_study_is_not_strict(tmp_path: Path) -> None:
-    done = invoke("run", "ambrosio2012", "--study", "--strict", "-o", str(tmp_path / "out"))
+@pytest.mark.parametrize("option", ["--strict", "--no-report"])
+def test_a_study_has_no_options_of_a_run(option: str, tmp_path: Path) -> None:
+    done = invoke("run", "ambrosio2012", "--study", option, "-o", str(tmp_path / "out"))
     assert done.exit_code == 2
-    assert "give --study without --strict" in done.stderr
+    assert f"give --study without {option}" in done.stderr
 
 
 @pytest.mark.parametrize(
