@@ -58,7 +58,7 @@ def test_a_signal_closes_the_file_and_restart_finishes_the_run(
 ) -> None:
     """Which signal it was leaves no trace in the file: one of the runs is continued."""
     out = tmp_path / "out"
-    words = short_run(out, FINE, SHORT_FLUSHES)
+    words = short_run(out, FINE, SHORT_FLUSHES, report=True)
     with catenary_started(*words, cwd=tmp_path) as program:
         program.wait_for(lambda: n_rows(out / "run.h5") > 200)
         program.send(number)
@@ -197,7 +197,7 @@ def test_a_file_that_may_not_grow_ends_the_run_with_a_sentence(tmp_path: Path) -
         "from catenary.cases.cli.main import main\n"
         "main()\n"
     )
-    words = short_run(out, FINE, SHORT_FLUSHES)
+    words = short_run(out, FINE, SHORT_FLUSHES, report=True)
     with program_started(python(str(script), *words), tmp_path) as program:
         done = program.end()
     assert done.code == 1, done.stderr
@@ -231,7 +231,7 @@ def test_a_full_disk_ends_the_run_with_a_sentence(room: str, ranks: int, tmp_pat
     disk.mkdir()
     out = disk / "out"
     # Without --force the lack of room is seen before anything is computed.
-    words = [*short_run(out, SHORT_FLUSHES, "numerics.dt_s=1e-4"), "--force"]
+    words = [*short_run(out, SHORT_FLUSHES, "numerics.dt_s=1e-4", report=True), "--force"]
     # The disk is there for these processes only.
     script = tmp_path / "on_a_small_disk.sh"
     script.write_text(
@@ -298,7 +298,7 @@ BROKEN = {
 def test_a_step_that_breaks_ends_the_run_with_time_and_remedy(how: str, tmp_path: Path) -> None:
     assignments, words = BROKEN[how]
     out = tmp_path / "out"
-    done = catenary(*short_run(out, *assignments), cwd=tmp_path)
+    done = catenary(*short_run(out, *assignments, report=True), cwd=tmp_path)
     assert done.code == 1, done.stderr
     assert "Results:" not in done.stdout
     (sentence,) = done.sentences

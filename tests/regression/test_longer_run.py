@@ -38,7 +38,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def begun(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("begun")
-    done = catenary(*short_run(folder / "run", *SCENE, FIRST), cwd=folder)
+    done = catenary(*short_run(folder / "run", *SCENE, FIRST, report=True), cwd=folder)
     assert done.code == 0, done.stderr
     return folder / "run"
 

@@ -25,7 +25,7 @@ FILM = ("--from", "0.2", "--to", "0.4", "--fps", "10", "--every-m", "2")
 @pytest.mark.study
 def test_films_and_views_of_a_run_that_goes_on(tmp_path: Path) -> None:
     out = tmp_path / "out"
-    words = ["run", "en50318_2002", "-o", str(out), "--set", *LONG]
+    words = ["run", "en50318_2002", "-o", str(out), "--no-report", "--set", *LONG]
     with catenary_started(*words, cwd=tmp_path) as program:
         program.wait_for(lambda: n_rows(out / "run.h5") > 10_000)
         before = n_rows(out / "run.h5")

@@ -78,7 +78,7 @@ def test_before_the_march(number: signal.Signals, tmp_path: Path) -> None:
 def test_after_the_march(tmp_path: Path) -> None:
     out = tmp_path / "out"
     # Without snapshots a report works out no waves.
-    words = short_run(out, COARSE, "output.field_every_s=0")
+    words = short_run(out, COARSE, "output.field_every_s=0", report=True)
     done = signalled(tmp_path, REPORT, words, signal.SIGUSR1)
     assert done.code == 1
     (sentence,) = done.sentences
@@ -122,7 +122,7 @@ def test_a_signal_to_one_of_several_ranks(
     place: tuple[str, str, str], to_rank: int, tmp_path: Path
 ) -> None:
     out = tmp_path / "out"
-    done = signalled(tmp_path, place, short_run(out), signal.SIGUSR2, 2, to_rank)
+    done = signalled(tmp_path, place, short_run(out, report=True), signal.SIGUSR2, 2, to_rank)
     assert done.code == 1
     assert done.left == []
     (sentence,) = done.sentences

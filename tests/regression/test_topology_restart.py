@@ -29,7 +29,7 @@ STEPS = 300
 def words(case: str, out: Path) -> list[str]:
     """A run of some hundred steps."""
     given = [*RUNS[case], "numerics.dt_s=1e-3", "train.raise_time_s=0.05"]
-    return ["run", case, "-o", str(out), "--set", *given]
+    return ["run", case, "-o", str(out), "--no-report", "--set", *given]
 
 
 @pytest.mark.parametrize(

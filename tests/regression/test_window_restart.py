@@ -53,7 +53,7 @@ def words(window: str) -> tuple[str, ...]:
         f"{{type='dropper_break',at_s=0.4,span={before + 1},dropper=6}},"
         "{type='tension_loss',at_s=0.7,wire='messenger_wire',share=0.9}]",
     )  # fmt: skip
-    return ("run", "ambrosio2012", "--set", *scene, *WINDOWS[window])
+    return ("run", "ambrosio2012", "--no-report", "--set", *scene, *WINDOWS[window])
 
 
 @pytest.fixture(scope="module")

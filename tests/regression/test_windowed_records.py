@@ -102,7 +102,7 @@ def test_a_run_that_is_interrupted_goes_on_with_its_snapshots(
     window: str, run: Made, tmp_path: Path
 ) -> None:
     out = tmp_path / "out"
-    words = ["run", CASE, "-o", str(out), "--set", *SCENE, *WINDOWS[window]]
+    words = ["run", CASE, "-o", str(out), "--no-report", "--set", *SCENE, *WINDOWS[window]]
     begun = called(*words, "--", "-march_ts_max_steps", "450", cwd=tmp_path)
     assert begun.code == 1, begun.stderr
     done = called("restart", str(out), cwd=tmp_path)

@@ -62,9 +62,10 @@ _MARK = "CATENARY_TEST_MARK"
 _PROC = Path("/proc")
 
 
-def short_run(out: Path, *assignments: str) -> list[str]:
+def short_run(out: Path, *assignments: str, report: bool = False) -> list[str]:
     """Words of ``catenary run`` for the short scene with further assignments."""
-    return ["run", "en50318_2002", "-o", str(out), "--set", *SHORT_SCENE, *assignments]
+    words = ["run", "en50318_2002", "-o", str(out), *([] if report else ["--no-report"])]
+    return [*words, "--set", *SHORT_SCENE, *assignments]
 
 
 @dataclass
