@@ -14,11 +14,17 @@ from catenary.base.errors import InputError
 from catenary.cases.scene.checks.scene import check
 from catenary.cases.scene.input.case_files import find_case
 from catenary.cases.scene.input.csv_files import absolute_names, take_in_files
-from catenary.cases.scene.input.faults import Origin, SceneError, text_faults
+from catenary.cases.scene.input.faults import Origin, SceneError, shown, text_faults
 from catenary.cases.scene.input.plain_text import refuse_deep
-from catenary.cases.scene.input.toml_input import Assigned, assign, parse_assignment, read_toml
+from catenary.cases.scene.input.toml_input import (
+    Assigned,
+    assign,
+    parse_assignment,
+    read_toml,
+    value_at,
+)
 from catenary.cases.scene.keys.error_sentences import schema_faults, unknown_key
-from catenary.cases.scene.keys.keys import is_known, known_keys, with_kinds
+from catenary.cases.scene.keys.keys import is_known, known_keys, list_of, names_value, with_kinds
 from catenary.cases.scene.scene import Scene
 
 
@@ -55,9 +61,12 @@ class Draft:
             return self
         raw, given = self._copy(), list(self.given)
         for key, value, where in values:
-            if not is_known(key, known_keys(Scene)):
+            known = known_keys(Scene)
+            if not names_value(key, known):
                 near = known_keys(Scene, with_kinds(key, raw, Scene))
                 raise InputError(unknown_key(key, where, near))
+            if not is_known(key, known):
+                _refuse_without_entry(raw, key, where)
             assign(raw, key, value, where)
             given.append((key, where))
         return replace(self, raw=raw, given=tuple(given))
@@ -92,6 +101,19 @@ class Draft:
     def _copy(self) -> dict[str, Any]:
         refuse_deep(self.raw, self.file)
         return copy.deepcopy(self.raw)
+
+
+def _refuse_without_entry(raw: dict[str, Any], key: str, where: str) -> None:
+    """Raise InputError unless the entry of a list that a key names is written in the case."""
+    entries = value_at(raw, list_of(key))
+    name = shown(list_of(key))[1:-1]
+    if not isinstance(entries, list):
+        what = "has no list in the case" if entries is None else f"is {shown(entries)} and no list"
+    elif int(key.rpartition(".")[2]) >= len(entries):
+        what = f"has {len(entries)} entries, which count from 0"
+    else:
+        return
+    raise InputError(f"{shown(key)[1:-1]} cannot be set {where}: {name} {what}")
 
 
 def read_draft(case: str | Path, overrides: Sequence[str] = (), shortened: bool = False) -> Draft:

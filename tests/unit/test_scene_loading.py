@@ -114,6 +114,18 @@ def test_a_second_pantograph_is_appended_by_its_number() -> None:
     assert train.end == scene.evaluation.to_m + 200.0 + 60.0
 
 
+def test_an_entry_of_a_list_is_replaced_by_its_number() -> None:
+    scene = load_scene("en50318_2002", ["pantographs.reference.masses_kg.1=16"])
+    assert scene.pantographs["reference"].masses_kg == [7.2, 16.0]
+    for key, sentence in (
+        ("pantographs.reference.masses_kg.2", "masses_kg has 2 entries, which count from 0"),
+        ("line.dropper.pre_sag_mm.3", "line.dropper.pre_sag_mm has no list in the case"),
+        ("line.contact_wire.tension_N.0", "line.contact_wire.tension_N is 20000.0 and no list"),
+    ):
+        with pytest.raises(InputError, match=f"{key} cannot be set .*: .*{sentence}"):
+            load_scene("en50318_2002", [f"{key}=16"])
+
+
 def test_the_end_stops_at_the_end_of_the_running_range() -> None:
     scene = load_scene("en50318_2002", ["line.n_spans=13", "evaluation.to_m=750"])
     assert end_of(scene) == 780.0

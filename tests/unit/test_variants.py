@@ -70,6 +70,8 @@ def test_named_variants_come_before_the_varied_keys_that_win() -> None:
 def test_keys_that_share_their_last_part_are_told_apart() -> None:
     (variant,) = product([parse_vary("one.t=1"), parse_vary("two.t=1")], {})
     assert variant.name == "one.t_1__two.t_1"
+    (of_an_entry,) = product([parse_vary("head.masses_kg.0=7.2")], {})
+    assert of_an_entry.name == "masses_kg.0_7.2"
 
 
 def test_values_that_make_the_same_folder_get_two() -> None:

@@ -125,6 +125,22 @@ def assign(raw: dict[str, Any], key: str, value: Any, where: str = COMMAND_LINE)
             del here[place]
 
 
+def value_at(tables: Any, key: str) -> Any:
+    """The value of a dotted key in nested tables, None if there is none; numbers index lists.
+
+    Parameters
+    ----------
+    tables : of a scene, as a case file or ``resolved`` gives them
+    """
+    here = tables
+    for part in key.split("."):
+        if isinstance(here, list) and part.isdigit() and int(part) < len(here):
+            here = here[int(part)]
+        else:
+            here = here.get(part) if isinstance(here, dict) else None
+    return here
+
+
 def _index(here: list[Any], parts: list[str], depth: int, where: str) -> int:
     """The index that a key names in a list, at most one past its last entry."""
     above, part = ".".join(parts[:depth]), parts[depth]

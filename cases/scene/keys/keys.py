@@ -148,6 +148,17 @@ def is_known(key: str, known: tuple[str, ...]) -> bool:
     return key in known or any(_matches(parts, candidate.split(".")) for candidate in known)
 
 
+def list_of(key: str) -> str:
+    """The key of the list whose entry a key names by its number; the key itself if it is none."""
+    above, _, number = key.rpartition(".")
+    return above if above and number.isascii() and number.isdigit() else key
+
+
+def names_value(key: str, known: tuple[str, ...]) -> bool:
+    """Whether a dotted key, or the list whose entry it names by its number, is one of ``known``."""
+    return is_known(key, known) or is_known(list_of(key), known)
+
+
 def _matches(parts: list[str], pattern: list[str]) -> bool:
     if pattern == ["test", ANY]:
         return len(parts) >= 2 and parts[0] == pattern[0]  # a free table: its names hold dots

@@ -10,7 +10,7 @@ import numpy as np
 
 from catenary.base.errors import InputError
 from catenary.cases.process.workers import Pool
-from catenary.cases.scene.input.toml_input import REMOVED, parse_assignment
+from catenary.cases.scene.input.toml_input import REMOVED, parse_assignment, value_at
 from catenary.cases.scene.load import Draft
 from catenary.cases.scene.scene import Scene
 from catenary.cases.scene.turned import FORWARD, has_mirrored_line, turned
@@ -29,7 +29,6 @@ from catenary.cases.studies.optimise.task import OptimiseTask
 from catenary.cases.studies.optimise.variables import Variables, variables_of
 from catenary.cases.studies.records import KeptRows
 from catenary.cases.studies.scene_sets import Evaluation, SceneSet, members_of
-from catenary.cases.studies.sweep.variants import value_at
 from catenary.postproc.report.study_table import StudyTable
 
 # Shares of an optimum's changes that are tried in whole units.

@@ -10,10 +10,11 @@ import numpy as np
 
 from catenary.base.errors import InputError
 from catenary.base.options import option
+from catenary.cases.scene.input.toml_input import value_at
 from catenary.cases.scene.problem import resolved
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.optimise.task import VariableTable
-from catenary.cases.studies.sweep.variants import check_key, is_number, value_at
+from catenary.cases.studies.sweep.variants import check_key, is_number
 
 # Keys whose entries are places along a span: of two that are symmetric one moves against the other.
 _PLACES = "positions_m"

@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 
 from catenary.base.errors import InputError
+from catenary.cases.scene.input.toml_input import value_at
+from catenary.cases.scene.keys.keys import list_of
 from catenary.cases.scene.problem import resolved
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.sampling.design import points
@@ -20,8 +22,8 @@ from catenary.cases.studies.sampling.distributions import (
     takes_mean,
 )
 from catenary.cases.studies.sampling.fields import fields_as_text
-from catenary.cases.studies.sampling.tables import SamplingTable, field_column, list_of
-from catenary.cases.studies.sweep.variants import Variant, is_number, text_of, value_at
+from catenary.cases.studies.sampling.tables import SamplingTable, field_column
+from catenary.cases.studies.sweep.variants import Variant, is_number, text_of
 
 
 def sample_name(number: int) -> str:

@@ -13,7 +13,7 @@ from catenary.cases.scene.input.faults import shown
 from catenary.cases.scene.input.plain_text import refuse_deep
 from catenary.cases.scene.input.toml_input import read_toml
 from catenary.cases.scene.keys.error_sentences import unknown_key
-from catenary.cases.scene.keys.keys import is_known, known_keys
+from catenary.cases.scene.keys.keys import known_keys, names_value
 from catenary.cases.scene.keys.table import Table
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.sampling.distributions import (
@@ -169,12 +169,6 @@ class SamplingTable(Table):
         return self
 
 
-def list_of(key: str) -> str:
-    """The key of the list whose entry a key names by its number; the key itself if it is none."""
-    above, _, number = key.rpartition(".")
-    return above if above and number.isascii() and number.isdigit() else key
-
-
 def field_column(key: str) -> str:
     """The input, and the column of a sweep's table, that numbers the realisations of a field."""
     return f"field of {key}"
@@ -217,7 +211,7 @@ def sampling_of(raw: Mapping[str, Any], file: str) -> SamplingTable:
                 f"{key} in {file} cannot vary: PETSc takes its options once, when the program "
                 "starts"
             )
-        if not is_known(key, known) and not is_known(list_of(key), known):
+        if not names_value(key, known):
             raise InputError(unknown_key(key, f"in {file}", known))
         if key in table.keys and key in table.fields:
             raise InputError(f"{shown(key)[1:-1]} in {file} is in keys and in fields; keep one")

@@ -21,13 +21,14 @@ import numpy as np
 from catenary.base.errors import InputError
 from catenary.base.options import option
 from catenary.cases.scene.input.faults import Origin, shown
+from catenary.cases.scene.input.toml_input import value_at
 from catenary.cases.scene.keys.error_sentences import unknown_key
-from catenary.cases.scene.keys.keys import is_known, known_keys
+from catenary.cases.scene.keys.keys import known_keys, names_value
 from catenary.cases.scene.keys.units import unit_of
 from catenary.cases.scene.load import scene_from
 from catenary.cases.scene.problem import line_of, resolved
 from catenary.cases.scene.scene import Scene
-from catenary.cases.studies.sweep.variants import is_number, value_at
+from catenary.cases.studies.sweep.variants import is_number
 
 # Patterns of the parameters that are taken if none are named, in the order in which they are taken.
 USUAL = (
@@ -169,9 +170,7 @@ class ChangedScenes:
             return self._length_of(key, *map(int, dropper.groups()))
         known = known_keys(Scene)
         parts = key.split(".")
-        if not is_known(key, known) and not (
-            parts[-1].isdigit() and is_known(key.rpartition(".")[0], known)
-        ):
+        if not names_value(key, known):
             where = where or f"in {option('--parameter', 'parameters')}"
             raise InputError(unknown_key(key, where, known))
         if parts[0] == "pantographs" and len(parts) > 2:

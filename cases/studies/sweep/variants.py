@@ -17,7 +17,7 @@ from catenary.cases.scene.input.faults import shown
 from catenary.cases.scene.input.plain_text import steers
 from catenary.cases.scene.input.toml_input import parse_assignment, read_toml
 from catenary.cases.scene.keys.error_sentences import unknown_key
-from catenary.cases.scene.keys.keys import is_known, known_keys
+from catenary.cases.scene.keys.keys import known_keys, list_of, names_value
 from catenary.postproc.files.csv_text import begins_formula
 
 MAX_VARIANTS = 10_000
@@ -134,22 +134,6 @@ def text_of(value: Any) -> str:
     return text
 
 
-def value_at(tables: Any, key: str) -> Any:
-    """The value of a dotted key in nested tables, None if there is none; numbers index lists.
-
-    Parameters
-    ----------
-    tables : of a scene, as ``resolved`` gives them
-    """
-    here = tables
-    for part in key.split("."):
-        if isinstance(here, list) and part.isdigit() and int(part) < len(here):
-            here = here[int(part)]
-        else:
-            here = here.get(part) if isinstance(here, dict) else None
-    return here
-
-
 def is_number(value: Any) -> bool:
     """Whether a value is a number, which true and false are not."""
     return isinstance(value, int | float) and not isinstance(value, bool)
@@ -161,7 +145,7 @@ def check_key(key: str, where: str) -> None:
     from catenary.cases.scene.scene import Scene
 
     known = known_keys(Scene)
-    if not is_known(key, known):
+    if not names_value(key, known):
         raise InputError(unknown_key(key, where, known))
 
 
@@ -209,8 +193,8 @@ def product(
         count *= len(each.values)
     if count > MAX_VARIANTS:
         raise InputError(f"these variations make {count} runs; at most {MAX_VARIANTS} are allowed")
-    last = [key.rsplit(".", 1)[-1] for key in keys]
-    # The last part of each key, the whole key where two share it.
+    last = [key[list_of(key).rfind(".") + 1 :] for key in keys]
+    # The last part of each key, with the number of an entry; the whole key where two share it.
     labels = [name if last.count(name) == 1 else key for key, name in zip(keys, last, strict=True)]
     variants = []
     for name, assignments in (named or {"": ()}).items():

@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 
 from catenary.base.errors import InputError
+from catenary.cases.scene.input.toml_input import value_at
 from catenary.cases.scene.keys.units import length_from_mm, unit_of
 from catenary.cases.scene.problem import line_of, resolved
 from catenary.cases.scene.scene import Scene
-from catenary.cases.studies.sweep.variants import check_key, is_number, value_at
+from catenary.cases.studies.sweep.variants import check_key, is_number
 from catenary.cases.studies.tolerance.task import (
     DropperErrors,
     ErrorKind,
