@@ -3,18 +3,17 @@
 
 #include <algorithm>
 
+#include "base/targets.hpp"
+
 namespace catenary {
 
 namespace {
 
-/// Call `take` with each link from `begin` to `end` and its reserve.
-template <class Take>
-void each_reserve(const Motion& motion, const Links& links, int64_t begin, int64_t end, Take take) {
-    if (links.unknowns.columns != 2) {
-        for (int64_t link = begin; link < end; ++link) take(link, reserve_of(link, links, motion));
-        return;
-    }
-    // Droppers alone, mostly: without a loop over unknowns this takes half the time.
+/// Reserves of links between two unknowns, as droppers alone are, mostly: without a loop over
+/// unknowns this takes half the time.
+CATENARY_FOR_TARGETS
+void reserves_of_pairs(const Motion& motion, const Links& links, int64_t begin, int64_t end,
+                       double* __restrict result) {
     const double *x = motion.x.data(), *y = motion.y.data(), *z = motion.z.data();
     const double s0 = motion.shares[0], s1 = motion.shares[1], s2 = motion.shares[2],
                  s3 = motion.shares[3], s4 = motion.shares[4];
@@ -25,8 +24,8 @@ void each_reserve(const Motion& motion, const Links& links, int64_t begin, int64
         const double of_x = u * x[i] + v * x[j], of_y = u * y[i] + v * y[j],
                      of_z = u * z[i] + v * z[j];
         const Reserve& law = links.law[link];
-        take(link, law.rest + law.stiffness * (s0 * of_x + s1 * of_y + s2 * of_z) +
-                       law.damping * (s3 * of_y + s4 * of_z));
+        result[link] = law.rest + law.stiffness * (s0 * of_x + s1 * of_y + s2 * of_z) +
+                       law.damping * (s3 * of_y + s4 * of_z);
     }
 }
 
@@ -34,8 +33,9 @@ void each_reserve(const Motion& motion, const Links& links, int64_t begin, int64
 
 void reserves_within(const Motion& motion, const Links& links, int64_t begin, int64_t end,
                      std::span<double> result) {
-    each_reserve(motion, links, begin, end,
-                 [&](int64_t link, double reserve) { result[link] = reserve; });
+    if (links.unknowns.columns == 2)
+        return reserves_of_pairs(motion, links, begin, end, result.data());
+    for (int64_t link = begin; link < end; ++link) result[link] = reserve_of(link, links, motion);
 }
 
 void reserves(const Motion& motion, const Links& links, std::span<double> result) {
@@ -44,10 +44,11 @@ void reserves(const Motion& motion, const Links& links, std::span<double> result
 
 void forces_within(const Motion& motion, const Links& links, int64_t begin, int64_t end,
                    std::span<double> result) {
-    each_reserve(motion, links, begin, end, [&](int64_t link, double reserve) {
+    reserves_within(motion, links, begin, end, result);
+    for (int64_t link = begin; link < end; ++link) {
         const Reserve& law = links.law[link];
-        result[link] = reserve * (reserve < 0.0 ? law.carried - law.released : law.carried);
-    });
+        result[link] *= result[link] < 0.0 ? law.carried - law.released : law.carried;
+    }
 }
 
 void add_bends(const Motion& motion, const Dependents& bends, int64_t begin, int64_t end,
