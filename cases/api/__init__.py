@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from catenary.questions import highest_speeds, separations
     from catenary.results import Run, open
     from catenary.runs import restart, run
-    from catenary.scenes import Scene, load
+    from catenary.scenes import Scene, load, shipped_cases
     from catenary.sensitivities import sensitivity
     from catenary.steps import Simulation
     from catenary.sweeps import sweep
@@ -58,6 +58,7 @@ __all__ = [
     "run",
     "sensitivity",
     "separations",
+    "shipped_cases",
     "static",
     "sweep",
     "tolerance",
@@ -73,7 +74,7 @@ _FILES = {
     "questions": ("highest_speeds", "separations"),
     "results": ("Run", "open"),
     "runs": ("restart", "run"),
-    "scenes": ("Scene", "load"),
+    "scenes": ("Scene", "load", "shipped_cases"),
     "sensitivities": ("sensitivity",),
     "base.errors": ("CatenaryError", "Fault", "InputError", "RunBroken"),
     "steps": ("Simulation",),

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from catenary.base.errors import InputError
+from catenary.cases.scene.input.case_files import titles
 from catenary.cases.scene.input.faults import shown
 from catenary.cases.scene.input.plain_text import DEEPEST
 from catenary.cases.scene.input.toml_input import REMOVED
@@ -172,6 +173,22 @@ def load(scene: str | Path | Mapping[str, Any], *, short: bool = False) -> Scene
     else:
         draft = read_draft(scene)
     return Scene(draft.shortened() if short else draft)
+
+
+def shipped_cases() -> dict[str, str]:
+    """The cases that come with the program. Not collective.
+
+    Returns
+    -------
+    dict
+        Title of each case by the name that ``load`` takes, in alphabetical order.
+
+    Examples
+    --------
+    >>> catenary.shipped_cases()["en50318_2002"]
+    'Reference model of EN 50318:2002'
+    """
+    return titles()
 
 
 def scene_of(scene: SceneLike) -> Scene:

@@ -9,9 +9,9 @@ from __future__ import annotations
 
 def cases(incomplete: str) -> list[tuple[str, str]]:
     """Names of shipped cases with their titles; shells complete paths themselves."""
-    from catenary.cases.scene.input.case_files import entries
+    from catenary.cases.scene.input.case_files import titles
 
-    return [(one.name, one.title) for one in entries() if one.name.startswith(incomplete)]
+    return [(name, title) for name, title in titles().items() if name.startswith(incomplete)]
 
 
 def beginnings(incomplete: str) -> list[tuple[str, str]]:

@@ -88,10 +88,10 @@ def list_cases(
 
         console.say(pantograph_table())
         return
-    from catenary.cases.scene.input.case_files import entries
     from catenary.cases.terminal import terminal_text
+    from catenary.scenes import shipped_cases
 
-    console.say(terminal_text.case_table(entries()))
+    console.say(terminal_text.case_table(shipped_cases()))
 
 
 @serial_verb(

@@ -30,7 +30,7 @@ from catenary.cases.terminal import console
 
 if TYPE_CHECKING:
     import catenary
-    from catenary.cases.run.planning.slurm_script import Job
+    from catenary.cases.run.planning.slurm_script import SlurmJob
     from catenary.cases.scene.scene import Scene
 
 
@@ -230,7 +230,7 @@ def submit(
     """Serial."""
     import shutil
 
-    from catenary.cases.run.planning.slurm_script import Job, slurm_script
+    from catenary.cases.run.planning.slurm_script import SlurmJob, slurm_script
 
     refuse_impossible(out)
     if array is None and (vary or named or study):
@@ -240,7 +240,9 @@ def submit(
     case_words += ["--short"] if words.shortened else []
     # The folder comes last, so that nothing is taken for a further assignment.
     case_words += [word for value in chosen for word in ("--set", value)]
-    job = Job(ranks, nodes, minutes, chain, directives or [], before or [], "B:" if array else "")
+    job = SlurmJob(
+        ranks, nodes, minutes, chain, directives or [], before or [], "B:" if array else ""
+    )
     if array is None:
         from catenary.cases.run.planning.plan import make_plan
         from catenary.cases.scene.load import load_scene
@@ -266,7 +268,7 @@ def _array_script(
     words: RunWords,
     case_words: list[str],
     out: Path,
-    job: Job,
+    job: SlurmJob,
     n_tasks: int,
     vary: list[str] | None,
     named: Path | None,

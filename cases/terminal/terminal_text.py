@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from catenary.cases.scene.input.case_files import CaseEntry
 from catenary.mbs.library import READY, ReadyPantograph
 from catenary.meshgen.line import Line
 from catenary.meshgen.wires import Role, Wire
@@ -22,10 +21,10 @@ from catenary.postproc.evaluate.wording import (
 from catenary.postproc.read.registration import Registration
 
 
-def case_table(cases: Sequence[CaseEntry]) -> str:
+def case_table(titles: Mapping[str, str]) -> str:
     """Names and titles of cases, one line each."""
-    width = max((len(entry.name) for entry in cases), default=0)
-    return "\n".join(f"{entry.name:{width}}  {entry.title}" for entry in cases)
+    width = max(map(len, titles), default=0)
+    return "\n".join(f"{name:{width}}  {title}" for name, title in titles.items())
 
 
 def summary_text(

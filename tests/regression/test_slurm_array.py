@@ -15,7 +15,7 @@ from scenes import load_scene
 
 from catenary import InputError
 from catenary.cases.run.planning.needs import NeedsOfRuns, total_needs
-from catenary.cases.run.planning.slurm_script import Job, array_script
+from catenary.cases.run.planning.slurm_script import SlurmJob, array_script
 
 pytestmark = pytest.mark.process
 CASE, VARIED = "en50318_2002", "train.speed_km_h=230,250,270"
@@ -118,7 +118,7 @@ def test_a_task_that_is_told_to_end_asks_to_be_started_again(
 
 
 def test_a_task_that_breaks_is_not_started_again(programs: Path, tmp_path: Path) -> None:
-    script = array_script(["sweep", "no_such_case"], tmp_path / "out", Job(), 3, NEEDS)
+    script = array_script(["sweep", "no_such_case"], tmp_path / "out", SlurmJob(), 3, NEEDS)
     program = task(script, 2)
     program.communicate(timeout=240)
     assert program.returncode == 2 and not (programs / "calls").exists()
@@ -144,7 +144,7 @@ def test_a_study_is_made_in_parts_too(tmp_path: Path) -> None:
 
 def test_words_of_strangers_stay_words(programs: Path, tmp_path: Path) -> None:
     out, words = tmp_path / "it's $(touch bad)", ["sweep", "--set", "case.title=`touch bad`'"]
-    script = array_script(words, out, Job(ranks=2), 3, NEEDS, ["-x", "$(touch bad)"])
+    script = array_script(words, out, SlurmJob(ranks=2), 3, NEEDS, ["-x", "$(touch bad)"])
     (programs / "catenary").unlink()
     (programs / "catenary").write_text('#!/bin/bash\nprintf "%s\\n" "$@" > "$STAND_IN/words"\n')
     (programs / "catenary").chmod(0o755)
@@ -159,9 +159,9 @@ def test_limits_follow_from_the_share_of_a_task(tmp_path: Path) -> None:
     """The longest run, or the runs of a task one after the other on each of its ranks; three times
     that, five minutes around, in steps of five."""
     for job, n_tasks, limit in (
-        (Job(), 1, "02:35"),
-        (Job(), 3, "00:55"),
-        (Job(ranks=2), 1, "01:20"),
+        (SlurmJob(), 1, "02:35"),
+        (SlurmJob(), 3, "00:55"),
+        (SlurmJob(ranks=2), 1, "01:20"),
     ):
         script = array_script(["sweep"], tmp_path, job, n_tasks, NEEDS)
         assert f"#SBATCH --time={limit}:00\n" in script, script
@@ -193,4 +193,4 @@ def test_what_does_not_fit_together_is_refused(words: list[str], told: str, tmp_
 
 def test_more_nodes_than_ranks_are_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="--nodes is 3, more than the 2 ranks"):
-        array_script(["sweep"], tmp_path, Job(ranks=2, nodes=3), 3, NEEDS)
+        array_script(["sweep"], tmp_path, SlurmJob(ranks=2, nodes=3), 3, NEEDS)

@@ -12,7 +12,7 @@ from program import assert_same_histories, catenary, write_program
 
 from catenary import InputError
 from catenary import open as open_run
-from catenary.cases.run.planning.slurm_script import Job, limit_minutes, slurm_script
+from catenary.cases.run.planning.slurm_script import SlurmJob, limit_minutes, slurm_script
 
 # Some four seconds of march, so that a signal meets it.
 SCENE = ["numerics.dt_s=5e-5"]
@@ -83,13 +83,13 @@ def test_a_run_goes_on_in_the_next_job_to_the_same_end(tmp_path: Path) -> None:
 
 def test_the_last_job_of_a_chain_has_no_follower(tmp_path: Path) -> None:
     programs, out = stand_in(tmp_path / "slurm"), tmp_path / "out"
-    script = slurm_script(["no_such_case"], out, Job(chain=0), 1.0, 1e9)
+    script = slurm_script(["no_such_case"], out, SlurmJob(chain=0), 1.0, 1e9)
     assert job(script, programs, out) == (2, [])
 
 
 def test_bad_input_ends_the_chain(tmp_path: Path) -> None:
     programs, out = stand_in(tmp_path / "slurm"), tmp_path / "out"
-    script = slurm_script(["no_such_case"], out, Job(), 1.0, 1e9)
+    script = slurm_script(["no_such_case"], out, SlurmJob(), 1.0, 1e9)
     code, calls = job(script, programs, out)
     assert code == 2 and calls[-1] == "scancel left= 42"
 
@@ -97,7 +97,7 @@ def test_bad_input_ends_the_chain(tmp_path: Path) -> None:
 def test_words_of_strangers_stay_words(tmp_path: Path) -> None:
     programs, out = stand_in(tmp_path / "slurm"), tmp_path / "it's $(touch bad)"
     words = ["en50318_2002", "--set", "case.title=`touch bad`'$(touch bad)"]
-    script = slurm_script(words, out, Job(chain=0), 1.0, 1e9, ["-x", "$(touch bad)"])
+    script = slurm_script(words, out, SlurmJob(chain=0), 1.0, 1e9, ["-x", "$(touch bad)"])
     (programs / "catenary").unlink()
     (programs / "catenary").write_text('#!/bin/bash\nprintf "%s\\n" "$@" > "$STAND_IN/words"\n')
     (programs / "catenary").chmod(0o755)
@@ -116,12 +116,12 @@ def test_limits_leave_room_and_are_whole(march: float, minutes: int) -> None:
 @pytest.mark.parametrize("directive", ["account=x", "--a\n#SBATCH", "--x y; rm", ""])
 def test_a_directive_is_one_option(directive: str, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="takes one option of sbatch"):
-        slurm_script(["x"], tmp_path, Job(directives=[directive]), 1.0, 1e9)
+        slurm_script(["x"], tmp_path, SlurmJob(directives=[directive]), 1.0, 1e9)
 
 
 def test_more_nodes_than_ranks_are_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="--nodes is 3, more than the 2 ranks"):
-        slurm_script(["x"], tmp_path, Job(ranks=2, nodes=3), 1.0, 1e9)
+        slurm_script(["x"], tmp_path, SlurmJob(ranks=2, nodes=3), 1.0, 1e9)
 
 
 def test_without_slurm_the_script_can_be_printed(tmp_path: Path) -> None:

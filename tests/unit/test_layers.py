@@ -181,7 +181,7 @@ def test_the_solver_never_writes_results() -> None:
 
 
 # Public functions whose verbs have other names.
-NAMED_OTHERWISE = {"speed": "highest_speeds", "separation": "separations"}
+NAMED_OTHERWISE = {"list": "shipped_cases", "speed": "highest_speeds", "separation": "separations"}
 # What both the face and the command line take from runs and studies: wishes as data, and what verbs
 # without a counterpart in the face need. All other work of these verbs is that of the face.
 TAKEN_BY_BOTH = {

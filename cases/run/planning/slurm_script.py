@@ -30,7 +30,7 @@ _GB = 1e9
 
 
 @dataclass(frozen=True)
-class Job:
+class SlurmJob:
     """Request for a job.
 
     Attributes
@@ -55,7 +55,7 @@ class Job:
 def slurm_script(
     words: list[str],
     out: Path,
-    job: Job,
+    job: SlurmJob,
     march_s: float,
     memory: float,
     petsc_options: list[str] | None = None,
@@ -84,7 +84,7 @@ def slurm_script(
     )
 
 
-def directives_of(job: Job, out: Path, march_s: float, memory: float) -> list[str]:
+def directives_of(job: SlurmJob, out: Path, march_s: float, memory: float) -> list[str]:
     """The lines for sbatch at the head of a script. Not collective.
 
     Parameters
@@ -164,7 +164,7 @@ exit "$code"
 def array_script(
     words: Sequence[str],
     out: Path,
-    job: Job,
+    job: SlurmJob,
     n_tasks: int,
     needs: NeedsOfRuns,
     petsc_options: Sequence[str] = (),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import difflib
-from dataclasses import dataclass
 from pathlib import Path
 
 from catenary.base.errors import InputError
@@ -14,23 +13,14 @@ CASES = Path(__file__).resolve().parents[2]
 CASE_FILE = "case.toml"
 
 
-@dataclass(frozen=True)
-class CaseEntry:
-    """A shipped case: its name, its title and its file."""
-
-    name: str
-    title: str
-    path: Path
-
-
 def shipped() -> dict[str, Path]:
     """Case files of the shipped cases by name, in alphabetical order."""
     return {path.parent.name: path for path in sorted(CASES.glob(f"*/{CASE_FILE}"))}
 
 
-def entries() -> list[CaseEntry]:
-    """The shipped cases with their titles, which are read without checking the rest."""
-    return [CaseEntry(name, _title(path), path) for name, path in shipped().items()]
+def titles() -> dict[str, str]:
+    """Titles of the shipped cases by name, which are read without checking the rest."""
+    return {name: _title(path) for name, path in shipped().items()}
 
 
 def _title(path: Path) -> str:

