@@ -27,8 +27,8 @@ class Simulation:
     ----------
     scene : Scene, str, Path or mapping
         The scene, or whatever ``load`` takes for one; its line is meshed, hung and factored first.
-        A file ``*.line`` that ``catenary prepare`` wrote is ready for steps. Numbers in such a file
-        are believed: do not open one from someone whose program you would not start.
+        A file ``*.line`` that ``catenary prepare`` wrote is ready for steps. Its indices are not
+        checked: open files from people you trust alone.
 
     Raises
     ------

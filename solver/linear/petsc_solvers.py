@@ -62,7 +62,7 @@ class Wrapped(NamedTuple):
 
         A vector keeps its norm until PETSc is informed of a change of its numbers: an iteration
         would take the norm of an earlier right-hand side, or keep an initial guess because it
-        believes that it is zero already (PETSc 3.22).
+        takes it for zero already (PETSc 3.22).
         """
         self.vector.stateIncrease()
 
