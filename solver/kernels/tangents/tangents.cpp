@@ -5,9 +5,6 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "base/targets.hpp"
-#include "heads/sprung_head.hpp"
-
 namespace catenary {
 
 namespace {
@@ -28,21 +25,6 @@ Moved moved_at(int64_t unknown, const Motion& motion) {
     return {displacement_at(unknown, motion), velocity_at(unknown, motion)};
 }
 
-/// Contact forces that a head's laws read; empty without laws.
-std::span<double> laws_of(const Head& head) {
-    const auto* sprung = dynamic_cast<const SprungHead*>(&head);
-    return sprung ? sprung->laws().pressed : std::span<double>{};
-}
-
-/// By how much a state is changed to differentiate a step: heights and their rates little beside
-/// the bends of tables, and much beside round-off.
-constexpr double kMoved[] = {1e-4, 1e-2, 1.0}, kDriven = 1.0;
-/// Factor of a smaller change, for laws that bend by more than the part `kBent` in between; a
-/// change below `kNearest` is taken in any case.
-constexpr double kNearer = 1e-2, kBent = 1e-5, kNearest = 1e-3;
-/// Weights of a derivative of the fourth order, see set_up.py.
-constexpr double kStencil[] = {1.0 / 12.0, -8.0 / 12.0, 8.0 / 12.0, -1.0 / 12.0};
-
 double at(std::span<const double> numbers, int64_t i) {
     return numbers.empty() ? 0.0 : numbers[i];
 }
@@ -50,19 +32,10 @@ double at(std::span<const double> numbers, int64_t i) {
 }  // namespace
 
 TangentSteps::TangentSteps(StepParts parts, Block block, MarchTangents tangents)
-    : Steps(std::move(parts), std::move(block)), tangents_(std::move(tangents)) {
+    : Steps(std::move(parts), std::move(block)),
+      tangents_(std::move(tangents)),
+      heads_(this->parts().heads, tangents_.pairs, force()) {
     const StepParts& own = this->parts();
-    if (tangents_.pairs.size() != own.heads.size())
-        throw std::invalid_argument("tangents have pairs of other heads than the steps");
-    for (const Head* head : own.heads) {
-        chains_.push_back(dynamic_cast<const LinearChain*>(head));
-        if (!chains_.back() && tangents_.pairs[chains_.size() - 1].size() != 2)
-            throw std::invalid_argument("a head is no linear chain and has no pair");
-        pressed_.emplace_back(laws_of(*head).size());
-        row_.resize(std::max<size_t>(row_.size(), kDrive + 2 * head->n_strips()));
-        before_.emplace_back(3 * head->n());
-        free_.emplace_back(3 * head->n());
-    }
     const size_t n_unknowns = own.contacts.motion.x.size();
     for (const TangentGroup& group : tangents_.groups) {
         if (!group.lanes.loads.empty())
@@ -70,7 +43,7 @@ TangentSteps::TangentSteps(StepParts parts, Block block, MarchTangents tangents)
         if (static_cast<int64_t>(group.tangents.size()) > group.lanes.n())
             throw std::invalid_argument("a group of tangents has more than lanes");
         for (const Tangent& tangent : group.tangents)
-            if (tangent.heads.size() != chains_.size())
+            if (tangent.heads.size() != heads_.n())
                 throw std::invalid_argument("a tangent has other heads than the steps");
     }
     const int64_t n = n_contacts(), most = size(own.problem.unknowns.right);
@@ -86,11 +59,7 @@ TangentSteps::TangentSteps(StepParts parts, Block block, MarchTangents tangents)
 
 Taken TangentSteps::take(int64_t first, int64_t end) {
     for (int64_t number = first; number < end; ++number) {
-        for (size_t h = 0; h < chains_.size(); ++h) {
-            const Head& head = *parts().heads[h];
-            std::ranges::copy(head.arrays().state, before_[h].begin());
-            std::ranges::copy(laws_of(head), pressed_[h].begin());
-        }
+        heads_.keep();
         const Taken taken = Steps::take(number, number + 1);
         if (taken.begun) return {number - first, true, false};
         read_motion();
@@ -191,18 +160,25 @@ void TangentSteps::follow(const TangentGroup& group, int64_t number) {
         const Tangent& tangent = group.tangents[s];
         const Motion own = lanes.at(s);
         for (auto* numbers : {&place_, &rate_}) std::ranges::fill(*numbers, 0.0);
-        predict_heads(tangent, number);
+        heads_.predict(tangent.heads, block().drives[number], changed_drives(tangent, number),
+                       {place_, rate_});
         find_places(tangent, own, tangent.speed * time);
         solve(tangent, own);
         for (int64_t i : acting_.contacts) forces(i, s) = forces_[i];
         for (int64_t k = 0; n + k < m; ++k) of_links(k, s) = -compensations_[k];
-        move_heads(tangent);
+        heads_.move(tangent.heads, forces_);
         remember(tangent);
         show(tangent, number);
     }
     superpose(parts().contacts, forces, lanes);
     compensate(parts().contacts, acting_.numbers, of_links, lanes);
     show_arms(group, number);
+}
+
+/// Derivatives of the rows that drive the heads in a step; no rows if they do not change.
+Array2<const double> TangentSteps::changed_drives(const Tangent& tangent, int64_t number) const {
+    if (tangent.drives.n == 0) return {};
+    return tangent.drives[tangents_.first[0] + number];
 }
 
 /// Solve the small problem of a tangent.
@@ -245,137 +221,6 @@ void TangentSteps::load(const Tangent& tangent, const TangentLanes& lanes, int64
         if (moved == 0.0) continue;
         for (int j = 0; j < 4; ++j) add(touch.local[j], force()[i] * touch.slope[j] * moved);
     }
-}
-
-/// Put the derivatives of heads without changes of contact forces, and add those of gaps by them.
-void TangentSteps::predict_heads(const Tangent& tangent, int64_t number) {
-    for (size_t h = 0; h < chains_.size(); ++h) {
-        const HeadChange& change = tangent.heads[h];
-        const std::span<const double> drive = block().drives[number][h];
-        std::span<const double> changed;
-        if (tangent.drives.n > 0) changed = tangent.drives[tangents_.first[0] + number][h];
-        if (!chains_[h]) {
-            step_beside(change, drive, changed, h);
-            continue;
-        }
-        const Drive none{};
-        step_chain(*chains_[h], change, *reinterpret_cast<const Drive*>(drive.data()),
-                   changed.empty() ? none : *reinterpret_cast<const Drive*>(changed.data()), h);
-    }
-}
-
-/// Differentiate the step of a linear chain.
-void TangentSteps::step_chain(const LinearChain& chain, const HeadChange& change,
-                              const Drive& drive, const Drive& changed, size_t h) {
-    const LinearStep& step = chain.linear();
-    const HeadArrays& arrays = chain.arrays();
-    const NewmarkFactors& newmark = arrays.newmark;
-    const int64_t n = chain.n(), s = chain.n_strips(), first = chain.first();
-    const bool changes = change.matrix.rows > 0;
-    std::vector<double>& free = free_[h];
-    for (int64_t i = 0; i < 3 * n; ++i) {
-        double value = changed.force * step.by_drive[i] + changed.head_air * step.by_head[i];
-        for (int64_t k = 0; k < 3 * n; ++k) value += step.matrix(i, k) * change.state[k];
-        if (changes) {
-            value += drive.force * change.by_drive[i] + drive.head_air * change.by_head[i];
-            for (int64_t k = 0; k < 3 * n; ++k) value += change.matrix(i, k) * before_[h][k];
-        }
-        free[i] = value;
-    }
-    // The answer of the state to a force changes with the masses.
-    for (int64_t j = 0; changes && j < s; ++j)
-        for (int64_t i = 0; i < n; ++i) {
-            double answer = 0.0;
-            for (int64_t k = 0; k < n; ++k) answer += change.inverse(i, k) * arrays.touch(0, j, k);
-            answer *= force()[first + j];
-            free[i] -= newmark.position * answer;
-            free[n + i] -= newmark.velocity * answer;
-            free[2 * n + i] -= answer;
-        }
-    add_places(chain, free, h, 1.0);
-}
-
-/// Add the heights and rates of the strips by a head's state, or by a part of it.
-void TangentSteps::add_places(const Head& head, std::span<const double> state, size_t h,
-                              double weight) {
-    const auto& touch = head.arrays().touch;
-    const int64_t n = head.n(), first = parts().heads[h]->first();
-    for (int64_t j = 0; j < head.n_strips(); ++j)
-        for (int64_t k = 0; k < n; ++k) {
-            place_[first + j] += weight * touch(0, j, k) * state[k];
-            rate_[first + j] +=
-                weight * (touch(0, j, k) * state[n + k] + touch(1, j, k) * state[k]);
-        }
-}
-
-/// Differentiate the step of another head by steps of heads like it: by its state, its drive and
-/// the parameter.
-void TangentSteps::step_beside(const HeadChange& change, std::span<const double> drive,
-                               std::span<const double> changed, size_t h) {
-    const int64_t n = parts().heads[h]->n();
-    const auto row = std::span(row_).first(kDrive + 2 * parts().heads[h]->n_strips());
-    std::ranges::fill(free_[h], 0.0);
-    double largest = 0.0;
-    for (int64_t i = 0; i < 3 * n; ++i)
-        largest = std::max(largest, std::abs(change.state[i]) / kMoved[i / n]);
-    for (size_t i = 0; i < row.size() && !changed.empty(); ++i)
-        largest = std::max(largest, std::abs(changed[i]) / kDriven);
-    // Nearer still where a law bends in between.
-    for (double by = 1.0; largest > 0.0; by *= kNearer) {
-        const double step = by / largest;
-        for (int side = 0; side < 2; ++side) {
-            const double sign = side == 0 ? step : -step;
-            Head& head = *tangents_.pairs[h][side];
-            put_state(head, h);
-            for (int64_t i = 0; i < 3 * n; ++i) head.arrays().state[i] += sign * change.state[i];
-            for (size_t i = 0; i < row.size(); ++i)
-                row[i] = drive[i] + (changed.empty() ? 0.0 : sign * changed[i]);
-            take_step(head, row, h);
-        }
-        if (by < kNearest || is_straight(h)) {
-            for (int side = 0; side < 2; ++side)
-                add_end(*tangents_.pairs[h][side], h, (side == 0 ? 0.5 : -0.5) / step);
-            break;
-        }
-    }
-    for (size_t side = 0; side < change.beside.size(); ++side) {
-        put_state(*change.beside[side], h);
-        take_step(*change.beside[side], drive.first(row.size()), h);
-        add_end(*change.beside[side], h, kStencil[side] / change.step);
-    }
-}
-
-void TangentSteps::put_state(Head& head, size_t h) const {
-    std::ranges::copy(before_[h], head.arrays().state.begin());
-    std::ranges::copy(pressed_[h], laws_of(head).begin());
-}
-
-/// Take a step with the forces that were found.
-void TangentSteps::take_step(Head& head, std::span<const double> drive, size_t h) const {
-    const int64_t first = parts().heads[h]->first();
-    head.step(drive);
-    head.advance(part(force(), first, first + head.n_strips()));
-}
-
-/// Whether the ends of a pair's steps are to both sides of that of the head, as of a smooth law.
-bool TangentSteps::is_straight(size_t h) const {
-    const auto here = parts().heads[h]->arrays().state;
-    const auto one = tangents_.pairs[h][0]->arrays().state,
-               other = tangents_.pairs[h][1]->arrays().state;
-    const int64_t n = parts().heads[h]->n();
-    double bent = 0.0, moved = 0.0;
-    for (int64_t i = 0; i < 3 * n; ++i) {
-        bent = std::max(bent, std::abs(one[i] + other[i] - 2.0 * here[i]) / kMoved[i / n]);
-        moved = std::max(moved, std::abs(one[i] - other[i]) / kMoved[i / n]);
-    }
-    return bent <= kBent * moved;
-}
-
-/// Add the end of a step to derivatives with a weight.
-void TangentSteps::add_end(const Head& head, size_t h, double weight) {
-    const auto state = head.arrays().state;
-    for (size_t i = 0; i < state.size(); ++i) free_[h][i] += weight * state[i];
-    add_places(head, state, h, weight);
 }
 
 /// Subtract the changes of the wires' heights from gaps.
@@ -445,20 +290,6 @@ double TangentSteps::of_reserve(const Tangent& tangent, const Motion& own, int64
     return value;
 }
 
-/// Move the heads by the changes of forces.
-void TangentSteps::move_heads(const Tangent& tangent) const {
-    for (size_t h = 0; h < chains_.size(); ++h) {
-        const Head& head = *parts().heads[h];
-        const auto state = tangent.heads[h].state;
-        const auto answers = head.answers();
-        for (int64_t i = 0; i < answers.rows; ++i) {
-            state[i] = free_[h][i];
-            for (int64_t j = 0; j < answers.columns; ++j)
-                state[i] -= answers(i, j) * forces_[head.first() + j];
-        }
-    }
-}
-
 /// Keep the derivatives of a Hertzian law's memory, see `remember` of the law.
 void TangentSteps::remember(const Tangent& tangent) const {
     if (!parts().law.marched) return;
@@ -494,8 +325,7 @@ void TangentSteps::show(const Tangent& tangent, int64_t number) const {
         }
     }
     const auto heights = row.subspan(n_pantographs + size(parts().shown.arms));
-    for (int64_t p = 0; p < n_pantographs; ++p)
-        heights[p] = head_height(*parts().heads[p], tangent.heads[p].state);
+    for (int64_t p = 0; p < n_pantographs; ++p) heights[p] = heads_.height(p, tangent.heads[p]);
 }
 
 /// Fill in the displacements at arms in the rows of a group.
@@ -507,15 +337,6 @@ void TangentSteps::show_arms(const TangentGroup& group, int64_t number) const {
         const Motion own = group.lanes.at(s);
         for (int64_t i = 0; i < size(arms); ++i) row[i] = displacement_at(arms[i], own);
     }
-}
-
-/// Mean height of the strips by a head's state, or by a derivative of it.
-double TangentSteps::head_height(const Head& head, std::span<const double> state) const {
-    const auto& touch = head.arrays().touch;
-    double sum = 0.0;
-    for (int64_t j = 0; j < head.n_strips(); ++j)
-        for (int64_t k = 0; k < head.n(); ++k) sum += touch(0, j, k) * state[k];
-    return sum / static_cast<double>(head.n_strips());
 }
 
 }  // namespace catenary

@@ -11,8 +11,8 @@
 // by the same method and with the same factors. Contacts that touch and links that have switched
 // keep their laws, differentiated; others keep no force. Heads and contact laws likewise.
 #include "contact_problem/active_set.hpp"
-#include "heads/linear_chain.hpp"
 #include "steps/steps.hpp"
+#include "tangents/head_tangents.hpp"
 #include "tangents/tangent_lanes.hpp"
 
 namespace catenary {
@@ -22,20 +22,6 @@ namespace catenary {
 struct LinkChange {
     Array2<const double> law, weights;
     CATENARY_RECORD(law, weights)
-};
-
-/// Derivatives of a head: of its state (3 n,), which goes on with the steps, and of the step
-/// itself. Of a linear chain these are all of its arrays or none; others are made anew with the
-/// parameter two steps below, one below, one above and two above where it is, `step` apart, or not
-/// at all.
-struct HeadChange {
-    Array2<const double> matrix;
-    std::span<const double> by_drive, by_head;
-    Array2<const double> inverse;
-    std::span<double> state;
-    std::vector<Head*> beside;
-    double step;
-    CATENARY_RECORD(matrix, by_drive, by_head, inverse, state, beside, step)
 };
 
 /// Derivatives of the contact law at n contacts: of own, offset, by_depth and by_rate (4, n), and,
@@ -104,34 +90,19 @@ class TangentSteps : public Steps {
     void follow(const TangentGroup& group, int64_t number);
     void solve(const Tangent& tangent, const Motion& own);
     void load(const Tangent& tangent, const TangentLanes& lanes, int64_t lane, double way) const;
-    void predict_heads(const Tangent& tangent, int64_t number);
-    void step_chain(const LinearChain& chain, const HeadChange& change, const Drive& drive,
-                    const Drive& changed, size_t h);
-    void step_beside(const HeadChange& change, std::span<const double> drive,
-                     std::span<const double> changed, size_t h);
-    void add_places(const Head& head, std::span<const double> state, size_t h, double weight);
-    void take_step(Head& head, std::span<const double> drive, size_t h) const;
-    bool is_straight(size_t h) const;
-    void add_end(const Head& head, size_t h, double weight);
-    void put_state(Head& head, size_t h) const;
+    Array2<const double> changed_drives(const Tangent& tangent, int64_t number) const;
     void find_places(const Tangent& tangent, const Motion& own, double way);
     double of_law(const Tangent& tangent, int64_t contact) const;
     double of_reserve(const Tangent& tangent, const Motion& own, int64_t link) const;
-    void move_heads(const Tangent& tangent) const;
     void remember(const Tangent& tangent) const;
     void show(const Tangent& tangent, int64_t number) const;
     void show_arms(const TangentGroup& group, int64_t number) const;
-    double head_height(const Head& head, std::span<const double> state) const;
 
     std::span<const double> force() const { return parts().problem.unknowns.solution; }
     int64_t n_contacts() const { return size(parts().problem.found.depth); }
 
     MarchTangents tangents_;
-    std::vector<const LinearChain*> chains_;       ///< of heads that are linear chains, else null
-    std::vector<std::vector<double>> before_;      ///< states of the heads before the step
-    std::vector<std::vector<double>> pressed_;     ///< contact forces that their laws read then
-    std::vector<double> row_;                      ///< room for the drive of a head
-    std::vector<std::vector<double>> free_;        ///< derivatives of heads without contact
+    HeadTangents heads_;
     std::vector<double> displacement_, velocity_;  ///< of the line
     std::vector<double> place_, rate_;             ///< derivatives of gaps without forces
     std::vector<double> forces_;                   ///< of contacts
