@@ -18,6 +18,7 @@ struct HeadChange {
     std::vector<Head*> beside;
     double step;
     CATENARY_RECORD(matrix, by_drive, by_head, inverse, state, beside, step)
+    CATENARY_SHAPES("3n 3n?, 3n?, 3n?, n n?, 3n")
 };
 
 /// Derivatives of gaps and of their rates at n contacts, without changes of contact forces (n,).

@@ -22,6 +22,7 @@ namespace catenary {
 struct LinkChange {
     Array2<const double> law, weights;
     CATENARY_RECORD(law, weights)
+    CATENARY_SHAPES("n 3?, n *?")
 };
 
 /// Derivatives of the contact law at n contacts: of own, offset, by_depth and by_rate (4, n), and,
@@ -32,6 +33,7 @@ struct LawChange {
     std::span<double> speed;   ///< of the rates at which gaps closed (n,)
     std::span<double> latest;  ///< of the latest forces (n,)
     CATENARY_RECORD(tangents, hertz, speed, latest)
+    CATENARY_SHAPES("4 n?, 4?, n, n")
 };
 
 /// A march differentiated by one parameter.
@@ -46,6 +48,7 @@ struct Tangent {
     Array2<double> results;         ///< (n, 2 n_pantographs + n_arms) of each step of a block:
                                     ///< contact forces, displacements at arms, heights of heads
     CATENARY_RECORD(rest, links, heads, drives, law, start, speed, results)
+    CATENARY_SHAPES("* 2?")
 };
 
 /// Tangents with a motion of the line in each lane; the last lanes may have none.
