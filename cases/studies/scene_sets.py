@@ -64,17 +64,19 @@ class BoundTable(Table):
 
     def margin(self, value: float) -> float:
         """Distance of a value from the bound, in its unit; negative beyond."""
-        if self.at_least is not None:
-            return value - self.at_least
-        assert self.at_most is not None
-        return self.at_most - value
+        return self.limit - value if self.at_least is None else value - self.limit
+
+    @property
+    def limit(self) -> float:
+        """The least or the greatest value allowed."""
+        limit = self.at_most if self.at_least is None else self.at_least
+        assert limit is not None
+        return limit
 
     @property
     def scale(self) -> float:
         """Scale of margins: the absolute bound, or 100 if that is smaller than 1."""
-        bound = self.at_most if self.at_least is None else self.at_least
-        assert bound is not None
-        return abs(bound) if abs(bound) >= 1.0 else 100.0
+        return abs(self.limit) if abs(self.limit) >= 1.0 else 100.0
 
 
 class ErrorSamples(Table):

@@ -191,7 +191,8 @@ def write_files(folder: Path, content: Mapping[str, Content]) -> list[Path]:
     content : mapping
         Content by names of files. A table, or rows with the same keys, become CSV, a mapping JSON,
         and what a function draws a picture; no rows, and a picture that there is none of or that
-        fails, are left out; texts and bytes are written as they are.
+        fails, are left out, and such a file of an earlier study is removed; texts and bytes are
+        written as they are.
 
     Raises
     ------
@@ -199,6 +200,7 @@ def write_files(folder: Path, content: Mapping[str, Content]) -> list[Path]:
         If the disk refuses.
     """
     from catenary.postproc.files.disk import write_all
+    from catenary.postproc.files.own_files import remove_stale
 
     files: dict[str, bytes | str] = {}
     for name, own in content.items():
@@ -214,7 +216,9 @@ def write_files(folder: Path, content: Mapping[str, Content]) -> list[Path]:
             files |= figures.painted(name, own)
         elif own:
             files[name] = rows_csv(own)
-    return write_all(folder, files)
+    written = write_all(folder, files)
+    remove_stale(folder, content.keys() - files.keys())
+    return written
 
 
 def json_text(record: Mapping[str, Any]) -> str:

@@ -252,6 +252,12 @@ def test_raw_samples_and_the_march_pass_the_same_filter() -> None:
     # Cubic splines through 33 samples a wave of 10 N: (2 pi/33)^4/384, 3e-5 N, times some.
     modelled = found.of_march(100.0 + 50.0 * dense, values, 1e-3)
     check("as the march", modelled, signal.values, within=1e-3)
+    place, filtered = found.curve_of_march(100.0 + 50.0 * dense, values, 1e-3)
+    assert (place[0], place[-1]) == pytest.approx((found.place[0], found.place[-1]), abs=0.05)
+    assert np.diff(place) == pytest.approx(0.05)
+    # Of the wave of 30 Hz the filter leaves 0.075 N in steps of 1 ms, 0.055 N in those of 4 ms.
+    at_samples = np.interp(found.place, place, filtered)
+    assert np.abs(at_samples - signal.values).max() < 0.025
     # Of 5 N white noise at 250 Hz the filter leaves the root of 0.148.
     assert signal.deviation == pytest.approx(5.0 * np.sqrt(filters.kept_variance(20.0, 0.004)))
 
@@ -391,7 +397,7 @@ def test_the_verb_finds_a_force_and_writes_its_tables_once(files: Path) -> None:
 
 
 def test_pictures_show_signals_residuals_and_distances_from_priors() -> None:
-    place = np.linspace(100.0, 120.0, 5)
+    place, steps = np.linspace(100.0, 120.0, 5), np.linspace(100.0, 120.0, 21)
     force, height = (
         Signal("force", place, None, 2.0, 0.0),
         Signal("head height", 5.0 + 0.0 * place, None, 0.003, 0.01),
@@ -402,8 +408,9 @@ def test_pictures_show_signals_residuals_and_distances_from_priors() -> None:
         posterior_of(np.array([[3.0, 0.0], [0.0, 0.0]])),
         place,
         [force, height],
-        [place - 3.0, 4.9 + 0.0 * place],
         [place - 1.0, 4.99 + 0.0 * place],
+        [np.stack([steps, steps - 3.0]), np.stack([steps, 4.9 + 0.0 * steps])],
+        [np.stack([steps, steps - 1.0]), np.stack([steps, 4.99 + 0.0 * steps])],
         {},
         1,
         1,
@@ -411,7 +418,15 @@ def test_pictures_show_signals_residuals_and_distances_from_priors() -> None:
         True,
     )
     panels = draw_passage(found).axes
+    measured, by_priors, marched = panels[0].lines
     assert [line.get_label() for line in panels[0].lines] == ["measured", "priors' means", "found"]
+    # Dots of samples, and lines in steps of the marches.
+    assert measured.get_linestyle() == panels[1].lines[0].get_linestyle() == "None"
+    assert np.allclose(measured.get_xydata(), np.stack([place, place], axis=1))
+    assert np.allclose(by_priors.get_xydata(), np.stack([steps, steps - 3.0], axis=1))
+    assert np.allclose(marched.get_xydata(), np.stack([steps, steps - 1.0], axis=1))
+    # The bias of 2 mm belongs to what was found.
+    assert np.allclose(panels[2].lines[2].get_ydata(), 4.992)
     # Residuals: of force 1 N, of heights 5 - (4.99 + 0.002) m in millimetres.
     assert np.allclose(panels[1].lines[0].get_ydata(), 1.0)
     assert np.allclose(panels[3].lines[0].get_ydata(), 8.0)

@@ -68,6 +68,14 @@ def test_files_of_a_study_are_written_by_what_they_hold(tmp_path: Path) -> None:
     assert texts["picture.png"].startswith(b"\x89PNG") and texts["page.md"] == b"# A page\n"
 
 
+def test_a_study_leaves_no_picture_of_an_earlier_one(tmp_path: Path) -> None:
+    figure = Figure()
+    write_files(tmp_path, {"picture.png": lambda: figure, "rows.csv": [{"a": 1}]})
+    (tmp_path / "of_others.png").touch()
+    assert write_files(tmp_path, {"picture.png": lambda: None, "rows.csv": []}) == []
+    assert [path.name for path in tmp_path.iterdir()] == ["of_others.png"]
+
+
 def test_files_have_all_digits_and_only_their_columns() -> None:
     rows = list(csv.DictReader(TABLE.csv().splitlines()))
     assert list(rows[0]) == ["run", "std_N", "span_m", "none"]

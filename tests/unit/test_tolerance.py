@@ -21,9 +21,12 @@ from catenary.cases.studies.scene_sets import BROKE, BoundTable
 from catenary.cases.studies.task_files import read_task
 from catenary.cases.studies.tolerance.errors import Group, groups_of
 from catenary.cases.studies.tolerance.output import as_text, installer_table
+from catenary.cases.studies.tolerance.pictures import draw_shares, draw_values
+from catenary.cases.studies.tolerance.samples import Bound, samples_of
 from catenary.cases.studies.tolerance.study import (
     ALL,
     EACH,
+    bounds_of,
     find_tolerances,
     least,
     make_plan,
@@ -142,7 +145,13 @@ def evaluated(monkeypatch: pytest.MonkeyPatch) -> Callable[[Callable[[Scene], fl
 
 
 def summary(std: float) -> dict[str, Any]:
-    row = {"criterion": "deviation, one", "value": std, "limit": 30.0, "relation": "<="}
+    row = {
+        "criterion": "deviation, one",
+        "value": std,
+        "limit": 30.0,
+        "relation": "<=",
+        "unit": "N",
+    }
     return {
         "pantographs": [{"name": "one", "std_N": std}],
         "supports": {"max_uplift_mm": 50.0},
@@ -225,6 +234,7 @@ def test_what_is_never_lost_and_what_is_lost_already(evaluated: Any) -> None:
     evaluated(lambda scene: 31.0)
     (lost,) = find_tolerances(plan)
     assert lost.level == 0.0 and lost.kept == 0
+    assert draw_shares(plan, [lost]) is None and draw_values(plan, [lost]) is None
     assert "not kept without errors" in as_text(plan, [lost])
 
 
@@ -251,6 +261,98 @@ def test_margins_have_the_sign_of_their_bounds() -> None:
         {"criterion": "least", "value": 5.0, "limit": 0.0, "relation": ">", "passed": True}
     )
     assert margins_of(run, []) == {"deviation": [10.0], "least": [5.0]}
+
+
+def test_bounds_are_those_of_the_task_or_of_the_standard() -> None:
+    bounds = [BoundTable(statistic="min_N", at_least=15.0), BoundTable(**AT_MOST)]
+    assert list(bounds_of([summary(20.0)], bounds).items()) == [
+        ("min_N >= 15", Bound(15.0, True, "minimum force [N]")),
+        ("std_N <= 30", Bound(30.0, False, "standard deviation, 0-20 Hz [N]")),
+    ]
+    runs = [summary(20.0), summary(25.0)]
+    assert bounds_of(runs, []) == {"deviation": Bound(30.0, False, "deviation [N]")}
+    margins = np.array([2.0, -1.0])
+    assert Bound(15.0, True, "").values(margins).tolist() == [17.0, 14.0]
+    assert Bound(30.0, False, "").values(margins).tolist() == [28.0, 31.0]
+    # Of two limits the margin is what has one.
+    runs[1]["acceptance"][0]["limit"] = 40.0
+    (margin,) = bounds_of(runs, []).values()
+    assert margin.meaning == "margin of deviation [N]"
+    assert margin.values(margins) == pytest.approx(margins) and margin.limit == 0.0
+
+
+def test_lines_that_were_not_run_are_known_by_other_levels() -> None:
+    """Five lines: kept everywhere, lost above 1, lost above 2, one that comes back, never run."""
+    nan = np.nan
+    found = samples_of(
+        [2.0, 0.0, 3.0, 1.0],
+        [
+            [nan, nan, nan, nan, nan],
+            [1.0, 1.0, 1.0, 1.0, 1.0],
+            [1.0, nan, -1.0, 1.0, nan],
+            [nan, -1.0, nan, -np.inf, nan],
+        ],
+    )
+    assert found.levels.tolist() == [0.0, 1.0, 2.0, 3.0]
+    assert found.n_run.tolist() == [5, 2, 0, 3]
+    fewest, most = found.n_kept
+    # At 1 the first is kept; at 2, too, the second is lost; at 3 the first and the fourth are kept,
+    # the second and the third lost.
+    assert fewest.tolist() == [5, 1, 1, 2] and most.tolist() == [5, 3, 4, 3]
+    assert found.records()[1] == {"level": 1.0, "n_run": 2, "kept_at_least": 1, "kept_at_most": 3}
+
+
+def test_pictures_show_the_samples_of_all_levels(evaluated: Any) -> None:
+    """Of errors within +-L those lines keep the deviation whose error is at most 20 km/h."""
+    evaluated(by_speed)
+    samples = {"number": 60, "probability": 0.9, "resolution": 0.05, "worst_case": False}
+    plan = make_plan(tiny(), task_of(SPEED, samples=samples))
+    (found,) = find_tolerances(plan)
+    drawn = plan.groups[0].random(np.random.default_rng([1, 0]), 60)[:, 0]
+    known = found.samples
+    assert known is not None and known.levels[[0, -1]].tolist() == [0.0, 40.0]
+    # The formula is monotonic, so that lines which were not run do as other levels tell.
+    exact = np.count_nonzero(known.levels[:, None] * drawn <= 20.0, axis=1)
+    fewest, most = known.n_kept
+    assert (fewest <= exact).all() and (exact <= most).all()
+    whole = known.n_run == 60
+    assert (known.levels == found.level)[whole].any() and (~whole).any()
+    assert (fewest[whole] == exact[whole]).all() and (most[whole] == exact[whole]).all()
+
+    shares = draw_shares(plan, [found])
+    assert shares is not None
+    (axes,) = shares.axes
+    lines = {line.get_label(): line for line in axes.lines}
+    at, share = lines["std_N <= 30"].get_xydata().T  # type: ignore[union-attr]
+    assert at.tolist() == known.levels[fewest == most].tolist()
+    assert share == pytest.approx(exact[fewest == most] / 0.6)
+    ring = next(line for line in axes.lines if line.get_markersize() == 9.0).get_xydata()
+    assert ring == pytest.approx(np.array([[found.level, found.kept / 0.6]]))
+    # Of so many samples the bar of the tolerance ends above the wanted share.
+    ends = next(line for line in axes.lines if np.isnan(line.get_ydata()).any()).get_xydata()
+    bar = ends[np.isclose(ends[:, 0], found.level), 1]  # type: ignore[index, call-overload]
+    assert bar[0] == pytest.approx(100.0 * found.least_share) and bar[0] >= 90.0
+    from scipy.stats import binomtest
+
+    interval = binomtest(found.kept, 60, alternative="less").proportion_ci(0.95, "exact")
+    assert bar[1] == pytest.approx(100.0 * interval.high)
+    assert lines["90 % of all lines"].get_color() == axes.lines[-1].get_color()
+    assert axes.get_title(loc="left") == f"speed, std_N <= 30: {found.level:.3g} km/h"
+
+    values = draw_values(plan, [found])
+    assert values is not None
+    (axes,) = values.axes
+    lines = {line.get_label(): line for line in axes.lines}
+    assert axes.get_ylabel().replace("\n", " ") == "standard deviation, 0-20 Hz [N]"
+    assert lines["limit"].get_ydata() == [30.0, 30.0]
+    assert lines["tolerance"].get_xdata() == [found.level, found.level]
+    at, value = lines["all lines run"].get_xydata().T  # type: ignore[union-attr]
+    assert at.size == 60 * whole.sum()
+    own = abs(at - found.level) < 0.5
+    # The speed moves the deviation by 0.2 N for each km/h.
+    assert np.sort(value[own]) == pytest.approx(np.sort(26.0 + 0.2 * found.level * drawn))
+    early = lines["level left early"].get_xydata()
+    assert len(early) == known.n_run[~whole].sum()  # type: ignore[arg-type]
 
 
 def test_samples_are_enough_to_show_their_share() -> None:
@@ -336,9 +438,18 @@ def test_the_verb_writes_what_it_says(
     assert "speed +-40 km/h: 19 of 19 lines run, " in done.output
     record = json.loads((tmp_path / "out" / "tolerance.json").read_text())
     (row,) = record["tolerances"]
+    at_level = next(one for one in row["levels"] if one["level"] == row["level"])
+    assert (at_level["n_run"], at_level["kept_at_least"]) == (19, row["kept"])
     assert row["linear"] == pytest.approx(20.0) and 20.0 < row["level"] < 30.0
     assert {path.name for path in (tmp_path / "out").iterdir()} == {
         "tolerance.csv",
         "tolerance.json",
         "tolerance.md",
+        "tolerance_shares.png",
+        "tolerance_values.png",
     }
+    # A study that has no pictures leaves none of an earlier one.
+    evaluated(lambda scene: 31.0)
+    done = invoke(*words, "--force")
+    assert done.exit_code == 0, done.output
+    assert not list((tmp_path / "out").glob("*.png"))

@@ -40,8 +40,9 @@ class FittedMarch:
         self._measurement, self._comm = measurement, comm
         self._kept: dict[str, Change] = {}
 
-    def values(self, by: Sequence[float]) -> list[np.ndarray]:
-        """Samples (n,) of each signal, with the parameters changed ``by`` (m,) in their units.
+    def values(self, by: Sequence[float]) -> tuple[list[np.ndarray], list[np.ndarray]]:
+        """Samples (n,) of each signal, with the parameters changed ``by`` (m,) in their units, and
+        the places and values (2, k) of its steps between them.
 
         Raises
         ------
@@ -51,10 +52,10 @@ class FittedMarch:
             If the march breaks.
         """
         marched = march_with_tangents(self._comm, self._at_rest(by), [])
-        return [
-            self._measurement.of_march(marched.position[:, self._number], of_all, marched.dt)
-            for of_all, _ in self._signals(marched)
-        ]
+        position, dt = marched.position[:, self._number], marched.dt
+        of_all = [values for values, _ in self._signals(marched)]
+        samples = [self._measurement.of_march(position, one, dt) for one in of_all]
+        return samples, [self._measurement.curve_of_march(position, one, dt) for one in of_all]
 
     def derivatives(self, by: Sequence[float]) -> list[np.ndarray]:
         """Derivatives (n, m) of the samples of each signal by the parameters, per their units.

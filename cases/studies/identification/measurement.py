@@ -197,3 +197,13 @@ class Measurement:
             values = filters.low_pass(values, dt, self._cut_off)
             return np.asarray(CubicSpline(position, values)(needed))
         return self._sampled(np.asarray(CubicSpline(position, values)(needed)))
+
+    def curve_of_march(self, position: np.ndarray, values: np.ndarray, dt: float) -> np.ndarray:
+        """Places and filtered values, shape (2, k), of the steps of a march between the first
+        sample that is compared and the last.
+
+        Parameters are those of ``of_march``, with values (n_steps,).
+        """
+        within = (self.place[0] <= position) & (position <= self.place[-1])
+        filtered = filters.low_pass(values, dt, self._cut_off)
+        return np.stack([position, filtered])[:, within]

@@ -9,29 +9,37 @@ from catenary.cases.studies.identification.measurement import UNITS
 from catenary.cases.studies.identification.study import Identification
 from catenary.postproc.report.pictures import figures
 
+# Samples more than these are drawn small.
+_MANY = 400
 # Entries of the panel of parameters that leave letters legible.
 _MOST = 60
 
 
 @figures.own_style()
 def draw_passage(found: Identification) -> Figure:
-    """Each signal as measured, by the priors' means, and as found; below it the residual beside the
-    standard deviation of the stated noise."""
+    """The samples of each signal over its marches, by the priors' means and as found; below them
+    the residual beside the standard deviation of the stated noise."""
     n = len(found.signals)
     figure = figures.new_figure(4.2 * n)
     panels = figure.subplots(2 * n, 1, sharex=True, height_ratios=[2.2, 1.0] * n)
+    size = 4.5 if found.place.size <= _MANY else 2.0
     for number, (signal, bias) in enumerate(zip(found.signals, found.biases, strict=True)):
         above, below = panels[2 * number : 2 * number + 2]
         modelled, unit = found.modelled[number] + bias, UNITS[signal.name]
-        figures.curve(above, found.place, signal.values, 2, "measured", ".", ms=2.5)
-        figures.curve(above, found.place, found.expected[number], 1, "priors' means", "--", 1.0)
-        figures.curve(above, found.place, modelled, 0, "found")
+        figures.curve(above, found.place, signal.values, 2, "measured", ".", ms=size, zorder=3)
+        place, by_priors = found.by_priors[number]
+        figures.curve(above, place, by_priors, 1, "priors' means", "--", 1.0)
+        place, marched = found.marched[number]
+        figures.curve(above, place, marched + bias, 0, "found", width=1.0)
         figures.tidy(above, "", f"{signal.name} [{unit}]")
         figures.legend_above(above)
         factor, unit = (1e3, "mm") if unit == "m" else (1.0, unit)
         noise = factor * signal.deviation
         below.axhspan(-noise, noise, color=figures.SHADE, zorder=0)
-        figures.curve(below, found.place, factor * (signal.values - modelled), 0, width=0.8)
+        figures.curve(
+            below, found.place, factor * (signal.values - modelled), 2, None, ".", ms=size
+        )
+        below.axhline(0.0, color=figures.GREY, linewidth=0.8, zorder=1)
         figures.tidy(below, "", f"residual [{unit}]\n(shaded: noise)")
     panels[-1].set_xlabel("position along the track [m]")
     return figure

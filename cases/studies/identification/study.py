@@ -77,8 +77,9 @@ class Identification:
     posterior : their uncertainty, in deviations of the priors
     place : (n,) of the samples of each signal [m]
     signals : that were measured
-    expected : of each signal the samples (n,) of the march with the means of the priors
     modelled : of each signal the samples (n,) of the march that was found, without biases
+    by_priors, marched : of each signal places and values (2, k) of the steps of the march with the
+        means of the priors, and of the march that was found, without biases
     judged : the residuals of each signal and of "all"
     n_marches, n_jacobians : how many were made
     sums : least sum of squares of each search that came to an end, the best first
@@ -90,8 +91,9 @@ class Identification:
     posterior: Posterior
     place: np.ndarray
     signals: list[Signal]
-    expected: list[np.ndarray]
     modelled: list[np.ndarray]
+    by_priors: list[np.ndarray]
+    marched: list[np.ndarray]
     judged: dict[str, Judged]
     n_marches: int
     n_jacobians: int
@@ -129,8 +131,9 @@ class _Compared:
         # The latest of each with its place, which searches ask for several times.
         self._residual: tuple[bytes, np.ndarray] | None = None
         self._jacobian: tuple[bytes, np.ndarray] | None = None
-        self.expected: list[np.ndarray] = []  # the first march, with the priors' means
         self.modelled: list[np.ndarray] = []
+        self.by_priors: list[np.ndarray] = []  # the first march, with the priors' means
+        self.marched: list[np.ndarray] = []
 
     def residual(self, at: np.ndarray) -> np.ndarray:
         """Measured less modelled samples of all signals, made independent."""
@@ -157,10 +160,10 @@ class _Compared:
         return judge(moved, names)
 
     def _made_residual(self, at: np.ndarray) -> np.ndarray:
-        self.modelled = self._march.values(self._by(at))
-        if not self.expected:
-            self.expected = self.modelled
-            _refuse_other_units(self._signals, self.expected)
+        self.modelled, self.marched = self._march.values(self._by(at))
+        if not self.by_priors:
+            self.by_priors = self.marched
+            _refuse_other_units(self._signals, self.modelled)
         biases = iter(at[self._offsets.size :])
         found = np.concatenate(
             [
@@ -240,8 +243,9 @@ def identify(
         posterior_of(compared.jacobian(found.x)),
         measurement.place,
         measurement.signals,
-        compared.expected,
         compared.modelled,
+        compared.by_priors,
+        compared.marched,
         compared.judged(found),
         compared.n_marches,
         compared.n_jacobians,

@@ -3,31 +3,42 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from catenary.cases.studies.tolerance.study import ALL, EACH, Plan, Tolerance
+from catenary.cases.studies.tolerance.pictures import draw_shares, draw_values
+from catenary.cases.studies.tolerance.study import ALL, EACH, Plan, Tolerance, at_least
 from catenary.postproc.report.study_table import Column, Content, StudyTable, write_files
 
 TABLE, RECORD, PAGE = "tolerance.csv", "tolerance.json", "tolerance.md"
+SHARES, VALUES = "tolerance_shares.png", "tolerance_values.png"
 
 
 def write(out_dir: Path, plan: Plan, found: Sequence[Tolerance]) -> list[Path]:
-    """Write all tables of a study; returns the files. Not collective."""
+    """Write all tables and pictures of a study; returns the files. Not collective."""
     record = {
         "case": plan.name,
         "task": plan.task.model_dump(exclude_none=True),
-        "tolerances": [_fields(one) for one in found],
+        "tolerances": [
+            _fields(one) | {"levels": one.samples.records() if one.samples else []} for one in found
+        ],
     }
-    content: dict[str, Content] = {TABLE: table_of(found), RECORD: record}
-    return write_files(out_dir, content | {PAGE: markdown(plan, found)})
+    content: dict[str, Content] = {
+        TABLE: table_of(found),
+        RECORD: record,
+        PAGE: markdown(plan, found),
+        SHARES: partial(draw_shares, plan, found),
+        VALUES: partial(draw_values, plan, found),
+    }
+    return write_files(out_dir, content)
 
 
 def _fields(one: Tolerance) -> dict[str, Any]:
-    return asdict(one) | {"at_most": one.at_most}
+    found = {name: value for name, value in vars(one).items() if name not in ("samples", "bound")}
+    return found | {"at_most": one.at_most}
 
 
 def table_of(found: Sequence[Tolerance]) -> StudyTable:
@@ -35,11 +46,11 @@ def table_of(found: Sequence[Tolerance]) -> StudyTable:
     rows = [
         _fields(one)
         | {
-            "shown": _level(one),
+            "shown": one.text,
             "samples": f"{one.kept} of {one.n_samples}" if one.level else "",
             "least_share": one.least_share if one.level else None,
             "linear": one.linear if np.isfinite(one.linear or 0.0) else None,
-            "as_run": None if one.checked is None else _at_least(one.checked, one.most),
+            "as_run": None if one.checked is None else at_least(one.checked, one.most),
         }
         for one in found
     ]
@@ -62,17 +73,6 @@ def table_of(found: Sequence[Tolerance]) -> StudyTable:
     return StudyTable(columns, rows, "Tolerances by criterion")
 
 
-def _level(one: Tolerance) -> str:
-    if not one.level:
-        return "not kept without errors" if not one.kept else "none"
-    return _at_least(one.level, one.most)
-
-
-def _at_least(level: float, most: float) -> str:
-    """A tolerance in words, which may be larger than the greatest that was looked at."""
-    return f"{'at least ' if level >= most else ''}{level:.3g}"
-
-
 def installer_table(plan: Plan, found: Sequence[Tolerance]) -> StudyTable:
     """Tolerance of each error for all criteria at once that the line keeps without errors."""
     rows = []
@@ -84,11 +84,11 @@ def installer_table(plan: Plan, found: Sequence[Tolerance]) -> StudyTable:
         row |= {"alone": "none", "lost_at": None, "by": "", "together": ""}
         row["worst"] = None
         if each is not None:
-            row |= {"alone": _level(each), "lost_at": each.lost_at, "by": _first_to_fail(own)}
+            row |= {"alone": each.text, "lost_at": each.lost_at, "by": _first_to_fail(own)}
             row["worst"] = each.linear if np.isfinite(each.linear or 0.0) else None
         if together is not None:
-            level = together.level * group.table.level
-            row["together"] = f"{'at least ' if together.at_most else ''}{level:.3g}"
+            level = group.table.level
+            row["together"] = at_least(together.level * level, together.most * level)
         rows.append(row)
     columns = [
         Column("error", "error"),

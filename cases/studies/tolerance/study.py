@@ -21,7 +21,9 @@ from catenary.cases.studies.scene_sets import (
     members_of,
     values_of,
 )
+from catenary.cases.studies.sweep.jobs import STATISTICS
 from catenary.cases.studies.tolerance.errors import Group, groups_of
+from catenary.cases.studies.tolerance.samples import Bound, Samples, least_share, samples_of
 from catenary.cases.studies.tolerance.task import SamplesTable, ToleranceTask
 from catenary.postproc.evaluate.wording import counted
 
@@ -44,12 +46,16 @@ def margins_of(summary: Mapping[str, Any], criteria: Sequence[BoundTable]) -> Ma
     if criteria:
         return {one.text: _margins(summary, one) for one in criteria}
     found: Margins = {}
-    for row in summary["acceptance"]:
-        if row["passed"] is not None:
-            by = row["limit"] - row["value"]
-            margin = -by if row["relation"].startswith(">") else by
-            found.setdefault(_without_pantograph(row["criterion"], summary), []).append(margin)
+    for row in _judged(summary):
+        by = row["limit"] - row["value"]
+        margin = -by if row["relation"].startswith(">") else by
+        found.setdefault(_without_pantograph(row["criterion"], summary), []).append(margin)
     return found
+
+
+def _judged(summary: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """What the standard has judged of a run."""
+    return [row for row in summary["acceptance"] if row["passed"] is not None]
 
 
 def _margins(summary: Mapping[str, Any], one: BoundTable) -> list[float]:
@@ -62,6 +68,35 @@ def _without_pantograph(criterion: str, summary: Mapping[str, Any]) -> str:
     for one in summary["pantographs"]:
         criterion = criterion.removesuffix(f", {one['name']}")
     return criterion
+
+
+def bounds_of(
+    summaries: Sequence[Mapping[str, Any]], criteria: Sequence[BoundTable]
+) -> dict[str, Bound]:
+    """Bounds of all criteria by their names, as ``margins_of`` names them.
+
+    A criterion of the standard whose limit is another one in other runs has its margin bounded.
+
+    Parameters
+    ----------
+    summaries : of the runs of the line without errors, none of which broke
+    criteria : as of ``margins_of``
+    """
+    found = {
+        one.text: Bound(
+            one.limit,
+            one.at_least is not None,
+            STATISTICS[one.statistic].meaning or one.statistic,
+        )
+        for one in criteria
+    }
+    for summary in summaries if not criteria else ():
+        for row in _judged(summary):
+            name = _without_pantograph(row["criterion"], summary)
+            own = Bound(row["limit"], row["relation"].startswith(">"), f"{name} [{row['unit']}]")
+            if found.setdefault(name, own) != own:
+                found[name] = Bound(0.0, True, f"margin of {own.meaning}")
+    return found
 
 
 def names_of(margins: Sequence[Margins]) -> list[str]:
@@ -112,6 +147,8 @@ class Tolerance:
     checked : largest tolerance at which the line of that worst case keeps the criterion
     lost_at : least tolerance at which a line that was run, of the samples or of the worst case,
         loses it: an upper bound of the true worst-case tolerance; None if no line loses it
+    samples : at all levels that were run; None if the line without errors does not keep it
+    bound : of the criterion; None of ``EACH``
     """
 
     criterion: str
@@ -125,11 +162,25 @@ class Tolerance:
     linear: float | None = None
     checked: float | None = None
     lost_at: float | None = None
+    samples: Samples | None = field(default=None, compare=False, repr=False)
+    bound: Bound | None = None
 
     @property
     def at_most(self) -> bool:
         """Whether the level is the greatest that was looked at."""
         return self.level >= self.most
+
+    @property
+    def text(self) -> str:
+        """The tolerance in words, without its unit."""
+        if not self.level:
+            return "none" if self.kept else "not kept without errors"
+        return at_least(self.level, self.most)
+
+
+def at_least(level: float, most: float) -> str:
+    """A tolerance in words, which may be larger than the greatest that was looked at."""
+    return f"{'at least ' if level >= most else ''}{level:.3g}"
 
 
 @dataclass(frozen=True)
@@ -234,11 +285,14 @@ class _Search:
     say: Callable[[str], None]
     varied: list[_Varied] = field(default_factory=list)
     _weak: dict[str, set[int]] = field(default_factory=dict)
+    # Of each error and level, the margins of the runs of each sample that was run.
+    _seen: dict[str, dict[float, dict[int, list[Margins]]]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         task = self.plan.task
         self.nominal = self._margins([{}])[0]
         self.criteria = names_of(self.nominal)
+        self.bounds = bounds_of(self._summaries([{}]), task.criteria)
         random = [
             group.random(np.random.default_rng([task.samples.seed, number]), task.samples.n)
             for number, group in enumerate(self.plan.groups)
@@ -272,7 +326,26 @@ class _Search:
                 )
             )
             found.append(replace(together, linear=linear, checked=checked, lost_at=lost_at))
-        return found
+        names = {EACH: [one.criterion for one in held]}
+        return [
+            replace(
+                one,
+                samples=self._samples(varied, names.get(one.criterion, [one.criterion])),
+                bound=self.bounds.get(one.criterion),
+            )
+            if one in held or one.criterion == EACH
+            else one
+            for one in found
+        ]
+
+    def _samples(self, varied: _Varied, criteria: Sequence[str]) -> Samples:
+        """Samples at all levels, which other criteria may have had run; at level 0 all are the line
+        without errors."""
+        n, seen = self.samples.n, self._seen.get(varied.name, {})
+        margins = [[least(self.nominal, *criteria)] * n]
+        for lines in seen.values():
+            margins.append([least(lines[i], *criteria) if i in lines else np.nan for i in range(n)])
+        return samples_of([0.0, *seen], margins)
 
     def _tolerance(self, varied: _Varied, criterion: str) -> Tolerance:
         if least(self.nominal, criterion) < 0.0:
@@ -287,8 +360,6 @@ class _Search:
 
     def _by_samples(self, varied: _Varied, name: str, *criteria: str) -> Tolerance:
         """The tolerance at which enough samples keep all of some criteria."""
-        from scipy.stats import beta
-
         n = self.samples.n
         allowed = self.samples.allowed
         lost: list[float] = []
@@ -306,7 +377,7 @@ class _Search:
 
         level = self._bisect(varied.most, holds)
         kept = n - self._failures(varied, level, criteria, n) if level else n
-        share = float(beta.ppf(1.0 - self.samples.confidence, kept, n - kept + 1))
+        share = least_share(kept, n, self.samples.confidence)
         lost_at = min(lost, default=None)
         head = name, varied.name, varied.unit
         return Tolerance(*head, level, varied.most, kept, n, share, lost_at=lost_at)
@@ -328,11 +399,13 @@ class _Search:
         early.
         """
         weak = self._weak.setdefault(varied.name, set())
+        seen = self._seen.setdefault(varied.name, {}).setdefault(level, {})
         order = sorted(range(self.samples.n), key=lambda number: number not in weak)
         failed, n_runs = 0, self.evaluation.n_runs
         for first in range(0, len(order), _PART):
             numbers = order[first : first + _PART]
             lines = self._margins([varied.values(level, varied.sample(i)) for i in numbers])
+            seen.update(zip(numbers, lines, strict=True))
             own = [
                 i for i, line in zip(numbers, lines, strict=True) if least(line, *criteria) < 0.0
             ]
@@ -350,14 +423,18 @@ class _Search:
 
     def _margins(self, lines: Sequence[Mapping[str, Any]]) -> list[list[Margins]]:
         """Margins of the runs of all scenes of the set, for each line."""
+        criteria = self.plan.task.criteria
+        found = [margins_of(summary, criteria) for summary in self._summaries(lines)]
+        n = len(self.plan.scenes.members)
+        return [found[i * n : (i + 1) * n] for i in range(len(lines))]
+
+    def _summaries(self, lines: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+        """Summaries of the runs of all scenes of the set, line by line."""
         members = self.plan.scenes.members
         wanted: list[Wanted] = [
             (self.plan.scenes, member, values) for values in lines for member in members
         ]
-        criteria = self.plan.task.criteria
-        found = [margins_of(summary, criteria) for summary in self.evaluation.of(wanted)]
-        n = len(members)
-        return [found[i * n : (i + 1) * n] for i in range(len(lines))]
+        return self.evaluation.of(wanted)
 
     def _worst_case(self, varied: _Varied, criterion: str) -> tuple[float, float, float | None]:
         """Tolerance by slopes, the largest one that the line with that worst case keeps, and the
