@@ -16,7 +16,7 @@ import numpy as np
 
 from catenary.mbs.called_model import CalledModel
 from catenary.mbs.head.head_arrays import drive_width, named
-from catenary.mbs.head.newmark_head import SteppedHead, raised
+from catenary.mbs.head.newmark_head import Raising, SteppedHead
 from catenary.mbs.interface import HeadState, Pantograph
 from catenary.mbs.vehicle.base_motion import BaseMotion
 from catenary.solver.kernels import native
@@ -38,13 +38,14 @@ class Lowering:
     def course(self, static_force: float, raise_time: float) -> Callable[[float], float]:
         """Part of the lift that acts as a function of time [s], after a raising over ``raise_time``
         [s] to ``static_force`` [N]."""
-        before = raised(self.time, raise_time)
+        rising, falling = Raising(raise_time), Raising(self.within)
+        before = rising(self.time)
         last = self.force / static_force
 
         def part(time: float) -> float:
             if time <= self.time:
-                return raised(time, raise_time)
-            return before + (last - before) * raised(time - self.time, self.within)
+                return rising(time)
+            return before + (last - before) * falling(time - self.time)
 
         return part
 

@@ -139,8 +139,9 @@ class FullPantograph:
         self._data, self._dt, self._base = data, dt, base
         part = Raising(raise_time)
         self._hold_down = _HoldDown("held down until raised", data.arm, part)
-        system = without_spins(standing.system, standing.motion)
-        system = system.with_forces(*_blown(data, air), self._hold_down)
+        still = without_spins(standing.system, standing.motion)
+        self._still = still.with_forces(*_blown(data, air))
+        system = self._still.with_forces(self._hold_down)
         if base is not None:
             masses = tuple(body.mass for body in system.bodies)
             system = system.with_forces(_Carried("carried by the base", masses, base))
@@ -148,8 +149,6 @@ class FullPantograph:
         # Heights of the head above the base, with the arm at its working height.
         alone = float(standing.motion.position[standing.motion.numbers[data.head], 2])
         self._zero = nominal_height - (alone - pressing / standing.head.stiffness)
-        still = without_spins(standing.system, standing.motion)
-        self._still = still.with_forces(*_blown(data, air))
         s, space = len(data.strips.contact_offsets), self._rest.numbers[SPACE]
         # Heights of the points that touch the wire.
         self._heights = np.zeros(s, dtype=native.BODY_PRODUCT)
