@@ -16,9 +16,9 @@ import numpy as np
 
 from catenary.mbs.called_model import CalledModel
 from catenary.mbs.head.head_arrays import drive_width, named
-from catenary.mbs.head.newmark_head import SteppedHead, raised
+from catenary.mbs.head.newmark_head import Raising, SteppedHead
 from catenary.mbs.interface import HeadState, Pantograph
-from catenary.mbs.vehicle.base_motion import BaseMotion
+from catenary.mbs.vehicle.base_motion import BaseMotion, lifted
 from catenary.solver.kernels import native
 
 
@@ -38,13 +38,14 @@ class Lowering:
     def course(self, static_force: float, raise_time: float) -> Callable[[float], float]:
         """Part of the lift that acts as a function of time [s], after a raising over ``raise_time``
         [s] to ``static_force`` [N]."""
-        before = raised(self.time, raise_time)
+        rising, falling = Raising(raise_time), Raising(self.within)
+        before = rising(self.time)
         last = self.force / static_force
 
         def part(time: float) -> float:
             if time <= self.time:
-                return raised(time, raise_time)
-            return before + (last - before) * raised(time - self.time, self.within)
+                return rising(time)
+            return before + (last - before) * falling(time - self.time)
 
         return part
 
@@ -98,13 +99,13 @@ class LoweredPantograph:
         """Put the model without contact to where its head is at ``head_height`` [m], moving upward
         with ``velocity`` [m/s]."""
         self.model.place(head_height, velocity)
-        self._memory["height"] = head_height - self._base_at(0.0)[0]
+        self._memory["height"] = head_height - lifted(self._base, 0.0)[0]
 
     def extrapolate(self, time: float) -> tuple[np.ndarray, np.ndarray]:
         """Heights and velocities (s,) of the strips at ``time`` [s] from the motion alone."""
         if not self.is_caught:
             return self.model.extrapolate(time)
-        place, velocity = self._base_at(time)
+        place, velocity = lifted(self._base, time)
         s = len(self.strip_offsets)
         return np.full(s, self._memory["caught_at"][0] + place), np.full(s, velocity)
 
@@ -115,7 +116,7 @@ class LoweredPantograph:
         """
         now = self._now
         now["time"] = time
-        now["roof"], now["roof_velocity"] = self._base_at(time)
+        now["roof"], now["roof_velocity"] = lifted(self._base, time)
         if isinstance(self.model, SteppedHead):
             return self.model.predict(time)
         self.stepped.step(self._row)
@@ -131,7 +132,7 @@ class LoweredPantograph:
         """Fill in what steps to ``times`` [s] depend on, see `SteppedHead`."""
         if self._base is not None:
             rows = named(drives)
-            motions = np.array([self._base_at(time) for time in times])
+            motions = np.array([lifted(self._base, time) for time in times])
             rows["roof"], rows["roof_velocity"] = motions.T
         if isinstance(self.model, SteppedHead):
             self.model.fill_drives(times, drives)
@@ -153,10 +154,3 @@ class LoweredPantograph:
     def base(self, time: float) -> float:
         """Height of the model's base [m]."""
         return self.model.base(time)
-
-    def _base_at(self, time: float) -> tuple[float, float]:
-        """Height [m] and velocity [m/s] of the base."""
-        if self._base is None:
-            return 0.0, 0.0
-        vertical = self._base.vertical(time)
-        return float(vertical.place), float(vertical.velocity)

@@ -17,6 +17,7 @@ from catenary.mbs.head.newmark_head import SteppedHead, parts_of
 from catenary.mbs.head.stepping import Stepping
 from catenary.mbs.interface import HeadState
 from catenary.mbs.lumped_data import LumpedData, chain_matrix
+from catenary.mbs.vehicle.base_motion import lifted
 from catenary.solver.kernels import native
 
 # Half of the time over which the speed of a base that rises is found [s]: a half cosine of 0.1 s is
@@ -172,7 +173,7 @@ class LumpedPantograph(SteppedHead):
 
     def base(self, time: float) -> float:
         """Lift of the base by the vehicle [m]."""
-        return 0.0 if self._base is None else float(self._base.vertical(time).place)
+        return lifted(self._base, time)[0]
 
     def _in_place(self, data: LumpedData, static_force: float, nominal: float) -> LawsInPlace:
         """The laws of a chain whose head is at its nominal height under the static force."""
@@ -195,10 +196,7 @@ class LumpedPantograph(SteppedHead):
 
     def _base_motion(self, time: float) -> tuple[float, float]:
         """Lift of the base by vehicle and raising, and its speed [m], [m/s]."""
-        place = velocity = 0.0
-        if self._base is not None:
-            moved = self._base.vertical(time)
-            place, velocity = float(moved.place), float(moved.velocity)
+        place, velocity = lifted(self._base, time)
         if self._tied:
             (rise,), (rate,) = self._rise(np.array([time]))
             place, velocity = place + float(rise), velocity + float(rate)

@@ -45,11 +45,6 @@ class LumpedData:
         return len(self.masses)
 
     @property
-    def strip_offsets(self) -> tuple[float, ...]:
-        """Places of the strips ahead of the pantograph's own place [m]."""
-        return self.strips.offsets
-
-    @property
     def compliance(self) -> float:
         """Compliance of the springs between head and last mass, the strips' included [m/N]."""
         return sum(1.0 / k for k in self.stiffnesses[:-1]) + self.strips.compression(1.0)

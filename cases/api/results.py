@@ -304,7 +304,7 @@ class Run:
                 "wire": (dim, [wire for one in wires for wire in one]),
                 "pantograph": (dim, own),
             }
-        words = results.contact_names()
+        words = results.contact_columns()
         own = np.repeat(names, [len(one) for one in words])
         return {"contact": [word for one in words for word in one], "pantograph": (dim, own)}
 

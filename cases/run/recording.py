@@ -156,7 +156,7 @@ def train_of(problem: Problem) -> channels.TrainLayout:
     """The facts of a problem that decide which channels a run has. Not collective."""
     places = problem.train.placements
     return channels.TrainLayout(
-        tuple(len(place.data.strip_offsets) for place in places),
+        tuple(len(place.data.strips.offsets) for place in places),
         any(has_joints(place.data) for place in places),
         len(problem.line.wires_of(Role.CONTACT)),
         simulated(problem),

@@ -458,7 +458,7 @@ def _refuse_other_run(
     from catenary.postproc.files.later_end import CHANGED
 
     assert header is not None and order.state is not None
-    n_strips = tuple(len(place.data.strip_offsets) for place in problem.train.placements)
+    n_strips = tuple(len(place.data.strips.offsets) for place in problem.train.placements)
     refuse_other_run(order.result, header, n_strips, CHANGED if order.extends else ())
     refuse_other_state(order.result, order.state, at_rest.model)
 

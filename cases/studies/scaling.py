@@ -180,7 +180,7 @@ def work_of(scene: Scene) -> Work:
     problem, mesh = problem_of(scene), mesh_of(scene)
     needs = needs_with_mesh(scene, mesh)
     n_unknowns, n_spans = numbering_of(problem, mesh).n_unknowns, problem.line.n_spans
-    contacts = sum(len(place.data.strip_offsets) for place in problem.train.placements)
+    contacts = sum(len(place.data.strips.offsets) for place in problem.train.placements)
     share = _FLAGS + 2 * contacts * (1 + contacts)
     reply = _HEAD + contacts + 2 * _LINKS
     sizes = Sizes(_BYTES * math.ceil(n_unknowns / n_spans), _BYTES * share, _BYTES * reply)

@@ -211,13 +211,6 @@ class SteppedHead(ABC):
             self.row[N_DRIVE + s :] = self._lateral.rate
 
 
-def raised(time: float, raise_time: float) -> float:
-    """Part of the lift that acts at ``time`` [s]: a half cosine from 0 to 1 over ``raise_time``."""
-    if time >= raise_time:
-        return 1.0
-    return float(_half_cosine(time, raise_time))
-
-
 def _half_cosine(time: Any, raise_time: float) -> Any:
     """From 0 to 1 over ``raise_time``, at one time or at several [s]."""
     return 0.5 * (1.0 - np.cos(np.pi * time / raise_time))
@@ -225,13 +218,15 @@ def _half_cosine(time: Any, raise_time: float) -> Any:
 
 @dataclass(frozen=True)
 class Raising:
-    """Part of the lift that acts at a time [s], see ``raised``."""
+    """Part of the lift that acts at a time [s]: a half cosine from 0 to 1 over ``raise_time``."""
 
     raise_time: float
 
     def __call__(self, time: float) -> float:
         """The part at ``time`` [s]."""
-        return raised(time, self.raise_time)
+        if time >= self.raise_time:
+            return 1.0
+        return float(_half_cosine(time, self.raise_time))
 
 
 def parts_of(part: Callable[[float], float], times: Sequence[float]) -> np.ndarray:

@@ -29,7 +29,7 @@ from catenary.mbs.rigid.spin_locks import without_spins
 from catenary.mbs.rigid.statics import equilibrium, held_force
 from catenary.mbs.rigid.step_solvers import StepSolver
 from catenary.mbs.rigid.system import System
-from catenary.mbs.vehicle.base_motion import BaseMotion
+from catenary.mbs.vehicle.base_motion import BaseMotion, lifted
 from catenary.solver.kernels import native
 
 ARM, HEAD = "arm held at its place", "head moved from its place"
@@ -139,8 +139,9 @@ class FullPantograph:
         self._data, self._dt, self._base = data, dt, base
         part = Raising(raise_time)
         self._hold_down = _HoldDown("held down until raised", data.arm, part)
-        system = without_spins(standing.system, standing.motion)
-        system = system.with_forces(*_blown(data, air), self._hold_down)
+        still = without_spins(standing.system, standing.motion)
+        self._still = still.with_forces(*_blown(data, air))
+        system = self._still.with_forces(self._hold_down)
         if base is not None:
             masses = tuple(body.mass for body in system.bodies)
             system = system.with_forces(_Carried("carried by the base", masses, base))
@@ -148,8 +149,6 @@ class FullPantograph:
         # Heights of the head above the base, with the arm at its working height.
         alone = float(standing.motion.position[standing.motion.numbers[data.head], 2])
         self._zero = nominal_height - (alone - pressing / standing.head.stiffness)
-        still = without_spins(standing.system, standing.motion)
-        self._still = still.with_forces(*_blown(data, air))
         s, space = len(data.strips.contact_offsets), self._rest.numbers[SPACE]
         # Heights of the points that touch the wire.
         self._heights = np.zeros(s, dtype=native.BODY_PRODUCT)
@@ -206,10 +205,9 @@ class FullPantograph:
 
     def _place(self, head_height: float, velocity: float) -> None:
         data, number = self._data, self._rest.numbers[self._data.head]
-        wanted, motion = head_height - self._zero, self._rest
-        if self._base is not None:
-            vertical = self._base.vertical(0.0)
-            wanted, velocity = wanted - vertical.place, velocity - vertical.velocity
+        lift, rising = lifted(self._base, 0.0)
+        wanted, velocity = head_height - self._zero - lift, velocity - rising
+        motion = self._rest
         arm = wanted - stand(data).head.offset
         for _ in range(20):
             holder = PrescribedPoint(ARM, data.arm, Constant(arm))
@@ -292,8 +290,7 @@ class FullPantograph:
 
     def base(self, time: float) -> float:
         """Height of the base at ``time`` [s], in the line's heights [m]."""
-        moved = 0.0 if self._base is None else float(self._base.vertical(time).place)
-        return self._zero + moved
+        return self._zero + lifted(self._base, time)[0]
 
     @contextmanager
     def _named(self) -> Iterator[None]:
@@ -327,7 +324,6 @@ class FullPantograph:
         if self._lateral is not None:
             tilt = motion.rotation[motion.numbers[self._data.head]][2, 1]
             velocity += tilt * self._lateral.rate
-        if self._base is not None:
-            vertical = self._base.vertical(time)
-            height += vertical.place
-            velocity += vertical.velocity
+        lift, rising = lifted(self._base, time)
+        height += lift
+        velocity += rising

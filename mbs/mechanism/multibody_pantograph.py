@@ -106,11 +106,6 @@ class MultibodyData:
         """Roll of the head about the track as its joints allow it, None if they do not."""
         return head_turning(self, ROLL)
 
-    @property
-    def strip_offsets(self) -> tuple[float, ...]:
-        """Places of the strips ahead of the pantograph's own place [m]."""
-        return self.strips.offsets
-
 
 class Head(NamedTuple):
     """The head on its arm: ``mass`` [kg], ``stiffness`` [N/m] and ``damping`` [N s/m] of what

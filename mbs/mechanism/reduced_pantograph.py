@@ -28,6 +28,7 @@ from catenary.mbs.head.stepping import Stepping
 from catenary.mbs.head.strips import ONE_STRIP, Strips, Turning, head_parts
 from catenary.mbs.interface import HeadState
 from catenary.mbs.mechanism.reduction import ReducedMechanism
+from catenary.mbs.vehicle.base_motion import lifted
 from catenary.solver.kernels import native
 
 
@@ -117,8 +118,7 @@ class RaisingPantograph(SteppedHead):
 
     def base(self, time: float) -> float:
         """Height of the base at ``time`` [s], in the line's heights [m]."""
-        moved = 0.0 if self._base is None else float(self._base.vertical(time).place)
-        return self._data.base_height + moved
+        return self._data.base_height + lifted(self._base, time)[0]
 
     def _move_base(self, time: float) -> None:
         """Put lift and base to ``time`` [s]."""

@@ -118,6 +118,14 @@ class BaseMotion:
         return Motion(place, velocity, acceleration)
 
 
+def lifted(base: BaseMotion | None, time: float) -> tuple[float, float]:
+    """Lift [m] and upward velocity [m/s] of a base at ``time`` [s], both zero without one."""
+    if base is None:
+        return 0.0, 0.0
+    vertical = base.vertical(time)
+    return float(vertical.place), float(vertical.velocity)
+
+
 def _course(
     source: Source, direction: str, vehicle: VehicleMotion, speed: float
 ) -> tuple[_Course, bool]:

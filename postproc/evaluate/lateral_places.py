@@ -45,9 +45,8 @@ def lateral_ranges(results: Results) -> list[LateralRange]:
         return []
     half_lengths = results.facts_of("strip_half_length")
     found = []
-    for p, (name, own) in enumerate(
-        zip(results.pantograph_names(), results.contact_columns(), strict=True)
-    ):
+    columns = [list(own.values()) for own in results.contact_columns()]
+    for p, (name, own) in enumerate(zip(results.pantograph_names(), columns, strict=True)):
         farthest, at, left = 0.0, 0, -1
         half = float(half_lengths[p])
         for part, places in results.blocks("lateral_place"):

@@ -7,7 +7,6 @@ as it was.
 from __future__ import annotations
 
 import json
-import os
 import shutil
 from pathlib import Path
 
@@ -15,7 +14,7 @@ import h5py
 
 from catenary.base.errors import RunBroken
 from catenary.postproc.channels.header import Header
-from catenary.postproc.files.disk import as_attribute, open_to_write
+from catenary.postproc.files.disk import appears_whole, as_attribute, open_to_write
 from catenary.postproc.files.disk_errors import reason
 from catenary.postproc.files.hdf5.checked import (
     ATTRIBUTE_SUMS,
@@ -26,7 +25,6 @@ from catenary.postproc.files.hdf5.checked import (
     set_attribute,
     text_of,
 )
-from catenary.postproc.files.own_files import new_part
 from catenary.postproc.files.run_schema import INTERRUPTED
 
 # Steps of the run as it was begun: what is recorded follows from them.
@@ -54,14 +52,12 @@ def extend_run(path: Path, header: Header, n_steps: int) -> None:
     RunBroken
         If the file cannot be written; it is as it was.
     """
-    made_as = new_part(path)
     try:
-        shutil.copyfile(path, made_as, follow_symlinks=False)
-        with open_to_write(made_as, "r+", libver=FORMAT_BOUNDS) as file:
-            _change(file, header, n_steps)
-        os.replace(made_as, path)
+        with appears_whole(path) as made_as:
+            shutil.copyfile(path, made_as, follow_symlinks=False)
+            with open_to_write(made_as, "r+", libver=FORMAT_BOUNDS) as file:
+                _change(file, header, n_steps)
     except (OSError, RuntimeError) as error:
-        made_as.unlink(missing_ok=True)
         raise RunBroken(
             f"{path} cannot be given a later end ({reason(error)}); it is as it was"
         ) from error

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
@@ -107,9 +106,7 @@ class Registration(NamedTuple):
 
     def csv(self) -> str:
         """The table as CSV text."""
-        stream = io.StringIO()
-        stream.write(csv_text([*_HEADS, *(["wire"] if self.wires else [])], self.rows()))
-        return stream.getvalue()
+        return csv_text([*_HEADS, *(["wire"] if self.wires else [])], self.rows())
 
 
 def _fixed(value: float, digits: int) -> str:

@@ -44,22 +44,17 @@ class TrainOfRun(LineOfRun):
         numbers = itertools.count()
         return [{name: next(numbers) for name in names} for _ in range(self.n_pantographs)]
 
-    def contact_columns(self) -> list[slice]:
-        """Columns of ``lateral_place`` of each pantograph: its strips, each with all wires."""
-        n = len(self.wires_of(Role.CONTACT))
-        return [slice(n * own.start, n * own.stop) for own in self.strip_columns()]
-
-    def contact_names(self) -> list[list[str]]:
-        """Names of the same columns: "strip 1 contact wire"; the strip is left out where there is
-        one strip, the wire where there is one wire."""
-        wires, found = self.wires_of(Role.CONTACT), []
+    def contact_columns(self) -> list[dict[str, int]]:
+        """Column of ``lateral_place`` by the name of a contact, of each pantograph: "strip 1
+        contact_wire"; the strip is left out where there is one strip, the wire where one wire."""
+        wires, found, numbers = self.wires_of(Role.CONTACT), [], itertools.count()
         for strips in self.strip_columns():
-            parts = [
+            words = [
                 [*([f"strip {n + 1}"] if len(strips) > 1 else ()), *([w] if len(wires) > 1 else ())]
                 for n in range(len(strips))
                 for w in wires
             ]
-            found.append([" ".join(words) for words in parts])
+            found.append({" ".join(own): next(numbers) for own in words})
         return found
 
     def pantograph_words(self) -> list[dict[str, Any]]:

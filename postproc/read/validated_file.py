@@ -89,11 +89,6 @@ def opened(path: Path) -> tuple[h5py.File, Complete | None]:
     return file, None
 
 
-def opened_image(image: bytes) -> h5py.File:
-    """A result file that was read into memory, of a run of this program that has ended."""
-    return h5py.File(h5f.open_file_image(image))
-
-
 def _read_indices(file: h5py.File) -> None:
     """Read where the chunks of all tables lie, into a cache that has room for it."""
     cache = file.id.get_mdc_config()
@@ -144,7 +139,7 @@ class ValidatedFile:
         self.path = path
         try:
             self._file, self._complete = (
-                opened(path) if image is None else (opened_image(image), None)
+                opened(path) if image is None else (h5py.File(h5f.open_file_image(image)), None)
             )
         except HDF5_ERRORS as error:
             reason = " ".join(str(error).split())

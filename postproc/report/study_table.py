@@ -172,11 +172,6 @@ def texts_table(
     return StudyTable(columns, texts, title, note)
 
 
-def rows_csv(rows: Sequence[Row]) -> str:
-    """Rows with the same keys, at least one, as CSV text."""
-    return StudyTable([Column(name) for name in rows[0]], rows).csv()
-
-
 # Content of a file of a study, see ``write_files``.
 Content = StudyTable | Mapping[str, Any] | Sequence[Row] | Callable[[], Any] | str | bytes
 
@@ -215,7 +210,7 @@ def write_files(folder: Path, content: Mapping[str, Content]) -> list[Path]:
 
             files |= figures.painted(name, own)
         elif own:
-            files[name] = rows_csv(own)
+            files[name] = StudyTable([Column(key) for key in own[0]], own).csv()
     written = write_all(folder, files)
     remove_stale(folder, content.keys() - files.keys())
     return written

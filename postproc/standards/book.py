@@ -11,6 +11,7 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, Literal, NamedTuple
 
+from numpy.polynomial.polynomial import polyval
 from pydantic import (
     BaseModel,
     BeforeValidator,
@@ -100,10 +101,7 @@ class LimitRow(_Part):
     def number(self, speed: float) -> float | None:
         """The limit at a speed [km/h], None if it depends on something else."""
         if self.polynomial is not None:
-            total = 0.0
-            for coefficient in reversed(self.polynomial):
-                total = total * speed + coefficient
-            return total
+            return float(polyval(speed, self.polynomial))
         return self.value
 
     def share(self, of: float) -> float:

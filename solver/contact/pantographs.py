@@ -152,7 +152,7 @@ class Pantographs:
         self._wires = wires
         self._start = np.array([train.start - p.behind for p in train.placements])
         self.speed = train.speed
-        offsets = [placement.data.strip_offsets for placement in train.placements]
+        offsets = [placement.data.strips.offsets for placement in train.placements]
         counts, n_wires = [len(own) for own in offsets], wires.n_wires
         of_strip, of_pantograph = np.arange(sum(counts) + 1), np.cumsum([0, *counts])
         self.ends = StripEnds(n_wires * of_strip.astype(np.int64), of_pantograph.astype(np.int64))
@@ -423,7 +423,7 @@ def _lateral_path(
         LateralPath(
             *wires.course(number),
             train.start - placement.behind,
-            placement.data.strip_offsets,
+            placement.data.strips.offsets,
             train.speed,
             base,
         )
@@ -458,7 +458,7 @@ def nominal_height_rule(
         lifted = elasticity.pressed(at_rest, force)
         above = 0.0
         if contact is not None and isinstance(placement.data, LumpedData) and placement.data.tied:
-            above = contact.depth(force / (len(placement.data.strip_offsets) * wires.n_wires))
+            above = contact.depth(force / (len(placement.data.strips.offsets) * wires.n_wires))
         # By trapezoids; scipy.integrate, which has the rule, loads solvers for 0.03 s.
         mean = float(np.sum(np.diff(x) * (lifted[1:] + lifted[:-1]) / 2.0) / (x[-1] - x[0]))
         return mean + above

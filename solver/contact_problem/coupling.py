@@ -13,7 +13,7 @@ docs/theory/one_solve.md.
 
 from __future__ import annotations
 
-from typing import Protocol
+from abc import ABC, abstractmethod
 
 import numpy as np
 
@@ -29,15 +29,18 @@ from catenary.solver.problem.problem import Numerics
 DIVERGED = 1e9
 
 
-class Coupling(Protocol):
+class Coupling(ABC):
     """Finds the forces of a step. Lives on rank 0; not collective.
 
     ``extrapolates`` is whether it needs heights and rates extrapolated from both motions.
     """
 
-    extrapolates: bool
-    law: LawInSteps
+    extrapolates = False
 
+    def __init__(self, inner: InnerProblem) -> None:
+        self.inner, self.law = inner, inner.law
+
+    @abstractmethod
     def solve(self, line: LineResponse, heads: Heads) -> InnerSolution:
         """Contact forces and compensations of slack droppers.
 
@@ -48,43 +51,45 @@ class Coupling(Protocol):
         """
 
     def state(self) -> np.ndarray:
-        """Memory from step to step, as one array."""
-
-    def restore(self, state: np.ndarray) -> None:
-        """Continue from what ``state`` returned."""
-
-
-class _RemembersLaw:
-    """Remembers nothing besides what the contact law does."""
-
-    law: LawInSteps
-
-    def state(self) -> np.ndarray:
-        """Memory of the law."""
+        """Memory from step to step, as one array; mostly that of the law."""
         return self.law.state()
 
     def restore(self, state: np.ndarray) -> None:
         """Continue from what ``state`` returned."""
         self.law.restore(state)
 
+    def _applied(self, force: np.ndarray, line: LineResponse) -> np.ndarray:
+        """A copy of the law's forces (n,) [N]: none where no wire is, none that pull unless the law
+        has these; RunBroken if they diverge."""
+        least = -np.inf if self.law.pulls else 0.0
+        applied = np.where(line.present == 0.0, 0.0, np.maximum(force, least))
+        # Also true for what is no number.
+        if not (np.abs(applied) < DIVERGED).all():
+            raise RunBroken(
+                "the contact force grows beyond all bounds: the coupling is unstable at this step; "
+                'take numerics.coupling = "implicit" or a smaller numerics.dt_s'
+            )
+        return applied
 
-class Implicit(_RemembersLaw):
-    """Linearly implicit through both compliances, stable for every stiffness and mass.
-
-    Attributes
-    ----------
-    inner : InnerProblem
-    """
-
-    extrapolates = False
-
-    def __init__(self, inner: InnerProblem) -> None:
-        self.law = inner.law
-        self.inner = inner
-        self.solve = inner.solve
+    def _answered(
+        self, line: LineResponse, force: np.ndarray, slack: np.ndarray, rounds: int
+    ) -> InnerSolution:
+        """The solution with forces and compensations, from both sides' answers in the gap."""
+        inner = self.inner
+        depth, rate = inner.gap.under(force, slack)
+        complete = inner.covers(line, force, slack)
+        return InnerSolution(force, slack, depth, rate, rounds, inner.pivoted, complete)
 
 
-class Explicit(_RemembersLaw):
+class Implicit(Coupling):
+    """Linearly implicit through both compliances, stable for every stiffness and mass."""
+
+    def solve(self, line: LineResponse, heads: Heads) -> InnerSolution:
+        """Forces of the law at the end of the step."""
+        return self.inner.solve(line, heads)
+
+
+class Explicit(Coupling):
     """Forces from the extrapolated motion of both sides; droppers answer to them.
 
     ``line.early_height`` and ``early_rate`` (n,) and ``heads.early_height`` and ``early_velocity``
@@ -93,30 +98,18 @@ class Explicit(_RemembersLaw):
 
     extrapolates = True
 
-    def __init__(self, inner: InnerProblem) -> None:
-        self.law = inner.law
-        self._inner = inner
-
     def solve(self, line: LineResponse, heads: Heads) -> InnerSolution:
         """Forces of the law at the extrapolation."""
-        law = self.law
         depth = heads.early_height - line.early_height
         depth[line.present == 0.0] = NOWHERE
-        force = law.force(depth, heads.early_velocity - line.early_rate).copy()
-        if not law.pulls:
-            np.maximum(force, 0.0, out=force)
-        force[line.present == 0.0] = 0.0
-        _refuse_diverged(force)
-        inner = self._inner
-        inner.pivoted = False
-        slack = inner.slack_under(line, force)
-        inner.gap.put(line, heads)
-        depth, rate = inner.gap.under(force, slack)
-        complete = inner.covers(line, force, slack)
-        return InnerSolution(force, slack, depth, rate, 1, inner.pivoted, complete)
+        force = self._applied(self.law.force(depth, heads.early_velocity - line.early_rate), line)
+        self.inner.pivoted = False
+        slack = self.inner.slack_under(line, force)
+        self.inner.gap.put(line, heads)
+        return self._answered(line, force, slack, 1)
 
 
-class Iterated:
+class Iterated(Coupling):
     """Forces and motions exchanged until they agree, which starts from the step before.
 
     Parameters
@@ -125,47 +118,35 @@ class Iterated:
     max_iterations : exchanges a step
     """
 
-    extrapolates = False
-
     def __init__(self, inner: InnerProblem, tolerance: float, max_iterations: int) -> None:
-        self.law = inner.law
-        self._inner = inner
+        super().__init__(inner)
         self._tolerance = tolerance
         self._max_iterations = max_iterations
         self._latest = np.zeros(inner.law.n)
 
     def state(self) -> np.ndarray:
         """The latest forces, from which the next step starts, and what the law remembers."""
-        return np.concatenate([self._latest, self.law.state()])
+        return np.concatenate([self._latest, super().state()])
 
     def restore(self, state: np.ndarray) -> None:
         """Continue from what ``state`` returned."""
         n = self._latest.size
         self._latest = state[:n].copy()
-        self.law.restore(state[n:])
+        super().restore(state[n:])
 
     def solve(self, line: LineResponse, heads: Heads) -> InnerSolution:
         """Forces after as many exchanges as they need."""
-        gap, law, force = self._inner.gap, self.law, self._latest
-        gap.put(line, heads)
-        self._inner.pivoted = False
+        inner, force = self.inner, self._latest
+        inner.gap.put(line, heads)
+        inner.pivoted = False
+        slack = inner.slack_under(line, force)
         for number in range(1, self._max_iterations + 1):
-            slack = self._inner.slack_under(line, force)
-            new = law.force(*gap.under(force, slack)).copy()
-            if not law.pulls:
-                np.maximum(new, 0.0, out=new)
-            new[line.present == 0.0] = 0.0
-            _refuse_diverged(new)
+            new = self._applied(self.law.force(*inner.gap.under(force, slack)), line)
             change = float(np.abs(new - force).max(initial=0.0))
-            force = new
+            force, slack = new, inner.slack_under(line, new)
             if change <= self._tolerance:
                 self._latest = force
-                slack = self._inner.slack_under(line, force)
-                depth, rate = gap.under(force, slack)
-                complete = self._inner.covers(line, force, slack)
-                return InnerSolution(
-                    force, slack, depth, rate, number, self._inner.pivoted, complete
-                )
+                return self._answered(line, force, slack, number)
         raise NotConverged(
             f"line and pantographs do not agree on the contact forces within "
             f"{self._max_iterations} exchanges (numerics.max_iterations): these still change by "
@@ -181,12 +162,3 @@ def make_coupling(law: LawInSteps, coupled: Coupled, numerics: Numerics) -> Coup
     if numerics.coupling == "iterated":
         return Iterated(inner, numerics.eps_force, numerics.max_iterations)
     return Implicit(inner)
-
-
-def _refuse_diverged(force: np.ndarray) -> None:
-    # Also true for what is no number.
-    if not (np.abs(force) < DIVERGED).all():
-        raise RunBroken(
-            "the contact force grows beyond all bounds: the coupling is unstable at this step; "
-            'take numerics.coupling = "implicit" or a smaller numerics.dt_s'
-        )

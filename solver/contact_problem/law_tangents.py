@@ -6,7 +6,7 @@ Each gives, for n contacts, own f = offset + by_depth d + by_rate d' with depth 
 
 from __future__ import annotations
 
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
@@ -52,8 +52,8 @@ class StepLaw(NamedTuple):
     reported: ReportedForces
 
 
-class LawInSteps(Protocol):
-    """A law for n contacts.
+class LawInSteps:
+    """A law for n contacts; by itself one of a spring and a damper, which remembers nothing.
 
     Attributes
     ----------
@@ -63,16 +63,21 @@ class LawInSteps(Protocol):
     pulls : whether forces below zero are part of the law
     """
 
-    n: int
-    tangents: Tangents
-    is_linear: bool
-    pulls: bool
+    is_linear = True
+
+    def __init__(self, n: int, own: float, by_depth: float, by_rate: float, pulls: bool) -> None:
+        self.n = n
+        self.tangents = Tangents(
+            np.full(n, own), np.zeros(n), np.full(n, by_depth), np.full(n, by_rate)
+        )
+        self.pulls = pulls
 
     def linearise(self, depth: np.ndarray, rate: np.ndarray) -> None:
         """Put the tangents at depths and rates (n,)."""
 
     def force(self, depth: np.ndarray, rate: np.ndarray) -> np.ndarray:
         """The law itself without the cut at zero (n,) [N]."""
+        return np.asarray(self.tangents.by_depth * depth + self.tangents.by_rate * rate)
 
     def accept(self, time: float, depth: np.ndarray, rate: np.ndarray, force: np.ndarray) -> None:
         """Store what the law needs of an accepted step.
@@ -94,63 +99,28 @@ class LawInSteps(Protocol):
 
     def reported(self, force: np.ndarray) -> np.ndarray:
         """Recorded part of the forces (n,) of the latest step [N]."""
+        return force
 
     def in_loop(self) -> StepLaw:
-        """The law for a loop of kernels."""
+        """The law for a loop of kernels; forces count as they are."""
+        return StepLaw(None, ReportedForces(0.0, 0.0, np.zeros(0), np.zeros(self.n)))
 
     def state(self) -> np.ndarray:
         """Memory of the law, as one array."""
+        return np.zeros(0)
 
     def restore(self, state: np.ndarray) -> None:
         """Continue from what ``state`` returned."""
 
 
-class _Tangents:
-    """Base of laws that remember nothing."""
-
-    is_linear = True
-
-    def __init__(self, n: int, own: float, by_depth: float, by_rate: float, pulls: bool) -> None:
-        self.n = n
-        self.tangents = Tangents(
-            np.full(n, own), np.zeros(n), np.full(n, by_depth), np.full(n, by_rate)
-        )
-        self.pulls = pulls
-
-    def linearise(self, depth: np.ndarray, rate: np.ndarray) -> None:
-        """Do nothing: the law is linear."""
-
-    def force(self, depth: np.ndarray, rate: np.ndarray) -> np.ndarray:
-        """Spring and damper (n,) [N]."""
-        return np.asarray(self.tangents.by_depth * depth + self.tangents.by_rate * rate)
-
-    def accept(self, time: float, depth: np.ndarray, rate: np.ndarray, force: np.ndarray) -> None:
-        """Do nothing: the law has no memory."""
-
-    def reported(self, force: np.ndarray) -> np.ndarray:
-        """The forces themselves."""
-        return force
-
-    def in_loop(self) -> StepLaw:
-        """Forces count as they are."""
-        return StepLaw(None, ReportedForces(0.0, 0.0, np.zeros(0), np.zeros(self.n)))
-
-    def state(self) -> np.ndarray:
-        """Nothing."""
-        return np.zeros(0)
-
-    def restore(self, state: np.ndarray) -> None:
-        """Nothing."""
-
-
-class LinearInSteps(_Tangents):
+class LinearInSteps(LawInSteps):
     """The linear law."""
 
     def __init__(self, law: LinearLaw, n: int, pulls: bool) -> None:
         super().__init__(n, 1.0, law.stiffness, law.damping, pulls)
 
 
-class HertzInSteps(_Tangents):
+class HertzInSteps(LawInSteps):
     """Hertz's law with hysteresis, which remembers the speed of each contact's last impact.
 
     That is the rate at the start of the step in which the gap closes.
@@ -199,7 +169,7 @@ class HertzInSteps(_Tangents):
         self.speed[:] = state
 
 
-class KinematicInSteps(_Tangents):
+class KinematicInSteps(LawInSteps):
     """Head and wire as one: d + tau d' = 0, with which a depth is gone after two steps.
 
     A force at the end of a step acts on heights and velocities through its mean with the one

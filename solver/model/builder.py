@@ -9,7 +9,7 @@ import numpy as np
 from catenary.meshgen.mesh import DROPPERS
 from catenary.solver.model import beam
 from catenary.solver.model.alike import alike
-from catenary.solver.model.link_directions import dropper_directions
+from catenary.solver.model.link_directions import between_nodes, dropper_directions
 from catenary.solver.model.links import BOTH, NO_BENDS, PULLS, Bends, Direction, Links, law
 from catenary.solver.model.loads import Load
 from catenary.solver.model.model import Block, Hanging, Model, wire_elements
@@ -112,6 +112,13 @@ class ModelBuilder:
         matrices = mass[:, None, None] * weights[:, :, None] * weights[:, None, :]
         self.add_block(Block.of_elements(component, unknowns, mass=matrices))
         self.model.hanging.append(Hanging(unknowns, mass[:, None] * weights))
+
+    def add_clamps(self, unknown: str) -> None:
+        """Add the clamps between wires against relative motion in one unknown of their nodes."""
+        for number, clamps in enumerate(self.problem.line.clamps):
+            pairs = self.mesh.clamps[self.problem.line.clamp_group == number]
+            laws = law(self.mesh.x(pairs[:, 1]), clamps.stiffness)
+            self.add_links(clamps.name, between_nodes(self.model, pairs, unknown), laws)
 
     def add_links(
         self,

@@ -36,7 +36,7 @@ from catenary.solver.problem.problem import Numerics, n_halvings
 from catenary.solver.schemes.fixed_point import FixedPoint
 from catenary.solver.schemes.make_scheme import Parts
 from catenary.solver.schemes.one_solve import OneSolve
-from catenary.solver.schemes.scheme import Counters, Decision, StepRejected
+from catenary.solver.schemes.scheme import Counters, Decision, Scheme, StepRejected
 
 # Steps before this one that the estimate needs.
 _PAST = 3
@@ -197,7 +197,7 @@ class LevelCounters(Counters):
         return {**counts, **{f"steps_of_{1e3 * size:.4g}_ms": n for size, n in sizes}}
 
 
-class StepLevels:
+class StepLevels(Scheme):
     """A scheme that takes the interval of the record in steps of another one. Collective.
 
     Attributes
@@ -299,11 +299,6 @@ class StepLevels:
         self._wanted, self._active = int(state[0]), 0
         self._error.restore(state[1 : 1 + n])
         self._levels[0].scheme.restore(state[1 + n :])
-
-    @property
-    def traffic(self) -> None:
-        """Not counted: intervals differ in what they need."""
-        return None
 
     def destroy(self) -> None:
         """Free all PETSc objects but those of the line at level 0. Collective."""

@@ -19,6 +19,7 @@ from catenary.solver.kernels.native import NOWHERE
 from catenary.solver.problem.problem import Numerics
 from catenary.solver.schemes.scheme import (
     Counters,
+    Scheme,
     StepController,
     StepRejected,
     find_crossings,
@@ -29,7 +30,7 @@ _FAR = 10.0
 
 
 @dataclass
-class FixedPoint:
+class FixedPoint(Scheme):
     """The paper's correction: eqs. (2.4) to (2.7) repeated until the iterates agree.
 
     Contact forces and the compensation of switched links are evaluated from the latest iterate
@@ -125,14 +126,6 @@ class FixedPoint:
         n = self._force.size
         self._force = state[:n].copy()
         self.law.restore(state[n:])
-
-    @property
-    def traffic(self) -> None:
-        """Not counted: rounds of messages, many a step."""
-        return None
-
-    def destroy(self) -> None:
-        """Nothing: there are no PETSc objects of its own."""
 
     def _heads_everywhere(self, time: float) -> Heads:
         """Rank 0's prediction on all ranks, which all know if there is none."""

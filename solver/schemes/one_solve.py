@@ -19,6 +19,7 @@ from catenary.solver.contact_problem.coupling import Coupling
 from catenary.solver.contact_problem.force_exchange import Exchange, Reply, Verdict
 from catenary.solver.schemes.scheme import (
     Counters,
+    Scheme,
     StepController,
     StepRejected,
     find_crossings,
@@ -33,7 +34,7 @@ _NO_MARGIN = -np.finfo(float).max
 
 
 @dataclass
-class OneSolve:
+class OneSolve(Scheme):
     """One solve for the free response, then the exact small problem of contacts and links.
 
     The columns of A^-1 that the forces act through are tabulated, so that superposition needs no
@@ -143,9 +144,6 @@ class OneSolve:
     def traffic(self) -> tuple[int, int]:
         """Messages and bytes that this rank sent to agree on forces."""
         return self._exchange.messages, self._exchange.bytes_sent
-
-    def destroy(self) -> None:
-        """Nothing: there are no PETSc objects of its own."""
 
     def _solve_inner(self, time: float, stop: bool) -> Reply:
         exchange, interaction, events = self._exchange, self.interaction, self._events

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
@@ -82,12 +83,13 @@ class StepRejected(Exception):
     """Step control rejected the step; only the state of the line has changed. On all ranks."""
 
 
-class Scheme(Protocol):
+class Scheme(ABC):
     """Advances line and pantographs by one step."""
 
     counters: Counters
     pantographs: Pantographs
 
+    @abstractmethod
     def step(self, time: float, stop: bool) -> bool:
         """Advance to ``time`` [s]; False if ``stop`` is set on any rank. Collective.
 
@@ -102,12 +104,15 @@ class Scheme(Protocol):
     def traffic(self) -> tuple[int, int] | None:
         """Messages and bytes that this rank sent so far, those to neighbours left out; None if
         they are not counted."""
+        return None
 
+    @abstractmethod
     def state(self) -> np.ndarray:
         """State of the contacts from which a run continues, as one array."""
 
+    @abstractmethod
     def restore(self, state: np.ndarray) -> None:
         """Continue from what ``state`` returned."""
 
-    def destroy(self) -> None:
+    def destroy(self) -> None:  # noqa: B027  (many have none)
         """Free PETSc objects of the scheme's own. Collective."""

@@ -269,7 +269,7 @@ class March:
         ahead = [happened for happened in self._ahead if happened.step < self.n_steps]
         ends = [*(happened.step for happened in ahead), self.n_steps]
         # PETSc's monitors of the solution look at each.
-        fill = self._line_fills_solution if wants_solution() else None
+        fill = (lambda: self._line.fill_solution()) if wants_solution() else None
         observer_list = ObserverList(observers, fill)
         ts = self._make_ts(observer_list, stop_requested, first, ends[0])
         try:
@@ -397,9 +397,6 @@ class March:
         sent = np.array(scheme, dtype=float) / n_steps + np.array(self._line.operators.traffic)
         self._comm.Allreduce(MPI.IN_PLACE, sent, op=MPI.MAX)
         return float(sent[0]), float(sent[1])
-
-    def _line_fills_solution(self) -> None:
-        self._line.fill_solution()
 
     def _make_ts(
         self,

@@ -63,10 +63,10 @@ def path(offsets: tuple[float, ...], base: BaseMotion | None = None) -> LateralP
 def measure(benchmark: Any, name: str, data: PantographData, rolls: bool, moves: bool) -> None:
     track = (Irregularity("fra_6", 3.0, 100.0, 1),)
     base = BaseMotion(VehicleMotion(track, track), 100.0, 80.0) if moves else None
-    lateral = path(data.strip_offsets, base) if rolls else None
+    lateral = path(data.strips.offsets, base) if rolls else None
     operation = Operation(150.0, 5.0, Stepping(0.5, 1e-3, 0.25, 0.5, lateral, base))
     pantograph = make_pantograph(data, operation)
-    force = np.full(len(data.strip_offsets), 150.0 / len(data.strip_offsets))
+    force = np.full(len(data.strips.offsets), 150.0 / len(data.strips.offsets))
 
     def march() -> None:
         for number in range(N_STEPS):

@@ -18,7 +18,7 @@ from scipy import sparse
 
 from catenary.mbs.air import AirForces
 from catenary.mbs.build import steady_forces
-from catenary.mbs.head.newmark_head import raised
+from catenary.mbs.head.newmark_head import Raising
 from catenary.mbs.lumped_data import LumpedData
 from catenary.solver.integrators.line_loads import LineLoads
 from catenary.solver.model.beam import shape_slopes, shape_values
@@ -212,7 +212,7 @@ class WholeSystem:
     def residual(self, time: float, u: np.ndarray, v: np.ndarray, a: np.ndarray) -> np.ndarray:
         """F(t, u, v, a), (n,) [N]; at held unknowns u itself."""
         result = self._mass @ a + self._damping @ v + self._stiffness @ u
-        grown = raised(time, self._train.raise_time)
+        grown = Raising(self._train.raise_time)(time)
         result[self._carriers] -= grown * self._static + self._base
         moved = np.array([1.0 - grown, -_raising_rate(time, self._train.raise_time)])
         result[self._carriers] -= self._way * (moved @ self._rises)

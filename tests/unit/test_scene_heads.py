@@ -34,7 +34,7 @@ def load(*overrides: str) -> Scene:
 def test_one_strip_fixed_to_the_head_is_the_default() -> None:
     (place,) = problem_of(load()).train.placements
     assert place.data.strips == Strips()
-    assert place.data.strip_offsets == (0.0,)
+    assert place.data.strips.offsets == (0.0,)
 
 
 def test_a_head_s_springs_become_those_of_its_roll_and_pitch() -> None:
@@ -48,7 +48,7 @@ def test_a_head_s_springs_become_those_of_its_roll_and_pitch() -> None:
     assert strips == Strips(
         2, 0.56, 1.6, Suspension(1.2, 9000, 20), Turning(0.4, 7000 * 0.15**2, 45 * 0.15**2)
     )
-    assert place.data.strip_offsets == (0.28, -0.28)
+    assert place.data.strips.offsets == (0.28, -0.28)
 
 
 def test_a_multibody_head_takes_strips_and_rolls_as_its_bodies_do() -> None:

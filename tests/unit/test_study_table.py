@@ -22,7 +22,6 @@ from catenary.cases.studies.records import FOLDER, KeptRows
 from catenary.postproc.report.study_table import (
     Column,
     StudyTable,
-    rows_csv,
     texts_table,
     write_files,
 )
@@ -82,7 +81,10 @@ def test_files_have_all_digits_and_only_their_columns() -> None:
     assert float(rows[0]["std_N"]) == 0.1 + 0.2 and rows[0]["span_m"] == "[50, 60]"
     assert rows[1]["span_m"] == rows[2]["std_N"] == ""
     assert TABLE.records()[0] == {key: ROWS[0][key] for key in rows[0]}
-    assert rows_csv([{"a": True, "b": ["x", "y"]}]) == "a,b\ntrue,x; y\n"
+    assert (
+        StudyTable([Column("a"), Column("b")], [{"a": True, "b": ["x", "y"]}]).csv()
+        == "a,b\ntrue,x; y\n"
+    )
 
 
 def test_a_terminal_has_columns_that_stand_below_their_heads() -> None:

@@ -217,7 +217,7 @@ def test_a_head_under_two_wires_is_that_head_at_two_places(rolls: bool) -> None:
     places = (0.3, -0.2)
 
     def path(y: float) -> LateralPath:
-        return LateralPath(np.array([0.0, 100.0]), (y, y), 10.0, data.strip_offsets, 20.0)
+        return LateralPath(np.array([0.0, 100.0]), (y, y), 10.0, data.strips.offsets, 20.0)
 
     def head(lateral: Any, wires: int) -> LumpedPantograph:
         own = replace(data, strips=replace(data.strips, wires=wires))

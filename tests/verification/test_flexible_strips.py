@@ -137,13 +137,13 @@ def stepped(data: LumpedData, stagger: float, n: int = 400) -> np.ndarray:
     """Heights of the strips after each step under a force that swings, on a zigzag."""
     x = np.arange(0.0, 200.0, 20.0)
     path = LateralPath(x, tuple(stagger * (-1) ** i for i in range(x.size)), 10.0,
-                       data.strip_offsets, 70.0)  # fmt: skip
+                       data.strips.offsets, 70.0)  # fmt: skip
     one = LumpedPantograph(data, 120.0, 5.0, Stepping(0.0, 1e-3, lateral=path))
     one.place(5.0)
     found = []
     for number in range(1, n + 1):
         head = one.predict(1e-3 * number)
-        force = np.full(len(data.strip_offsets), 60.0 + 30.0 * math.sin(0.2 * number))
+        force = np.full(len(data.strips.offsets), 60.0 + 30.0 * math.sin(0.2 * number))
         found.append(head.height - head.height_compliance @ force)
         one.advance(force)
     return np.array(found)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from catenary.postproc.evaluate.wording import capital
 from catenary.postproc.files.own_files import CHANNEL_PICTURE
 from catenary.postproc.read.results import Results
 from catenary.postproc.report.pictures.envelope import thinned, thinned_ranges
@@ -40,12 +41,12 @@ def channel_pictures(results: Results) -> list[tuple[str, str, Callable[[], Figu
     for channel in CHANNELS.values():
         if not channel.own_picture and results.has(channel.name) and results.n_rows("time") > 1:
             draw: Callable[[], Figure | None] = partial(_picture_of, results, channel)
-            drawn.append((picture_name(channel), f"{_sentence(channel)}.", draw))
+            drawn.append((picture_name(channel), f"{capital(channel.meaning)}.", draw))
     recorded = results.energies()
     for channel in ENERGIES.values():
         if channel.energy is not None and not channel.own_picture and channel.name in recorded:
             draw = partial(_of_energy, recorded["time"], recorded[channel.name], channel)
-            drawn.append((picture_name(channel), f"{_sentence(channel)}.", draw))
+            drawn.append((picture_name(channel), f"{capital(channel.meaning)}.", draw))
     return drawn
 
 
@@ -58,10 +59,6 @@ def _picture_of(results: Results, channel: Channel) -> Figure | None:
 def picture_name(channel: Channel) -> str:
     """Name of a channel's picture without its end."""
     return f"{CHANNEL_PICTURE}{channel.name}"
-
-
-def _sentence(channel: Channel) -> str:
-    return channel.meaning[:1].upper() + channel.meaning[1:]
 
 
 def _label(channel: Channel) -> str:
@@ -80,10 +77,8 @@ def _of_train(results: Results, channel: Channel) -> Figure:
     elif channel.per == WIRE:
         shown = {p: list(own.items()) for p, own in enumerate(results.wire_columns())}
     elif channel.per == CONTACT:
-        columns = results.contact_columns()
-        for p, words in enumerate(results.contact_names()):
-            own = range(columns[p].start, columns[p].stop)
-            shown[p] = [(name or word, column) for name, column in zip(words, own, strict=True)]
+        for p, by_name in enumerate(results.contact_columns()):
+            shown[p] = [(name or word, column) for name, column in by_name.items()]
     return panels_along_track(results, channel.name, shown, _label(channel))[0]
 
 

@@ -240,10 +240,8 @@ def force_histogram(results: Results, statistics: RunStatistics) -> Figure:
 def lateral_places(results: Results) -> Figure:
     """Lateral position of each contact wire on each strip along the track, and where strips end."""
     shown = {
-        p: [(word or "contact wire", column) for word, column in zip(words, own, strict=True)]
-        for p, (words, own) in enumerate(
-            zip(results.contact_names(), map(_all_of, results.contact_columns()), strict=True)
-        )
+        p: [(word or "contact wire", column) for word, column in own.items()]
+        for p, own in enumerate(results.contact_columns())
     }
     label = "position on the strip, to the left [m]"
     figure, panels = panels_along_track(results, "lateral_place", shown, label)
@@ -254,7 +252,3 @@ def lateral_places(results: Results) -> Figure:
                 axes.axhline(at, color="0.35", linestyle="--", linewidth=1.0, label=word)
             legend_above(axes)
     return figure
-
-
-def _all_of(columns: slice) -> range:
-    return range(columns.start, columns.stop)

@@ -102,10 +102,6 @@ class Section(NamedTuple):
     folded: Iterable[Folded] = ()
 
 
-def _always(run: EvaluatedRun) -> bool:
-    return True
-
-
 class SectionEntry(NamedTuple):
     """An entry of a report's list of sections.
 
@@ -119,7 +115,7 @@ class SectionEntry(NamedTuple):
 
     name: str
     make: Callable[[EvaluatedRun], Section]
-    applies: Callable[[EvaluatedRun], bool] = _always
+    applies: Callable[[EvaluatedRun], bool] = lambda run: True
     full: bool = False
 
 

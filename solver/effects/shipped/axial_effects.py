@@ -12,7 +12,7 @@ from catenary.solver.effects.effect import Effect, register
 from catenary.solver.effects.shipped import vertical_effects  # noqa: F401  (built before)
 from catenary.solver.model import axial_elements, wire_ends
 from catenary.solver.model.alike import alike
-from catenary.solver.model.link_directions import across_droppers, between_nodes
+from catenary.solver.model.link_directions import across_droppers
 from catenary.solver.model.links import PULLS, PUSHES, Direction, law, slips
 from catenary.solver.model.model import Block
 from catenary.solver.model.stations import SAME_STATION
@@ -40,12 +40,8 @@ def _axial(builder: ModelBuilder) -> None:
     for wire in builder.problem.line.wires:
         _add_bars(builder, wire.name)
     _add_pendulums(builder)
-    model, mesh = builder.model, builder.mesh
-    for number, clamps in enumerate(builder.problem.line.clamps):
-        pairs = mesh.clamps[builder.problem.line.clamp_group == number]
-        laws = law(mesh.x(pairs[:, 1]), clamps.stiffness)
-        builder.add_links(clamps.name, between_nodes(model, pairs, "u"), laws)
-    builder.hold(wire_ends.held_along(model), "u")
+    builder.add_clamps("u")
+    builder.hold(wire_ends.held_along(builder.model), "u")
 
 
 def _add_bars(builder: ModelBuilder, name: str) -> None:

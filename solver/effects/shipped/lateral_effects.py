@@ -9,7 +9,7 @@ import numpy as np
 
 from catenary.solver.effects.effect import Effect, register
 from catenary.solver.effects.shipped import vertical_effects  # noqa: F401  (built before)
-from catenary.solver.model.link_directions import between_nodes, sideways_of_droppers
+from catenary.solver.model.link_directions import sideways_of_droppers
 from catenary.solver.model.links import Direction, law
 from catenary.solver.model.model import Block
 
@@ -27,10 +27,7 @@ def _lateral(builder: ModelBuilder) -> None:
     for wire in reversed(line.wires):
         builder.add_wire(wire.name, PLANE)
     _pendulums(builder)
-    for number, clamps in enumerate(line.clamps):
-        pairs = mesh.clamps[line.clamp_group == number]
-        laws = law(mesh.x(pairs[:, 1]), clamps.stiffness)
-        builder.add_links(clamps.name, between_nodes(builder.model, pairs, "v"), laws)
+    builder.add_clamps("v")
     barred = np.array([arms.kind.length > 0.0 for arms in line.steady_arms], dtype=bool)
     on_bars = barred[mesh.arm_group] if barred.size else np.zeros(0, dtype=bool)
     for number, arms in enumerate(line.steady_arms):

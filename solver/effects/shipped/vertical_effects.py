@@ -9,8 +9,6 @@ import numpy as np
 
 from catenary.meshgen.wires import Profile
 from catenary.solver.effects.effect import Effect, Limit, register
-from catenary.solver.model.link_directions import between_nodes
-from catenary.solver.model.links import law
 from catenary.solver.problem.contact_laws import KinematicLaw
 from catenary.solver.problem.incidents import DropperBreak, LineIncident, TensionLoss
 from catenary.solver.problem.problem import Problem, slowest_wave_speed
@@ -39,10 +37,7 @@ def _vertical(builder: ModelBuilder) -> None:
     for number, supports in enumerate(line.supports):
         nodes = mesh.supports[mesh.support_group == number]
         builder.add_springs(supports.name, nodes, "w", supports.stiffness)
-    for number, clamps in enumerate(line.clamps):
-        pairs = mesh.clamps[line.clamp_group == number]
-        laws = law(mesh.x(pairs[:, 1]), clamps.stiffness)
-        builder.add_links(clamps.name, between_nodes(builder.model, pairs), laws)
+    builder.add_clamps("w")
     builder.hold(builder.held_ends, "w")
 
 

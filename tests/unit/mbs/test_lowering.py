@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from catenary.mbs.build import Operation, make_pantograph
-from catenary.mbs.head.newmark_head import Raising, parts_of, raised
+from catenary.mbs.head.newmark_head import Raising, parts_of
 from catenary.mbs.head.stepping import Stepping
 from catenary.mbs.lowering import LoweredPantograph, Lowering
 from catenary.mbs.lumped_data import LumpedData
@@ -25,15 +25,15 @@ def test_the_lift_goes_over_by_half_a_cosine() -> None:
 
 def test_a_pantograph_is_lowered_from_where_its_raising_was() -> None:
     part = Lowering(0.2, -60.0, 0.1, 0.3).course(STATIC, 0.5)
-    assert part(0.2) == raised(0.2, 0.5)
+    assert part(0.2) == Raising(0.5)(0.2)
     assert part(0.2 + 1e-9) == pytest.approx(part(0.2), abs=1e-9)
-    assert part(0.25) == pytest.approx(0.5 * (raised(0.2, 0.5) - 0.5))
+    assert part(0.25) == pytest.approx(0.5 * (Raising(0.5)(0.2) - 0.5))
     assert part(0.6) == pytest.approx(-0.5)
 
 
 def test_the_parts_of_many_steps_are_those_of_each() -> None:
     times = [1e-3 * step for step in range(1, 700)]
-    each = [raised(time, 0.5) for time in times]
+    each = [Raising(0.5)(time) for time in times]
     # A cosine of an array may be rounded otherwise than one alone: half of 2.2e-16.
     for some in (slice(None), slice(100, 103), slice(498, None), slice(500, None)):
         found = parts_of(Raising(0.5), times[some])
