@@ -13,7 +13,8 @@ import numpy as np
 from catenary.base.errors import InputError
 from catenary.base.parallel import on_root
 from catenary.pictures import Pictures
-from catenary.postproc.read.results import RESULT_FILE, Results
+from catenary.postproc.files.own_files import RUN_FILE
+from catenary.postproc.read.results import Results
 from catenary.solver.time_loop.views import channels
 
 if TYPE_CHECKING:
@@ -481,7 +482,7 @@ def held(run: Run, comm: Any, in_memory: bool) -> Run:
     In memory all processes have the file, of which only rank 0 may be able to see it.
     """
     assert run.folder is not None
-    path = run.folder / RESULT_FILE
+    path = run.folder / RUN_FILE
     if not in_memory:
         return Run(Results(path), run.folder, run._told)
     return Run(Results(path, image=on_root(comm, path.read_bytes)), None, run._told)

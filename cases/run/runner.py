@@ -43,7 +43,7 @@ from catenary.cases.scene.scene import Scene
 from catenary.meshgen.mesh import LineMesh
 from catenary.postproc.channels.header import Header
 from catenary.postproc.files.filtered_force import ForceFilter
-from catenary.postproc.files.own_files import remove_stale
+from catenary.postproc.files.own_files import RUN_FILE, remove_stale
 from catenary.postproc.record.progress import Progress
 from catenary.postproc.record.recorder import Recorder
 from catenary.postproc.record.run_watch import RunWatch, StripWatch, watch_cadence, watch_inputs
@@ -60,7 +60,6 @@ if TYPE_CHECKING:
 
 logger = logging.getLogger("catenary.runner")
 
-RESULT = "run.h5"
 T = TypeVar("T")
 
 
@@ -216,7 +215,7 @@ def restart_case(
     from catenary.cases.run.continuing import state_to_continue
 
     with held(out_dir, comm, f"catenary restart {out_dir}"):
-        state = on_root(comm, lambda: state_to_continue(out_dir / RESULT, extends))
+        state = on_root(comm, lambda: state_to_continue(out_dir / RUN_FILE, extends))
         order = _Order(
             scene, out_dir, comm, petsc_options, tell, state, only_summary, extends=extends
         )
@@ -246,7 +245,7 @@ class _Order:
     @property
     def result(self) -> Path:
         """The result file."""
-        return self.out_dir / RESULT
+        return self.out_dir / RUN_FILE
 
 
 def _run(order: _Order, judge: Callable[[RunSize], None]) -> RunOutcome:
@@ -437,9 +436,9 @@ def _report(out_dir: Path, outcome: Outcome, only_summary: bool) -> RunOutcome:
 
     try:
         if only_summary:
-            write_summary(out_dir / RESULT, out_dir)
+            write_summary(out_dir / RUN_FILE, out_dir)
         else:
-            write_report(out_dir / RESULT, out_dir)
+            write_report(out_dir / RUN_FILE, out_dir)
         summary = json.loads((out_dir / "summary.json").read_text(encoding="utf-8"))
     except (OSError, CatenaryError) as error:
         if outcome.outcome != "done":  # reported already

@@ -7,6 +7,7 @@ and what constant forces do when their levers change.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -20,7 +21,8 @@ from catenary.mbs.rigid.arrays import ORIGIN
 from catenary.mbs.rigid.bodies import Motion, Vector
 from catenary.mbs.rigid.joints import unit
 from catenary.mbs.rigid.kinematics import point
-from catenary.mbs.rigid.least_squares import least_squares, null_space
+from catenary.mbs.rigid.least_squares import null_space
+from catenary.mbs.rigid.statics import force_on_ways
 from catenary.mbs.rigid.system import System
 
 # Largest displacement [m or rad] and velocity [m/s or rad/s] for differences of forces.
@@ -204,8 +206,14 @@ def linearise(
     lower = linalg.cholesky(free.T @ (system.mass[:, None] * free), lower=True)
     ways = linalg.solve_triangular(lower, free.T, lower=True).T
     push = linalg.solve_triangular(lower, push, lower=True)
-    stiffness = _stiffness(system, rest, ways)
-    damping = _damping(system, rest, ways)
+    stiffness = _resistance(
+        lambda displacement: force_on_ways(system, rest.moved(displacement), ways), ways, STEP
+    )
+
+    def damped(velocities: np.ndarray) -> np.ndarray:  # gyroscopic moments cancel out at rest
+        return ways.T @ system.generalised_forces(rest.with_velocities(velocities), 0.0)
+
+    damping = _resistance(damped, ways, SPEED)
     kept, dropped = _separated(stiffness, damping, push)
     return LinearModel(
         np.eye(kept.shape[1]),
@@ -218,39 +226,16 @@ def linearise(
     )
 
 
-def _stiffness(system: System, rest: Motion, ways: np.ndarray) -> np.ndarray:
-    """-d (N^T g) / dx by central differences with the joints kept closed (k, k)."""
+def _resistance(
+    force: Callable[[np.ndarray], np.ndarray], ways: np.ndarray, most: float
+) -> np.ndarray:
+    """-df/dx (k, k) of forces (k,) that displacements or velocities (6 n,) make, by central
+    differences of at most ``most`` along ``ways`` (6 n, k)."""
     result = np.empty((ways.shape[1],) * 2)
     for k, way in enumerate(ways.T):
-        step = STEP / float(np.abs(way).max())
-        ahead, behind = (
-            _force_on(system, rest.moved(sign * step * way), ways) for sign in (1.0, -1.0)
-        )
+        step = most / float(np.abs(way).max())
+        ahead, behind = (force(sign * step * way) for sign in (1.0, -1.0))
         result[:, k] = (behind - ahead) / (2.0 * step)
-    return result
-
-
-def _force_on(system: System, motion: Motion, ways: np.ndarray) -> np.ndarray:
-    """Force on motions ``ways`` (6 n, k), as the joints allow them at a place near by, (k,)."""
-    there = system.assemble(motion)
-    jacobian = system.constraints(there, 0.0).jacobian
-    # The least change that makes them allowed: smooth, unlike another null space.
-    basis = ways
-    if len(jacobian):
-        basis = ways - least_squares(jacobian, jacobian @ ways, 1e-8)
-    return basis.T @ system.generalised_forces(there, 0.0)
-
-
-def _damping(system: System, rest: Motion, ways: np.ndarray) -> np.ndarray:
-    """-d (N^T g) / dx' by central differences (k, k); gyroscopic moments cancel out at rest."""
-    result = np.empty((ways.shape[1],) * 2)
-    for k, way in enumerate(ways.T):
-        speed = SPEED / float(np.abs(way).max())
-        ahead, behind = (
-            ways.T @ system.generalised_forces(rest.with_velocities(sign * speed * way), 0.0)
-            for sign in (1.0, -1.0)
-        )
-        result[:, k] = (behind - ahead) / (2.0 * speed)
     return result
 
 

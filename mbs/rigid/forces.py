@@ -17,22 +17,16 @@ import numpy as np
 from scipy.interpolate import BSpline, make_interp_spline
 
 from catenary.base.errors import InputError
-from catenary.mbs.rigid.arrays import ORIGIN, Line
+from catenary.mbs.rigid.arrays import ORIGIN, Line, LineForce
 from catenary.mbs.rigid.bodies import Motion, Vector
 from catenary.mbs.rigid.kinematics import difference, point
 
 
-class Force(Protocol):
+class Force(LineForce, Protocol):
     """Interface of a force to a system of bodies."""
-
-    @property
-    def name(self) -> str: ...
 
     def generalised(self, motion: Motion, time: float) -> np.ndarray:
         """Generalised forces at ``time`` [s], shape (6 n,) [N, N m]."""
-
-    def on_line(self) -> Line | None:
-        """The line along which it acts; None for a force that acts otherwise."""
 
 
 class Table:

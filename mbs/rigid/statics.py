@@ -77,7 +77,8 @@ def at_rest(system: System, start: Motion, tolerance: float = 1e-9) -> Motion:
         tangent = np.empty((free.shape[1],) * 2)
         for k in range(free.shape[1]):
             ahead, behind = (
-                _unbalanced(system, motion, free, sign * STEP * free[:, k]) for sign in (1.0, -1.0)
+                force_on_ways(system, motion.moved(sign * STEP * free[:, k]), free)
+                for sign in (1.0, -1.0)
             )
             tangent[:, k] = (ahead - behind) / (2.0 * STEP)
         step = free @ least_squares(tangent, -unbalanced, NEUTRAL)
@@ -93,14 +94,14 @@ def at_rest(system: System, start: Motion, tolerance: float = 1e-9) -> Motion:
     )
 
 
-def _unbalanced(
-    system: System, motion: Motion, free: np.ndarray, displacement: np.ndarray
-) -> np.ndarray:
-    """Force on the free motions ``free`` (6 n, k) after a displacement, shape (k,)."""
-    there = system.assemble(motion.moved(displacement))
+def force_on_ways(system: System, motion: Motion, ways: np.ndarray) -> np.ndarray:
+    """Force on motions ``ways`` (6 n, k), as the joints allow them at a place near by, (k,)."""
+    there = system.assemble(motion)
     jacobian = system.constraints(there, 0.0).jacobian
-    # The same motions as the joints allow them there: a smooth basis, unlike a new null space.
-    basis = free - least_squares(jacobian, jacobian @ free, 1e-8)
+    # The least change that makes them allowed: smooth, unlike another null space.
+    basis = ways
+    if len(jacobian):
+        basis = ways - least_squares(jacobian, jacobian @ ways, 1e-8)
     return basis.T @ system.generalised_forces(there, 0.0)
 
 

@@ -105,16 +105,13 @@ class BaseMotion:
     def _sum(self, courses: list[tuple[_Course, bool]], time: float) -> Motion:
         place = velocity = acceleration = 0.0
         for course, along_track in courses:
-            if along_track:
-                value, first, second = course(self._start + self._speed * time)
-                place += value
-                velocity += self._speed * first
-                acceleration += self._speed**2 * second
-            else:
-                value, first, second = course(time)
-                place += value
-                velocity += first
-                acceleration += second
+            at, pace = (
+                (self._start + self._speed * time, self._speed) if along_track else (time, 1.0)
+            )
+            value, first, second = course(at)
+            place += value
+            velocity += pace * first
+            acceleration += pace**2 * second
         return Motion(place, velocity, acceleration)
 
 

@@ -12,12 +12,12 @@ import numpy as np
 
 from catenary.base.errors import InputError
 from catenary.postproc.files.hdf5.self_contained import open_own
+from catenary.postproc.files.own_files import FIELD_FILES
 from catenary.postproc.read.guard import survives
 from catenary.postproc.record.snapshots.blocks import OTHER_PARTS
 from catenary.postproc.record.snapshots.field_layout import PLACES, BlockTables
 from catenary.postproc.record.snapshots.fields_schema import FieldsFault, read_fields
 
-FIELDS_FILE = "fields.h5"
 # Snapshots that are looked through for the largest motion.
 _SAMPLED = 200
 # Share of them that the ends of a scale hold.
@@ -104,7 +104,7 @@ class Snapshots:
     """
 
     def __init__(self, folder: Path, n_nodes: int, until: float = np.inf) -> None:
-        path = folder / FIELDS_FILE
+        path = folder / FIELD_FILES[0]
         if not path.is_file():
             raise InputError(
                 f"{path} does not exist: a film needs snapshots of the line; run the scene again "

@@ -14,10 +14,10 @@ import sys
 from pathlib import Path
 
 from catenary.base.errors import InputError
+from catenary.postproc.files.own_files import RUN_FILE
 from catenary.postproc.read.records import Records
 from catenary.postproc.read.validated_file import ValidatedFile
 
-RESULT_FILE = "run.h5"
 # Time limit of reading a file: so long, and a second for each part of this size [s], [B].
 LIMIT, PER_SECOND = 30.0, 10e6
 # The process is to be no rank of a run, with its launcher's variables.
@@ -51,7 +51,7 @@ def examined(path: Path) -> Records | None:
         If it is no result file, or damaged so that no report can be made of it; also where HDF5
         crashes at it or does not come to an end.
     """
-    path = path / RESULT_FILE if path.is_dir() else path
+    path = path / RUN_FILE if path.is_dir() else path
     if not path.is_file():
         return None
     limit = LIMIT + path.stat().st_size / PER_SECOND

@@ -16,6 +16,7 @@ from catenary.meshgen.wires import Role
 from catenary.postproc.channels.line_record import LineRecord
 from catenary.postproc.files.filtered_force import filtered_in
 from catenary.postproc.files.hdf5 import table_rows
+from catenary.postproc.files.own_files import RUN_FILE
 from catenary.postproc.files.run_schema import ALL_COLUMNS, DONE, LINE_TIME, PLACES, RUNNING
 from catenary.postproc.read.line_of_run import ResultTables
 from catenary.postproc.read.records import Records
@@ -24,8 +25,6 @@ from catenary.postproc.read.validated_file import ValidatedFile
 from catenary.solver.time_loop.views import channels
 
 logger = logging.getLogger("catenary.results")
-
-RESULT_FILE = "run.h5"
 
 
 class Results(TrainOfRun):
@@ -53,7 +52,7 @@ class Results(TrainOfRun):
         self, path: Path | str, records: Records | None = None, image: bytes | None = None
     ) -> None:
         path = Path(path)
-        self.path = path / RESULT_FILE if path.is_dir() else path
+        self.path = path / RUN_FILE if path.is_dir() else path
         if image is None and not self.path.is_file():
             raise InputError(f"{self.path} does not exist: name a result file or its folder")
         super().__init__(ValidatedFile(self.path, records, image))

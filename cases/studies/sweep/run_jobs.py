@@ -30,13 +30,14 @@ from catenary.cases.result_folder.output_folder import (
     refuse_impossible,
 )
 from catenary.cases.run.planning.needs import Kept, total_size
-from catenary.cases.run.runner import RESULT, run_case
+from catenary.cases.run.runner import run_case
 from catenary.cases.scene.problem import resolved
 from catenary.cases.studies.records import is_whole, read_record, read_table, write_record
 from catenary.cases.studies.sweep.jobs import AS_USUAL, Ended, Job, RunOptions
 from catenary.cases.terminal.runs_bar import RunsBar
 from catenary.postproc.evaluate.wording import duration, fixed
 from catenary.postproc.files.disk import plain
+from catenary.postproc.files.own_files import RUN_FILE
 from catenary.postproc.files.own_files import VARIANT_FILE as RECORD
 from catenary.postproc.files.run_schema import DONE, INTERRUPTED
 from catenary.postproc.read.results import Results
@@ -204,7 +205,7 @@ def _leave_record(job: Job, folder: Path, measure: Measure | None, wall: float) 
         _SUM_OF_SUMMARY: zlib.crc32((folder / SUMMARY).read_bytes()),
     }
     if not job.keep_results:
-        (folder / RESULT).unlink()
+        (folder / RUN_FILE).unlink()
     write_record(folder / RECORD, as_json(record))
     return measured
 
@@ -230,7 +231,7 @@ def _found(job: Job, folder: Path, measured: bool) -> Ended | None:
             f"{another_folder()}, or give {force_option()} to replace them"
         )
     summary = read_summary(folder / SUMMARY, record)
-    missing = job.keep_results and not (folder / RESULT).is_file()
+    missing = job.keep_results and not (folder / RUN_FILE).is_file()
     missing = missing or (job.full_report and not (folder / "report.html").is_file())
     if summary is None or missing or (measured and not record.get("measured")):
         return None
@@ -240,7 +241,7 @@ def _found(job: Job, folder: Path, measured: bool) -> Ended | None:
 
 def _refuse_other_run(folder: Path, wanted: dict[str, Any]) -> None:
     """Refuse to replace a run that no sweep with this configuration has begun."""
-    if not (folder / RESULT).exists():
+    if not (folder / RUN_FILE).exists():
         return
     try:
         with Results(folder) as results:
@@ -249,7 +250,7 @@ def _refuse_other_run(folder: Path, wanted: dict[str, Any]) -> None:
         same = True
     if not same:
         raise InputError(
-            f"{folder / RESULT} holds the results of another run; {another_folder()}, or "
+            f"{folder / RUN_FILE} holds the results of another run; {another_folder()}, or "
             f"give {force_option()} to replace them"
         )
 
