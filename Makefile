@@ -66,8 +66,9 @@ test: setup ## lint and tests, also on several ranks
 	$(call BESIDE_LINT,$(PYTEST_SHARED) -m "not study" tests/regression tests/verification tests/unit)
 	@$(MAKE) --no-print-directory test-mpi
 
-test-studies: setup ## whole studies: hard cases, stability, accuracy, waves, the paper's; random scenes
+test-studies: setup ## whole studies: hard cases, stability, accuracy, waves, the paper's; random scenes; 2 ranks
 	$(PYTEST_SHARED) -m "study and not long" tests/regression tests/verification tests/unit
+	timeout 1200 mpirun -n 2 $(MPI_SHARED) $(MPI_PYTEST) -m "not study" tests/mpi
 	timeout 1200 mpirun -n 3 $(MPI_SHARED) $(MPI_PYTEST) -m study --ignore=tests/mpi/test_rank_counts.py tests/mpi
 
 test-unit: setup ## tests of single parts
@@ -79,8 +80,7 @@ test-verification: setup ## tests against closed-form and published solutions
 test-regression: setup ## every case, shortened, against published ranges
 	$(PYTEST_SHARED) tests/regression
 
-test-mpi: setup ## the same answers on 2 and 3 ranks
-	timeout 1200 mpirun -n 2 $(MPI_SHARED) $(MPI_PYTEST) -m "not study" tests/mpi
+test-mpi: setup ## the same answers on 3 ranks; those on 2 are among the studies
 	timeout 1200 mpirun -n 3 $(MPI_SHARED) $(MPI_PYTEST) -m "not study" tests/mpi
 
 test-ranks: setup ## lines of all topologies and in all planes on 1, 2, 3, 5 and 8 ranks
