@@ -179,6 +179,32 @@ def test_a_dropper_has_a_length() -> None:
     assert evaluated[0].endswith(".3.1") and evaluated[-1].endswith(".4.6")
 
 
+def test_a_support_has_a_height() -> None:
+    """Droppers are cut for it: the wire at rest is as high there, and as before at others."""
+    line = scenes(*TINY)
+    (parameter,) = line.heights_at([2])
+    assert (parameter.values, parameter.unit, parameter.change) == ((0.0,), "mm", 1.0)
+    lifted = line.changed(parameter, 3.0)
+    heights = lifted.irregularities.contact_wire_height
+    assert heights is not None and heights.by_place is not None
+    assert [own for own in heights.by_place if own[1]] == [[120.0, pytest.approx(3e-3)]]
+    again = ChangedScenes(lifted)
+    assert again.parameter(parameter.key).values == pytest.approx((3.0,))
+    rests = [line_at_rest(problem_of(scene), mesh_of(scene)) for scene in (line.scene, lifted)]
+    places, (before, after) = (
+        rests[0].model.contact_x,
+        (set_up_of(MPI.COMM_SELF, rest, 1).rest[:, 0] for rest in rests),
+    )
+    at = [int(np.argmin(np.abs(places - 60.0 * number))) for number in range(1, 5)]
+    # The spline is exact at supports; stiff wires between droppers round its corners.
+    assert (after - before)[at] == pytest.approx([0.0, 3e-3, 0.0, 0.0], abs=1e-4)
+    with pytest.raises(InputError, match="names no support: the line has supports from 0 to 6"):
+        line.heights_at([7])
+    surveyed = scenes(*TINY, "irregularities.contact_wire_height.by_place=[[100,0.01],[130,0.0]]")
+    with pytest.raises(InputError, match="by_place has other places than all supports"):
+        surveyed.heights_at([2])
+
+
 def test_a_longer_dropper_changes_the_rest_as_elasticity_says() -> None:
     """The wire at a dropper too long by e sinks by e less what its neighbours take over."""
     line = scenes(*TINY)

@@ -156,6 +156,25 @@ def test_planted_errors_lie_within_their_widths(tmp_path: Path) -> None:
 
 
 @pytest.mark.study
+def test_heights_at_supports_are_found(tmp_path: Path) -> None:
+    """Errors of 8 mm at three supports; by chi-square."""
+    rng = np.random.default_rng(23)
+    scene = load_scene(CASE, SMALL)
+    scenes, errors = ChangedScenes(scene), 8.0 * rng.normal(size=3)
+    twin = scenes.all_changed(list(zip(scenes.heights_at([2, 3, 4]), errors, strict=True)))
+    file = tmp_path / "measured.csv"
+    write_measurement(file, twin, rng, FORCE_NOISE, HEIGHT_NOISE)
+    task = task_with({}, [], True) | {"heights": {"supports": [2, 3, 4], "deviation_mm": 10.0}}
+    found = identify(scene, file, read_task(task, Task), MPI.COMM_SELF)
+    off = (found.values - errors) / 10.0
+    distance = float(off @ np.linalg.solve(found.posterior.covariance, off))
+    print(f"{errors}: {found.values} +- {found.widths}; chi-square {distance:.1f} of 3")
+    assert stats.chi2.sf(distance, 3) > 1e-3
+    # Supports 2 and 3 lie within the stretch; 5 mm and 56 samples a span leave less than 1 mm.
+    assert verdict(found).startswith("The model fits") and found.widths[:2].max() < 2.0
+
+
+@pytest.mark.study
 def test_widths_are_right_in_repeated_linear_trials(tmp_path: Path) -> None:
     """Four hundred passages by the tangents of a march, with noise that the filter itself made.
 

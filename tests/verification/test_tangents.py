@@ -256,6 +256,8 @@ TWO = ["line.n_spans=6", "evaluation.from_m=160", "evaluation.to_m=220",
        "train.pantographs.1.name=three_masses", "train.pantographs.1.behind_m=100"]  # fmt: skip
 HEAD = "pantographs.reference"
 DAMPER = f'{HEAD}.laws=[{{type="damper",at_mass=2,up_N_s_per_m=60.0,down_N_s_per_m=120.0}}]'
+# At all supports, of which that at 180 m is 10 mm higher.
+HEIGHTS = [[60.0 * number, 0.01 * (number == 3)] for number in range(7)]
 # A case, how it is changed, and parameters with steps of differences in parts of them.
 SCENES: dict[str, tuple[str, list[str], dict[str, float]]] = {
     "simple": (
@@ -269,6 +271,11 @@ SCENES: dict[str, tuple[str, list[str], dict[str, float]]] = {
             "line.messenger_wire.tension_N": 1e-5,
             "line.damping.alpha_s": 1e-4,
         },
+    ),
+    "height at a support": (
+        "en50318_2002",
+        [*SHORT, f"irregularities.contact_wire_height.by_place={HEIGHTS}"],
+        {"irregularities.contact_wire_height.3": 1e-3},
     ),
     "impact": (
         "en50318_2002",

@@ -109,8 +109,8 @@ class FittedMarch:
         return sound_rest(self._changed(by))
 
     def _changes(self, by: Sequence[float], at_rest: LineAtRest, now: SetUp) -> list[Change]:
-        """Derivatives of the set-up. Those by lengths of droppers, in which the line at rest is
-        linear, are kept from the first ones."""
+        """Derivatives of the set-up. Those in which the line at rest is linear are kept from the
+        first ones."""
         scenes, changes = ChangedScenes(self._changed(by)), []
         for parameter in self._parameters:
             key = parameter.key
@@ -122,7 +122,7 @@ class FittedMarch:
                         f"{key} moves the pantograph along the track: where it was is measured, "
                         "and no parameter of an identification"
                     )
-                if parameter.is_dropper:
+                if parameter.is_of_shape:
                     self._kept[key] = change
             changes.append(change)
         return changes

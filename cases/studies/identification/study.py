@@ -343,11 +343,17 @@ def _sought(scenes: ChangedScenes, task: Task) -> tuple[list[Parameter], list[Un
         mean = own if one.mean is None else one.mean
         parameters.append(parameter)
         unknowns.append(Unknown(one.key, parameter.unit, mean, one.deviation))
+    of_shape: list[tuple[Parameter, float]] = []
     if task.droppers is not None:
-        for parameter in scenes.droppers_of(task.droppers.spans):
-            own = parameter.values[0]
-            parameters.append(parameter)
-            unknowns.append(Unknown(parameter.key, parameter.unit, own, task.droppers.deviation_mm))
+        droppers = scenes.droppers_of(task.droppers.spans)
+        of_shape += ((one, task.droppers.deviation_mm) for one in droppers)
+    if task.heights is not None:
+        heights = scenes.heights_at(task.heights.supports)
+        of_shape += ((one, task.heights.deviation_mm) for one in heights)
+    for parameter, deviation in of_shape:
+        parameters.append(parameter)
+        own = parameter.values[0]
+        unknowns.append(Unknown(parameter.key, parameter.unit, own, deviation))
     keys = [one.name for one in unknowns]
     for key in keys:
         if keys.count(key) > 1:

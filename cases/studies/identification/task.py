@@ -40,6 +40,14 @@ class Droppers(Table):
         return given
 
 
+class Supports(Table):
+    """Heights of the contact wire at some supports; ``supports`` counts from 0 at the start of the
+    line, ``deviation_mm`` is the standard deviation of their prior."""
+
+    supports: Annotated[list[Annotated[int, Field(ge=0)]], Field(min_length=1, max_length=1000)]
+    deviation_mm: POSITIVE
+
+
 class Task(Table):
     """The whole file; ``starts`` is the number of searches, the first from the means of the priors,
     others from draws of them, of which the best is taken. None: one, and two more if that leaves a
@@ -49,11 +57,12 @@ class Task(Table):
     starts: Annotated[int, Field(ge=1, le=100)] | None = None
     parameters: Annotated[list[Sought], Field(max_length=1000)] = []
     droppers: Droppers | None = None
+    heights: Supports | None = None
 
     @model_validator(mode="after")
     def _something(self) -> Task:
-        if not self.parameters and self.droppers is None:
-            raise ValueError("must have [[parameters]] or [droppers] to look for")
+        if not self.parameters and self.droppers is None and self.heights is None:
+            raise ValueError("must have [[parameters]], [droppers] or [heights] to look for")
         for name in ("force", "head_height"):
             signal = getattr(self.measured, name)
             if signal is not None and signal.noise is None:

@@ -3,7 +3,9 @@
 A parameter is a key of the scene with a number, or with a list whose entries change together; the
 number of an entry may follow the key. Of a static force that depends on the speed all forces change
 together, under the key of the force. The length of a single dropper has the key
-``irregularities.dropper_lengths.SPAN.DROPPER``, both counted from 1.
+``irregularities.dropper_lengths.SPAN.DROPPER``, both counted from 1, and the height of the contact
+wire at a support ``irregularities.contact_wire_height.SUPPORT``, counted from 0 at the start of the
+line. Between supports heights are those of a cubic spline, and droppers are cut for them.
 """
 
 from __future__ import annotations
@@ -24,7 +26,7 @@ from catenary.cases.scene.input.faults import Origin, shown
 from catenary.cases.scene.input.toml_input import value_at
 from catenary.cases.scene.keys.error_sentences import unknown_key
 from catenary.cases.scene.keys.keys import known_keys, names_value
-from catenary.cases.scene.keys.units import unit_of
+from catenary.cases.scene.keys.units import length_from_mm, unit_of
 from catenary.cases.scene.load import scene_from
 from catenary.cases.scene.problem import line_of, resolved
 from catenary.cases.scene.scene import Scene
@@ -72,6 +74,9 @@ _OF_TRAIN = ("pantographs", "train", "contact")
 # The length of one dropper, which scenes have as entries of a list.
 _LENGTHS = "irregularities.dropper_lengths"
 _OF_DROPPER = re.compile(re.escape(_LENGTHS) + r"\.([1-9]\d{0,5})\.([1-9]\d{0,5})")
+# The height of the contact wire at a support, an entry of a list as well.
+_HEIGHTS = "irregularities.contact_wire_height"
+_OF_SUPPORT = re.compile(re.escape(_HEIGHTS) + r"\.(\d{1,6})")
 _BY_SPEED, _FORCE = "static_force_by_speed", "static_force_N"
 
 
@@ -90,8 +95,8 @@ class Parameter:
 
     @property
     def unit(self) -> str:
-        """Unit that the key names, mm for the length of a dropper."""
-        return "mm" if _OF_DROPPER.fullmatch(self.key) else unit_of(self.key)
+        """Unit that the key names, mm for the length of a dropper and the height at a support."""
+        return "mm" if self.is_of_shape else unit_of(self.key)
 
     @property
     def size(self) -> float:
@@ -99,9 +104,10 @@ class Parameter:
         return max(map(abs, self.values))
 
     @property
-    def is_dropper(self) -> bool:
-        """Whether it is the length of a single dropper."""
-        return _OF_DROPPER.fullmatch(self.key) is not None
+    def is_of_shape(self) -> bool:
+        """Whether it is the length of a single dropper or the height at a support, in which the
+        line at rest is linear."""
+        return any(one.fullmatch(self.key) for one in (_OF_DROPPER, _OF_SUPPORT))
 
     @property
     def is_of_train(self) -> bool:
@@ -111,6 +117,8 @@ class Parameter:
     @property
     def step(self) -> float:
         """Step by which it is changed to differentiate set-ups, in its unit."""
+        if self.is_of_shape:
+            return max(_STEP * self.size, _STEP_OF_ZERO["mm"])
         if self.size > 0.0:
             return _STEP * self.size
         return _STEP_OF_ZERO.get(self.unit, _USUAL_STEP_OF_ZERO)
@@ -155,7 +163,10 @@ class ChangedScenes:
         """The scene with several parameters changed, each by a number."""
         raw = copy.deepcopy(self._raw)
         for parameter, by in changes:
-            _change(raw, parameter, by)
+            if support := _OF_SUPPORT.fullmatch(parameter.key):
+                _lift(raw, self.scene, int(support[1]), by)
+            else:
+                _change(raw, parameter, by)
         return self._checked(raw)
 
     def parameter(self, key: str, where: str = "") -> Parameter:
@@ -168,6 +179,8 @@ class ChangedScenes:
         """
         if dropper := _OF_DROPPER.fullmatch(key):
             return self._length_of(key, *map(int, dropper.groups()))
+        if support := _OF_SUPPORT.fullmatch(key):
+            return self._height_at(key, int(support[1]))
         known = known_keys(Scene)
         parts = key.split(".")
         if not names_value(key, known):
@@ -217,6 +230,30 @@ class ChangedScenes:
         if not found:
             raise InputError("there are no droppers in the spans whose droppers are looked for")
         return found
+
+    def heights_at(self, supports: Sequence[int]) -> list[Parameter]:
+        """The height of the contact wire at each of some supports, counted from 0.
+
+        Raises
+        ------
+        InputError
+            If the line has no such support, or if the scene has heights at other places.
+        """
+        return [self.parameter(f"{_HEIGHTS}.{number}") for number in dict.fromkeys(supports)]
+
+    def _height_at(self, key: str, support: int) -> Parameter:
+        """The height at a support that the scene adds to that of the line, mostly none."""
+        heights = _heights_at_supports(self._raw, self.scene)
+        if heights is None:
+            raise InputError(
+                f"{key} is no parameter of this scene: {_HEIGHTS}.by_place has other places than "
+                "all supports"
+            )
+        if support >= len(heights):
+            raise InputError(
+                f"{key} names no support: the line has supports from 0 to {len(heights) - 1}"
+            )
+        return Parameter(key, (1e3 * heights[support][1],))
 
     def _length_of(self, key: str, span: int, number: int) -> Parameter:
         """The error of a dropper's length that the scene gives, mostly none."""
@@ -300,6 +337,22 @@ def _lengthen(raw: dict[str, Any], span: int, number: int, error: float) -> None
     others = [own for own in lengths.get("by_dropper", []) if own[:2] != [span, number]]
     lengths["by_dropper"] = [*others, [span, number, error]]
     raw["effects"]["dropper_lengths"] = True
+
+
+def _heights_at_supports(raw: dict[str, Any], scene: Scene) -> list[list[float]] | None:
+    """Places of all supports and heights there [m], None if the scene has others by places."""
+    places = line_of(scene).support_positions.tolist()
+    given = value_at(raw, f"{_HEIGHTS}.by_place") or [[x, 0.0] for x in places]
+    return given if [x for x, _ in given] == places else None
+
+
+def _lift(raw: dict[str, Any], scene: Scene, support: int, by: float) -> None:
+    """Change the height of the contact wire at a support [mm]."""
+    heights = copy.deepcopy(_heights_at_supports(raw, scene))
+    assert heights is not None
+    heights[support][1] += length_from_mm(by)
+    raw.setdefault("irregularities", {}).setdefault("contact_wire_height", {})["by_place"] = heights
+    raw["effects"]["contact_wire_height"] = True
 
 
 def _numbers(raw: Any, prefix: str = "") -> Iterator[str]:
