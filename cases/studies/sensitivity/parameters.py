@@ -163,10 +163,7 @@ class ChangedScenes:
         """The scene with several parameters changed, each by a number."""
         raw = copy.deepcopy(self._raw)
         for parameter, by in changes:
-            if support := _OF_SUPPORT.fullmatch(parameter.key):
-                _lift(raw, self.scene, int(support[1]), by)
-            else:
-                _change(raw, parameter, by)
+            _change(raw, self.scene, parameter, by)
         return self._checked(raw)
 
     def parameter(self, key: str, where: str = "") -> Parameter:
@@ -314,11 +311,14 @@ class ChangedScenes:
         return scene_from(raw, Origin("the scene", (), recorded=True), folder=Path.cwd())
 
 
-def _change(raw: dict[str, Any], parameter: Parameter, by: float) -> None:
-    """Change all values of a parameter."""
+def _change(raw: dict[str, Any], scene: Scene, parameter: Parameter, by: float) -> None:
+    """Change all values of a parameter in the tables of a scene."""
     if dropper := _OF_DROPPER.fullmatch(parameter.key):
         span, number = map(int, dropper.groups())
         _lengthen(raw, span, number, parameter.values[0] + by)
+        return
+    if support := _OF_SUPPORT.fullmatch(parameter.key):
+        _lift(raw, scene, int(support[1]), by)
         return
     above, _, last = parameter.key.rpartition(".")
     holder = value_at(raw, above)
