@@ -76,9 +76,10 @@ class Samples:
 def least_share(kept: int, n: int, confidence: float) -> float:
     """Lower bound of the share of all lines that keep a criterion which ``kept`` of n samples keep
     (C. Clopper, E. Pearson, Biometrika 26, 1934)."""
-    from scipy.stats import beta
+    from scipy.stats import binomtest
 
-    return float(beta.ppf(1.0 - confidence, kept, n - kept + 1)) if kept else 0.0
+    found = binomtest(kept, n, alternative="greater")
+    return float(found.proportion_ci(confidence, method="exact").low)
 
 
 def samples_of(levels: Sequence[float], margins: Sequence[Sequence[float]]) -> Samples:
