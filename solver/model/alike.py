@@ -10,6 +10,8 @@ import numpy as np
 # Bits of numbers that are alike: those that follow are what rounding leaves of places along the
 # line and of its shape at rest.
 _EQUAL_BITS = 38
+# Odd factors of the columns of rows, by which these are mixed.
+_FACTORS = np.random.default_rng(0).integers(0, 2**63, 64, dtype=np.uint64) * np.uint64(2) + 1
 
 
 def kinds_of(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -36,9 +38,8 @@ def alike(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def digests(rows: np.ndarray) -> np.ndarray:
     """A number (n,) uint64 for each of ``rows`` (n, k), the same for the same rows."""
-    factors = np.random.default_rng(0).integers(0, 2**63, 64, dtype=np.uint64) * np.uint64(2) + 1
     result = np.zeros(rows.shape[0], dtype=np.uint64)
     for number, column in enumerate((rows + 0.0).view(np.uint64).T):
-        result = (result + column * factors[number % 64]) * factors[(7 * number + 1) % 64]
+        result = (result + column * _FACTORS[number % 64]) * _FACTORS[(7 * number + 1) % 64]
         result ^= result >> np.uint64(29)
     return result

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from catenary.solver.model.model import Model
+from catenary.solver.model.model import Block, Model
 
 
 def iterate_entries(
@@ -50,29 +50,47 @@ def iterate_sums(
             dofs, kind = dofs[chosen], kind[chosen]
         if not kind.size:
             continue
-        moves = _free(model, dofs)
         shape = *dofs.shape, dofs.shape[1]
         rows = np.broadcast_to(dofs[:, :, None], shape)
         columns = np.broadcast_to(dofs[:, None, :], shape)
-        keep = (rows >= first) & (rows < last) & moves[:, :, None] & moves[:, None, :]
+        keep = _kept(model, dofs, first, last)
         if wanted is not None:
+            keep = np.ones(shape, dtype=bool) if keep is None else keep
             keep[keep] = wanted[rows[keep] - first]
-        values = []
-        for mass, stiffness, damping in sums:
-            matrix = np.zeros(shape)
-            if block.mass is not None:
-                matrix += (mass + damping * beta) * block.mass[kind]
-            if block.stiffness is not None:
-                matrix += (stiffness + damping * alpha) * block.stiffness[kind]
-            if block.damping is not None:
-                matrix += damping * block.damping[kind]
-            values.append(matrix[keep])
-        yield rows[keep], columns[keep], np.stack(values)
+        values = [_sum_of(block, alpha, beta, *of)[kind] for of in sums]
+        if keep is None:
+            yield rows.ravel(), columns.ravel(), np.stack([own.ravel() for own in values])
+        else:
+            yield rows[keep], columns[keep], np.stack([own[keep] for own in values])
 
 
-def _free(model: Model, dofs: np.ndarray) -> np.ndarray:
-    """Mask of unknowns that are not held, shape as ``dofs``; they stand close to each other."""
-    low, high = int(dofs.min()), int(dofs.max()) + 1
+def _sum_of(
+    block: Block, alpha: float, beta: float, mass: float, stiffness: float, damping: float
+) -> np.ndarray:
+    """``mass`` M + ``stiffness`` K + ``damping`` C of the kinds of a block, (k, m, m)."""
+    terms = (
+        (mass + damping * beta, block.mass),
+        (stiffness + damping * alpha, block.stiffness),
+        (damping, block.damping),
+    )
+    there = [(share, own) for share, own in terms if own is not None]
+    total = np.zeros(there[0][1].shape)
+    for share, own in there:
+        if share != 0.0:
+            total += share * own
+    return total
+
+
+def _kept(model: Model, dofs: np.ndarray, first: int, last: int) -> np.ndarray | None:
+    """Mask (n, m, m) of the entries of elements that are in rows from ``first`` to before ``last``
+    and of free unknowns; None if all are."""
+    low, high = int(dofs.min()), int(dofs.max()) + 1  # an element's unknowns are near each other
+    held = model.constrained_between(low, high)
+    inside = first <= low and high <= last
+    if inside and not held.size:
+        return None
     free = np.ones(high - low, dtype=bool)
-    free[model.constrained_between(low, high) - low] = False
-    return np.asarray(free[dofs - low])
+    free[held - low] = False
+    moves = free[dofs - low]
+    mine = moves if inside else moves & (dofs >= first) & (dofs < last)
+    return np.asarray(mine[:, :, None] & moves[:, None, :])
