@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 
 from catenary.base.errors import CatenaryError, RunBroken
-from catenary.base.freed_memory import give_back_long_line
+from catenary.base.freed_memory import give_back
 from catenary.base.parallel import on_root
 from catenary.base.petsc import PETSc
 from catenary.cases.process.interrupts import Phase, StopRequest
@@ -256,7 +256,7 @@ def _run(order: _Order, judge: Callable[[RunSize], None]) -> RunOutcome:
     phases = Phases(Progress(order.comm))
     outcome, n_unknowns = _marched(order, judge, phases)
     # The line is not needed any more: of a long one it is a gigabyte.
-    give_back_long_line(n_unknowns)
+    give_back(n_unknowns)
     order.tell(outcome.outcome)
     with phases("report"):
         result = _reported(order, outcome)
@@ -301,7 +301,7 @@ def _marched(
                 order, problem, at_rest, header, phases.progress, march.n_steps
             )
             header = None  # the recorder has it until it has written it
-        give_back_long_line(at_rest.model.n_unknowns)
+        give_back(at_rest.model.n_unknowns)
         with StopRequest() as stop:
             with phases("march"):
                 outcome = march.run(observers, stop)

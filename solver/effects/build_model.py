@@ -62,7 +62,7 @@ def build(
         numbering, row_of_node = before.numbering, before.row_of_node
     model = Model(
         problem,
-        effects.simulated(problem),
+        effects.simulated(problem) if before is None else before.simulated,
         mesh,
         numbering,
         row_of_node,

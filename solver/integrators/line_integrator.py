@@ -27,6 +27,7 @@ from catenary.solver.linear.pieces.operator_pieces import WantedPieces
 from catenary.solver.linear.step_operators import LineOperators, Loads
 from catenary.solver.linear.unit_responses import UnitResponses, Windows
 from catenary.solver.model.model import Model
+from catenary.solver.model.operator_bands import OperatorBands
 from catenary.solver.model.partition import Ownership
 from catenary.solver.model.switching_links import NO_LINKS, LinkArrays
 from catenary.solver.window.moving_window import MovingWindow
@@ -72,7 +73,8 @@ class LineIntegrator(ABC):
         self.position_factor = position_factor
         self.velocity_factor = velocity_factor
         coefficients = (1.0, self.position_factor, self.velocity_factor)
-        self.windows = Windows(model.numbering, reach(model, coefficients))
+        bands = OperatorBands(model, coefficients)
+        self.windows = Windows(model.numbering, reach(model, bands))
         in_pieces = None
         if wanted is not None:
             in_pieces = wanted.pieces_of(model, coefficients, self.windows.reach)
@@ -80,7 +82,7 @@ class LineIntegrator(ABC):
             comm, model, ownership, coefficients, self.windows, in_pieces
         )
         like = self.operators.like
-        self.responses = UnitResponses(comm, model, ownership, coefficients, self.windows, like)
+        self.responses = UnitResponses(comm, model, ownership, bands, self.windows, like)
         self._proportional = model.damping_is_proportional
         # Parts that are folded into the product with K, and parts left for after the solve.
         self._alpha_share = self._beta_share = 0.0

@@ -8,11 +8,10 @@ parallel solver and the compliance table are both built on this length.
 from __future__ import annotations
 
 import numpy as np
-from scipy import sparse
-from scipy.sparse import linalg as sparse_linalg
+from scipy import linalg
 
-from catenary.solver.model.entries import iterate_entries
 from catenary.solver.model.model import Model
+from catenary.solver.model.operator_bands import OperatorBands
 from catenary.solver.model.stations import SAME_STATION
 
 # Beyond the reach a column is below this share of its peak; two orders under what an iteration
@@ -21,17 +20,17 @@ DECAY = 1e-16
 # The probes look at two places of the line; spans differ, so take this much more.
 _MARGIN = 1.25
 # First distance of probes to either side [m], doubled whenever that is not enough.
-_WINDOW = 400.0
+_WINDOW = 200.0
 # Share of a window within which columns must decay, so that its ends have no part in that.
 _SEEN = 0.9
 # Distance around the longest element in which loads are tried, about a span to either side [m].
 _NEAR = 75.0
 
 
-def reach(model: Model, coefficients: tuple[float, float, float]) -> float:
+def reach(model: Model, bands: OperatorBands) -> float:
     """Distance along the track beyond which a column of A^-1 vanishes [m]. Not collective.
 
-    ``coefficients`` are those of M, K and C in A. Solves with A on windows of the line, for loads
+    ``bands`` are those of A. Solves with A on windows of the line, for loads
     in the middle and at the gaps' ends around the longest element: every element takes its share
     of the decay, so that this needs more way where elements are long. Windows grow until columns
     decay within them: bending waves within a span or two, waves along wires in 18 steps of their
@@ -42,12 +41,12 @@ def reach(model: Model, coefficients: tuple[float, float, float]) -> float:
     furthest = 0.0
     for place, loads in (_in_the_middle(positions), _around_the_longest(positions)):
         window = _WINDOW
-        found, seen = _reach_of(loads, place, model, coefficients, positions, window)
+        found, seen = _reach_of(loads, place, model, bands, positions, window)
         while found > _SEEN * seen:
             if window >= total:
                 return total
             window *= 2.0
-            found, seen = _reach_of(loads, place, model, coefficients, positions, window)
+            found, seen = _reach_of(loads, place, model, bands, positions, window)
         furthest = max(furthest, found)
     return min(total, _MARGIN * furthest)
 
@@ -73,7 +72,7 @@ def _reach_of(
     loads: np.ndarray,
     place: float,
     model: Model,
-    coefficients: tuple[float, float, float],
+    bands: OperatorBands,
     positions: np.ndarray,
     window: float,
 ) -> tuple[float, float]:
@@ -83,24 +82,15 @@ def _reach_of(
     side is there to be seen.
     """
     first, last = model.numbering.within(place - window, place + window)
-    parts = list(iterate_entries(model, first, last, *coefficients))
-    rows, columns, values = (np.concatenate(part) for part in zip(*parts, strict=True))
-    inside = (columns >= first) & (columns < last)
-    matrix = sparse.csc_matrix(
-        (values[inside], (rows[inside] - first, columns[inside] - first)),
-        shape=(last - first, last - first),
-    )
-    empty = matrix.diagonal() == 0
-    factor = sparse_linalg.splu((matrix + sparse.diags(empty.astype(float))).tocsc())
+    own = bands.between(first, last)
     x = model.numbering.as_vector(model.mesh.points[:, :1], np.inf)[first:last]
-    furthest, seen = 0.0, np.inf
-    for station in loads:
-        ahead, behind = float(positions[-1] - station), float(station - positions[0])
-        seen = min(seen, window - abs(station - place), max(ahead, behind))
-        for load in np.flatnonzero((np.abs(x - station) <= SAME_STATION) & ~empty):
-            unit = np.zeros(last - first)
-            unit[load] = 1.0
-            column = np.abs(factor.solve(unit))
-            big = column > DECAY * column.max()
-            furthest = max(furthest, float(np.abs(x[big] - x[load]).max()))
-    return furthest, float(seen)
+    x[model.constrained_between(first, last) - first] = np.inf
+    loaded = np.flatnonzero((np.abs(x[:, None] - loads) <= SAME_STATION).any(axis=1))
+    right = np.zeros((loaded.size, last - first))
+    right[np.arange(loaded.size), loaded] = 1.0
+    columns = np.abs(linalg.solveh_banded(own, right.T, overwrite_b=True, lower=True).T)
+    big = columns > DECAY * columns.max(axis=1, keepdims=True)
+    apart = np.where(big, np.abs(x - x[loaded, None]), 0.0)
+    both = np.maximum(positions[-1] - loads, loads - positions[0])
+    seen = np.minimum(window - np.abs(loads - place), both).min()
+    return float(apart.max(initial=0.0)), float(seen)

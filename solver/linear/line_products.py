@@ -62,7 +62,7 @@ class LineProducts:
         self._model, self._domain, self._padded, self._read = model, domain, padded, read
         self._like, self._in_pieces = like, in_pieces
         self.layout: Layout | None = None if in_pieces is None else in_pieces.layout
-        self._stiffness: StationRows | None = None  # kept until its product is made
+        self._rows: dict[str, StationRows] = {}  # kept until products are made
         self._matrices: dict[str, PETSc.Mat] = {}
         self._products: dict[str, StationProduct | None] = {}
 
@@ -70,7 +70,7 @@ class LineProducts:
         """Make the products that steps and energies need, before the first of them."""
         for name in ("stiffness", "mass"):
             self.by_stations(name)
-        self._stiffness = None
+        self._rows.clear()
 
     def destroy(self) -> None:
         """Free all PETSc objects."""
@@ -159,11 +159,14 @@ class LineProducts:
         domain = self._domain
         rows = self._sections(domain.low, domain.high)
         operator = self._like_rows.sum_of(coefficients, (domain.low, domain.high), 1.0)
-        self._stiffness = self._rows_of("stiffness")
-        if operator is None or self._stiffness is None:
+        names = ("stiffness", "mass")
+        read = domain.read_low, domain.read_high
+        found = self._like_rows.sums_of([_COEFFICIENTS[name] for name in names], read, (0.0, 0.0))
+        if operator is None or found is None:
             return None
+        self._rows = dict(zip(names, found, strict=True))
         station_types = rows.station_types if rows.varies else ()
-        self.layout = layout_of(operator.blocks, self._stiffness.blocks, station_types)
+        self.layout = layout_of(operator.blocks, self._rows["stiffness"].blocks, station_types)
         return operator if self.layout is not None else None
 
     @cached_property
@@ -181,7 +184,7 @@ class LineProducts:
         return columns, int(np.searchsorted(columns.starts, domain.low - domain.read_low))
 
     def _rows_of(self, name: str) -> StationRows | None:
-        if name == "stiffness" and self._stiffness is not None:
-            return self._stiffness
+        if name in self._rows:
+            return self._rows[name]
         read = self._domain.read_low, self._domain.read_high
         return self._like_rows.sum_of(_COEFFICIENTS[name], read)

@@ -17,8 +17,8 @@ from catenary.base.mpi import MPI
 from catenary.solver.kernels import native
 from catenary.solver.linear.stations.like_stations import LikeStations
 from catenary.solver.model.alike import kinds_of
-from catenary.solver.model.entries import iterate_entries
 from catenary.solver.model.model import Model
+from catenary.solver.model.operator_bands import OperatorBands
 from catenary.solver.model.partition import Ownership
 from catenary.solver.model.unknown_registry import Unknowns
 
@@ -40,54 +40,6 @@ _FELT, _MARGIN = 1e-12, 1.1
 FELT_AT_MOST = 1e-9
 # By how much that reach grows where some column is felt further.
 _MORE = 1.5
-
-
-# Unknowns whose bands are put together at once, some ninety spans of two wires: entries of a
-# hundred elements take nearly as long as those of a thousand.
-_AT_ONCE = 2**14
-
-
-class OperatorBands:
-    """Lower bands of A, as LAPACK takes them. Not collective.
-
-    Parameters
-    ----------
-    model : Model
-    coefficients : of M, K and C in A
-    end : number of unknowns whose bands are ever read
-    """
-
-    def __init__(self, model: Model, coefficients: tuple[float, float, float], end: int) -> None:
-        self._model, self._coefficients, self._end = model, coefficients, end
-        self._first = self._last = 0
-        self._numbers = np.zeros((1, 0))
-
-    def between(self, first: int, last: int) -> np.ndarray:
-        """Bands (k, last - first) of A for the columns from ``first`` to before ``last``.
-
-        Entry [i, j] is that of A in row ``first`` + j + i and column ``first`` + j. Entries of rows
-        from ``last`` on are undefined.
-        """
-        if first < self._first or last > self._last:
-            self._put_together(first, max(last, min(first + _AT_ONCE, self._end)))
-        numbers = self._numbers[:, first - self._first : last - self._first]
-        bands = max(1, min(len(numbers), last - first))
-        while bands > 1 and not numbers[bands - 1, : last - first + 1 - bands].any():
-            bands -= 1
-        return numbers[:bands]
-
-    def _put_together(self, first: int, last: int) -> None:
-        parts = list(iterate_entries(self._model, first, last, *self._coefficients))
-        held = self._model.constrained_between(first, last)
-        parts.append((held, held, np.ones(held.size)))
-        rows, columns, values = (np.concatenate(part) for part in zip(*parts, strict=True))
-        lower = (columns <= rows) & (columns >= first)
-        rows, columns, values = rows[lower], columns[lower], values[lower]
-        apart, n = rows - columns, last - first
-        bands = int(apart.max(initial=0)) + 1
-        flat = np.bincount(n * apart + columns - first, weights=values, minlength=n * bands)
-        self._first, self._last = first, last
-        self._numbers = np.asarray(flat, dtype=float).reshape(bands, n)
 
 
 class FeltFurther(RunBroken):
@@ -145,7 +97,7 @@ class UnitResponses:
     ----------
     comm : mpi4py communicator
     model, ownership : of the line
-    coefficients : of M, K and C in A
+    bands : of A
     like : marks of the line's stations, found where needed if not given
     """
 
@@ -154,13 +106,13 @@ class UnitResponses:
         comm: Any,
         model: Model,
         ownership: Ownership,
-        coefficients: tuple[float, float, float],
+        bands: OperatorBands,
         windows: Windows,
         like: LikeStations | None = None,
     ) -> None:
-        self._like = like
+        self._like, self._bands = like, bands
         self._comm, self._model, self._ownership = comm, model, ownership
-        self._coefficients, self.windows = coefficients, windows
+        self.windows = windows
 
     def columns(
         self,
@@ -232,9 +184,9 @@ class UnitResponses:
         data = np.zeros(at[-1])
         leak, further = 0.0, (1.0 + _SEEN) * self.windows.reach
         end = float((places.x[chosen] + places.half[chosen]).max(initial=-np.inf)) + further
-        bands = self._bands(end)
+        _, furthest = self.windows.numbering.within(-np.inf, end)
         for stretch in _stretches(places.x, chosen):
-            leak = max(leak, self._fill(bands, places, chosen[stretch], at[stretch], data))
+            leak = max(leak, self._fill(places, chosen[stretch], at[stretch], data, furthest))
         allowed = _LEAK if reach >= self.windows.reach else felt
         if self._comm.allreduce(leak, op=MPI.MAX) > allowed:
             kind = RunBroken if reach >= self.windows.reach else FeltFurther
@@ -253,8 +205,7 @@ class UnitResponses:
         for place in np.unique(np.linspace(0, x.size - 1, _PROBES).astype(int)):
             near, to_side = slice(place, place + 1), half[place] + self.windows.reach
             first, last = numbering.within(x[place] - to_side, x[place] + to_side)
-            bands = self._bands(x[place] + to_side)
-            answers = np.abs(self._answers(bands, dofs[near], weights[near], first, last))
+            answers = np.abs(self._answers(dofs[near], weights[near], first, last))
             felt = (answers > _FELT * answers.max(axis=1, keepdims=True)).any(axis=0)
             if not felt.any():
                 continue
@@ -264,22 +215,17 @@ class UnitResponses:
             furthest = max(furthest, *(float(way) - half[place] for way in ways))
         return min(self.windows.reach, _MARGIN * furthest)
 
-    def _bands(self, end: float) -> OperatorBands:
-        """Bands of A up to a place [m]."""
-        _, last = self.windows.numbering.within(-np.inf, end)
-        return OperatorBands(self._model, self._coefficients, last)
-
     def _answers(
-        self, bands: OperatorBands, dofs: np.ndarray, weights: np.ndarray, first: int, last: int
+        self, dofs: np.ndarray, weights: np.ndarray, first: int, last: int, further: int = 0
     ) -> np.ndarray:
         """Answers (n k, m) of the unknowns from ``first`` to before ``last``, alone, to forces with
-        ``weights`` on ``dofs``, both (n, k, m')."""
+        ``weights`` on ``dofs``, both (n, k, m'); those to before ``further`` come next."""
         n, each = dofs.shape[:2]
         right = np.zeros((n * each, last - first))
         column = np.repeat(np.arange(n * each), dofs.shape[2])
         np.add.at(right, (column, dofs.ravel() - first), weights.ravel())
         try:
-            own = bands.between(first, last)
+            own = self._bands.between(first, last, further)
             answers = linalg.solveh_banded(
                 own, right.T, overwrite_b=True, lower=True, check_finite=False
             )
@@ -304,14 +250,14 @@ class UnitResponses:
 
     def _fill(
         self,
-        bands: OperatorBands,
         places: Places,
         chosen: np.ndarray,
         at: np.ndarray,
         data: np.ndarray,
+        further: int,
     ) -> float:
         """Fill in the columns of ``chosen`` places; how much of one is outside of its window,
-        relative to its peak."""
+        relative to its peak. Columns to before unknown ``further`` come next."""
         owned = chosen[places.width[chosen] > 0]
         if not owned.size:
             return 0.0
@@ -320,7 +266,8 @@ class UnitResponses:
         first, last = numbering.within(
             float(places.x[owned].min()) - half - more, float(places.x[owned].max()) + half + more
         )
-        answers = self._answers(bands, places.dofs[owned], places.weights[owned], first, last)
+        dofs, weights = places.dofs[owned], places.weights[owned]
+        answers = self._answers(dofs, weights, first, last, further)
         begin = places.begin[owned] + self._ownership.first - first
         low, high = (numbering.starts[station[owned]] for station in (places.first, places.last))
         width, to = places.width[owned], at[places.width[chosen] > 0]

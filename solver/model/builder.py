@@ -75,7 +75,7 @@ class ModelBuilder:
         """
         values = np.broadcast_to(np.asarray(stiffness, dtype=float), nodes.shape)
         dofs = self.model.dofs(nodes, unknown)[:, None]
-        self.add_block(Block.of_elements(component, dofs, stiffness=values[:, None, None]))
+        self.add_elements(component, dofs, stiffness=values[:, None, None])
 
     def add_masses(
         self,
@@ -93,7 +93,7 @@ class ModelBuilder:
         """
         values = np.broadcast_to(np.asarray(mass, dtype=float), nodes.shape)
         dofs = self.model.dofs(nodes, unknown)
-        self.add_block(Block.of_elements(component, dofs[:, None], mass=values[:, None, None]))
+        self.add_elements(component, dofs[:, None], mass=values[:, None, None])
         for name in _LEVEL if unknown == "w" else ():
             there = self.model.numbering.has(nodes, name)
             if there.any():
@@ -110,7 +110,7 @@ class ModelBuilder:
         """
         unknowns, weights = places
         matrices = mass[:, None, None] * weights[:, :, None] * weights[:, None, :]
-        self.add_block(Block.of_elements(component, unknowns, mass=matrices))
+        self.add_elements(component, unknowns, mass=matrices)
         self.model.hanging.append(Hanging(unknowns, mass[:, None] * weights))
 
     def add_clamps(self, unknown: str) -> None:
@@ -158,9 +158,7 @@ class ModelBuilder:
                 raise ValueError(f"links of one sign need a name of their own, not {component}")
         model.links.append(links)
         stiffness = links.stiffness_matrices
-        self.add_block(
-            Block.of_elements(component, direction.unknowns, stiffness=stiffness, of_shape=of_shape)
-        )
+        self.add_elements(component, direction.unknowns, stiffness=stiffness, of_shape=of_shape)
         return links
 
     def add_droppers(self) -> None:
@@ -176,9 +174,7 @@ class ModelBuilder:
         for number, group in enumerate(self.problem.line.droppers):
             mine = mesh.dropper_group == number
             unknowns = model.droppers.direction.unknowns[mine]
-            self.add_block(
-                Block.of_elements(group.name, unknowns, stiffness=matrices[mine], of_shape=True)
-            )
+            self.add_elements(group.name, unknowns, stiffness=matrices[mine], of_shape=True)
             if self.problem.slack_dampers_act and slack[mine].any():
                 self._add_dampers(group.name, mine & slack)
 
@@ -190,12 +186,30 @@ class ModelBuilder:
         kept = (model.dropper_damping - model.released_damping)[which]
         lacking = (1.0 - model.simulated.kept_ratio) * kept
         damping = lacking[:, None, None] * weights[:, :, None] * weights[:, None, :]
-        self.add_block(Block.of_elements(component, unknowns, damping=damping))
+        self.add_elements(component, unknowns, damping=damping)
 
     def add_load(self, load: Load) -> None:
         """A load in time, of one of the kinds in ``model/loads.py``."""
         self.model.loads.append(load)
         self._n_terms += len(load.unknowns)
+
+    def add_elements(
+        self,
+        component: str,
+        dofs: np.ndarray,
+        mass: np.ndarray | None = None,
+        stiffness: np.ndarray | None = None,
+        damping: np.ndarray | None = None,
+        of_shape: bool = False,
+    ) -> None:
+        """Add elements, each with matrices of its own, as ``Block.of_elements`` takes them."""
+        number, terms = len(self.model.blocks), (mass, stiffness, damping)
+        if self._before is not None and number < len(self._before.blocks):
+            same = self._before.blocks[number]
+            if same.component == component and same.is_of(dofs, terms):
+                self.add_block(same)
+                return
+        self.add_block(Block.of_elements(component, dofs, *terms, of_shape=of_shape))
 
     def add_block(self, block: Block) -> None:
         """Element matrices of any kind; masses carry no weight."""

@@ -76,6 +76,15 @@ class Block:
         mass, stiffness, damping = (None if term is None else term[first] for term in terms)
         return cls(component, dofs, kind, mass, stiffness, damping, of_shape)
 
+    def is_of(self, dofs: np.ndarray, terms: Sequence[np.ndarray | None]) -> bool:
+        """Whether it has elements with unknowns ``dofs`` (n, m) and these ``terms``, each (n, m, m)
+        or None: matrices of mass, stiffness and damping."""
+        own = (self.mass, self.stiffness, self.damping)
+        return np.array_equal(self.dofs, dofs) and all(
+            term is mine if term is None or mine is None else np.array_equal(mine[self.kind], term)
+            for mine, term in zip(own, terms, strict=True)
+        )
+
     def near(self, first: int, last: int) -> slice | np.ndarray:
         """Elements among which are all with unknowns from ``first`` to before ``last``."""
         lowest, highest, ascend = self._ranges

@@ -7,20 +7,21 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy import sparse
-from scipy.sparse import linalg as sparse_linalg
+from scipy import linalg
 
 from catenary.meshgen.line import Line
 from catenary.meshgen.wires import Role
 from catenary.solver.effects.build_model import with_wires_apart
 from catenary.solver.model.link_directions import at_nodes, at_places
-from catenary.solver.model.matrices import part_of
 from catenary.solver.model.model import Model
+from catenary.solver.model.operator_bands import OperatorBands
 
 # Length of line to both sides of a stretch in the first solution [m], and motion that is none.
 _FIRST_REACH, _STILL = 1500.0, 1e-13
 # Places closer than this along the track are one [m].
 _SAME_PLACE = 1e-6
+# Numbers of solutions that are held at once.
+_AT_ONCE = 1 << 20
 
 
 @dataclass(frozen=True)
@@ -92,24 +93,25 @@ def elasticity(model: Model, x_from: float, x_to: float) -> Elasticity:
         places = [at_places(model, wire, x) for wire in wires]
         present = np.stack([_is_there(model, wire, x) for wire in wires], axis=1)
         x_from, x_to = _element_ends(model, x_from, x_to)
-    first, last = model.numbering.within(x_from, x_to)
-    factor = sparse_linalg.splu(_seen_from(model, x_from, x_to))
+    first, factor = _seen_from(model, x_from, x_to)
     # A held wire does not give way; the one that the matrix has there is no spring.
     weights = [
         np.where(np.isin(place.unknowns, model.constrained), 0.0, place.weights) for place in places
     ]
-    unknowns = [place.unknowns - first for place in places]
+    unknowns = [
+        np.where(own != 0.0, place.unknowns - first, 0)
+        for place, own in zip(places, weights, strict=True)
+    ]
     compliance = np.full((x.size, len(places), len(places)), np.nan)
-    load = np.zeros(last - first)
-    for i, j in np.argwhere(present):
-        acting = weights[j][i] != 0.0
-        at = unknowns[j][i][acting]
-        load[at] = weights[j][i][acting]
-        motion = factor.solve(load)
-        load[at] = 0.0
-        for k in np.flatnonzero(present[i]):
-            felt = weights[k][i] != 0.0
-            compliance[i, k, j] = motion[unknowns[k][i][felt]] @ weights[k][i][felt]
+    size, pressed = factor.shape[1], np.argwhere(present)
+    for some in np.array_split(pressed, 1 + pressed.shape[0] * size // _AT_ONCE):
+        loads = np.zeros((len(some), size))
+        for load, (i, j) in zip(loads, some, strict=True):
+            np.add.at(load, unknowns[j][i], weights[j][i])
+        moved = linalg.cho_solve_banded((factor, True), loads.T, overwrite_b=True).T
+        for motion, (i, j) in zip(moved, some, strict=True):
+            for k in np.flatnonzero(present[i]):
+                compliance[i, k, j] = motion[unknowns[k][i]] @ weights[k][i]
     return Elasticity(x, compliance)
 
 
@@ -164,45 +166,64 @@ def _element_ends(model: Model, x_from: float, x_to: float) -> tuple[float, floa
     return float(min(low)), float(max(high))
 
 
-def _seen_from(model: Model, x_from: float, x_to: float) -> sparse.csc_matrix:
-    """Stiffness of what stands in a stretch, all else eliminated."""
+def _seen_from(model: Model, x_from: float, x_to: float) -> tuple[int, np.ndarray]:
+    """Stiffness of what stands in a stretch, all else eliminated: its first unknown, and lower
+    bands of Cholesky's factor."""
     numbering, width, reach = model.numbering, model.numbering.width, _FIRST_REACH
     first, last = numbering.within(x_from, x_to)
     while True:
         low, high = numbering.within(x_from - reach, x_to + reach)
-        near, stiffness = (low, high), (0.0, 1.0, 0.0)
-        matrix = part_of(model, near, near, stiffness, 1.0, numbering.block).tocsc()
-        matrix.eliminate_zeros()
-        condensed, motion = _condensed(matrix, first - low, last - low)
+        bands = OperatorBands(model, (0.0, 1.0, 0.0)).between(low, high)
+        # So wide that nothing before it is joined to anything behind it.
+        more = len(bands)
+        begin = first - more if first - low > 2 * more else low
+        end = last + more if high - last > 2 * more else high
+        condensed, before, behind = _condensed(bands, begin - low, end - low)
         # Motion at the ends of the examined stretch, wherever the line goes on there.
-        ends = [motion[:width]] if low > 0 else []
-        ends += [motion[-width:]] if high < numbering.size else []
-        most = _STILL * np.abs(motion).max(initial=0.0)
-        if all(np.abs(end).max(initial=0.0) <= most for end in ends):
-            return condensed
+        ends = [before[:width]] if low > 0 else []
+        ends += [behind[-width:]] if high < numbering.size else []
+        most = _STILL * max(np.abs(motion).max(initial=0.0) for motion in (before, behind))
+        if all(np.abs(motion).max(initial=0.0) <= most for motion in ends):
+            return begin, linalg.cholesky_banded(condensed, overwrite_ab=True, lower=True)
         reach *= 4.0
 
 
 def _condensed(
-    matrix: sparse.csc_matrix, first: int, last: int
-) -> tuple[sparse.csc_matrix, np.ndarray]:
-    """Rows and columns ``first`` to ``last`` of a symmetric matrix, the others eliminated.
+    bands: np.ndarray, first: int, last: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Rows and columns ``first`` to ``last`` of a symmetric matrix in lower bands, the others
+    eliminated.
 
-    Also how these, (n, m), move with the unknowns that they are joined to.
+    Also how those before and those behind them move with the unknowns that they are joined to.
     """
-    others = np.r_[0:first, last : matrix.shape[0]]
-    inner = matrix[first:last, first:last]
-    between = matrix[:, first:last][others]
-    joined = np.flatnonzero(np.diff(between.tocsc().indptr))
-    if not joined.size:
-        return inner, np.zeros((others.size, 0))
-    right = between[:, joined].toarray()
-    given_way = sparse_linalg.splu(matrix[:, others][others].tocsc()).solve(right)
-    rows, columns = np.meshgrid(joined, joined, indexing="ij")
-    change = sparse.csc_matrix(
-        ((right.T @ given_way).ravel(), (rows.ravel(), columns.ravel())), shape=inner.shape
-    )
-    return (inner - change).tocsc(), given_way
+    size, k = bands.shape[1], len(bands) - 1
+    inner = bands[:, first:last].copy()
+    before = behind = np.zeros((0, k))
+    if first > 0:
+        pulls = np.zeros((first, k))
+        pulls[-k:] = _across(bands, first).T
+        before = linalg.solveh_banded(bands[:, :first], pulls, lower=True)
+        _subtract(inner[:, :k], pulls[-k:].T @ before[-k:])
+    if last < size:
+        pulls = np.zeros((size - last, k))
+        pulls[:k] = _across(bands, last)
+        behind = linalg.solveh_banded(bands[:, last:], pulls, lower=True)
+        _subtract(inner[:, -k:], pulls[:k].T @ behind[:k])
+    return inner, before, behind
+
+
+def _across(bands: np.ndarray, cut: int) -> np.ndarray:
+    """Entries (k, k) of a matrix in lower ``bands`` in the k rows from ``cut`` on and the k columns
+    before it."""
+    k = len(bands) - 1
+    row, column = np.indices((k, k))
+    return np.where(row <= column, bands[np.minimum(k + row - column, k), cut - k + column], 0.0)
+
+
+def _subtract(bands: np.ndarray, change: np.ndarray) -> None:
+    """Subtract a symmetric matrix (k, k) from the k columns of lower ``bands`` where it stands."""
+    for number in range(len(change)):
+        bands[number, : len(change) - number] -= np.diagonal(change, -number)
 
 
 def middle_span(line: Line) -> tuple[float, float]:

@@ -104,7 +104,7 @@ def line_at_rest(problem: Problem, mesh: LineMesh, sound: SoundLine | None = Non
         If there is no equilibrium with all droppers taut, or if it is unstable.
     """
     model, form = stable_form(problem, mesh, sound)
-    give_back()
+    give_back(model.n_unknowns)
     is_sound = sound is not None and same_matrices(sound.model, model)
     lift = sound.lift if sound is not None and is_sound else _lift_of(model)
     return LineAtRest(model.problem, model, form, lift)

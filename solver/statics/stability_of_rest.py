@@ -15,6 +15,7 @@ from scipy import linalg
 from catenary.base.errors import InputError
 from catenary.meshgen.wires import Role
 from catenary.solver.model.model import Model
+from catenary.solver.model.operator_bands import OperatorBands
 from catenary.solver.model.rest_shape import Equilibrium
 
 
@@ -54,16 +55,8 @@ def _softens(model: Model) -> bool:
 def _first_unstable(model: Model) -> int | None:
     """The first unknown at which elimination along the track finds K indefinite, None if K is
     positive definite."""
-    # PETSc is not loaded by a check of a sound line.
-    from catenary.solver.model.matrices import stiffness_matrix
-
-    lower = stiffness_matrix(model).tocoo()
-    below = lower.row >= lower.col
-    row, column, value = lower.row[below], lower.col[below], lower.data[below]
-    width = int((row - column).max(initial=0))
-    bands = np.zeros((width + 1, model.n_dofs))
-    np.add.at(bands, (row - column, column), value)
-    _, failed = linalg.lapack.dpbtrf(bands, lower=1, overwrite_ab=1)
+    bands = OperatorBands(model, (0.0, 1.0, 0.0)).between(0, model.n_dofs)
+    _, failed = linalg.lapack.dpbtrf(bands, lower=1)
     return None if failed == 0 else int(failed) - 1
 
 

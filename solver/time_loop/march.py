@@ -121,7 +121,7 @@ class March:
         self._set_up(unchanged(model, form), self._wire)
         self._set_off(model)
         self._showing.cross(0.0)
-        give_back()
+        give_back(model.n_unknowns)
         self._first_step = 0
         self._happened: tuple[LineIncident, ...] = ()
         self._ahead = self._happening()

@@ -99,9 +99,9 @@ def test_a_long_line_is_looked_at_as_far_as_it_moves(monkeypatch: pytest.MonkeyP
     looked: list[int] = []
     condensed = lifts._condensed
 
-    def counted(matrix, first, last):
-        looked.append(matrix.shape[0])
-        return condensed(matrix, first, last)
+    def counted(bands, first, last):
+        looked.append(bands.shape[1])
+        return condensed(bands, first, last)
 
     monkeypatch.setattr(lifts, "_condensed", counted)
     found = elasticity(model, *stretch).lift

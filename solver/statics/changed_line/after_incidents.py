@@ -51,6 +51,7 @@ from catenary.solver.model.links import Direction
 from catenary.solver.model.loads import ShapeLoad
 from catenary.solver.model.matrices import whole_matrix
 from catenary.solver.model.model import Model, wire_elements
+from catenary.solver.model.operator_bands import OperatorBands
 from catenary.solver.model.partition import Ownership
 from catenary.solver.model.rest_shape import Equilibrium
 from catenary.solver.model.switching_links import switching_links
@@ -261,7 +262,7 @@ def _times(
 def divided_by_mass(comm: Any, ownership: Ownership, model: Model, force: np.ndarray) -> np.ndarray:
     """M^-1 ``force``, owned parts (n_local,) [m/s2], [rad/s2] of [N], [N m]. Collective."""
     only_mass = (1.0, 0.0, 0.0)
-    windows = Windows(model.numbering, reach(model, only_mass))
+    windows = Windows(model.numbering, reach(model, OperatorBands(model, only_mass)))
     operators = LineOperators(comm, model, ownership, only_mass, windows)
     try:
         whole = np.concatenate(comm.allgather(force))

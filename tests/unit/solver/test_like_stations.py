@@ -9,16 +9,16 @@ import pytest
 from measuring import COMM, matrix_of
 from small_lines import HANGING, ac_simple_line, mesh_of, problem_of
 
-from catenary.solver.linear import unit_responses
 from catenary.solver.linear.decay_length import reach
 from catenary.solver.linear.stations.like_stations import LikeStations
 from catenary.solver.linear.unit_responses import (
-    OperatorBands,
     ShortColumns,
     UnitResponses,
     Windows,
 )
+from catenary.solver.model import operator_bands
 from catenary.solver.model.model import Model
+from catenary.solver.model.operator_bands import OperatorBands
 from catenary.solver.model.partition import distribute
 from catenary.solver.problem.problem import Damping
 from catenary.solver.statics.form_finding.equilibrium import find_form
@@ -41,8 +41,10 @@ def long_line() -> Model:
 
 def columns_of(model: Model) -> tuple[ShortColumns, np.ndarray]:
     """Columns of both unknowns of all nodes of the contact wire, and these unknowns."""
-    windows = Windows(model.numbering, reach(model, COEFFICIENTS))
-    responses = UnitResponses(COMM, model, distribute(model, 1, 0), COEFFICIENTS, windows)
+    windows = Windows(model.numbering, reach(model, OperatorBands(model, COEFFICIENTS)))
+    responses = UnitResponses(
+        COMM, model, distribute(model, 1, 0), OperatorBands(model, COEFFICIENTS), windows
+    )
     nodes = model.contact_nodes
     dofs = np.stack([model.dofs(nodes), model.dofs(nodes, "theta_y")], axis=1)
     free = np.ones(model.n_dofs)
@@ -133,11 +135,11 @@ def test_bands_of_a_stretch_are_those_of_its_own_matrix(
     long_line: Model, at_once: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Whether put together alone or with others: terms are added in one order."""
-    monkeypatch.setattr(unit_responses, "_AT_ONCE", at_once)
+    monkeypatch.setattr(operator_bands, "_AT_ONCE", at_once)
     starts, n = long_line.numbering.starts, long_line.n_dofs
     whole = matrix_of(long_line, *COEFFICIENTS).toarray()
     whole[np.diag_indices(n)] += np.isin(np.arange(n), long_line.constrained)
-    bands = OperatorBands(long_line, COEFFICIENTS, n)
+    bands = OperatorBands(long_line, COEFFICIENTS)
     for begin, end in ((0, 4), (1, 60), (40, 120), (10, 50), (200, starts.size - 1)):
         first, last = int(starts[begin]), int(starts[end])
         found, own = bands.between(first, last), whole[first:last, first:last]

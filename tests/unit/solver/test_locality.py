@@ -28,6 +28,7 @@ from catenary.solver.integrators.line_integrator import LineIntegrator
 from catenary.solver.linear.decay_length import DECAY, reach
 from catenary.solver.linear.unit_responses import UnitResponses, Windows
 from catenary.solver.model.model import Model
+from catenary.solver.model.operator_bands import OperatorBands
 from catenary.solver.model.unknown_registry import Unknowns
 from catenary.solver.problem.problem import Damping
 from catenary.solver.statics.form_finding.equilibrium import find_form
@@ -65,7 +66,7 @@ def test_columns_vanish_beyond_a_reach_of_less_than_a_span(alpha: float, dt: flo
     """beta dt^2 and gamma dt of average acceleration; paper's dampings; steps from 0.25 to 4 ms."""
     model = line_model(alpha)
     coefficients = (1.0, 0.25 * dt**2, 0.5 * dt)
-    found = reach(model, coefficients)
+    found = reach(model, OperatorBands(model, coefficients))
     x = positions(model)
     # Loads in every part of two spans: on wires, near droppers, masts, in gaps.
     rows = np.flatnonzero((x > 270.0) & (x < 335.0))[::3]
@@ -84,7 +85,7 @@ def test_a_line_too_short_for_the_decay_is_taken_whole() -> None:
     """20 m of wire in elements of 1 m at 4 ms: nothing vanishes within 10 m."""
     line = bare_wires(20.0)
     model = build(problem_of(line, BARE), mesh_of(line, 20), np.zeros(0))
-    assert reach(model, (1.0, 0.25 * 4e-3**2, 2e-3)) == 20.0
+    assert reach(model, OperatorBands(model, (1.0, 0.25 * 4e-3**2, 2e-3))) == 20.0
 
 
 def test_waves_along_wires_reach_far_but_not_over_the_whole_line() -> None:
@@ -93,7 +94,7 @@ def test_waves_along_wires_reach_far_but_not_over_the_whole_line() -> None:
     wires = elastic_wires(2400.0)
     model = build(problem_of(wires, BARE | {"axial_motion"}), mesh_of(wires, 400), np.zeros(0))
     coefficients = (1.0, 0.25 * 8e-3**2, 4e-3)
-    found = reach(model, coefficients)
+    found = reach(model, OperatorBands(model, coefficients))
     assert 400.0 < found < 900.0
     x = positions(model)
     rows = np.flatnonzero((x > 1100.0) & (x < 1120.0))
@@ -108,7 +109,7 @@ def test_droppers_far_apart_do_not_lengthen_the_reach() -> None:
     found = []
     for one in line:
         model, _ = find_form(problem_of(one, DAMPED), mesh_of(one, 4))
-        found.append(reach(model, (1.0, 0.25e-6, 0.5e-3)))
+        found.append(reach(model, OperatorBands(model, (1.0, 0.25e-6, 0.5e-3))))
     # The middle falls on a mast in both: the same surroundings.
     assert found[0] == pytest.approx(found[1], abs=1e-9)
 
@@ -149,7 +150,9 @@ def test_columns_that_leak_are_refused(stepper: LineIntegrator) -> None:
     too_short = Windows(model.numbering, 4.0)
     ones = np.ones((*dofs.shape, 1))
     coefficients = (1.0, stepper.position_factor, stepper.velocity_factor)
-    responses = UnitResponses(COMM, model, stepper.ownership, coefficients, too_short)
+    responses = UnitResponses(
+        COMM, model, stepper.ownership, OperatorBands(model, coefficients), too_short
+    )
     with pytest.raises(RunBroken, match=r"does not decay within 4 m.*numerics\.dt_s"):
         responses.columns(dofs[:, None], ones, x)
 
@@ -184,7 +187,7 @@ def test_reach_covers_gaps_of_very_different_lengths() -> None:
     model = find_form(problem, mesh_of(line, 4))[0]
     dt = 1e-3
     coefficients = (1.0, 0.25 * dt**2, 0.5 * dt)
-    found = reach(model, coefficients)
+    found = reach(model, OperatorBands(model, coefficients))
     free = np.setdiff1d(np.arange(model.n_dofs), model.constrained)
     columns = np.abs(inverse_columns(model, coefficients, free))
     x = positions(model)
