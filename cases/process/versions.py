@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import platform
+from functools import cache
 from importlib import metadata
 
 # Python packages that leave a record of their version, in the order in which they are printed.
 _PACKAGES = ("numpy", "scipy", "gmsh", "meshio", "pydantic", "typer")
 
 
+@cache
 def versions() -> dict[str, str]:
     """Versions by name: Catenary, libraries with their Python packages, Python. Not collective.
 
