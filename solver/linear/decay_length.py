@@ -8,7 +8,6 @@ parallel solver and the compliance table are both built on this length.
 from __future__ import annotations
 
 import numpy as np
-from scipy import linalg
 
 from catenary.solver.model.model import Model
 from catenary.solver.model.operator_bands import OperatorBands
@@ -82,13 +81,12 @@ def _reach_of(
     side is there to be seen.
     """
     first, last = model.numbering.within(place - window, place + window)
-    own = bands.between(first, last)
     x = model.numbering.as_vector(model.mesh.points[:, :1], np.inf)[first:last]
     x[model.constrained_between(first, last) - first] = np.inf
     loaded = np.flatnonzero((np.abs(x[:, None] - loads) <= SAME_STATION).any(axis=1))
     right = np.zeros((loaded.size, last - first))
     right[np.arange(loaded.size), loaded] = 1.0
-    columns = np.abs(linalg.solveh_banded(own, right.T, overwrite_b=True, lower=True).T)
+    columns = np.abs(bands.solve(first, last, right))
     big = columns > DECAY * columns.max(axis=1, keepdims=True)
     apart = np.where(big, np.abs(x - x[loaded, None]), 0.0)
     both = np.maximum(positions[-1] - loads, loads - positions[0])

@@ -10,7 +10,6 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy import linalg
 
 from catenary.base.errors import RunBroken
 from catenary.base.mpi import MPI
@@ -224,14 +223,7 @@ class UnitResponses:
         right = np.zeros((n * each, last - first))
         column = np.repeat(np.arange(n * each), dofs.shape[2])
         np.add.at(right, (column, dofs.ravel() - first), weights.ravel())
-        try:
-            own = self._bands.between(first, last, further)
-            answers = linalg.solveh_banded(
-                own, right.T, overwrite_b=True, lower=True, check_finite=False
-            )
-        except linalg.LinAlgError as error:
-            raise RunBroken("the step operator cannot be factored: it is not positive") from error
-        return np.ascontiguousarray(answers.T)
+        return np.ascontiguousarray(self._bands.solve(first, last, right, further))
 
     def _kinds(self, places: Places, like: LikeStations) -> tuple[np.ndarray, np.ndarray]:
         """Numbers of the places with own columns, and for each place the one that it shares."""

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy import linalg
 
+from catenary.base.errors import RunBroken
 from catenary.solver.model.entries import iterate_entries
 from catenary.solver.model.model import Model
 
@@ -44,6 +46,24 @@ class OperatorBands:
         while bands > 1 and not numbers[bands - 1, : last - first + 1 - bands].any():
             bands -= 1
         return numbers[:bands]
+
+    def solve(self, first: int, last: int, right: np.ndarray, further: int = 0) -> np.ndarray:
+        """Answers (n, last - first) of the unknowns from ``first`` to before ``last``, alone, to
+        forces ``right`` of the same shape, which are overwritten; ``further`` as in ``between``.
+
+        Raises
+        ------
+        RunBroken
+            If A is not positive definite there.
+        """
+        bands = self.between(first, last, further)
+        try:
+            answers = linalg.solveh_banded(
+                bands, right.T, overwrite_b=True, lower=True, check_finite=False
+            )
+        except linalg.LinAlgError as error:
+            raise RunBroken("the step operator cannot be factored: it is not positive") from error
+        return np.asarray(answers.T)
 
     def _put_together(self, first: int, last: int) -> None:
         parts = list(iterate_entries(self._model, first, last, *self._coefficients))

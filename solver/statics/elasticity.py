@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from scipy import linalg
 
+from catenary.base.errors import InputError
 from catenary.meshgen.line import Line
 from catenary.meshgen.wires import Role
 from catenary.solver.effects.build_model import with_wires_apart
@@ -79,6 +80,11 @@ def elasticity(model: Model, x_from: float, x_to: float) -> Elasticity:
     to; then there is a small solve for each place. Of a long line that is as much of it as moves by
     more than round-off. Each wire gives way by itself, also one that moves with another. Not
     collective.
+
+    Raises
+    ------
+    InputError
+        If the line is unstable.
     """
     model = with_wires_apart(model)
     chains = model.nodes_of(Role.CONTACT)
@@ -93,7 +99,12 @@ def elasticity(model: Model, x_from: float, x_to: float) -> Elasticity:
         places = [at_places(model, wire, x) for wire in wires]
         present = np.stack([_is_there(model, wire, x) for wire in wires], axis=1)
         x_from, x_to = _element_ends(model, x_from, x_to)
-    first, factor = _seen_from(model, x_from, x_to)
+    try:
+        first, factor = _seen_from(model, x_from, x_to)
+    except linalg.LinAlgError as error:
+        raise InputError(
+            "the contact wires have no elasticity: the line at rest is unstable"
+        ) from error
     # A held wire does not give way; the one that the matrix has there is no spring.
     weights = [
         np.where(np.isin(place.unknowns, model.constrained), 0.0, place.weights) for place in places
