@@ -31,8 +31,10 @@ from catenary.solver.problem.contact_laws import HertzLaw
 from catenary.solver.problem.problem import Numerics, steps_of
 from catenary.solver.statics.line_at_rest import LineAtRest
 
-# Weights of a derivative of the fourth order by values at -2, -1, 1 and 2 steps.
-STENCIL = {-2: 1.0 / 12.0, -1: -8.0 / 12.0, 1: 8.0 / 12.0, 2: -1.0 / 12.0}
+# Weights of a derivative of the fourth order by values at -2, -1, 1 and 2 steps, and of one of the
+# second order, which is exact for what is linear.
+STENCIL: Mapping[int, float] = {-2: 1.0 / 12.0, -1: -8.0 / 12.0, 1: 8.0 / 12.0, 2: -1.0 / 12.0}
+CENTRAL: Mapping[int, float] = {-1: -0.5, 1: 0.5}
 # Numbers that differ by so many roundings of themselves are equal.
 _ROUNDINGS = 64.0 * float(np.finfo(float).eps)
 # Damping is proportional if no more than such a part of it is not.
@@ -222,10 +224,16 @@ def _fixed_of(
     }
 
 
-def differentiate(set_up: Callable[[float], SetUp], now: SetUp, step: float, what: str) -> Change:
+def differentiate(
+    set_up: Callable[[float], SetUp],
+    now: SetUp,
+    step: float,
+    what: str,
+    stencil: Mapping[int, float] = STENCIL,
+) -> Change:
     """Derivatives of a set-up by a parameter. Not collective.
 
-    Differences of the fourth order: their error is some step^4 of the set-up's fifth derivative
+    The error of differences of the fourth order is some step^4 of the set-up's fifth derivative
     and the round-off of the set-up over the step.
 
     Parameters
@@ -238,13 +246,16 @@ def differentiate(set_up: Callable[[float], SetUp], now: SetUp, step: float, wha
         Change of the parameter; set-ups are taken one and two changes to either side.
     what : str
         Name of the parameter, for messages.
+    stencil : mapping of int to float, optional
+        Weights of set-ups by numbers of changes; ``CENTRAL`` for a parameter in which the set-up is
+        linear, and only without heads of other kinds than linear chains.
 
     Raises
     ------
     InputError
         If the parameter changes a part of the set-up without derivative, such as the mesh.
     """
-    found = {number: set_up(number * step) for number in STENCIL}
+    found = {number: set_up(number * step) for number in stencil}
     for other in found.values():
         for name, values in now.fixed.items():
             mine = other.fixed[name]
@@ -262,7 +273,7 @@ def differentiate(set_up: Callable[[float], SetUp], now: SetUp, step: float, wha
 
     def of_head(number: int) -> StepChange:
         if not isinstance(now.heads[number], LinearStep):
-            models = [found[side].heads[number] for side in STENCIL]
+            models = [found[side].heads[number] for side in stencil]
             beside = [model for model in models if isinstance(model, SteppedHead)]
             return StepChange(_NO_STEP, beside, step)
         parts = [
@@ -312,7 +323,7 @@ def derivative(values: Mapping[int, np.ndarray], step: float) -> np.ndarray:
     ----------
     values : mapping of int to ndarray
         What is differentiated, with the parameter changed by each multiple of the step in
-        ``STENCIL``; all of one shape.
+        ``STENCIL`` or ``CENTRAL``; all of one shape.
     step : float
         Step of the parameter.
 
@@ -321,11 +332,15 @@ def derivative(values: Mapping[int, np.ndarray], step: float) -> np.ndarray:
     ndarray
         Of the same shape; zero if the values differ by round-off only.
     """
-    total = sum(STENCIL[number] * value for number, value in values.items()) / step
+    total = sum(_weights(values)[number] * value for number, value in values.items()) / step
     largest = max(float(np.abs(value).max(initial=0.0)) for value in values.values())
     if float(np.abs(total).max(initial=0.0)) <= _ROUNDINGS * largest / step:
         return np.zeros_like(total)
     return np.asarray(total)
+
+
+def _weights(values: Mapping[int, Any]) -> Mapping[int, float]:
+    return STENCIL if len(values) == len(STENCIL) else CENTRAL
 
 
 def _matrices(
@@ -353,7 +368,7 @@ def _matrices(
 
 def _derivative(matrices: dict[int, sparse.csc_matrix], step: float) -> sparse.csc_matrix:
     """Derivative of a matrix, zero where its change is round-off of the entry."""
-    total = sum(STENCIL[number] * matrix for number, matrix in matrices.items()) / step
+    total = sum(_weights(matrices)[number] * own for number, own in matrices.items()) / step
     changed = abs(total) > abs(matrices[1]) * (_ROUNDINGS / abs(step))
     derivative = total.multiply(changed).tocsc()
     derivative.eliminate_zeros()

@@ -17,14 +17,14 @@ from mpi4py import MPI
 from scenes import load_scene, mesh_of, problem_of
 
 from catenary import InputError
-from catenary.cases.run.prepared import sound_rest
+from catenary.cases.run.prepared import rest_of, sound_rest
 from catenary.cases.studies.sensitivity.output import as_text, table_of
 from catenary.cases.studies.sensitivity.parameters import ChangedScenes, Parameter
 from catenary.cases.studies.sensitivity.study import Sensitivity, change_by, sensitivity_of
 from catenary.postproc.evaluate.statistics import contact_statistics
 from catenary.solver.statics.line_at_rest import line_at_rest
 from catenary.solver.tangents.march import march_with_tangents
-from catenary.solver.tangents.set_up import differentiate, set_up_of
+from catenary.solver.tangents.set_up import SetUp, differentiate, set_up_of
 
 CASE = "en50318_2002"
 # Six spans with two elements a gap, run through in 1152 steps; droppers slacken, contact lasts.
@@ -95,6 +95,27 @@ def test_the_table_is_ranked_and_in_the_units_of_keys() -> None:
     assert tension["std_change_N"] == pytest.approx(1000.0 * found.by_force[1][0].std)
     # A newton of static force is a newton of mean force, but for the base's spring of 50 N/m.
     assert force["mean_change_N"] == pytest.approx(1.0, abs=0.03)
+
+
+@pytest.mark.parametrize("case", ["ac_simple", "re330_stitched"])  # a chain of masses, a mechanism
+def test_lengths_of_droppers_share_the_sound_line(case: str) -> None:
+    """Their derivatives are those by whole set-ups: equilibria solved anew agree within 1e-14 m,
+    over steps of 5e-5 m."""
+    own = scenes(case=case)
+    rest = sound_rest(own.scene)
+    now = set_up_of(MPI.COMM_SELF, rest)
+    parameter = own.parameter("irregularities.dropper_lengths.8.4")
+
+    def whole(by: float) -> SetUp:
+        changed = own.changed(parameter, by)
+        return set_up_of(MPI.COMM_SELF, rest_of(changed), len(now.drives))
+
+    found = change_by(parameter, own, rest, now, MPI.COMM_SELF)
+    expected = differentiate(whole, now, parameter.step, parameter.key)
+    for name in ("rest", "links"):
+        value = getattr(expected, name)
+        check(name, getattr(found, name), value, within=2e-9 * np.abs(value).max())
+    assert not found.matrices and not expected.matrices
 
 
 def test_the_place_of_one_pantograph_moves_that_one_only() -> None:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from catenary.base.errors import InputError
-from catenary.cases.run.prepared import rest_of, sound_rest
+from catenary.cases.run.prepared import sound_rest
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.sensitivity.parameters import ChangedScenes, Parameter, parameters_of
 from catenary.cases.terminal.terminal_text import elasticity_text
@@ -119,7 +119,7 @@ def _derivative(parameter: Parameter, scenes: ChangedScenes, at_rest: LineAtRest
         raise InputError(f"{parameter.key} does not change the line at rest")
     values, taut = {}, at_rest.form.dropper_force > 0.0
     for number in STENCIL:
-        rest = rest_of(scenes.changed(parameter, number * parameter.step))
+        rest = scenes.rest(parameter, number * parameter.step)
         if rest.lift.x.shape != at_rest.lift.x.shape or np.any(rest.lift.x != at_rest.lift.x):
             raise InputError(
                 f"{parameter.key} moves nodes of the mesh, by which the line at rest has no "

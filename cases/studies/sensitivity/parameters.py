@@ -15,6 +15,7 @@ import fnmatch
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -22,15 +23,19 @@ import numpy as np
 
 from catenary.base.errors import InputError
 from catenary.base.options import option
+from catenary.cases.run.prepared import rest_of
+from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.input.faults import Origin, shown
 from catenary.cases.scene.input.toml_input import value_at
 from catenary.cases.scene.keys.error_sentences import unknown_key
 from catenary.cases.scene.keys.keys import known_keys, names_value
 from catenary.cases.scene.keys.units import length_from_mm, unit_of
 from catenary.cases.scene.load import scene_from
-from catenary.cases.scene.problem import line_of, resolved
+from catenary.cases.scene.problem import line_of, problem_of, resolved
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.sweep.variants import is_number
+from catenary.meshgen.mesh import LineMesh
+from catenary.solver.statics.line_at_rest import LineAtRest, SoundLine, line_at_rest, sound_line
 
 # Patterns of the parameters that are taken if none are named, in the order in which they are taken.
 USUAL = (
@@ -110,6 +115,11 @@ class Parameter:
         return any(one.fullmatch(self.key) for one in (_OF_DROPPER, _OF_SUPPORT))
 
     @property
+    def is_length(self) -> bool:
+        """Whether it is the length of a single dropper."""
+        return bool(_OF_DROPPER.fullmatch(self.key))
+
+    @property
     def is_of_train(self) -> bool:
         """Whether it leaves the line at rest as it is."""
         return self.key.split(".")[0] in _OF_TRAIN
@@ -165,6 +175,28 @@ class ChangedScenes:
         for parameter, by in changes:
             _change(raw, self.scene, parameter, by)
         return self._checked(raw)
+
+    def rest(self, parameter: Parameter, by: float) -> LineAtRest:
+        """The line at rest with all values of a parameter changed ``by`` a number.
+
+        Lines that differ in the length of a dropper hang near the same sound line.
+
+        Raises
+        ------
+        InputError
+            If there is none, or the scene refuses the change.
+        """
+        changed = self.changed(parameter, by)
+        if not parameter.is_length:
+            return rest_of(changed)
+        mesh, sound = self._sound
+        return line_at_rest(problem_of(changed), mesh, sound)
+
+    @cached_property
+    def _sound(self) -> tuple[LineMesh, SoundLine]:
+        """Mesh of the line, and the line for which droppers are cut."""
+        mesh = mesh_of(self.scene)
+        return mesh, sound_line(problem_of(self.scene), mesh)
 
     def parameter(self, key: str, where: str = "") -> Parameter:
         """The parameter of a key; ``where`` it was written, for sentences, if not as an option.

@@ -9,17 +9,26 @@ from typing import Any
 import numpy as np
 
 from catenary.base.errors import InputError
-from catenary.cases.run.prepared import rest_of, sound_rest
+from catenary.cases.run.prepared import sound_rest
 from catenary.cases.scene.problem import problem_of
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.sensitivity.parameters import ChangedScenes, Parameter, parameters_of
 from catenary.cases.terminal.runs_bar import RunsBar
+from catenary.mbs.head.head_arrays import LinearStep
 from catenary.postproc.evaluate import derivatives, filters
 from catenary.postproc.evaluate.derivatives import ForceDerivatives
 from catenary.postproc.evaluate.statistics import covers
+from catenary.solver.model.model import same_matrices
 from catenary.solver.statics.line_at_rest import LineAtRest
 from catenary.solver.tangents.march import Tangents, march_with_tangents
-from catenary.solver.tangents.set_up import Change, SetUp, differentiate, set_up_of
+from catenary.solver.tangents.set_up import (
+    CENTRAL,
+    STENCIL,
+    Change,
+    SetUp,
+    differentiate,
+    set_up_of,
+)
 
 # Memory for derivatives of all steps; for further parameters the march is made again [B].
 _BYTES = 2**28
@@ -137,20 +146,26 @@ def change_by(
         If there is none.
     """
 
+    n_steps, linear = len(now.drives), parameter.is_of_shape
+
     def set_up(by: float) -> SetUp:
-        n_steps = len(now.drives)
         try:
-            changed = scenes.changed(parameter, by)
+            if parameter.is_of_train:
+                rest = at_rest.under(problem_of(scenes.changed(parameter, by)))
+            else:
+                rest = scenes.rest(parameter, by)
         except InputError as error:
             raise InputError(
                 f"{parameter.key} is at a bound of what is allowed, where a march has no "
                 f"derivative to both sides: {error}"
             ) from error
-        if parameter.is_of_train:
-            return set_up_of(comm, at_rest.under(problem_of(changed)), n_steps, now)
-        return set_up_of(comm, rest_of(changed), n_steps)
+        # Of a shape that changes no matrix, these are taken over.
+        same = linear and same_matrices(rest.model, at_rest.model)
+        return set_up_of(comm, rest, n_steps, now if same or parameter.is_of_train else None)
 
-    return differentiate(set_up, now, parameter.step, parameter.key)
+    heads_are_linear = all(isinstance(head, LinearStep) for head in now.heads)
+    stencil = CENTRAL if linear and heads_are_linear else STENCIL
+    return differentiate(set_up, now, parameter.step, parameter.key, stencil)
 
 
 def parts_of(changes: Sequence[Change], at_rest: LineAtRest, now: SetUp) -> Iterator[slice]:
