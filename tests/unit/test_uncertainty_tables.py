@@ -192,11 +192,13 @@ def test_few_samples_of_two_pantographs_have_no_curve_of_convergence() -> None:
 def test_what_is_no_table_of_runs_is_one_sentence(tmp_path: Path) -> None:
     (tmp_path / "empty.csv").write_text("")
     (tmp_path / "other.csv").write_text("x,y\n1,2\n")
+    (tmp_path / "semicolons.csv").write_text("variant;std_N\na;2\n")
     (tmp_path / "wrong.parquet").write_text("x,y\n1,2\n")
     (tmp_path / "notes.txt").write_text("x")
     for name, sentence in (
         ("empty.csv", "cannot be read as a table of runs"),
         ("other.csv", "is no table of runs: it needs a column variant"),
+        ("semicolons.csv", "it needs a column variant, and rows; its first line has variant;std_N"),
         ("wrong.parquet", "cannot be read as a table of runs|needs the package pyarrow"),
         ("notes.txt", "must end in .csv or .parquet"),
         ("nowhere", "is neither a folder of a sweep nor a table"),
@@ -205,6 +207,16 @@ def test_what_is_no_table_of_runs_is_one_sentence(tmp_path: Path) -> None:
         with pytest.raises(InputError, match=sentence) as error:
             read_run_table(tmp_path / name)
         assert "\n" not in str(error.value)
+    rows = read_run_table(folder(tmp_path / "c", some(range(1, 4)))).frame
+    with pytest.raises(InputError, match="has sample_000002 twice of second: a run may count once"):
+        run_table(pd.concat([rows, rows.iloc[[3]]]))
+    rows = rows.astype({SPEED: object})
+    rows.loc[2, SPEED] = "fast"
+    with pytest.raises(InputError, match=f'has "fast" in column {SPEED} of sample_000002; each'):
+        run_table(rows, sampling_of(SAMPLE, "s"))
+    # A run that did not end needs none.
+    rows.loc[rows.variant == "sample_000002", "outcome"] = "broke"
+    run_table(rows, sampling_of(SAMPLE, "s"))
     out = folder(tmp_path / "out", some(range(1, 4)))
     (out / SAMPLING).write_text("{")
     with pytest.raises(InputError, match="is damaged"):
