@@ -418,7 +418,9 @@ def test_the_verb_finds_a_force_and_writes_its_tables_once(files: Path) -> None:
     assert (row.prior, row.prior_deviation, row.unit) == (117.0, 4.0, "N")
     # The scene has 120 N; four posterior deviations, and these are far below the prior's.
     assert abs(row.found - 120.0) < 4.0 * row.deviation < 4.0
-    assert abs(table.loc["bias of head height"].found) < 4.0 * 0.002
+    bias = table.loc["bias of head height"]
+    # In the file's unit, in which the task gives 20 mm; the file has none of its own.
+    assert (bias.unit, bias.prior_deviation) == ("mm", 20.0) and abs(bias.found) < 4.0 * 2.0
     names = {path.name for path in out.iterdir()}
     assert names == {"parameters.csv", "correlation.csv", "directions.csv", "residuals.csv",
                      "identification.json", "passage.png", "parameters.png"}  # fmt: skip
@@ -435,12 +437,12 @@ def test_the_verb_finds_a_force_and_writes_its_tables_once(files: Path) -> None:
 def test_pictures_show_signals_residuals_and_distances_from_priors() -> None:
     place, steps = np.linspace(100.0, 120.0, 5), np.linspace(100.0, 120.0, 21)
     force, height = (
-        Signal("force", place, None, 2.0, 0.0),
-        Signal("head height", 5.0 + 0.0 * place, None, 0.003, 0.01),
+        Signal("force", place, None, 2.0, 0.0, "N", 1.0),
+        Signal("head height", 5.0 + 0.0 * place, None, 0.003, 0.01, "mm", 1e-3),
     )  # type: ignore[arg-type]
     found = Identification(
-        [Unknown("tension", "N", 20e3, 1e3), Unknown("bias of head height", "m", 0.0, 0.01)],
-        np.array([21.5e3, 0.002]),
+        [Unknown("tension", "N", 20e3, 1e3), Unknown("bias of head height", "mm", 0.0, 10.0)],
+        np.array([21.5e3, 2.0]),
         posterior_of(np.array([[3.0, 0.0], [0.0, 0.0]])),
         place,
         [force, height],
