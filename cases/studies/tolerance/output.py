@@ -106,7 +106,16 @@ def installer_table(plan: Plan, found: Sequence[Tolerance]) -> StudyTable:
     absent = {"worst"} if not plan.task.samples.worst_case else set()
     absent |= {"together"} if together is None else set()
     columns = [column for column in columns if column.name not in absent]
-    return StudyTable(columns, rows, "What an installer may have")
+    title, lost = "What an installer may have", _lost(found)
+    if lost:
+        n = len({one.criterion for one in found if one.criterion != EACH})
+        title += f" for {n - len(lost)} of {n} criteria: others fail without errors"
+    return StudyTable(columns, rows, title)
+
+
+def _lost(found: Sequence[Tolerance]) -> list[str]:
+    """The criteria that the line does not keep without errors."""
+    return list(dict.fromkeys(one.criterion for one in found if not one.is_kept))
 
 
 def _of_each(found: Sequence[Tolerance]) -> Tolerance | None:
@@ -125,11 +134,9 @@ def _first_to_fail(found: Sequence[Tolerance]) -> str:
 def remarks(plan: Plan, found: Sequence[Tolerance]) -> list[str]:
     """Sentences on what the tables cannot say."""
     sentences = []
-    lost = list(dict.fromkeys(one.criterion for one in found if not one.is_kept))
-    for name in lost:
+    if lost := _lost(found):
         sentences.append(
-            f"{name} is not kept without errors: it has no tolerance, and those of others do not "
-            "count it"
+            f"not kept without errors, so that no tolerance counts it: {', '.join(lost)}"
         )
     if all(not one.is_kept for one in found):
         return sentences
