@@ -282,6 +282,28 @@ def test_sweeps_that_contradict_each_other_are_refused(tmp_path: Path) -> None:
         with pytest.raises(InputError, match=sentence) as error:
             merged(first, folder(tmp_path / name, [one], sample))
         assert "\n" not in str(error.value)
+    tables: dict[str, Any] = {
+        "mesh": {"file": "/a/m.msh"},
+        "case": {"title": "A"},
+        "train": {"speed_km_h": 250.0, "start_m": 1},
+    }
+    write(tmp_path / "base", "", runs[:2], None, scene=tables)
+    # A varied key, a title and the folder of a file may differ, where the train starts may not.
+    for number, (start, speed) in enumerate(((1, 250.0), (1, 300.0), (2, 250.0))):
+        other = {
+            "mesh": {"file": "/b/m.msh"},
+            "case": {"title": "B"},
+            "train": {"speed_km_h": speed, "start_m": start},
+        }
+        write(tmp_path / f"other{number}", "", runs[2:], None, scene=other)
+        if start == 1:
+            assert len(merged(tmp_path / "base", tmp_path / f"other{number}")["variants"]) == 4
+            continue
+        with pytest.raises(
+            InputError, match=r"other2 cannot join .*: train.start_m is 2 there, and 1"
+        ):
+            merged(tmp_path / "base", tmp_path / f"other{number}")
+        assert "\n" not in str(error.value)
     # More samples of the same sequence are no contradiction.
     assert len(merged(first, folder(tmp_path / "g", [ended(9)], longer))["variants"]) == 5
     write(tmp_path / "h", "another_case", runs, None)
