@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from pydantic import BaseModel
 
 from catenary.base.errors import InputError
+from catenary.cases.scene.input.faults import shown
 from catenary.cases.studies.sampling.tables import SamplingTable
 from catenary.cases.studies.sweep.histories import FILE as HISTORIES
 from catenary.cases.studies.sweep.histories import merge_histories
@@ -22,6 +23,8 @@ from catenary.postproc.report.study_table import Column, StudyTable, write_files
 _DONE = "done"
 # Figures that differ between two runs of the same variant.
 _OWN = ("wall_s", "remarks")
+# Tables of a case that its figures do not depend on.
+_IDLE = ("case", "output", "test")
 
 
 class Merged(NamedTuple):
@@ -49,8 +52,8 @@ def merge(folders: Sequence[Path]) -> Merged:
     Raises
     ------
     InputError
-        If a folder holds no sweep, or if two contradict each other: other cases, other samplings,
-        or a variant with other assignments or other figures.
+        If a folder holds no sweep, or if two contradict each other: other cases, other values of
+        them, other samplings, or a variant with other assignments or other figures.
     """
     folders = [part for folder in folders for part in _parts(folder)]
     records = [_record(folder) for folder in folders]
@@ -64,6 +67,7 @@ def merge(folders: Sequence[Path]) -> Merged:
         ):
             if one != two:
                 raise InputError(f"{folder} cannot join {folders[0]}: they differ in the {what}")
+        _refuse_other_scene(folder, record, folders[0], first)
     assignments: dict[str, tuple[Any, Path]] = {}
     rows: dict[str, tuple[list[dict[str, Any]], Path]] = {}
     for folder, record in zip(folders, records, strict=True):
@@ -85,6 +89,7 @@ def merge(folders: Sequence[Path]) -> Merged:
     merged = {
         "case": first["case"],
         "varied": first["varied"],
+        "scene": first["scene"],
         "wall_s": sum(record["wall_s"] for record in records),
         "variants": [
             {"name": name, "assignments": assignments[name][0]}
@@ -132,6 +137,38 @@ class _Record(BaseModel):
     wall_s: float
     variants: list[_Variant]
     rows: list[dict[str, Any]]
+    scene: dict[str, Any] | None = None
+
+
+def _refuse_other_scene(
+    folder: Path, record: dict[str, Any], of: Path, first: dict[str, Any]
+) -> None:
+    """Refuse sweeps whose variants differ from other values, if their records have these."""
+    if record["scene"] is None or first["scene"] is None:
+        return
+    for key, one, two in _differences(first["scene"], record["scene"]):
+        varied = any(f"{key}.".startswith(f"{own}.") for own in first["varied"])
+        # Files may stand in other folders of other machines.
+        elsewhere = key.endswith("file") and Path(str(one)).name == Path(str(two)).name
+        if key.split(".")[0] not in _IDLE and not varied and not elsewhere:
+            raise InputError(
+                f"{folder} cannot join {of}: {key} is {shown(two)} there, and {shown(one)} here"
+            )
+
+
+def _differences(one: Any, two: Any, key: str = "") -> Iterator[tuple[str, Any, Any]]:
+    """Keys of tables, and of lists of one length, with the values in which they differ."""
+    pairs: list[tuple[str, Any, Any]]
+    if isinstance(one, dict) and isinstance(two, dict):
+        pairs = [(name, one.get(name), two.get(name)) for name in dict.fromkeys([*one, *two])]
+    elif isinstance(one, list) and isinstance(two, list) and len(one) == len(two):
+        pairs = [(str(i), a, b) for i, (a, b) in enumerate(zip(one, two, strict=True))]
+    else:
+        if one != two:
+            yield key, one, two
+        return
+    for name, a, b in pairs:
+        yield from _differences(a, b, f"{key}.{name}" if key else name)
 
 
 def _endless(sampling: SamplingTable | None) -> SamplingTable | None:

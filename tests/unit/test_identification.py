@@ -36,7 +36,7 @@ from catenary.cases.studies.identification.posterior import (
 from catenary.cases.studies.identification.study import Identification, Unknown
 from catenary.cases.studies.identification.task import Task
 from catenary.cases.studies.measured.description import Measured
-from catenary.cases.studies.measured.passages import read_table
+from catenary.cases.studies.measured.passages import column_of, read_table
 from catenary.cases.studies.task_files import checked_table
 from catenary.postproc.evaluate import filters
 
@@ -262,6 +262,17 @@ def test_raw_samples_and_the_march_pass_the_same_filter() -> None:
     assert signal.deviation == pytest.approx(5.0 * np.sqrt(filters.kept_variance(20.0, 0.004)))
 
 
+def test_innovations_of_hardly_any_noise_are_those_of_its_limit() -> None:
+    """Of noise that goes to zero two samples fix two parameters, and the third tells what is left:
+    1, 2 and 3.5 lie 0.5 off a straight line, whose prediction has a deviation of root 6."""
+    jacobian = 1e12 * np.array([[1.0, 0.0], [1.0, 1.0], [1.0, 2.0]])
+    values = 1e12 * np.array([1.0, 2.0, 3.5])
+    found = innovations_of(values, jacobian, np.zeros(2))
+    # Parameters are of order one in deviations of their priors, off by round-off times 1e12.
+    check("first", found[0], 1.0, within=1e-12)
+    check("last", found[2], 0.5e12 / np.sqrt(6.0), within=1e-3 * 0.5e12)
+
+
 def test_tables_with_semicolons_and_decimal_commas_are_read(tmp_path: Path) -> None:
     file = tmp_path / "m.csv"
     file.write_text("# a passage\nx;F\n0,5;100,25\n1,0;99,75\n", encoding="utf-8")
@@ -277,6 +288,31 @@ def test_a_file_that_is_no_table_is_told_in_one_sentence(tmp_path: Path) -> None
     with pytest.raises(InputError) as raised:
         read_table(file)
     assert str(raised.value) == f"{file} is no table of CSV: Expected 2 fields in line 3, saw 3"
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("", "is no table of CSV: it is empty"),
+        ("# nothing\n", "is no table of CSV: it is empty"),
+        ("x,F\n0,5,100,25\n1,0,99,75\n", "more values in a row than the names of columns, x, F: "),
+        ("x,F,F\n0,5,7\n", 'has several columns "F"'),
+    ],
+)
+def test_columns_that_are_not_clear_are_told(tmp_path: Path, text: str, told: str) -> None:
+    file = tmp_path / "m.csv"
+    file.write_text(text, encoding="utf-8")
+    with pytest.raises(InputError) as raised:
+        column_of(read_table(file), str(file), "F")
+    assert str(raised.value).startswith(str(file)) and told in str(raised.value)
+
+
+def test_separators_at_the_end_of_lines_make_no_column(tmp_path: Path) -> None:
+    file = tmp_path / "m.csv"
+    for text in ("x,F\n0.5,100.25,\n1.0,99.75,\n,,\n", "x;F;\n0,5;100,25;\n1,0;99,75; # last\n"):
+        file.write_text(text, encoding="utf-8")
+        table = read_table(file)
+        assert table.x.tolist() == [0.5, 1.0] and table.F.tolist() == [100.25, 99.75]
 
 
 @pytest.mark.parametrize(
@@ -382,7 +418,9 @@ def test_the_verb_finds_a_force_and_writes_its_tables_once(files: Path) -> None:
     assert (row.prior, row.prior_deviation, row.unit) == (117.0, 4.0, "N")
     # The scene has 120 N; four posterior deviations, and these are far below the prior's.
     assert abs(row.found - 120.0) < 4.0 * row.deviation < 4.0
-    assert abs(table.loc["bias of head height"].found) < 4.0 * 0.002
+    bias = table.loc["bias of head height"]
+    # In the file's unit, in which the task gives 20 mm; the file has none of its own.
+    assert (bias.unit, bias.prior_deviation) == ("mm", 20.0) and abs(bias.found) < 4.0 * 2.0
     names = {path.name for path in out.iterdir()}
     assert names == {"parameters.csv", "correlation.csv", "directions.csv", "residuals.csv",
                      "identification.json", "passage.png", "parameters.png"}  # fmt: skip
@@ -399,12 +437,12 @@ def test_the_verb_finds_a_force_and_writes_its_tables_once(files: Path) -> None:
 def test_pictures_show_signals_residuals_and_distances_from_priors() -> None:
     place, steps = np.linspace(100.0, 120.0, 5), np.linspace(100.0, 120.0, 21)
     force, height = (
-        Signal("force", place, None, 2.0, 0.0),
-        Signal("head height", 5.0 + 0.0 * place, None, 0.003, 0.01),
+        Signal("force", place, None, 2.0, 0.0, "N", 1.0),
+        Signal("head height", 5.0 + 0.0 * place, None, 0.003, 0.01, "mm", 1e-3),
     )  # type: ignore[arg-type]
     found = Identification(
-        [Unknown("tension", "N", 20e3, 1e3), Unknown("bias of head height", "m", 0.0, 0.01)],
-        np.array([21.5e3, 0.002]),
+        [Unknown("tension", "N", 20e3, 1e3), Unknown("bias of head height", "mm", 0.0, 10.0)],
+        np.array([21.5e3, 2.0]),
         posterior_of(np.array([[3.0, 0.0], [0.0, 0.0]])),
         place,
         [force, height],

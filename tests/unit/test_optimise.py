@@ -211,6 +211,41 @@ def test_a_search_ends_with_its_runs(evaluated: Any) -> None:
     assert found.found.value == found.shipped.value
 
 
+def test_a_search_that_finds_nothing_says_so(evaluated: Any) -> None:
+    """As shipped, with 7.2 and 15 kg, is best. Lines with other masses have no figures at all."""
+    evaluated(lambda scene: summary(20.0 + sum(abs(np.array(masses(scene)) - [7.2, 15.0]))))
+    told = remarks_of({"set": FORWARD})
+    assert told[0].startswith("none of ") and told[0].endswith("than the case as shipped")
+    assert not any("in the direction forward alone" in one for one in told)
+
+    evaluated(lambda scene: summary(20.0) if sum(masses(scene)) == 22.2 else {BROKE: "It fell."})
+    told = remarks_of({"set": FORWARD})
+    assert "4 of them broke, the first as It fell: narrow the bounds" in told[0]
+
+    told = remarks_of({"set": FORWARD, "search": {"most_runs": 1}})
+    assert told[0].startswith("nothing but the case as shipped was run")
+
+
+def test_constraints_that_nothing_keeps_are_named(evaluated: Any) -> None:
+    """A least force of 50 - 5 m1 has 40 N at 2 kg, and 10 N more are asked for."""
+    evaluated(lambda scene: summary(20.0, min_N=50.0 - 5.0 * masses(scene)[0]))
+    variables = [{"key": HEAD, "entries": [[1]], "change": [-5.2, 5.0], "round_to": 0.5}]
+    bound = {"statistic": "min_N", "at_least": 50.0}
+    told = remarks_of({"set": FORWARD, "variables": variables, "constraints": [bound]})
+    # Round-off of a search at its bound is a millionth; three digits are printed.
+    assert told[0] == "min_N >= 50 is not kept, by up to 10"
+    assert told[1].startswith("no point of ") and "violates them least" in told[1]
+    assert "keep all constraints: round_to" not in " ".join(told)
+    shipped = {"statistic": "std_N", "at_most": 0.5, "of_shipped": "each"}
+    told = remarks_of({"set": FORWARD, "variables": variables, "constraints": [shipped]})
+    assert told[0] == "std_N <= 0.5 of the value as shipped is not kept, by up to 10"
+
+
+def remarks_of(tables: dict[str, Any]) -> list[str]:
+    (found,) = study.optimise(study.make_plan(draft(), task_of(**tables)))
+    return found.remarks
+
+
 def test_whole_units_are_kept_where_they_are_allowed(evaluated: Any) -> None:
     evaluated(lambda scene: summary(20.0 + (masses(scene)[0] - 8.8) ** 2))
     variables = [{"key": HEAD, "entries": [[1]], "change": [-5.0, 5.0], "round_to": 0.5}]

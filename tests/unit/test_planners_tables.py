@@ -221,6 +221,8 @@ def test_a_survey_is_the_line_of_its_numbers(tmp_path: Path) -> None:
     )
     assert problem_of(scene) == problem_of(by_keys)
     assert problem_of(scene) != problem_of(load_scene("ac_simple"))
+    by_tabs = {name: text.replace(",", "\t") for name, text in SURVEY.items() if ";" not in text}
+    assert problem_of(surveyed(tmp_path, errors=by_tabs["errors.csv"])) == problem_of(by_keys)
     for _, file in SURVEYED:
         (tmp_path / file).unlink()
     again = recorded(scene)
@@ -237,6 +239,11 @@ def test_a_survey_is_the_line_of_its_numbers(tmp_path: Path) -> None:
         ("heights", "place_m,height_mm\n0,0\n1700,10\n", "the line runs from 0 to 1650 m"),
         ("errors", "span,error_mm\n7,4.0\n", "it has no column dropper"),
         ("errors", "span,dropper,error_mm\n7,30,4.0\n", "span 7 has 9 droppers"),
+        (
+            "errors",
+            "span;dropper;error_mm\n7;3;4,0\n7;4;1,0\n7;3;5,0\n",
+            "line 4 is about dropper 3 of span 7, as line 2 is",
+        ),
         ("errors", "span,dropper,error_mm\n7.5,3,4.0\n", "line 2 must have a span from 1 on"),
     ],
 )

@@ -118,6 +118,13 @@ def test_lengths_of_droppers_share_the_sound_line(case: str) -> None:
     assert not found.matrices and not expected.matrices
 
 
+def test_parameters_that_change_nothing_are_named() -> None:
+    """The end of the march, beyond the evaluated stretch, is a parameter without effect."""
+    found = sensitivity_of(load_scene(CASE, TINY), [KEYS[0], "train.end_m"], MPI.COMM_SELF)
+    assert "\nWithout effect in the digits above: train.end_m.\n" in as_text(found)
+    assert "Without effect" not in as_text(tiny())
+
+
 def test_the_place_of_one_pantograph_moves_that_one_only() -> None:
     """By the second one's place the first one's statistics change through the wire alone."""
     two = ["line.n_spans=8", "train.start_m=130", "train.end_m=285", "mesh.elements_per_gap=2",
@@ -272,7 +279,9 @@ def test_a_step_follows_from_the_size_of_a_value() -> None:
     [
         ("line.contact_wire.tensoin_N", "did you mean line.contact_wire.tension_N"),
         ("line.topology", "line.topology has no value in this scene that is a number"),
-        ("pantographs.reference.masses_kg.7", "masses_kg.7 has no value in this scene"),
+        ("pantographs.reference.masses_kg.7", "the list there has entries from 0 to 1"),
+        ("pantographs.refernce.masses_kg.0", "; its pantographs are reference"),
+        ("evaluation.to_m", "evaluation.to_m is nothing of the march, but of what is evaluated"),
         ("line.curve.radius_m", "has no value in this scene"),
         ("line.n_spans", "is a whole number, by which a march has no derivative"),
         ("irregularities.dropper_lengths.3.44", "and 9 droppers in this one"),

@@ -397,6 +397,27 @@ def test_an_installer_has_what_all_criteria_leave_together(
     assert row["by"] in (above.criterion, below.criterion)
 
 
+def test_an_installer_reads_which_criteria_nothing_helps_and_which_nothing_loses(
+    evaluated: Any,
+) -> None:
+    """A deviation of 28 N that no error changes: 30 N are always kept, 25 N never."""
+    evaluated(lambda scene: 28.0)
+    lost = {"statistic": "std_N", "at_most": 25.0}
+    samples = {"number": 20, "probability": 0.85, "worst_case": False}
+    plan = make_plan(tiny(), task_of(SPEED, criteria=[AT_MOST, lost], samples=samples))
+    said: list[str] = []
+    found = find_tolerances(plan, say=said.append)
+    assert said[0] == "std_N <= 25: not kept without errors"  # before minutes of runs
+    assert "speed, std_N <= 30: at least +-40 km/h" in said
+    text = as_text(plan, found)
+    assert "no one up to there" in text and "by slopes" not in text
+    assert "What an installer may have for 1 of 2 criteria: others fail without errors\n" in text
+    assert "not kept without errors, so that no tolerance counts it: std_N <= 25\n" in text
+    plan = make_plan(tiny(), task_of(SPEED, criteria=[lost], samples=samples))
+    # Nothing is said of tolerances where there are none.
+    assert as_text(plan, find_tolerances(plan)).count("REMARK") == 1
+
+
 # --- the verb ------------------------------------------------------------------------------------
 
 

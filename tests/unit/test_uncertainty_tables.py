@@ -192,11 +192,13 @@ def test_few_samples_of_two_pantographs_have_no_curve_of_convergence() -> None:
 def test_what_is_no_table_of_runs_is_one_sentence(tmp_path: Path) -> None:
     (tmp_path / "empty.csv").write_text("")
     (tmp_path / "other.csv").write_text("x,y\n1,2\n")
+    (tmp_path / "semicolons.csv").write_text("variant;std_N\na;2\n")
     (tmp_path / "wrong.parquet").write_text("x,y\n1,2\n")
     (tmp_path / "notes.txt").write_text("x")
     for name, sentence in (
         ("empty.csv", "cannot be read as a table of runs"),
         ("other.csv", "is no table of runs: it needs a column variant"),
+        ("semicolons.csv", "it needs a column variant, and rows; its first line has variant;std_N"),
         ("wrong.parquet", "cannot be read as a table of runs|needs the package pyarrow"),
         ("notes.txt", "must end in .csv or .parquet"),
         ("nowhere", "is neither a folder of a sweep nor a table"),
@@ -205,6 +207,16 @@ def test_what_is_no_table_of_runs_is_one_sentence(tmp_path: Path) -> None:
         with pytest.raises(InputError, match=sentence) as error:
             read_run_table(tmp_path / name)
         assert "\n" not in str(error.value)
+    rows = read_run_table(folder(tmp_path / "c", some(range(1, 4)))).frame
+    with pytest.raises(InputError, match="has sample_000002 twice of second: a run may count once"):
+        run_table(pd.concat([rows, rows.iloc[[3]]]))
+    rows = rows.astype({SPEED: object})
+    rows.loc[2, SPEED] = "fast"
+    with pytest.raises(InputError, match=f'has "fast" in column {SPEED} of sample_000002; each'):
+        run_table(rows, sampling_of(SAMPLE, "s"))
+    # A run that did not end needs none.
+    rows.loc[rows.variant == "sample_000002", "outcome"] = "broke"
+    run_table(rows, sampling_of(SAMPLE, "s"))
     out = folder(tmp_path / "out", some(range(1, 4)))
     (out / SAMPLING).write_text("{")
     with pytest.raises(InputError, match="is damaged"):
@@ -269,6 +281,28 @@ def test_sweeps_that_contradict_each_other_are_refused(tmp_path: Path) -> None:
     ):
         with pytest.raises(InputError, match=sentence) as error:
             merged(first, folder(tmp_path / name, [one], sample))
+        assert "\n" not in str(error.value)
+    tables: dict[str, Any] = {
+        "mesh": {"file": "/a/m.msh"},
+        "case": {"title": "A"},
+        "train": {"speed_km_h": 250.0, "start_m": 1},
+    }
+    write(tmp_path / "base", "", runs[:2], None, scene=tables)
+    # A varied key, a title and the folder of a file may differ, where the train starts may not.
+    for number, (start, speed) in enumerate(((1, 250.0), (1, 300.0), (2, 250.0))):
+        other = {
+            "mesh": {"file": "/b/m.msh"},
+            "case": {"title": "B"},
+            "train": {"speed_km_h": speed, "start_m": start},
+        }
+        write(tmp_path / f"other{number}", "", runs[2:], None, scene=other)
+        if start == 1:
+            assert len(merged(tmp_path / "base", tmp_path / f"other{number}")["variants"]) == 4
+            continue
+        with pytest.raises(
+            InputError, match=r"other2 cannot join .*: train.start_m is 2 there, and 1"
+        ):
+            merged(tmp_path / "base", tmp_path / f"other{number}")
         assert "\n" not in str(error.value)
     # More samples of the same sequence are no contradiction.
     assert len(merged(first, folder(tmp_path / "g", [ended(9)], longer))["variants"]) == 5

@@ -2,8 +2,8 @@
 
 A result then holds the numbers themselves, and does not change with the file. Courses and curves
 are pairs of numbers. Tables of spans and of droppers, and surveys of a line, have columns with
-names, as planners export them: separated by commas, or by semicolons with decimal points or decimal
-commas.
+names, as planners export them: separated by commas, or by semicolons or tabs with decimal points or
+decimal commas.
 """
 
 from __future__ import annotations
@@ -224,7 +224,8 @@ def _heights(path: Path, where: str, raw: dict[str, Any]) -> list[list[float]]:
 
 def _lengths(path: Path, where: str, raw: dict[str, Any]) -> list[list[float]]:
     """Span, number of the dropper and error [mm] of a survey."""
-    found = []
+    found: list[list[float]] = []
+    lines: dict[tuple[float, float], int] = {}
     for number, row in _rows(path, where, {"span": True, "dropper": True, "error_mm": True}):
         for name in ("span", "dropper"):
             if row[name] < 1 or row[name] != int(row[name]):
@@ -232,7 +233,13 @@ def _lengths(path: Path, where: str, raw: dict[str, Any]) -> list[list[float]]:
                     f"{where}; its line {number} must have a {name} from 1 on, a whole number, "
                     f"and has {row[name]:g}"
                 )
-        found.append([row["span"], row["dropper"], row["error_mm"]])
+        own = row["span"], row["dropper"]
+        if (first := lines.setdefault(own, number)) != number:
+            raise InputError(
+                f"{where}; its line {number} is about dropper {own[1]:g} of span {own[0]:g}, as "
+                f"line {first} is: give one error of each"
+            )
+        found.append([*own, row["error_mm"]])
     return found
 
 
@@ -242,19 +249,20 @@ def _rows(path: Path, where: str, columns: dict[str, bool]) -> list[tuple[int, d
     ``columns`` says which there may be, and whether they must be there.
     """
     text = read_text(path, f"{where}; it")
-    semicolons = ";" in text
+    lines = [line.split("#")[0].strip() for line in text.splitlines()]
+    first = next(filter(None, lines), "")  # with the names
+    separator = next((one for one in ";\t" if one in first), ",")
     named: list[str] = []
     rows: list[tuple[int, dict[str, float]]] = []
-    for number, line in enumerate(text.splitlines(), start=1):
-        line = line.split("#")[0]
-        cells = [cell.strip().strip('"') for cell in line.split(";" if semicolons else ",")]
+    for number, line in enumerate(lines, start=1):
+        cells = [cell.strip().strip('"') for cell in line.split(separator)]
         if not any(cells):
             continue
         if not named:
             named = cells
             _check_names(where, named, columns)
             continue
-        if semicolons:
+        if separator != ",":
             cells = [cell.replace(",", ".") for cell in cells]
         try:
             values = [float(cell) for cell in cells]

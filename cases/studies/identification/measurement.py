@@ -79,6 +79,7 @@ class Signal:
     whitening : makes them independent
     deviation : standard deviation of their noise
     bias : standard deviation of an unknown constant in them, zero if there is none
+    unit, factor : unit of the file, in which the constant is told, and its factor to N or m
     """
 
     name: str
@@ -86,6 +87,8 @@ class Signal:
     whitening: Whitening
     deviation: float
     bias: float
+    unit: str
+    factor: float
 
 
 class Measurement:
@@ -168,7 +171,8 @@ class Measurement:
         if self._dt is not None:
             deviation *= np.sqrt(filters.kept_variance(self._cut_off, self._dt))
         whitening = Whitening(lags, deviation, self._cut_off, self._dt)
-        return Signal(name, values, whitening, deviation, column.bias * column.factor)
+        bias = column.bias * column.factor
+        return Signal(name, values, whitening, deviation, bias, column.unit, column.factor)
 
     def _sampled(self, values: np.ndarray) -> np.ndarray:
         """Filter values (n, ...) at the file's places, and keep the values that are compared."""

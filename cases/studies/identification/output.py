@@ -163,28 +163,40 @@ def _sentence(name: str, one: Judged) -> str:
 def verdict(found: Identification) -> str:
     """Whether the residuals are those of noise as it was stated."""
     judged = found.judged
+    if len(judged) == 2:  # one signal, which is all
+        judged = {name: one for name, one in judged.items() if name != "all"}
     large = [name for name, one in judged.items() if one.is_too_large]
     small = [name for name, one in judged.items() if one.is_too_small]
     # A residual far below the noise has the colour of round-off, or of a noise that was overstated.
     coloured = [name for name, one in judged.items() if one.is_coloured and name not in small]
     wrong = []
     if large:
-        wrong.append(f"the residual of {' and '.join(large)} is larger than noise and priors allow")
+        wrong.append(f"{_residuals(large)} larger than noise and priors allow")
     if coloured:
-        wrong.append(f"the residual of {' and '.join(coloured)} is not white")
+        wrong.append(f"{_residuals(coloured)} not white")
     if wrong:
         return (
             f"The model does not fit: {'; '.join(wrong)} (each less probable than {RARE:g}). Found "
             "values and deviations are not to be trusted."
         )
     if small:
-        return f"The noise that the task states is too large: residual of {' and '.join(small)}."
-    if is_doubtful(judged):
+        return f"The noise that the task states is too large: {_residuals(small)} far below it."
+    if is_doubtful(found.judged):
         return (
             "The model fits, with a doubt: a right one leaves such residuals in one passage of ten "
             "at most, and more searches (starts) may find better values."
         )
     return "The model fits: residuals are those of the stated noise."
+
+
+def _residuals(names: Sequence[str]) -> str:
+    """The residuals of some signals, and the verb of a sentence about them."""
+    texts = ["all together" if name == "all" else name for name in names]
+    return (
+        f"the residual of {texts[0]} is"
+        if len(texts) == 1
+        else (f"the residuals of {', '.join(texts[:-1])} and {texts[-1]} are")
+    )
 
 
 def summary_of(found: Identification) -> dict[str, Any]:

@@ -16,7 +16,8 @@ judged together by the statistic of Ljung and Box.
 Source: A. Tarantola, *Inverse Problem Theory* (2005), sections 3.2 and 7.1; C. D. Rodgers, *Inverse
 Methods for Atmospheric Sounding* (2000), section 2.4, for degrees of freedom for signal;
 T. Kailath, *IEEE Trans. Automatic Control* 13 (1968) 646, innovations; G. M. Ljung,
-G. E. P. Box, *Biometrika* 65 (1978) 297.
+G. E. P. Box, *Biometrika* 65 (1978) 297; G. J. Bierman, *Factorization Methods for Discrete
+Sequential Estimation* (1977), section II.7, for Potter's update.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import linalg, stats
+from scipy import stats
 
 
 @dataclass(frozen=True)
@@ -137,10 +138,18 @@ def innovations_of(residual: np.ndarray, jacobian: np.ndarray, moved: np.ndarray
     jacobian : (n, m) of the modelled data by parameters in deviations of their priors
     moved : (m,) the parameters, from the means of their priors, in deviations of these
     """
-    covariance = np.eye(residual.size) + jacobian @ jacobian.T
-    factor = np.linalg.cholesky(covariance)
-    before = residual + jacobian @ moved
-    return np.asarray(linalg.solve_triangular(factor, before, lower=True))
+    before, found = residual + jacobian @ moved, np.empty(residual.size)
+    # One sample after the other updates the parameters and a root of their covariance (Potter):
+    # without the covariance of all samples, which round-off makes singular if noise is tiny.
+    root, mean = np.eye(moved.size), np.zeros(moved.size)
+    for i, (value, by) in enumerate(zip(before, jacobian, strict=True)):
+        turned = root.T @ by
+        size = np.sqrt(1.0 + turned @ turned)
+        found[i] = (value - by @ mean) / size
+        gain = root @ turned
+        mean += gain * (found[i] / size)
+        root -= np.outer(gain, turned / (size * (size + 1.0)))
+    return found
 
 
 def judge(innovations: np.ndarray, signals: Mapping[str, slice]) -> dict[str, Judged]:

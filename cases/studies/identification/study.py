@@ -107,9 +107,9 @@ class Identification:
 
     @property
     def biases(self) -> list[float]:
-        """Constant that was found in each signal, zero where none was looked for."""
+        """Constant that was found in each signal [N or m], zero where none was looked for."""
         by_name = dict(zip((one.name for one in self.unknowns), self.values, strict=True))
-        return [float(by_name.get(_bias_of(one.name), 0.0)) for one in self.signals]
+        return [one.factor * float(by_name.get(_bias_of(one.name), 0.0)) for one in self.signals]
 
 
 class _Compared:
@@ -226,7 +226,7 @@ def identify(
         [one.mean - _origin(own) for own, one in zip(parameters, unknowns, strict=True)]
     )
     biases = [
-        Unknown(_bias_of(one.name), UNITS[one.name], 0.0, one.bias)
+        Unknown(_bias_of(one.name), one.unit, 0.0, one.bias / one.factor)
         for one in measurement.signals
         if one.bias
     ]

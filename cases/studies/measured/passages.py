@@ -29,24 +29,33 @@ _EVEN = 0.02
 def read_table(path: Path) -> pd.DataFrame:
     """The table of a CSV file, with commas or with semicolons or tabs and decimal commas or points.
 
+    Separators at the end of a line make no column.
+
     Raises
     ------
     InputError
         If it is none.
     """
-    text = read_text(path, str(path))
-    lines = [line.partition("#")[0] for line in text.splitlines()]
+    lines = [line.partition("#")[0].rstrip() for line in read_text(path, str(path)).splitlines()]
     separator = next((one for one in ";\t" if any(one in line.strip() for line in lines)), ",")
+    text = "\n".join(line.rstrip(separator) for line in lines)
+    if not text.strip():
+        raise InputError(f"{path} is no table of CSV: it is empty")
     try:
-        return pd.read_csv(
+        table = pd.read_csv(
             io.StringIO(text if separator == "," else text.replace(",", ".")),
             sep=separator,
-            comment="#",
             skipinitialspace=True,
         )
     except ValueError as error:  # pandas' ParserError is one
         why = str(error).strip().removeprefix("Error tokenizing data. C error: ")
         raise InputError(f"{path} is no table of CSV: {plain(why, 200)}") from error
+    if not isinstance(table.index, pd.RangeIndex):  # pandas takes the values in excess as names
+        raise InputError(
+            f"{path} has more values in a row than the names of columns, {columns_in(table)}: "
+            "decimal commas need semicolons or tabs between columns"
+        )
+    return table
 
 
 def columns_in(table: pd.DataFrame) -> str:
@@ -65,10 +74,12 @@ def column_of(table: pd.DataFrame, path: str, name: str, may_lack: bool = False)
     Raises
     ------
     InputError
-        If there is no such column, or a cell without a number.
+        If there is no such column, several, or a cell without a number.
     """
     if name not in table:
         raise InputError(f'{path} has no column "{plain(name, 100)}": it has {columns_in(table)}')
+    if list(table.columns).count(name) > 1 or f"{name}.1" in table:  # as pandas names the second
+        raise InputError(f'{path} has several columns "{plain(name, 100)}"; give each its own name')
     values = pd.to_numeric(table[name], errors="coerce").to_numpy(dtype=float, copy=True)
     wrong = np.flatnonzero(~np.isfinite(values))
     if wrong.size and not may_lack:

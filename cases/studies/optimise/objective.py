@@ -226,6 +226,25 @@ class Problem:
         speeds = self.objective.speeds_km_h
         return [speeds is None or member.speed in speeds for member in self.scenes.members]
 
+    def beyond(self, point: Point) -> list[str]:
+        """Sentences on the constraints that a point does not keep, and by how much at most."""
+        found, first = [], 0
+        for one, (bound, sign_scale) in zip(self.constraints, self._bounds, strict=True):
+            own = point.margins[first : first + bound.size]
+            first += bound.size
+            if (own < -SLACK).any():
+                by = float(np.max(-own / np.abs(sign_scale)))
+                of = " of the value as shipped" if one.of_shipped else ""
+                found.append(f"{one.text}{of} is not kept, by up to {by:.3g}")
+        at_rest = point.margins[first:]
+        if (at_rest < -SLACK).any():
+            force = _FORCE_AT_REST * float(at_rest.min()) + self.least_dropper_force
+            found.append(
+                f"a dropper has {force:.3g} N at rest, less than least_dropper_force_N = "
+                f"{self.least_dropper_force:g}"
+            )
+        return found
+
     def natural_steps(self, spread: float) -> np.ndarray:
         """Columns (n, n), whose sums with standard normal factors are changes with taut droppers.
 

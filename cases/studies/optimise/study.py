@@ -29,6 +29,7 @@ from catenary.cases.studies.optimise.task import OptimiseTask
 from catenary.cases.studies.optimise.variables import Variables, variables_of
 from catenary.cases.studies.records import KeptRows
 from catenary.cases.studies.scene_sets import Evaluation, SceneSet, members_of
+from catenary.postproc.evaluate.wording import counted
 from catenary.postproc.report.study_table import StudyTable
 
 # Shares of an optimum's changes that are tried in whole units.
@@ -61,6 +62,7 @@ class Optimum:
     method : "gradient" or "cma"
     shipped, found : the unchanged case and the best point, rounded if a rounded point is allowed
     values : values of the scene's keys at the optimum
+    beyond : sentences on the constraints that the best point does not keep
     is_rounded : whether its changes are whole multiples of the task's units
     n_runs : runs of the search
     history : all points of the search
@@ -72,6 +74,7 @@ class Optimum:
     shipped: Point
     found: Point
     values: Mapping[str, Any]
+    beyond: Sequence[str]
     is_rounded: bool
     n_runs: int
     history: Sequence[Point]
@@ -80,12 +83,33 @@ class Optimum:
 
     @property
     def remarks(self) -> list[str]:
-        """Sentences on what it did not improve, the unseen direction first."""
-        unseen = unseen_direction(self.rows)
-        sentences = [unseen] if unseen else []
+        """Sentences on what it did not improve, constraints and the unseen direction first."""
+        sentences = list(self.beyond)
+        if self.beyond:
+            sentences.append(
+                f"no point of {len(self.history)} keeps all constraints: this is the one that "
+                "violates them least"
+            )
+        if not self.found.change.any():
+            sentences.append(self._nothing_found)
+        elif unseen := unseen_direction(self.rows):
+            sentences.append(unseen)
         if not self.is_rounded:
-            sentences.append("no changes in whole units keep all constraints: round_to is not kept")
+            sentences.append("changes in whole units violate constraints: round_to is not kept")
         return sentences + not_improved(self.rows)
+
+    @property
+    def _nothing_found(self) -> str:
+        others = [point for point in self.history if point.change.any()]
+        if not others:
+            return "nothing but the case as shipped was run: search.most_runs allows no more"
+        text = f"none of {counted(len(others), 'other point')} is better than the case as shipped"
+        broke = [point.broke for point in others if point.broke]
+        if broke:
+            text += f"; {len(broke)} of them broke, the first as {broke[0].rstrip('.')}"
+        if len(broke) == len(others):
+            text += ": narrow the bounds of the variables, or give them a smaller step"
+        return text
 
 
 def make_plan(draft: Draft, task: OptimiseTask) -> Plan:
@@ -211,7 +235,8 @@ def _by(method: str, plan: Plan, evaluation: Evaluation, say: Callable[[str], No
     rows = compare(plan.checks, task.set.directions, variables.shipped, values, evaluation)
     droppers = _cut(plan, values)
     whole = bool(np.array_equal(variables.rounded(found.change), found.change))
-    return Optimum(method, shipped, found, values, whole, n_runs, history, rows, droppers)
+    beyond = problem.beyond(found)
+    return Optimum(method, shipped, found, values, beyond, whole, n_runs, history, rows, droppers)
 
 
 def _rounded(problem: Problem, best: Point) -> Point:

@@ -134,10 +134,14 @@ class OptimiseTask(Table):
     """Variables, objective and constraints, and the scenes over which they are meant."""
 
     set: SetTable = Field(default_factory=SetTable, description="the scenes")
-    variables: list[VariableTable] = Field(min_length=1, max_length=100, description="variables")
-    objective: ObjectiveTable = Field(default_factory=ObjectiveTable, description="objective")
+    variables: list[VariableTable] = Field(
+        min_length=1, max_length=100, description="what is chosen"
+    )
+    objective: ObjectiveTable = Field(
+        default_factory=ObjectiveTable, description="what is made least"
+    )
     constraints: list[ConstraintTable] = Field(
-        default_factory=list, max_length=100, description="constraints"
+        default_factory=list, max_length=100, description="what must be kept"
     )
     least_dropper_force_N: float = Field(
         10.0, ge=0, le=1000, description="tension that every dropper of the line keeps at rest"

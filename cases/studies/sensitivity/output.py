@@ -10,6 +10,8 @@ from catenary.cases.studies.sensitivity.study import Sensitivity
 from catenary.postproc.report.study_table import Column, StudyTable
 
 _MM = 1e3
+# Half of the last digit of the last column, which has one more than others.
+_SEEN = 0.5e-4
 _BY_PERCENT = "std_change_by_percent_N"
 _FORCES = {
     "mean_change_N": ("mean", "mean [N]"),
@@ -81,10 +83,22 @@ def as_text(found: Sensitivity) -> str:
     if not np.isnan(found.max_uplift):
         lines.append(f"largest uplift {found.max_uplift * _MM:.1f} mm")
     lines += ["", "Changes of these under a change of each parameter:", table_of(found).text(), ""]
+    lines += _idle(found)
     lines.append(_kinks(found))
     for key, why in found.left_out.items():
         lines.append(f"{key} is left out: {why}")
     return "\n".join(lines)
+
+
+def _idle(found: Sensitivity) -> list[str]:
+    """A sentence on the parameters whose rows have nothing but zeros."""
+    figures = [*_FORCES, "max_uplift_change_mm", _BY_PERCENT]
+    idle = [
+        parameter.key
+        for number, parameter in enumerate(found.parameters)
+        if all(abs(row[name] or 0.0) < _SEEN for row in _rows(found, number) for name in figures)
+    ]
+    return [f"Without effect in the digits above: {', '.join(idle)}.\n"] if idle else []
 
 
 def _kinks(found: Sensitivity) -> str:

@@ -74,6 +74,8 @@ _CHANGES_OF_FORCES = {"tension_N": 1e3, "force_N": 1.0}
 _STEP = 1e-3
 _STEP_OF_ZERO = {"mm": 0.05}
 _USUAL_STEP_OF_ZERO = 1e-4
+# Tables without anything of the march.
+_OF_EVALUATION = ("case", "evaluation", "output")
 # Tables without anything of the line.
 _OF_TRAIN = ("pantographs", "train", "contact")
 # The length of one dropper, which scenes have as entries of a list.
@@ -222,15 +224,29 @@ class ChangedScenes:
                     f"pantographs.{parts[1]} is the ready {model}, whose numbers stay: "
                     "write its lists in place of model (`catenary list --pantographs`)"
                 )
+        if parts[0] in _OF_EVALUATION:
+            raise InputError(
+                f"{key} is nothing of the march, but of what is evaluated or written: a march has "
+                "no derivative by it"
+            )
         values = self._values(key)
         if values is None:
             raise InputError(
                 f"{shown(key)[1:-1]} has no value in this scene that is a number, by which a march "
-                "could be differentiated"
+                f"could be differentiated{self._instead(parts)}"
             )
         if any(isinstance(one, int) for one in values):
             raise InputError(f"{key} is a whole number, by which a march has no derivative")
         return Parameter(key, tuple(map(float, values)))
+
+    def _instead(self, parts: Sequence[str]) -> str:
+        """What the scene has where the parts of a key lead nowhere, for the end of a sentence."""
+        if parts[0] == "pantographs" and parts[1] not in self._raw["pantographs"]:
+            return f"; its pantographs are {', '.join(self._raw['pantographs'])}"
+        holder = value_at(self._raw, ".".join(parts[:-1]))
+        if isinstance(holder, list):
+            return f"; the list there has entries from 0 to {len(holder) - 1}"
+        return ""
 
     def droppers(self) -> list[Parameter]:
         """The length of each dropper in the evaluated stretch."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
@@ -134,6 +135,7 @@ def write(
     ended: Sequence[Ended],
     plotted: Sequence[str] | None,
     histogram: bool = False,
+    scene: Mapping[str, Any] | None = None,
 ) -> list[Path]:
     """Write table, record and picture of a sweep; returns the files. Not collective.
 
@@ -145,6 +147,7 @@ def write(
     plotted : statistics in the picture, None for no picture; fewer than two variants that are done
         have none
     histogram : whether histograms of the contact forces are written too
+    scene : tables of the case, from which variants differ; they go into the record
     """
     table = table_of(ended)
     record = {
@@ -155,6 +158,7 @@ def write(
             {"name": one.variant.name, "assignments": one.variant.assignments} for one in ended
         ],
         "rows": table.records(),
+        "scene": json.loads(json.dumps(scene, default=str)),
     }
     content = table_files(record, table)
     if plotted is not None and sum(one.done for one in ended) > 1:

@@ -38,11 +38,13 @@ class WholeRuns(NamedTuple):
 
     Attributes
     ----------
+    draft : the case
     variants : in their order
     jobs : of those that can be run
     refused : how the others ended
     """
 
+    draft: Draft
     variants: Sequence[Variant]
     jobs: list[Job]
     refused: list[Ended]
@@ -131,7 +133,7 @@ def whole_runs_of(
         As ``jobs_and_refused``, or if the folder has the table of a sweep with variants that this
         one has not, and ``force`` is not given.
     """
-    runs = WholeRuns(variants, *jobs_and_refused(draft, variants, full_report))
+    runs = WholeRuns(draft, variants, *jobs_and_refused(draft, variants, full_report))
     refuse_other_sweep(out, variants, force)
     return runs
 
@@ -161,14 +163,14 @@ def run_sweep(
     from catenary.cases.result_folder.folder_lock import held
     from catenary.cases.studies.sweep import output
 
-    name, show = sweep.first.case.name, plotted
+    name, show, scene = sweep.first.case.name, plotted, sweep.draft.table()
     if show is not None:
         show = show or output.PLOTTED
     with held(out, comm, command):
         on_root(comm, lambda: refuse_earlier(out, options.force))
         ended = sweep.run(out, comm, options)
         files = on_root(
-            comm, lambda: output.write(out, name, ended, show, histogram), takes_long=True
+            comm, lambda: output.write(out, name, ended, show, histogram, scene), takes_long=True
         )
     if not isinstance(sweep, WholeRuns) and sweep.histories:
         files += [path for path in (out / "histories.h5",) if path.is_file()]
@@ -185,8 +187,8 @@ def run_part(sweep: Sweep, part: Part, out: Path, comm: Any, options: RunOptions
     from catenary.cases.studies.sweep import output
 
     ended = sweep.run(out, comm, options, part)
-    name, folder = sweep.first.case.name, out / part.folder
-    on_root(comm, lambda: output.write(folder, name, ended, None), takes_long=True)
+    name, folder, scene = sweep.first.case.name, out / part.folder, sweep.draft.table()
+    on_root(comm, lambda: output.write(folder, name, ended, None, scene=scene), takes_long=True)
     return ended
 
 

@@ -54,6 +54,9 @@ def table_of(found: Sequence[Tolerance]) -> StudyTable:
         }
         for one in found
     ]
+    # Heads of people's tables; without a worst case these columns stand in files alone.
+    has_worst = any(one.linear is not None for one in found)
+    slopes, as_run = ("worst case by slopes +-", "as run +-") if has_worst else ("", "")
     columns = (
         Column("error", "error"),
         Column("criterion", "criterion"),
@@ -65,9 +68,9 @@ def table_of(found: Sequence[Tolerance]) -> StudyTable:
         Column("n_samples"),
         Column("samples", "samples keep it", ">", in_files=False),
         Column("least_share", "share at least", ".3f"),
-        Column("linear", "worst case by slopes +-", ".3g"),
+        Column("linear", slopes, ".3g"),
         Column("checked"),
-        Column("as_run", "as run +-", ">", in_files=False),
+        Column("as_run", as_run, ">", in_files=False),
         Column("lost_at", "a line loses it at +-", ".3g"),
     )
     return StudyTable(columns, rows, "Tolerances by criterion")
@@ -103,27 +106,40 @@ def installer_table(plan: Plan, found: Sequence[Tolerance]) -> StudyTable:
     absent = {"worst"} if not plan.task.samples.worst_case else set()
     absent |= {"together"} if together is None else set()
     columns = [column for column in columns if column.name not in absent]
-    return StudyTable(columns, rows, "What an installer may have")
+    title, lost = "What an installer may have", _lost(found)
+    if lost:
+        n = len({one.criterion for one in found if one.criterion != EACH})
+        title += f" for {n - len(lost)} of {n} criteria: others fail without errors"
+    return StudyTable(columns, rows, title)
+
+
+def _lost(found: Sequence[Tolerance]) -> list[str]:
+    """The criteria that the line does not keep without errors."""
+    return list(dict.fromkeys(one.criterion for one in found if not one.is_kept))
 
 
 def _of_each(found: Sequence[Tolerance]) -> Tolerance | None:
     """The tolerance for all criteria at once that the line keeps without errors, None for none."""
-    kept = [one for one in found if one.level or one.kept]
+    kept = [one for one in found if one.is_kept]
     return next((one for one in kept if one.criterion == EACH), kept[0] if kept else None)
 
 
 def _first_to_fail(found: Sequence[Tolerance]) -> str:
     """The criterion with the least tolerance of those that the line keeps without errors."""
-    kept = [one for one in found if one.criterion != EACH and (one.level or one.kept)]
-    return min(kept, key=lambda one: (one.level, one.at_most)).criterion
+    kept = [one for one in found if one.criterion != EACH and one.is_kept]
+    first = min(kept, key=lambda one: (one.level, one.at_most))
+    return "no one up to there" if first.at_most else first.criterion
 
 
 def remarks(plan: Plan, found: Sequence[Tolerance]) -> list[str]:
     """Sentences on what the tables cannot say."""
     sentences = []
-    lost = list(dict.fromkeys(one.criterion for one in found if not one.level and not one.kept))
-    for name in lost:
-        sentences.append(f"{name} is not kept without errors, and no tolerance counts for it")
+    if lost := _lost(found):
+        sentences.append(
+            f"not kept without errors, so that no tolerance counts it: {', '.join(lost)}"
+        )
+    if all(not one.is_kept for one in found):
+        return sentences
     samples = plan.task.samples
     fail = f"at most {samples.allowed} of them fail" if samples.allowed else "none of them fails"
     sentences.append(
@@ -139,8 +155,9 @@ def remarks(plan: Plan, found: Sequence[Tolerance]) -> list[str]:
         )
     if any(one.lost_at is not None for one in found):
         sentences.append(
-            "a line that was run, of the samples or of the worst case, fails at the tolerance of "
-            "that name: the worst of all lines fails below it"
+            "`a line fails at` is the least tolerance within which a line that was run fails, a "
+            "sample or the worst case by slopes: where it is not above the tolerance, that line is "
+            "one of the few that may fail, and a tolerance that all lines keep is smaller"
         )
     return sentences
 

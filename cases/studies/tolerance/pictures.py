@@ -65,7 +65,7 @@ def draw_shares(plan: Plan, found: Sequence[Tolerance]) -> Figure | None:
             beside = _BESIDE * one.most * (number - 0.5 * (len(shown) - 1))
             lows.append(_draw_share(axes, one, one.samples, number, beside, task.confidence))
         axes.axhline(100.0 * task.probability, ls="--", color=figures.LIMIT, lw=1.0, zorder=1)
-        bottom = max(deepest, min(lows))
+        bottom = max(deepest, min([*lows, 100.0 * task.probability]))
         axes.set_ylim(bottom - 0.05 * (100.0 - bottom), 100.0 + 0.05 * (100.0 - bottom))
         last = shown[-1]  # of all criteria, if there are several
         title = f"{error}, {last.criterion}: {last.text} {last.unit if last.level else ''}"
@@ -134,9 +134,13 @@ def draw_values(plan: Plan, found: Sequence[Tolerance]) -> Figure | None:
             label = figures.wrapped(axes.get_xlabel(), _WIDTH_OF_LABELS // len(names))
             axes.set_xlabel(label, fontsize="small")
         row[0].set_title(error, loc="left", fontsize="medium")
-    handles, labels = panels[0, 0].get_legend_handles_labels()
+    of_all = zip(*panels[0, 0].get_legend_handles_labels(), strict=True)
+    drawn = {
+        line.get_label() for axes in panels.flat for line in axes.lines if np.size(line.get_xdata())
+    }
+    handles = [handle for handle, label in of_all if label in drawn]
     legend = figure.legend(
-        handles, labels, loc="outside upper right", ncols=len(labels), frameon=False,
+        handles=handles, loc="outside upper right", ncols=len(handles), frameon=False,
         fontsize="small",
     )  # fmt: skip
     for handle in legend.get_lines():

@@ -121,7 +121,7 @@ def least(margins: Sequence[Margins], *names: str) -> float:
 
 
 ALL = "all together"
-EACH = "each of them"
+EACH = "all kept criteria"
 # Slopes are those of errors of this share of the tolerance from which all are scaled.
 _STEP = 0.1
 # Samples are run in parts, so that a level at which many fail is left early.
@@ -173,9 +173,21 @@ class Tolerance:
     @property
     def text(self) -> str:
         """The tolerance in words, without its unit."""
+        if not self.is_kept:
+            return "not kept without errors"
+        return at_least(self.level, self.most) if self.level else "none"
+
+    @property
+    def text_with_unit(self) -> str:
+        """The tolerance in words."""
         if not self.level:
-            return "none" if self.kept else "not kept without errors"
-        return at_least(self.level, self.most)
+            return self.text
+        return f"{'at least ' if self.at_most else ''}+-{self.level:.3g} {self.unit}"
+
+    @property
+    def is_kept(self) -> bool:
+        """Whether the line keeps the criterion without errors."""
+        return bool(self.level or self.kept)
 
 
 def at_least(level: float, most: float) -> str:
@@ -246,7 +258,7 @@ def find_tolerances(
     found: list[Tolerance] = []
     for varied in search.varied:
         for one in search.tolerances(varied):
-            say(f"{one.error}, {one.criterion}: {one.level:.3g} {one.unit}")
+            say(f"{one.error}, {one.criterion}: {one.text_with_unit}")
             found.append(one)
     say(counted(search.evaluation.n_runs, "run"))
     return found
@@ -293,6 +305,9 @@ class _Search:
         self.nominal = self._margins([{}])[0]
         self.criteria = names_of(self.nominal)
         self.bounds = bounds_of(self._summaries([{}]), task.criteria)
+        for name in self.criteria:
+            if least(self.nominal, name) < 0.0:
+                self.say(f"{name}: not kept without errors")
         random = [
             group.random(np.random.default_rng([task.samples.seed, number]), task.samples.n)
             for number, group in enumerate(self.plan.groups)
@@ -315,7 +330,7 @@ class _Search:
         """Tolerances of some errors for each criterion, and for all at once if there are several
         that the line keeps without errors."""
         found = [self._tolerance(varied, name) for name in self.criteria]
-        held = [one for one in found if one.level or one.kept]
+        held = [one for one in found if one.is_kept]
         if len(held) > 1:
             together = self._by_samples(varied, EACH, *(one.criterion for one in held))
             linear, checked, lost_at = (

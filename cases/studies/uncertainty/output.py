@@ -11,7 +11,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator, NullFormatter
+from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 
 from catenary.cases.studies.sampling.tables import SamplingTable
 from catenary.cases.studies.sweep.jobs import STATISTICS
@@ -203,10 +203,11 @@ def histograms(table: RunTable, wanted: Sequence[str] = ()) -> Figure | None:
             # The bins of Freedman and Diaconis, but no more than are seen.
             bins = min(60, len(np.histogram_bin_edges(x, "fd")))
             colour = figures.colour(number)
-            axes.hist(x, bins=bins, color=colour, alpha=0.5, label=pantograph or None)
+            axes.hist(x, bins, color=colour, alpha=0.5, edgecolor="white", label=pantograph or None)
             for probability, look in ((0.5, "-"), (adverse_probability(name), "--")):
                 axes.axvline(float(np.quantile(x, probability)), color=colour, ls=look, lw=1.2)
         _panel(axes, _meaning(name), "runs")
+        axes.yaxis.set_major_locator(MaxNLocator(5, integer=True))
     if len(table.of(statistics[0])) > 1:
         figures.legend_above(panels[0])
     panels[0].set_title(f"solid: median, dashed: {_ADVERSE}", loc="left", fontsize="medium")

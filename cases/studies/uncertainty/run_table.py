@@ -10,6 +10,8 @@ from typing import Any, NamedTuple
 import pandas as pd
 
 from catenary.base.errors import InputError
+from catenary.cases.scene.input.plain_text import plain
+from catenary.cases.studies.sampling.distributions import ChoicesTable
 from catenary.cases.studies.sampling.tables import SamplingTable, sampling_of
 from catenary.cases.studies.sweep.jobs import OF_LINE
 from catenary.cases.studies.sweep.output import PARQUET, TABLE
@@ -89,28 +91,48 @@ def run_table(
     Raises
     ------
     InputError
-        If columns are missing.
+        If columns are missing, a run is there twice, or one has no number for a key that has one.
     """
     frame = rows.copy() if isinstance(rows, pd.DataFrame) else pd.DataFrame(list(rows))
     names = list(frame.columns)
     if "variant" not in names or frame.empty:
-        raise InputError(f"{where} is no table of runs: it needs a column variant, and rows")
+        has = f"; its first line has {plain(', '.join(map(str, names)), 100)}" if names else ""
+        raise InputError(f"{where} is no table of runs: it needs a column variant, and rows{has}")
     if "outcome" not in names:
         frame["outcome"] = DONE
     if "pantograph" not in names:
         frame["pantograph"] = ""
     frame["pantograph"] = frame["pantograph"].fillna("")
+    twice = frame[frame.duplicated(["variant", "pantograph"])]
+    if not twice.empty:
+        run, who = twice.iloc[0][["variant", "pantograph"]]
+        of = f" of {plain(str(who), 100)}" if who else ""
+        raise InputError(f"{where} has {plain(str(run), 100)} twice{of}: a run may count once")
     for name in set(_LISTS) & set(names):
         frame[name] = frame[name].map(_words)
     if sampling is not None:
         missing = [name for name in sampling.columns if name not in names]
         if missing:
             raise InputError(f"{where} has no column {missing[0]}, which its sampling varies")
+        for name, given in sampling.keys.items():
+            if not isinstance(given, ChoicesTable):
+                _refuse_words(frame[frame["outcome"] == DONE], name, where)
         return RunTable(frame, sampling.columns, sampling)
     between = names[names.index("variant") + 1 : names.index("outcome")] if (
         "outcome" in names and names.index("outcome") > names.index("variant")
     ) else []  # fmt: skip
     return RunTable(frame, tuple(between))
+
+
+def _refuse_words(done: pd.DataFrame, name: str, where: str) -> None:
+    """Refuse cells of a column without a number."""
+    wrong = done[pd.to_numeric(done[name], errors="coerce").isna()]
+    if not wrong.empty:
+        cell, run = wrong.iloc[0][name], wrong.iloc[0]["variant"]
+        has = "no number" if pd.isna(cell) else f'"{plain(str(cell), 40)}"'
+        raise InputError(
+            f"{where} has {has} in column {name} of {plain(str(run), 100)}; each run needs a number"
+        )
 
 
 def read_run_table(path: Path) -> RunTable:
