@@ -132,7 +132,7 @@ class RunAttributes(BaseModel):
     Those without a default are needed for a report; others take it where they are damaged.
     """
 
-    model_config = ConfigDict(strict=True)
+    model_config = ConfigDict(strict=True, defer_build=True)
 
     case: Text
     title: Text = ""

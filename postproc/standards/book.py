@@ -36,7 +36,10 @@ Number = Annotated[float, Field(ge=-1e9, le=1e9)]
 
 
 class _Part(BaseModel):
-    model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
+    # The validator of a book, which includes those of its parts, is built at its first use.
+    model_config = ConfigDict(
+        strict=True, extra="forbid", frozen=True, allow_inf_nan=False, defer_build=True
+    )
 
 
 class Conditions(NamedTuple):
