@@ -22,6 +22,7 @@ from catenary.postproc.evaluate.span_differences import (
 )
 from catenary.postproc.evaluate.verdict import Criterion, criteria_of, judged_by, labels
 from catenary.postproc.evaluate.wording import UNCOMPARED, UNCOMPARED_SAYS, counted, fixed
+from catenary.postproc.read.line_of_run import in_stretch
 from catenary.postproc.read.records import Records
 from catenary.postproc.read.results import Results
 
@@ -210,8 +211,8 @@ def _span_sums(run: Results, number: int) -> SpanSums | None:
 
 def _evaluated_masts(run: Results) -> np.ndarray:
     """Places of the masts of the evaluated stretch [m]."""
-    masts, (begin, end) = run.line("support_x"), run.evaluation
-    return masts[(masts >= begin - 1e-6) & (masts <= end + 1e-6)]
+    masts = run.line("support_x")
+    return masts[in_stretch(masts, *run.evaluation)]
 
 
 def _spans_alike(a: Results, b: Results) -> bool:

@@ -20,7 +20,7 @@ from catenary.postproc.evaluate.statistics import (
     RunStatistics,
     slackens_at_all,
 )
-from catenary.postproc.read.line_of_run import ContactProfile
+from catenary.postproc.read.line_of_run import ContactProfile, in_stretch
 from catenary.postproc.read.results import Results
 from catenary.postproc.standards.quantities import KMH
 from catenary.solver.problem.watched_links import TENSION
@@ -59,9 +59,8 @@ def wire_at_rest(results: Results) -> WireAtRest | None:
     """The contact wire at rest in the evaluation stretch, None if no node is there. Not
     collective."""
     profiles = list(results.contact_profiles().values())
-    start, end = results.evaluation
     x = np.unique(np.concatenate([profile.x for profile in profiles]))
-    x = x[(x >= start) & (x <= end)]
+    x = x[in_stretch(x, *results.evaluation)]
     if not x.size:
         return None
     heights = np.array([_height_at(profile, x) for profile in profiles])
@@ -136,12 +135,10 @@ class ObservedRun:
     @cached_property
     def masts(self) -> np.ndarray:
         """Masts in the evaluation stretch, (n,) [m]."""
-        masts = self.results.line("support_x")
-        start, end = self.results.evaluation
         if self.wire is None:
             return np.zeros(0)
-        start, end = max(start, self.wire.x[0]), min(end, self.wire.x[-1])
-        return masts[(masts >= start) & (masts <= end)]
+        masts, x = self.results.line("support_x"), self.wire.x
+        return masts[in_stretch(masts, *self.results.evaluation) & in_stretch(masts, x[0], x[-1])]
 
 
 Observe = Callable[[ObservedRun], Observation]

@@ -16,6 +16,7 @@ import numpy as np
 from catenary.base.errors import InputError
 from catenary.postproc.evaluate import filters
 from catenary.postproc.evaluate.lateral_places import LateralRange, lateral_ranges
+from catenary.postproc.read.line_of_run import in_stretch
 from catenary.postproc.read.results import Results
 
 SHORTEST_ARC = 5e-3
@@ -294,14 +295,14 @@ def _noun(name: str) -> str:
 def _supports(results: Results) -> SupportStatistics:
     x = results.line("arm_x")
     uplift = results.extremes("arm_uplift")[1]
-    evaluated = _inside(x, results.evaluation)
+    evaluated = in_stretch(x, *results.evaluation)
     return SupportStatistics(x, uplift, evaluated, _of(uplift[evaluated], np.max))
 
 
 def _droppers(results: Results) -> DropperStatistics:
     x = results.line("dropper_x")
     lowest, highest = results.extremes("dropper_force")
-    evaluated = _inside(x, results.evaluation)
+    evaluated = in_stretch(x, *results.evaluation)
     return DropperStatistics(
         x,
         highest,
@@ -321,10 +322,6 @@ def slackens_at_all(results: Results) -> bool:
         on = results.attributes["effects_on"]
         return any(name == "dropper_slackening" for name, *_ in on)
     return bool(kept < 1.0)
-
-
-def _inside(x: np.ndarray, evaluation: tuple[float, float]) -> np.ndarray:
-    return np.asarray((x >= evaluation[0]) & (x <= evaluation[1]))
 
 
 def _of(values: np.ndarray, which: Callable[..., Any]) -> float:

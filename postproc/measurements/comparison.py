@@ -30,6 +30,7 @@ from catenary.postproc.measurements.passage import (
     Passage,
     RunForce,
 )
+from catenary.postproc.read.line_of_run import in_stretch
 from catenary.postproc.read.results import Results
 
 # Errors of heights below this are of no account, however certain [m].
@@ -378,7 +379,7 @@ class _Comparing:
         if far.any():
             text = f"{far.sum()} of {far.size} supports of the uplifts stand at none of the run's"
             self._find("supports", "", text, float(far.sum()))
-        near = ~far & (x[nearest] >= begin) & (x[nearest] <= end) & np.isfinite(measured.largest)
+        near = ~far & in_stretch(x[nearest], begin, end) & np.isfinite(measured.largest)
         if not near.any():
             return
         off = float(np.median(distance[near]))

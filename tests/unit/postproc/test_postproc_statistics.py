@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import pytest
 
 from catenary.postproc.evaluate import statistics as stats
+from catenary.postproc.evaluate.observations import ObservedRun
 from catenary.postproc.read.results import Results
 
 DT, SPEED = 1e-3, 100.0
@@ -126,6 +129,21 @@ def test_arms_and_droppers_are_those_of_the_stretch(run_folder: Path, march: Any
     assert found.droppers.n_slackened == (force[:, droppers] <= 0).any(axis=0).sum() == 54
     assert found.droppers.minimum == -0.5
     assert found.droppers.maximum == force[:, droppers].max()
+
+
+def test_places_at_the_ends_of_the_stretch_count_though_sums_of_spans_round(
+    run_folder: Path, tmp_path: Path
+) -> None:
+    """The uplift at such an arm is often the largest."""
+    path = shutil.copy(run_folder / "run.h5", tmp_path / "run.h5")
+    with h5py.File(path, "r+") as file:
+        file["line/evaluation_range"][...] = np.nextafter(250.0, 999.0), np.nextafter(550.0, 0.0)
+    with Results(run_folder) as exact, Results(path) as rounded:
+        first, second = stats.evaluate(exact), stats.evaluate(rounded)
+        assert ObservedRun(exact, first).masts.tolist() == np.arange(250.0, 551.0, 50.0).tolist()
+        assert ObservedRun(rounded, second).masts.size == 7
+    np.testing.assert_array_equal(first.supports.evaluated, second.supports.evaluated)
+    np.testing.assert_array_equal(first.droppers.evaluated, second.droppers.evaluated)
 
 
 def test_an_unfinished_run_gives_a_sentence_instead_of_figures(
