@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import pty
+import shlex
 import subprocess
 import sys
 import tomllib
@@ -163,6 +164,12 @@ def test_a_folder_that_is_there_is_left_alone(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ['q"uote', "back\\slash", "ümläut", "two words"])
 def test_any_name_of_a_folder_may_be_that_of_a_case(tmp_path: Path, name: str) -> None:
     assert load_scene(write_case(tmp_path / name, "simple")).case.title == name
+
+
+def test_commands_that_are_told_may_be_pasted(tmp_path: Path) -> None:
+    lines = invoke("new", str(tmp_path / "Straße 9")).output.splitlines()
+    (checked,) = [words for line in lines if (words := shlex.split(line))[1:2] == ["check"]]
+    assert invoke(*checked[1:]).exit_code == 0
 
 
 @pytest.mark.study
