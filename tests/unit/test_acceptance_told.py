@@ -33,6 +33,12 @@ def test_one_book_needs_no_name() -> None:
     ]
 
 
+def test_a_value_at_a_limit_that_it_must_not_reach() -> None:
+    row = {**judged("own", False, compared=True), "value": 350.0, "limit": 350.0, "relation": "<"}
+    told = _acceptance({"acceptance": [row], "not_judged": []})
+    assert told == ["  FAILED      arcing NQ: 350.00, limit < 350.00 %"]
+
+
 def test_books_are_named_and_limits_marked() -> None:
     rows = [judged("tsi_ene:2023", False), judged("line", True, compared=True)]
     summary = {"acceptance": rows, "not_judged": [LEFT], "judged_by": "TSI", "passed": False}
