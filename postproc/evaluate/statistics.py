@@ -142,6 +142,16 @@ def covers(position: np.ndarray, evaluation: tuple[float, float]) -> bool:
     return bool(position[0] <= evaluation[0] + step and position[-1] >= evaluation[1] - step)
 
 
+def has_a_period(within: np.ndarray, dt: float) -> bool:
+    """Whether records, ``dt`` [s] apart, that are in the stretch by ``within`` (n,) bool last for a
+    period of the filter, without which there are no statistics."""
+    return _time(within, dt) >= 1.0 / filters.CUT_OFF
+
+
+def _time(within: np.ndarray, dt: float) -> float:
+    return max(np.count_nonzero(within) - 1, 0) * dt
+
+
 def contact_statistics(
     name: str,
     position: np.ndarray,
@@ -250,14 +260,12 @@ def _pantograph(name: str, number: int, results: Results) -> PantographStatistic
         )
     within = (position >= start) & (position <= end)
     del position
-    taken = max(np.count_nonzero(within) - 1, 0) * results.dt
-    period = 1.0 / filters.CUT_OFF
-    if taken < period:
+    if not has_a_period(within, results.dt):
         return PantographStatistics(
             name,
             complaint=f"No statistics of the {_noun(name)}: it passes the evaluation stretch "
-            f"within {1e3 * taken:.3g} ms, less than a period of the 20 Hz filter "
-            f"({1e3 * period:g} ms).",
+            f"within {1e3 * _time(within, results.dt):.3g} ms, less than a period of the 20 Hz "
+            f"filter ({1e3 / filters.CUT_OFF:g} ms).",
         )
     try:
         force = results.column("contact_force", number)

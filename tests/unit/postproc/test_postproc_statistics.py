@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from catenary.postproc.evaluate import statistics as stats
+from catenary.postproc.evaluate.error_indicators import indicate
 from catenary.postproc.evaluate.observations import ObservedRun
 from catenary.postproc.read.results import Results
 
@@ -178,9 +179,12 @@ def test_a_stretch_of_a_few_samples_gives_a_sentence_instead_of_figures(
     with Results(run_folder) as results:
         results.evaluation = (300.0, 300.0 + length)
         found = stats.evaluate(results)
+        errors = indicate(results)
         results.evaluation = (300.0, 304.3)
         longer = stats.evaluate(results)
     assert all(np.isnan(p.std) for p in found.pantographs)
+    # Nor has what remains of the force an error that would ask for another step.
+    assert np.isnan(errors.force_error).all() and "step" not in " ".join(errors.warnings)
     assert len(found.complaints) == 2
     assert "less than a period of the 20 Hz filter (50 ms)" in found.complaints[0]
     # There are figures, by which nothing is judged.
