@@ -195,7 +195,7 @@ def _distance_ahead(run: ObservedRun) -> Observation:
     order = np.argsort(-first, kind="stable").tolist()
     return Observation(
         {
-            names[behind]: float(first[ahead] - first[behind])
+            names[behind]: _as_stated(first[ahead] - first[behind])
             for ahead, behind in zip(order[:-1], order[1:], strict=True)
         }
     )
@@ -206,9 +206,13 @@ def _arm_uplift(run: ObservedRun) -> Observation:
     return _one(value, "no steady arm in the evaluation stretch has a record")
 
 
+def _as_stated(value: float) -> float:
+    """A number of the scene that was converted and back, which rounds: 120 km/h are 1e-14 more."""
+    return round(float(value), 9)
+
+
 def _train_speed(run: ObservedRun) -> Observation:
-    # A scene states it in km/h: 120 km/h in m/s and back are 1e-14 more.
-    return _one(round(KMH * run.results.fact("speed"), 9))
+    return _one(_as_stated(KMH * run.results.fact("speed")))
 
 
 def _wave_speed(run: ObservedRun) -> Observation:

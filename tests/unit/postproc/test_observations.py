@@ -100,6 +100,18 @@ def test_a_train_as_fast_as_a_limit_does_not_exceed_it() -> None:
         assert observed("train_speed", run).values == {"": v}
 
 
+def test_pantographs_at_the_largest_distance_are_not_too_far_apart() -> None:
+    """50 - (50 - 8.6) is 8.600000000000001."""
+    names = ["leading", "trailing"]
+    run = SimpleNamespace(
+        pantograph_names=lambda: names,
+        n_rows=lambda name: 1,
+        first_position=np.array([50.0, 50.0 - 8.6]),
+    )
+    assert run.first_position[0] - run.first_position[1] > 8.6
+    assert observed("distance_ahead", run).values == {"trailing": 8.6}
+
+
 def test_few_masts_have_no_gradient() -> None:
     results = at_rest(rising())
     results.evaluation = (60.0, 140.0)
