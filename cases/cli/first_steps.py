@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import sys
 from pathlib import Path
 from typing import Annotated
@@ -152,10 +153,9 @@ def new(
         path = write_case(folder, topology or "simple", spans, droppers, complete)
     except OSError as error:
         raise InputError(f"{folder} cannot be made ({(error.strerror or '?').lower()})") from error
-    console.say(
-        f"{path} is written; try:\n  catenary check {folder}\n"
-        f"  catenary run {folder} --short -o {folder / 'results'}"
-    )
+    check = shlex.join(["catenary", "check", str(folder)])
+    run = shlex.join(["catenary", "run", str(folder), "--short", "-o", str(folder / "results")])
+    console.say(f"{path} is written; try:\n  {check}\n  {run}")
 
 
 @serial_verb(

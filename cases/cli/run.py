@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -149,7 +150,9 @@ def _teller(folder: Path) -> Callable[[str], None]:
 
     def tell(outcome: str) -> None:
         if outcome == "interrupted":
-            outcome = f"the run was interrupted; `catenary restart {folder}` continues it"
+            outcome = (
+                f"the run was interrupted; `catenary restart {quote(str(folder))}` continues it"
+            )
         if outcome != "done":
             console.complain(outcome)
 

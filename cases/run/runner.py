@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
@@ -425,7 +426,8 @@ def _reported(order: _Order, outcome: Outcome) -> RunOutcome:
 
     if outcome.outcome != "done":
         return on_root(order.comm, work, takes_long=True)
-    left = f"{order.result} is complete: `catenary report {order.out_dir}` writes the report again"
+    again = f"`catenary report {quote(str(order.out_dir))}` writes the report again"
+    left = f"{order.result} is complete: {again}"
     with Phase(order.comm, "the report was written", left) as phase:
         return on_root(order.comm, phase.alone(work), takes_long=True)
 
@@ -443,10 +445,8 @@ def _report(out_dir: Path, outcome: Outcome, only_summary: bool) -> RunOutcome:
     except (OSError, CatenaryError) as error:
         if outcome.outcome != "done":  # reported already
             return RunOutcome(outcome.outcome)
-        raise RunBroken(
-            f"{error}; the results are complete: `catenary report {out_dir}` writes the report "
-            "again"
-        ) from error
+        again = f"`catenary report {quote(str(out_dir))}` writes the report again"
+        raise RunBroken(f"{error}; the results are complete: {again}") from error
     return RunOutcome(outcome.outcome, summary)
 
 

@@ -105,7 +105,10 @@ def write_case(
             load_scene(inner)
         except InputError as error:
             # The files are named by where they come from: the folder was never there.
-            raise InputError(str(error).replace(str(inner), str(folder))) from error
+            sentence = str(error)
+            for name, path in copied.items():
+                sentence = sentence.replace(str(inner / name), str(path))
+            raise InputError(sentence.replace(str(inner), str(folder))) from error
         inner.rename(folder)
     return folder / CASE_FILE
 

@@ -90,9 +90,11 @@ def _acceptance(summary: Mapping[str, Any]) -> list[str]:
     for row in judged:
         value, limit = row["value"], row["limit"]
         digits = decimals_that_tell(value, limit, 2)
+        # At a limit that has to be kept clear of, the relation alone tells why.
+        only = f"{row['relation']} " if row["passed"] is False and value == limit else ""
         lines.append(
             f"  {words[row['passed']]:10}  {labelled(row, several)}: {_number(value, digits)}, "
-            f"limit {_number(limit, digits)} {row.get('unit', '')}".rstrip()
+            f"limit {only}{_number(limit, digits)} {row.get('unit', '')}".rstrip()
             + ("" if row.get("compared", True) else f" {UNCOMPARED}")
         )
     lines += [

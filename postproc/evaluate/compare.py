@@ -21,7 +21,14 @@ from catenary.postproc.evaluate.span_differences import (
     span_sums,
 )
 from catenary.postproc.evaluate.verdict import Criterion, criteria_of, judged_by, labels
-from catenary.postproc.evaluate.wording import UNCOMPARED, UNCOMPARED_SAYS, counted, fixed
+from catenary.postproc.evaluate.wording import (
+    UNCOMPARED,
+    UNCOMPARED_SAYS,
+    counted,
+    decimals_that_tell,
+    fixed,
+)
+from catenary.postproc.read.line_of_run import in_stretch
 from catenary.postproc.read.records import Records
 from catenary.postproc.read.results import Results
 
@@ -155,7 +162,8 @@ def _judged(one: Criterion | None) -> str:
     if one.absent:
         return _WORDS[None]
     mark = "" if one.compared else f" {UNCOMPARED}"
-    return f"{fixed(one.value, 2)} {one.unit} {_WORDS[one.passed]}{mark}"
+    digits = decimals_that_tell(one.value, one.limit, 2)
+    return f"{fixed(one.value, digits)} {one.unit} {_WORDS[one.passed]}{mark}"
 
 
 def _row(label: str, values: Sequence[float], digits: int = 4) -> str:
@@ -210,8 +218,8 @@ def _span_sums(run: Results, number: int) -> SpanSums | None:
 
 def _evaluated_masts(run: Results) -> np.ndarray:
     """Places of the masts of the evaluated stretch [m]."""
-    masts, (begin, end) = run.line("support_x"), run.evaluation
-    return masts[(masts >= begin - 1e-6) & (masts <= end + 1e-6)]
+    masts = run.line("support_x")
+    return masts[in_stretch(masts, *run.evaluation)]
 
 
 def _spans_alike(a: Results, b: Results) -> bool:

@@ -20,7 +20,7 @@ from catenary.meshgen.slowest_wave import bends
 from catenary.meshgen.wires import Role
 from catenary.postproc.channels.facts import FACTS, WIRE
 from catenary.postproc.evaluate import filters
-from catenary.postproc.evaluate.statistics import covers
+from catenary.postproc.evaluate.statistics import covers, has_a_period
 from catenary.postproc.read.results import Results
 from catenary.solver.model import beam
 from catenary.solver.problem.integrator_parameters import (
@@ -100,7 +100,8 @@ def indicate(results: Results) -> Indicators:
     for p in range(n):
         position = results.column("contact_position", p)
         within = (position >= start) & (position <= end)
-        if not covers(position, (start, end)) or np.count_nonzero(within) < 8:
+        long = np.count_nonzero(within) >= 8 and has_a_period(within, results.dt)
+        if not (long and covers(position, (start, end))):
             continue
         del position
         try:

@@ -20,7 +20,7 @@ from catenary.postproc.evaluate.statistics import (
     RunStatistics,
     slackens_at_all,
 )
-from catenary.postproc.read.line_of_run import ContactProfile
+from catenary.postproc.read.line_of_run import ContactProfile, in_stretch
 from catenary.postproc.read.results import Results
 from catenary.postproc.standards.quantities import KMH
 from catenary.solver.problem.watched_links import TENSION
@@ -59,9 +59,8 @@ def wire_at_rest(results: Results) -> WireAtRest | None:
     """The contact wire at rest in the evaluation stretch, None if no node is there. Not
     collective."""
     profiles = list(results.contact_profiles().values())
-    start, end = results.evaluation
     x = np.unique(np.concatenate([profile.x for profile in profiles]))
-    x = x[(x >= start) & (x <= end)]
+    x = x[in_stretch(x, *results.evaluation)]
     if not x.size:
         return None
     heights = np.array([_height_at(profile, x) for profile in profiles])
@@ -136,12 +135,10 @@ class ObservedRun:
     @cached_property
     def masts(self) -> np.ndarray:
         """Masts in the evaluation stretch, (n,) [m]."""
-        masts = self.results.line("support_x")
-        start, end = self.results.evaluation
         if self.wire is None:
             return np.zeros(0)
-        start, end = max(start, self.wire.x[0]), min(end, self.wire.x[-1])
-        return masts[(masts >= start) & (masts <= end)]
+        masts, x = self.results.line("support_x"), self.wire.x
+        return masts[in_stretch(masts, *self.results.evaluation) & in_stretch(masts, x[0], x[-1])]
 
 
 Observe = Callable[[ObservedRun], Observation]
@@ -198,7 +195,7 @@ def _distance_ahead(run: ObservedRun) -> Observation:
     order = np.argsort(-first, kind="stable").tolist()
     return Observation(
         {
-            names[behind]: float(first[ahead] - first[behind])
+            names[behind]: _as_stated(first[ahead] - first[behind])
             for ahead, behind in zip(order[:-1], order[1:], strict=True)
         }
     )
@@ -207,6 +204,15 @@ def _distance_ahead(run: ObservedRun) -> Observation:
 def _arm_uplift(run: ObservedRun) -> Observation:
     value = 1e3 * run.statistics.supports.maximum
     return _one(value, "no steady arm in the evaluation stretch has a record")
+
+
+def _as_stated(value: float) -> float:
+    """A number of the scene that was converted and back, which rounds: 120 km/h are 1e-14 more."""
+    return round(float(value), 9)
+
+
+def _train_speed(run: ObservedRun) -> Observation:
+    return _one(_as_stated(KMH * run.results.fact("speed")))
 
 
 def _wave_speed(run: ObservedRun) -> Observation:
@@ -364,7 +370,7 @@ OBSERVED: dict[str, Observe] = {
     "strip_half_length": _strip_half_length,
     "distance_ahead": _distance_ahead,
     "arm_uplift": _arm_uplift,
-    "train_speed": lambda run: _one(KMH * run.results.fact("speed")),
+    "train_speed": _train_speed,
     "wave_speed": _wave_speed,
     "wire_height_max": _of_wire(lambda wire: 1e3 * float(wire.height.max())),
     "wire_height_min": _of_wire(lambda wire: 1e3 * float(wire.height.min())),

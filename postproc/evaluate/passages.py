@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from catenary.postproc.read.line_of_run import in_stretch
 from catenary.postproc.read.results import Results
 
 # A pantograph moves the wire before it arrives: what a dropper does from here on, three dropper
@@ -32,8 +33,7 @@ def slack_droppers(results: Results) -> dict[str, dict[str, int]]:
     passage, ``trailing`` in or after it, ``any`` time, out of ``of``; of those next to mid-span
     (``mid``) and of all (``all``). With one pantograph its passage is the leading one."""
     x = results.line("dropper_x")
-    start, end = results.evaluation
-    evaluated = (x >= start) & (x <= end)
+    evaluated = in_stretch(x, *results.evaluation)
     leading, trailing = np.zeros(x.size, dtype=bool), np.zeros(x.size, dtype=bool)
     every = results.line_record.every
     for part, force in results.blocks("dropper_force"):
@@ -76,11 +76,10 @@ def uplift_onset(results: Results) -> float | None:
     without arms in the stretch.
     """
     x = results.line("arm_x")
-    start, end = results.evaluation
     lead = leading_position(results)[:: results.line_record.every]
     largest = results.extremes("arm_uplift")[1]
     ahead = []
-    for arm in np.flatnonzero((x >= start) & (x <= end)):
+    for arm in np.flatnonzero(in_stretch(x, *results.evaluation)):
         begun = results.column("arm_uplift", int(arm)) >= BEGUN * largest[arm]
         if begun.any():  # it has begun outside of what is recorded otherwise
             ahead.append(float(x[arm] - lead[int(np.argmax(begun))]))

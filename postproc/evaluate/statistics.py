@@ -16,6 +16,7 @@ import numpy as np
 from catenary.base.errors import InputError
 from catenary.postproc.evaluate import filters
 from catenary.postproc.evaluate.lateral_places import LateralRange, lateral_ranges
+from catenary.postproc.read.line_of_run import in_stretch
 from catenary.postproc.read.results import Results
 
 SHORTEST_ARC = 5e-3
@@ -141,6 +142,16 @@ def covers(position: np.ndarray, evaluation: tuple[float, float]) -> bool:
     return bool(position[0] <= evaluation[0] + step and position[-1] >= evaluation[1] - step)
 
 
+def has_a_period(within: np.ndarray, dt: float) -> bool:
+    """Whether records, ``dt`` [s] apart, that are in the stretch by ``within`` (n,) bool last for a
+    period of the filter, without which there are no statistics."""
+    return _time(within, dt) >= 1.0 / filters.CUT_OFF
+
+
+def _time(within: np.ndarray, dt: float) -> float:
+    return max(np.count_nonzero(within) - 1, 0) * dt
+
+
 def contact_statistics(
     name: str,
     position: np.ndarray,
@@ -249,14 +260,12 @@ def _pantograph(name: str, number: int, results: Results) -> PantographStatistic
         )
     within = (position >= start) & (position <= end)
     del position
-    taken = max(np.count_nonzero(within) - 1, 0) * results.dt
-    period = 1.0 / filters.CUT_OFF
-    if taken < period:
+    if not has_a_period(within, results.dt):
         return PantographStatistics(
             name,
             complaint=f"No statistics of the {_noun(name)}: it passes the evaluation stretch "
-            f"within {1e3 * taken:.3g} ms, less than a period of the 20 Hz filter "
-            f"({1e3 * period:g} ms).",
+            f"within {1e3 * _time(within, results.dt):.3g} ms, less than a period of the 20 Hz "
+            f"filter ({1e3 / filters.CUT_OFF:g} ms).",
         )
     try:
         force = results.column("contact_force", number)
@@ -294,14 +303,14 @@ def _noun(name: str) -> str:
 def _supports(results: Results) -> SupportStatistics:
     x = results.line("arm_x")
     uplift = results.extremes("arm_uplift")[1]
-    evaluated = _inside(x, results.evaluation)
+    evaluated = in_stretch(x, *results.evaluation)
     return SupportStatistics(x, uplift, evaluated, _of(uplift[evaluated], np.max))
 
 
 def _droppers(results: Results) -> DropperStatistics:
     x = results.line("dropper_x")
     lowest, highest = results.extremes("dropper_force")
-    evaluated = _inside(x, results.evaluation)
+    evaluated = in_stretch(x, *results.evaluation)
     return DropperStatistics(
         x,
         highest,
@@ -321,10 +330,6 @@ def slackens_at_all(results: Results) -> bool:
         on = results.attributes["effects_on"]
         return any(name == "dropper_slackening" for name, *_ in on)
     return bool(kept < 1.0)
-
-
-def _inside(x: np.ndarray, evaluation: tuple[float, float]) -> np.ndarray:
-    return np.asarray((x >= evaluation[0]) & (x <= evaluation[1]))
 
 
 def _of(values: np.ndarray, which: Callable[..., Any]) -> float:

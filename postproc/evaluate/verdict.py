@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from catenary.base.errors import InputError
@@ -109,7 +109,8 @@ def verdict(criteria: Sequence[Criterion]) -> bool | None:
 
 
 def verdict_sentence(criteria: Sequence[Criterion], supply: str) -> str:
-    """Sentence on the books that judge a run, and the number of criteria with each verdict.
+    """Sentence on the books that judge a run, and the number of criteria with each verdict, of
+    several books by each one too.
 
     Parameters
     ----------
@@ -120,15 +121,22 @@ def verdict_sentence(criteria: Sequence[Criterion], supply: str) -> str:
     """
     titles = list(dict.fromkeys(c.title for c in criteria))
     judged = [c for c in criteria if c.passed is not None]
-    failed = sum(c.passed is False for c in judged)
-    counts = f"{len(judged) - failed} of {len(judged)} criteria passed"
+    counts = f"{_share(judged)} criteria passed"
     left = len(criteria) - len(judged)
     counts += f", {left} not judged" if left else ""
     unseen = sum(not c.compared for c in judged)
     if unseen:
         counts += f"; {unseen} of {len(judged)} limits not compared with the text of their standard"
-    named = " and ".join([", ".join(titles[:-1]), titles[-1]] if titles[1:] else titles)
-    return f"{named} ({SYSTEMS[supply]}): {counts}"
+    if titles[1:]:
+        titles = [f"{title} ({_share(c for c in judged if c.title == title)})" for title in titles]
+        titles = [", ".join(titles[:-1]), titles[-1]]
+    return f"{' and '.join(titles)} ({SYSTEMS[supply]}): {counts}"
+
+
+def _share(judged: Iterable[Criterion]) -> str:
+    """How many of judged criteria passed."""
+    verdicts = [c.passed for c in judged]
+    return f"{sum(map(bool, verdicts))} of {len(verdicts)}"
 
 
 def labels(criteria: Sequence[Criterion]) -> list[str]:

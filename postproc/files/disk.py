@@ -10,6 +10,7 @@ import os
 import struct
 from collections.abc import Iterator, Mapping
 from pathlib import Path
+from shlex import quote
 from typing import Any
 
 import h5py
@@ -114,7 +115,7 @@ def check_in_place(path: Path, handle: int) -> None:
         ) from None
     raise Elsewhere(
         f"{path} is now {now}, moved while the run went on: what was written is there, and "
-        f"`catenary restart {now.parent}` continues the run"
+        f"`catenary restart {quote(str(now.parent))}` continues the run"
     )
 
 

@@ -53,9 +53,10 @@ REPORT_FILES = (
         for kind in ("png", "svg")
     ),
 )
+MP4, GIF = "film.mp4", "film.gif"
 # Files of a sweep beside those of a run.
 VARIANT_FILE = "variant.json"
-OWN_FILES = (RUN_FILE, *FIELD_FILES, *REPORT_FILES, VARIANT_FILE)
+OWN_FILES = (RUN_FILE, *FIELD_FILES, *REPORT_FILES, MP4, GIF, VARIANT_FILE)
 
 _PART = re.compile(r"\.(?P<name>.+)\.\d+\.part")
 # A report may be written beside a run; its files are made in less [s].

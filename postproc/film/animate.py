@@ -12,6 +12,7 @@ from tqdm import tqdm
 
 from catenary.base.errors import InputError
 from catenary.mbs.shape import Shape
+from catenary.postproc.files.own_files import GIF, MP4
 from catenary.postproc.film import drawing
 from catenary.postproc.film.chart import ForceChart, RingingChart
 from catenary.postproc.film.film_data import FilmData, film_data
@@ -23,7 +24,6 @@ from catenary.postproc.read.records import Records
 from catenary.postproc.read.results import Results
 from catenary.solver.waves.excitation import Blow
 
-MP4, GIF = "film.mp4", "film.gif"
 # Length of line in a picture beside one pantograph [m].
 _WIDTH = 110.0
 _LEAST_WIDTH = 5.0

@@ -8,7 +8,8 @@ S the force of the run, filtered as the file says that its values are, s the shi
 of what is compared, k the drift. All shifts with half of the record are looked at, by
 cross-correlation; the best are refined by least squares. The noise is what remains: its variance
 and its correlation time give the uncertainty of each parameter, so that a model that is not
-exact makes it larger.
+exact makes it larger. The file's own places are tried too where they share enough with what is
+compared: a passage that ends early is no error.
 """
 
 from __future__ import annotations
@@ -22,6 +23,8 @@ from scipy.signal import argrelmin, correlate
 
 from catenary.postproc.measurements.passage import RunForce
 
+# A record has to have so many periods of the cut-off.
+LEAST_PERIODS = 20
 # Samples of the search in a period of the cut-off; the search takes the better half of shifts with
 # at least this part of the record, and refines so many of them.
 _SAMPLES, _LEAST_OVERLAP, _MOST_REFINED = 8, 0.5, 12
@@ -228,7 +231,10 @@ class _Fit:
         near = int(np.argmin(np.abs(shifts)))
         order = np.argsort(values[minima], kind="stable")[:_MOST_REFINED]
         chosen = dict.fromkeys([*order.tolist(), near])
-        return [(float(shifts[i]), float(drifts[which[minima[i]]])) for i in chosen]
+        starts = [(float(shifts[i]), float(drifts[which[minima[i]]])) for i in chosen]
+        shared = min(self._end, self._place[-1]) - max(self._begin, self._place[0])
+        # The file's own places need no half of the record.
+        return [*starts, (0.0, 0.0)] if shared >= LEAST_PERIODS * self._wave else starts
 
     def chosen(
         self, starts: list[tuple[float, float]], passed: float | None

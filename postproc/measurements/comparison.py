@@ -8,7 +8,13 @@ import numpy as np
 
 from catenary.base.errors import InputError
 from catenary.postproc.evaluate.span_differences import STATISTICS, differences, span_sums
-from catenary.postproc.measurements.alignment import CERTAIN, Alignment, align, correlation_time
+from catenary.postproc.measurements.alignment import (
+    CERTAIN,
+    LEAST_PERIODS,
+    Alignment,
+    align,
+    correlation_time,
+)
 from catenary.postproc.measurements.compared import (
     LINE_TEST,
     Compared,
@@ -30,6 +36,7 @@ from catenary.postproc.measurements.passage import (
     Passage,
     RunForce,
 )
+from catenary.postproc.read.line_of_run import in_stretch
 from catenary.postproc.read.results import Results
 
 # Errors of heights below this are of no account, however certain [m].
@@ -41,8 +48,6 @@ _NO_FORCE, _MOST_GAPS = 0.2, 0.2
 _LEAST_CORRELATION = 0.6
 # A residual exceeds the stated noise beyond this factor.
 _MORE_THAN_NOISE = 1.3
-# The compared stretch has at least so many periods of the cut-off.
-_LEAST_PERIODS = 20
 # A range is widened by noise of deviation 1 by up to so much.
 _WIDENED = 6.0
 # A span is whole if the record ends this near its masts [m].
@@ -142,11 +147,11 @@ class _Comparing:
         place, force = own.place[valid], passage.in_band(force, dt)[valid]
         begin, end = self._stretch(run)
         length = float(place[-1] - place[0]) if place.size else 0.0
-        least = _LEAST_PERIODS * run.speed / passage.cut_off
+        least = LEAST_PERIODS * run.speed / passage.cut_off
         if min(length, end - begin) < least:
             raise InputError(
                 f"{passage.name} has {length:.1f} m, and the run is compared from {begin:g} to "
-                f"{end:g} m: both must have at least {least:.0f} m, {_LEAST_PERIODS} periods of "
+                f"{end:g} m: both must have at least {least:.0f} m, {LEAST_PERIODS} periods of "
                 f"{passage.cut_off:g} Hz"
             )
         aligned = self._placed(own, place, force)
@@ -164,6 +169,10 @@ class _Comparing:
                 f"compared from {begin:g} to {end:g} m: they share nothing"
             )
         at, force = at[within], force[within]
+        wave = run.speed / passage.cut_off
+        if at[0] > begin + wave or at[-1] < end - wave:
+            text = f"compared from {at[0]:.0f} to {at[-1]:.0f} m, which is all that was measured"
+            self.remarks.append(f"{name}: {text}")
         modelled = run.below(passage.cut_off)(at)
         heights = self._heights(own, valid, within, at, dt)
         self._force_figures(name, at, force, run)
@@ -378,7 +387,7 @@ class _Comparing:
         if far.any():
             text = f"{far.sum()} of {far.size} supports of the uplifts stand at none of the run's"
             self._find("supports", "", text, float(far.sum()))
-        near = ~far & (x[nearest] >= begin) & (x[nearest] <= end) & np.isfinite(measured.largest)
+        near = ~far & in_stretch(x[nearest], begin, end) & np.isfinite(measured.largest)
         if not near.any():
             return
         off = float(np.median(distance[near]))

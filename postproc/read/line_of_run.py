@@ -13,6 +13,14 @@ from catenary.postproc.channels.line_record import LineRecord
 from catenary.postproc.read.records import Records
 from catenary.postproc.read.registration import Registration
 
+# Places along the line come from sums of span lengths, which round by far less [m].
+_ROUNDING = 1e-6
+
+
+def in_stretch(x: np.ndarray, start: float, end: float) -> np.ndarray:
+    """Whether places ``x`` (n,) of the line are in a stretch, its ends included, (n,) bool."""
+    return np.asarray((x >= start - _ROUNDING) & (x <= end + _ROUNDING))
+
 
 class ContactProfile(NamedTuple):
     """A contact wire at rest.

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 from catenary.cases.studies.sweep.jobs import Ended
 from catenary.cases.studies.sweep.output import table_of
 from catenary.cases.studies.sweep.variants import Variant
 from catenary.cases.terminal.terminal_text import _acceptance
+from catenary.postproc.evaluate.compare import _judged
+from catenary.postproc.evaluate.verdict import Criterion
 
 
 def judged(book: str, passed: bool | None, compared: bool = False) -> dict[str, Any]:
@@ -31,6 +34,18 @@ def test_one_book_needs_no_name() -> None:
         "  passed      arcing NQ: 0.15, limit 0.20 % *",
         "  * limit not compared with the text of the standard",
     ]
+
+
+def test_a_value_at_a_limit_that_it_must_not_reach() -> None:
+    row = {**judged("own", False, compared=True), "value": 350.0, "limit": 350.0, "relation": "<"}
+    told = _acceptance({"acceptance": [row], "not_judged": []})
+    assert told == ["  FAILED      arcing NQ: 350.00, limit < 350.00 %"]
+
+
+def test_runs_side_by_side_show_what_fails_by_little() -> None:
+    one = Criterion("arcing NQ", 0.2046, 0.2, "%", "<=", False, "", compared=True)
+    assert _judged(one) == "0.205 % FAILED"
+    assert _judged(replace(one, value=0.5)) == "0.50 % FAILED"
 
 
 def test_books_are_named_and_limits_marked() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import pty
+import shlex
 import subprocess
 import sys
 import tomllib
@@ -135,6 +136,11 @@ def test_a_line_without_droppers_takes_spans_alone(tmp_path: Path) -> None:
         (["--spans", "few.csv", "--droppers", "hung.csv"], "a new case needs 12 spans"),
         (["--spans", "line 7.csv"], "line.dropper.positions_m"),
         (["--spans", "hung.csv"], "the table of spans is"),
+        (["--spans", "line 7.csv", "--droppers", "typed.csv"], "droppers is typed.csv; its line 5"),
+        (
+            ["--spans", "line 7.csv", "--droppers", "part.csv"],
+            "part.csv has no entry for span 3",
+        ),
     ],
 )
 def test_what_makes_no_case_writes_nothing(
@@ -143,6 +149,9 @@ def test_what_makes_no_case_writes_nothing(
     monkeypatch.chdir(tmp_path)
     tables(tmp_path, 20)
     (tmp_path / "few.csv").write_text("span_m\n55\n55\n")
+    hung = (tmp_path / "hung.csv").read_text().splitlines(keepends=True)
+    (tmp_path / "typed.csv").write_text("".join([*hung[:4], "1;x;0\n", *hung[5:]]))
+    (tmp_path / "part.csv").write_text("".join(hung[:15]))
     before = sorted(tmp_path.iterdir())
     done = invoke("new", "a", *words)
     assert done.exit_code == 2 and sentence in done.output, done.output
@@ -163,6 +172,12 @@ def test_a_folder_that_is_there_is_left_alone(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ['q"uote', "back\\slash", "ümläut", "two words"])
 def test_any_name_of_a_folder_may_be_that_of_a_case(tmp_path: Path, name: str) -> None:
     assert load_scene(write_case(tmp_path / name, "simple")).case.title == name
+
+
+def test_commands_that_are_told_may_be_pasted(tmp_path: Path) -> None:
+    lines = invoke("new", str(tmp_path / "Straße 9")).output.splitlines()
+    (checked,) = [words for line in lines if (words := shlex.split(line))[1:2] == ["check"]]
+    assert invoke(*checked[1:]).exit_code == 0
 
 
 @pytest.mark.study

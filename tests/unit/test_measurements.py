@@ -199,6 +199,17 @@ def test_shifts_that_fit_as_well_are_told() -> None:
     assert 58.0 in np.round(found.other_shifts)
 
 
+def test_a_passage_that_ends_early_is_compared_where_it_has_values(
+    run: Path, table: pd.DataFrame
+) -> None:
+    """From 250 m on it has 77 m, of the 170 m that are compared and of 262 m of its own."""
+    measured = {**PLACES, "from_m": 250.0}
+    found = found_in(run, table[table.place_m < 327.0], measured=measured)
+    assert [one.kind for one in found.findings] == []
+    assert any("compared from 250 to 327 m" in text for text in found.remarks)
+    assert not any("compared from" in text for text in found_in(run, table).remarks)
+
+
 @pytest.mark.study
 def test_a_long_record_is_aligned_from_its_middle_outwards() -> None:
     """20 km with a drift of 3 in 1000, which is 30 m at its ends."""

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
 from scenes import Scene, line_data_of, load_scene, mesh_of, problem_of, read_draft, recorded
 
 from catenary import InputError
+from catenary.cases.run.describe.arrivals import arrival_warnings
 from catenary.cases.scene.checks.mesh_size import size_of
 
 WITHOUT = (
@@ -95,6 +97,16 @@ def test_fewer_spans_are_the_first_ones(tmp_path: Path) -> None:
     assert shorter.line.span_m == [50.0, 51.0] * 8
     patterns = shorter.line.dropper.patterns  # type: ignore[union-attr]
     assert patterns is not None and patterns[0].spans == list(range(1, 17))
+
+
+def test_a_line_that_is_too_short_is_told_what_its_file_needs(tmp_path: Path) -> None:
+    """A larger ``line.n_spans`` alone would be refused."""
+    files = {"spans.csv": alike(12), "droppers.csv": droppers(12)}
+    (warning,) = arrival_warnings(load(tmp_path, files, "evaluation.to_m=600"))
+    n = int(re.search(r"Take a line\.spans_file of (\d+) spans", warning)[1])  # type: ignore[index]
+    assert n > 12
+    files = {"spans.csv": alike(n), "droppers.csv": droppers(n)}
+    assert arrival_warnings(load(tmp_path, files, "evaluation.to_m=600")) == []
 
 
 def test_files_beside_a_case_are_found_from_anywhere(tmp_path: Path) -> None:

@@ -97,7 +97,7 @@ def test_lengths_that_make_no_line_are_refused(tmp_path: Path) -> None:
     words = ["new", str(tmp_path / "line"), "--spans", str(tmp_path / "spans.csv")]
     done = invoke(*words, "--droppers", str(tmp_path / "lengths.csv"))
     assert done.exit_code == 2
-    assert "the table of droppers is droppers.csv; no pre-sag" in done.output
+    assert f"the table of droppers is {tmp_path / 'lengths.csv'}; no pre-sag" in done.output
     assert not (tmp_path / "line").exists()
 
 

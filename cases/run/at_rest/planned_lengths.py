@@ -53,7 +53,7 @@ def take_in_lengths(folder: Path) -> float | None:
     path = folder / DROPPERS_FILE
     if not path.is_file():
         return None
-    where = f"the table of droppers is {path.name}"
+    where = f"the table of droppers is {path}"
     hung = dropper_table(path, where, LENGTH_COLUMNS)
     rows = [(span, row) for span, own in hung.items() for row in own]
     if LENGTH not in rows[0][1]:

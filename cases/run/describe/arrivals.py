@@ -257,6 +257,8 @@ def _reflections(scene: Scene, traced: Traced) -> list[str]:
     # 1 mm for the rounding of sums.
     more = math.ceil((max(ends) - traced.line.end - 1e-3) / traced.line.span)
     wanted = scene.line.n_spans + max(more, 1)
+    in_file = "line.span_m" in dict(scene.origin.taken_in)
+    longer = f"a line.spans_file of {wanted} spans" if in_file else f"line.n_spans = {wanted}"
     sentences = []
     for i in felt:
         met = traced.found[i].far_end
@@ -269,8 +271,8 @@ def _reflections(scene: Scene, traced: Traced) -> list[str]:
         sentences.append(
             f"The reflection from the end of the line reaches {_object(traced.names[i])} at "
             f"{met.at:.0f} m ({met.time:.1f} s){left}, before the evaluated stretch ends "
-            f"({first:g} to {last:g} m): its force is not that of a long line. Take "
-            f"line.n_spans = {wanted}{shorter}."
+            f"({first:g} to {last:g} m): its force is not that of a long line. Take {longer}"
+            f"{shorter}."
         )
     return sentences
 

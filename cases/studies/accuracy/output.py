@@ -168,7 +168,7 @@ def _command(found: Measured) -> str:
     quick = " --quick" if found.plan.quick else ""
     repeats = "" if found.plan.repeats == _USUAL_REPEATS else f" --repeats {found.plan.repeats}"
     changes = "".join(f" --set {shlex.quote(one)}" for one in found.plan.overrides)
-    return f"catenary accuracy {found.plan.case}{some}{quick}{repeats}{changes}"
+    return f"catenary accuracy {shlex.quote(found.plan.case)}{some}{quick}{repeats}{changes}"
 
 
 def runs_with_remarks(found: Measured) -> list[tuple[str, Sequence[str]]]:

@@ -11,6 +11,7 @@ import numpy as np
 from catenary.cases.studies.questions.worst import Passage, Spot, dropper_likes, spans_in_stretch
 from catenary.meshgen.wires import Role
 from catenary.postproc.evaluate.wording import wire_words
+from catenary.postproc.read.line_of_run import in_stretch
 from catenary.postproc.read.results import Results
 from catenary.solver.effects.all_effects import simulated
 from catenary.solver.statics.elasticity import elasticity
@@ -282,9 +283,9 @@ class Causes:
         """Droppers that carry much more or less at rest than those at the same place of a span."""
         x, force = self._results.line("dropper_x"), self._results.static("dropper_force")
         likes = dropper_likes(self._results)
-        first, last = self._results.evaluation
+        evaluated = in_stretch(x, *self._results.evaluation)
         for number in np.flatnonzero((x >= start) & (x <= end)):
-            others = force[(likes == likes[number]) & (x >= first) & (x <= last)]
+            others = force[(likes == likes[number]) & evaluated]
             usual = float(np.median(others)) if others.size >= _FEWEST else 0.0
             if usual > 0.0 and abs(force[number] / usual - 1.0) > _HEAVIER:
                 yield (

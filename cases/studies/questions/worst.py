@@ -11,13 +11,12 @@ from catenary.postproc.evaluate import filters
 from catenary.postproc.evaluate import statistics as stats
 from catenary.postproc.evaluate.statistics import slack_times
 from catenary.postproc.evaluate.wording import wire_words
+from catenary.postproc.read.line_of_run import in_stretch
 from catenary.postproc.read.results import Results
 
 # A figure stands out if it exceeds the median of its likes by this many robust standard deviations
 # (1.4826 times the median absolute deviation) and by this share.
 _DEVIATIONS, _SHARE, _NORMAL = 3.0, 0.1, 1.4826
-# Spans whose ends lie so close to those of the evaluated stretch are within it [m].
-_SAME_PLACE = 1e-3
 # Likes of a dropper hang so close to the same share of their spans [-]; fewer than this say little.
 _SAME_SHARE, _FEWEST = 0.02, 3
 
@@ -129,9 +128,8 @@ def _of_several(wires: Sequence[str]) -> list[str]:
 
 def spans_in_stretch(results: Results) -> list[int]:
     """Numbers of the spans that lie within the evaluated stretch, from 0."""
-    masts, (start, end) = results.line("support_x"), results.evaluation
-    within = (masts[:-1] >= start - _SAME_PLACE) & (masts[1:] <= end + _SAME_PLACE)
-    return [int(number) for number in np.flatnonzero(within)]
+    within = in_stretch(results.line("support_x"), *results.evaluation)
+    return [int(number) for number in np.flatnonzero(within[:-1] & within[1:])]
 
 
 def _passages(results: Results) -> list[Passage]:

@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 
 from catenary.base.errors import InputError
 from catenary.postproc.evaluate import filters
+from catenary.postproc.read.line_of_run import in_stretch
 from catenary.postproc.read.results import Results
 from catenary.postproc.report.pictures.envelope import thinned
 from catenary.postproc.report.pictures.figures import (
@@ -106,10 +107,9 @@ def mark_line(
     label = "evaluation stretch" if named else None
     axes.axvspan(low, high, color=SHADE, zorder=0, label=label)
     support = results.line("support_x")
-    support = support[(support >= start) & (support <= end)]
-    _supports(axes, support, 0.9, "support" if named else None)
+    _supports(axes, support[in_stretch(support, start, end)], 0.9, "support" if named else None)
     dropper = results.line("dropper_x")
-    dropper = dropper[(dropper >= start) & (dropper <= end)]
+    dropper = dropper[in_stretch(dropper, start, end)]
     if 0 < dropper.size <= _MOST_DROPPERS:
         _ticks(axes, dropper, 0.035, 0.7, "dropper" if named else None)
     axes.set_xlim(start, end)
@@ -133,10 +133,9 @@ def mark_static(axes: Axes, results: Results, start: float, end: float) -> None:
     """Supports and droppers of the line at rest from ``start`` to ``end`` [m], with a margin at
     both ends."""
     support = results.line("support_x")
-    there = (support >= start - 1e-6) & (support <= end + 1e-6)
-    _supports(axes, support[there], 1.2, "support")
+    _supports(axes, support[in_stretch(support, start, end)], 1.2, "support")
     dropper = results.line("dropper_x")
-    dropper = dropper[(dropper >= start) & (dropper <= end)]
+    dropper = dropper[in_stretch(dropper, start, end)]
     if dropper.size:
         _ticks(axes, dropper, 0.06, 1.0, "dropper")
     axes.set_xlim(*with_margin(np.array([start, end])))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from shlex import quote
 
 import numpy as np
 
@@ -197,7 +198,7 @@ def _criteria(run: EvaluatedRun) -> Iterator[Text | StudyTable]:
         rows.append([*first, *of_margin, *words])
     heads = ["criterion", "verdict", "value", "", "limit", "margin", "error", "unit", "source"]
     yield texts_table(heads, rows, {2, 4, 5, 6})
-    case = run.results.attributes["case"]
+    case = quote(run.results.attributes["case"])
     how = (
         f"The error is that of step and mesh, from {run.measured_by}."
         if run.measured

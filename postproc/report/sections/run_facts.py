@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Mapping
 from hashlib import sha256
+from shlex import quote
 
 import numpy as np
 
@@ -88,7 +89,7 @@ def effects(run: EvaluatedRun, costs: tuple[Mapping[str, str], str] = ({}, "")) 
         "Costs are how many times as long a step takes with the effect as without; costs and "
         f"changes are those of {study}."
         if cost_of
-        else f"`catenary plan {about['case']} --cost -o STUDY` measures what each costs and "
+        else f"`catenary plan {quote(about['case'])} --cost -o STUDY` measures what each costs and "
         "changes; `catenary report --cost STUDY` shows it here."
     )
     return Section("What was simulated", [on, Text(how)], folded=[left])

@@ -29,7 +29,7 @@ from catenary.postproc.read.line_of_run import ContactProfile
 from catenary.postproc.read.results import Results
 from catenary.postproc.report.report import write_report
 from catenary.postproc.standards.library import shipped
-from catenary.postproc.standards.quantities import QUANTITIES
+from catenary.postproc.standards.quantities import KMH, QUANTITIES
 from catenary.solver.effects.all_effects import registry
 from catenary.solver.problem.watched_links import TENSION
 
@@ -89,6 +89,27 @@ def test_a_level_wire_has_no_gradient_at_all() -> None:
     for rise, found in ((0.9e-3, 0.0), (1.1e-3, 0.022)):  # over 50 m
         level = wire._replace(height=5.3 + rise * wire.x / 50.0)
         assert observed("wire_gradient", at_rest(level)).values[""] == pytest.approx(found)
+
+
+def test_a_train_as_fast_as_a_limit_does_not_exceed_it() -> None:
+    """120 / 3.6 * 3.6 is 120.00000000000001."""
+    speeds = [float(v) for v in range(1, 401)]
+    assert [v for v in speeds if KMH * (v / KMH) > v]
+    for v in speeds:
+        run = SimpleNamespace(fact=lambda name, v=v: {"speed": v / KMH}[name])
+        assert observed("train_speed", run).values == {"": v}
+
+
+def test_pantographs_at_the_largest_distance_are_not_too_far_apart() -> None:
+    """50 - (50 - 8.6) is 8.600000000000001."""
+    names = ["leading", "trailing"]
+    run = SimpleNamespace(
+        pantograph_names=lambda: names,
+        n_rows=lambda name: 1,
+        first_position=np.array([50.0, 50.0 - 8.6]),
+    )
+    assert run.first_position[0] - run.first_position[1] > 8.6
+    assert observed("distance_ahead", run).values == {"trailing": 8.6}
 
 
 def test_few_masts_have_no_gradient() -> None:

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import pytest
 
 from catenary.postproc.evaluate import statistics as stats
+from catenary.postproc.evaluate.error_indicators import indicate
+from catenary.postproc.evaluate.observations import ObservedRun
 from catenary.postproc.read.results import Results
 
 DT, SPEED = 1e-3, 100.0
@@ -128,6 +132,21 @@ def test_arms_and_droppers_are_those_of_the_stretch(run_folder: Path, march: Any
     assert found.droppers.maximum == force[:, droppers].max()
 
 
+def test_places_at_the_ends_of_the_stretch_count_though_sums_of_spans_round(
+    run_folder: Path, tmp_path: Path
+) -> None:
+    """The uplift at such an arm is often the largest."""
+    path = shutil.copy(run_folder / "run.h5", tmp_path / "run.h5")
+    with h5py.File(path, "r+") as file:
+        file["line/evaluation_range"][...] = np.nextafter(250.0, 999.0), np.nextafter(550.0, 0.0)
+    with Results(run_folder) as exact, Results(path) as rounded:
+        first, second = stats.evaluate(exact), stats.evaluate(rounded)
+        assert ObservedRun(exact, first).masts.tolist() == np.arange(250.0, 551.0, 50.0).tolist()
+        assert ObservedRun(rounded, second).masts.size == 7
+    np.testing.assert_array_equal(first.supports.evaluated, second.supports.evaluated)
+    np.testing.assert_array_equal(first.droppers.evaluated, second.droppers.evaluated)
+
+
 def test_an_unfinished_run_gives_a_sentence_instead_of_figures(
     tmp_path: Path, make_march: Any, record_run: Any
 ) -> None:
@@ -160,9 +179,12 @@ def test_a_stretch_of_a_few_samples_gives_a_sentence_instead_of_figures(
     with Results(run_folder) as results:
         results.evaluation = (300.0, 300.0 + length)
         found = stats.evaluate(results)
+        errors = indicate(results)
         results.evaluation = (300.0, 304.3)
         longer = stats.evaluate(results)
     assert all(np.isnan(p.std) for p in found.pantographs)
+    # Nor has what remains of the force an error that would ask for another step.
+    assert np.isnan(errors.force_error).all() and "step" not in " ".join(errors.warnings)
     assert len(found.complaints) == 2
     assert "less than a period of the 20 Hz filter (50 ms)" in found.complaints[0]
     # There are figures, by which nothing is judged.
