@@ -330,7 +330,8 @@ class AtRest:
         from catenary.callers import listed
         from catenary.cases.studies.sensitivity.at_rest import rest_sensitivity_of
 
-        found = rest_sensitivity_of(self._scene, listed(parameters), droppers=droppers)
+        names = listed(parameters, "parameters")
+        found = rest_sensitivity_of(self._scene, names, droppers=droppers)
         along = {"units": "m"}
         return xr.Dataset(
             {

@@ -13,6 +13,7 @@ import numpy as np
 # Of what evaluates a run, each method loads its own: to open a folder takes none of it.
 from catenary.base.errors import InputError
 from catenary.base.parallel import on_root
+from catenary.callers import path_of
 from catenary.pictures import Pictures
 from catenary.postproc.files.own_files import RUN_FILE
 from catenary.postproc.read.results import Results
@@ -503,7 +504,8 @@ def open(folder: str | Path) -> Run:
     """
     from catenary.postproc.read.guard import examined
 
-    results = Results(Path(folder), examined(Path(folder)))
+    path = path_of(folder, "folder")
+    results = Results(path, examined(path))
     return Run(results, results.path.parent)
 
 

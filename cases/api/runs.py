@@ -7,10 +7,19 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from catenary.base.errors import InputError, RunBroken
 from catenary.base.options import option
 from catenary.base.parallel import on_root
-from catenary.callers import communicator, progress_shown, temporary_folder
+from catenary.callers import (
+    communicator,
+    folder_of,
+    number_of,
+    path_of,
+    progress_shown,
+    temporary_folder,
+)
 from catenary.cases.process.petsc_options import options_of
 from catenary.scenes import SceneLike, checked
 
@@ -70,10 +79,10 @@ def run(
     >>> bool(100 < run.statistics.mean_N["pantograph"] < 130)
     True
     """
-    tables, comm = checked(scene), communicator(comm)
+    given, tables, comm = folder_of(out), checked(scene), communicator(comm)
     with _set_up(tables, progress, comm) as options:
-        if out is not None:
-            made = run_into(Path(out), tables, comm, options, force=force, only_summary=not report)
+        if given is not None:
+            made = run_into(given, tables, comm, options, force=force, only_summary=not report)
             return _returned(made, comm)
         with temporary_folder(comm, "run") as folder:
             made = run_into(folder, tables, comm, options, force=force, only_summary=True)
@@ -127,16 +136,18 @@ def restart(
     >>> longer.outcome, bool(longer.force.position.max() > end + 9.0)
     ('done', True)
     """
-    own, comm, stretch = Path(folder), communicator(comm), None
+    own, comm, stretch = path_of(folder, "folder"), communicator(comm), None
+    until = None if until_m is None else number_of(until_m, "until_m")
     if evaluate is not None:
-        stretch = ":".join(map(str, evaluate))
+        places: Any = evaluate if np.ndim(evaluate) else [evaluate]
+        stretch = ":".join(map(str, places))
 
     def read() -> CheckedScene:
-        return scene_to_continue(own, until_m, stretch)
+        return scene_to_continue(own, until, stretch)
 
     tables = on_root(comm, read, takes_long=True)
     with _set_up(tables, progress, comm) as options:
-        extends = until_m is not None
+        extends = until is not None
         made = go_on(
             own, tables, comm, options, force=force, extends=extends, only_summary=not report
         )

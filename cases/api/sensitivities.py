@@ -69,7 +69,8 @@ def sensitivity(
     >>> row.change, row.unit, bool(0.9 < row.mean_change_N < 1.1)
     (1.0, 'N', True)
     """
-    return derivatives(scene, listed(parameters), droppers=droppers, progress=progress).table()
+    names = listed(parameters, "parameters")
+    return derivatives(scene, names, droppers=droppers, progress=progress).table()
 
 
 def derivatives(

@@ -12,6 +12,7 @@ import numpy as np
 
 from catenary.base.errors import InputError, RunBroken
 from catenary.base.lone_process import alone
+from catenary.callers import number_of, path_of
 from catenary.cases.scene.input.faults import shown
 from catenary.scenes import SceneLike, checked
 from catenary.solver.kernels import native
@@ -56,7 +57,7 @@ class Simulation:
     def __init__(self, scene: SceneLike) -> None:
         self._ended = False
         if isinstance(scene, str | Path) and Path(scene).suffix == _SUFFIX:
-            self._own, self._line = _opened(Path(scene))
+            self._own, self._line = _opened(path_of(scene, "scene"))
             return
         own = checked(scene)
         alone()  # starts MPI as one process, before anything imports it
@@ -211,10 +212,7 @@ class Simulation:
 
     @speed.setter
     def speed(self, value: float) -> None:
-        try:
-            value = float(value)
-        except (TypeError, ValueError):
-            raise InputError(f"speed is {shown(value)}; it must be a number [m/s]") from None
+        value = number_of(value, "speed")
         if self._own.set_speed(value):
             return
         if not (np.isfinite(value) and value >= 0.0):

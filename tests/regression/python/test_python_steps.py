@@ -178,7 +178,7 @@ def test_what_cannot_be_set_is_refused(value: Any, says: str, scene: catenary.Sc
 def test_speeds_that_cannot_be_are_refused(scene: catenary.Scene) -> None:
     with catenary.Simulation(scene) as sim:
         for word in ("fast", None):
-            with pytest.raises(catenary.InputError, match=r"must be a number \[m/s\]"):
+            with pytest.raises(catenary.InputError, match="speed is .*must be a number"):
                 sim.speed = word  # type: ignore[assignment]
         for speed in (-1.0, np.nan, np.inf):
             with pytest.raises(catenary.InputError, match="must be at least 0"):
