@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -21,6 +22,7 @@ from catenary.callers import (
     temporary_folder,
 )
 from catenary.cases.process.petsc_options import options_of
+from catenary.postproc.files.own_files import RUN_FILE
 from catenary.scenes import SceneLike, checked
 
 if TYPE_CHECKING:
@@ -124,7 +126,8 @@ def restart(
     Raises
     ------
     InputError
-        If there is nothing to continue, or if the end is not later.
+        If there is nothing to continue, if a ``Run`` of this program still reads the file to
+        continue, or if the end is not later.
     RunBroken, KeyboardInterrupt
         As of ``run``.
 
@@ -143,6 +146,8 @@ def restart(
         stretch = ":".join(map(str, places))
 
     def read() -> CheckedScene:
+        if until is None:  # the file goes on in its place
+            _refuse_open(own / RUN_FILE)
         return scene_to_continue(own, until, stretch)
 
     tables = on_root(comm, read, takes_long=True)
@@ -152,6 +157,18 @@ def restart(
             own, tables, comm, options, force=force, extends=extends, only_summary=not report
         )
         return _returned(made, comm)
+
+
+def _refuse_open(file: Path) -> None:
+    """Raise InputError if this process reads a file, to which HDF5 then does not write."""
+    from h5py import h5f
+
+    names = [os.fsdecode(h5f.get_name(one)) for one in h5f.get_obj_ids(types=h5f.OBJ_FILE)]
+    there = filter(os.path.exists, names) if file.exists() else ()
+    if any(os.path.samefile(name, file) for name in there):
+        raise InputError(
+            f"{file} is open in this program: close() the run that reads it, then continue it"
+        )
 
 
 def run_into(
@@ -288,13 +305,15 @@ def _set_up(scene: CheckedScene, progress: bool, comm: Any) -> Iterator[list[str
 
 
 def _returned(made: Run, comm: Any, in_memory: bool = False) -> Run:
-    """A run that ended, with its file open, or in memory on all ranks, of which only rank 0 may be
-    able to see the file. Collective. Raises what ``run`` says unless it is done."""
+    """A run that is done, with its file open, or in memory on all ranks, of which only rank 0 may
+    be able to see the file. Collective. Raises what ``run`` says unless it is done."""
     from catenary.results import held
 
     if made.outcome == "interrupted":
         raise KeyboardInterrupt
-    own = held(made, comm, in_memory)
+    # What broke is opened when it is asked for, as a file that is open cannot be continued.
+    opens = in_memory or made.outcome == "done"
+    own = held(made, comm, in_memory) if opens else made
     if own.outcome != "done":
         error = RunBroken(own.outcome)
         error.run = own

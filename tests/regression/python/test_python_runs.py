@@ -261,6 +261,25 @@ def test_a_run_that_breaks_says_so_and_has_what_it_recorded(
     assert not list(temporary.iterdir())
 
 
+def test_what_broke_is_continued_as_soon_as_no_run_reads_it(
+    scene: catenary.Scene, tmp_path: Path
+) -> None:
+    """In a notebook the error stays, and holds its run."""
+    with pytest.raises(catenary.RunBroken, match="iterations") as broken:
+        catenary.run(scene.replace(BREAKS), tmp_path / "run", report=False)
+    with pytest.raises(catenary.RunBroken, match="iterations"):  # and breaks at the same place
+        catenary.restart(tmp_path / "run", report=False)
+    run = broken.value.run
+    assert run.force.sizes["time"] == 1
+    with pytest.raises(catenary.InputError, match=r"is open in this program: close\(\) the run"):
+        catenary.restart(tmp_path / "run", report=False)
+    with pytest.raises(catenary.InputError, match="no picture of statistics. No statistics of"):
+        run.plot.statistics()
+    run.close()
+    with pytest.raises(catenary.RunBroken, match="iterations"):
+        catenary.restart(tmp_path / "run", report=False)
+
+
 @pytest.mark.parametrize("swept", [False, True])
 def test_a_signal_ends_a_run_as_it_ends_python(
     swept: bool, scene: catenary.Scene, temporary: Path
