@@ -236,6 +236,15 @@ def test_memory_holds_all_and_the_disk_nothing(scene: catenary.Scene, temporary:
     assert run.plot.force().axes and run.folder is None and "in memory" in repr(run)
 
 
+def test_every_picture_that_is_named_can_be_drawn() -> None:
+    """Also of a line whose arms have forces and whose wires do not move sideways."""
+    scene = catenary.load("ambrosio2012", short=True)
+    run = catenary.run(scene.replace({"train.end_m": scene["evaluation.to_m"] + 1.0}))
+    assert run.plot.names
+    for name in run.plot.names:
+        assert run.plot(name).axes, name
+
+
 def test_a_refused_scene_leaves_nothing(scene: catenary.Scene, temporary: Path) -> None:
     loose = {"line.dropper.pre_sag_mid_mm": 900.0, "case.accept_unusual": True}
     with pytest.raises(catenary.InputError, match="slack"):
