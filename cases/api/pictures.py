@@ -127,7 +127,7 @@ class Pictures:
         return self("uplift")
 
     def droppers(self) -> Figure:
-        """Forces of the most loaded dropper and of one in the middle of a span; ranges of all [N].
+        """Forces of the dropper with the lowest one and of one at mid-span; ranges of all [N].
 
         Examples
         --------
@@ -136,7 +136,7 @@ class Pictures:
         return self("droppers")
 
     def at_rest(self) -> Figure:
-        """Profile of the contact wire at rest [m], and elasticity along a span [mm/N].
+        """Profile of the contact wire at rest [mm], and elasticity along a span [mm/N].
 
         Examples
         --------

@@ -271,3 +271,45 @@ def test_nothing_is_printed_unless_a_program_asks() -> None:
         [sys.executable, "-c", program], capture_output=True, text=True, check=True
     )
     assert done.stdout == "" and done.stderr == "WARNING:catenary.runner:two\n"
+
+
+def test_derivatives_at_rest_say_what_they_are_and_what_is_left_out(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    from catenary.cases.studies.sensitivity import at_rest
+
+    own, tension = at_rest._derivative, "line.contact_wire.tension_N"
+
+    def derivative(parameter: Any, *rest: Any) -> np.ndarray:
+        if parameter.key == tension:
+            raise catenary.InputError("it makes a dropper slack")
+        return own(parameter, *rest)
+
+    monkeypatch.setattr(at_rest, "_derivative", derivative)
+    found = catenary.static(catenary.load("tramway", short=True)).sensitivity()
+    assert tension not in found.parameter
+    assert found.attrs["left_out"] == [f"{tension}: it makes a dropper slack"]
+    assert {name: found[name].units for name in found.data_vars if name != "unit"} == {
+        "height": "m",
+        "elasticity": "m/N",
+        "by_height": "m per unit of the parameter",
+        "by_elasticity": "m/N per unit of the parameter",
+        "by_unevenness": "1 per unit of the parameter",
+    }
+    assert all(found[name].long_name for name in (*found.data_vars, "x") if name != "unit")
+
+
+def test_derivatives_of_a_march_say_what_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    from catenary.cases.studies.sensitivity import study
+
+    own, tension = study.change_by, "line.contact_wire.tension_N"
+
+    def change_by(parameter: Any, *rest: Any) -> Any:
+        if parameter.key == tension:
+            raise catenary.InputError("it has none")
+        return own(parameter, *rest)
+
+    monkeypatch.setattr(study, "change_by", change_by)
+    table = catenary.sensitivity(catenary.load(CASE, short=True))
+    assert tension not in set(table.parameter)
+    assert table.attrs["left_out"] == [f"{tension}: it has none"]
