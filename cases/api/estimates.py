@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from catenary.cases.studies.uncertainty.run_table import RunTable
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Uncertainty:
     """Estimates from a table of runs, with bounds of 95 % confidence, from ``uncertainty``.
 

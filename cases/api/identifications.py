@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from catenary.cases.studies.identification.task import Task
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Identified:
     """Result of ``identify``. As text it is what the program prints.
 

@@ -35,7 +35,7 @@ Task = str | Path | Mapping[str, Any]
 _PROGRAM = "a study of a Python program"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Optimum:
     """Result of a method of ``optimise``: the better scene, and its comparison with the given one.
 

@@ -78,3 +78,13 @@ def test_a_home_folder_is_that_of_a_shell(monkeypatch: pytest.MonkeyPatch, tmp_p
     monkeypatch.setenv("HOME", str(tmp_path))
     assert path_of("~/run", "out") == tmp_path / "run"
     assert path_of(Path("a/b"), "out") == Path("a/b")
+
+
+def test_results_are_told_apart_and_can_be_collected() -> None:
+    """Tables in them have no truth value, by which they could be compared."""
+    table = {"variant": ["a", "b"], "outcome": ["done", "done"], "std_N": [25.0, 27.0]}
+    table |= {"failed": [[], []], "passed": [True, True]}
+    one, other = catenary.uncertainty(table), catenary.uncertainty(table)
+    assert one != other and len({one, other}) == 2
+    fields = (catenary.Optimum, catenary.Identified, catenary.Uncertainty)
+    assert all(own.__eq__ is object.__eq__ for own in fields)
