@@ -472,6 +472,8 @@ def test_pictures_are_those_of_the_report(in_memory: catenary.Run) -> None:
     labels = {name: [axes.get_ylabel() for axes in own.axes] for name, own in made.items()}
     for name, own in labels.items():
         assert own == [axes.get_ylabel() for axes in plot(name).axes]
+    for figure in (*made.values(), plot.statistics()):  # what IPython asks for
+        assert figure._repr_png_().startswith(b"\x89PNG")  # type: ignore[attr-defined]
     force = made["contact_force"].axes[0]
     assert force.get_xlabel() == "position along the track [m]"
     assert len({str(own) for own in labels.values()}) == len(made)
