@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import logging
+import operator
+import os
 import sys
 import tempfile
-from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
 from catenary.base.errors import InputError
 from catenary.base.lone_process import alone, world
 from catenary.base.parallel import launched_by_mpirun, on_root
+from catenary.cases.scene.input.faults import shown
 
 _PROGRESS = "catenary.progress"
 
@@ -68,16 +71,52 @@ def ending_as_python() -> Iterator[None]:
 
 def n_at_once(jobs: Any) -> int:
     """The argument ``jobs`` of a function. Raises InputError if it is no number of processes."""
-    if not isinstance(jobs, int) or jobs < 0:
-        raise InputError(
-            f"jobs is {jobs!r}; it is a number of processes, or 0 for one on each core"
-        )
-    return jobs
+    with suppress(TypeError):
+        if (n := operator.index(jobs)) >= 0:
+            return n
+    raise InputError(
+        f"jobs is {shown(jobs)}; it is a number of processes, or 0 for one on each core"
+    )
 
 
-def listed(names: str | Sequence[str]) -> list[str]:
-    """Names of an argument, where a text is one name and not one for each of its letters."""
-    return [names] if isinstance(names, str) else list(names)
+def listed(names: str | Sequence[str], argument: str) -> list[str]:
+    """Names of an argument, where a text is one name and not one for each of its letters.
+
+    Raises InputError if it holds no names.
+    """
+    if isinstance(names, str):
+        return [names]
+    if isinstance(names, Iterable):
+        found = list(names)
+        if all(isinstance(name, str) for name in found):
+            return found
+    raise InputError(f"{argument} is {shown(names)}; it must be a name, or a list of names")
+
+
+def number_of(value: Any, argument: str) -> float:
+    """The number of an argument. Raises InputError if it is none."""
+    try:
+        return float(value)
+    except (TypeError, ValueError):
+        raise InputError(f"{argument} is {shown(value)}; it must be a number") from None
+
+
+def path_of(path: Any, argument: str, wanted: str = "a path") -> Path:
+    """The path of an argument, where ~ is the home folder, as in a shell.
+
+    Raises InputError if it is none; ``wanted`` says what the argument may be.
+    """
+    if isinstance(path, str | os.PathLike):
+        text = os.fspath(path)
+        if isinstance(text, str) and text and "\0" not in text:
+            with suppress(RuntimeError):  # a user whom nobody knows
+                return Path(text).expanduser()
+    raise InputError(f"{argument} is {shown(path)}; it must be {wanted}")
+
+
+def folder_of(out: Any) -> Path | None:
+    """The folder ``out`` of a function, None if nothing is to be written. InputError as above."""
+    return None if out is None else path_of(out, "out")
 
 
 def say_nothing(text: str) -> None:

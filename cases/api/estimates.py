@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from catenary.base.errors import InputError
+from catenary.callers import path_of
 from catenary.scenes import plain_value
 
 if TYPE_CHECKING:
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     from catenary.cases.studies.uncertainty.run_table import RunTable
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Uncertainty:
     """Estimates from a table of runs, with bounds of 95 % confidence, from ``uncertainty``.
 
@@ -127,7 +128,7 @@ def uncertainty(
 
     where = "the table"
     if isinstance(table, str | Path):
-        runs, where = read_run_table(Path(table)), str(table)
+        runs, where = read_run_table(path_of(table, "table")), str(table)
     else:
         try:
             runs = run_table(pd.DataFrame(table))
@@ -171,4 +172,4 @@ def sampling_like(sample: Mapping[str, Any] | str | Path) -> tuple[SamplingTable
     if isinstance(sample, Mapping):
         where = "the table given as sample"
         return sampling_of(plain_value(sample, "sample"), where), where
-    return read_sampling(Path(sample)), str(sample)
+    return read_sampling(path_of(sample, "sample", "a file, or its tables")), str(sample)

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from catenary.base.lone_process import alone
-from catenary.callers import say_nothing, say_on_error_stream
+from catenary.callers import path_of, say_nothing, say_on_error_stream
 from catenary.postproc.evaluate.wording import counted
-from catenary.scenes import Scene, SceneLike, checked, scene_of
+from catenary.scenes import Scene, SceneLike, checked, plain_value, scene_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from catenary.cases.studies.identification.task import Task
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Identified:
     """Result of ``identify``. As text it is what the program prints.
 
@@ -155,7 +155,9 @@ def identified(
     from catenary.cases.studies.identification import output
     from catenary.cases.studies.identification.study import identify as find
 
-    samples = measured if isinstance(measured, pd.DataFrame) else Path(measured)
+    samples = measured
+    if not isinstance(samples, pd.DataFrame):
+        samples = path_of(measured, "measured", "a table of pandas, or a file")
     found = find(checked(scene), samples, task, comm, say)
     tables = [
         pd.DataFrame(table.records())
@@ -192,7 +194,9 @@ def task_of(task: str | Path | Mapping[str, Any]) -> Task:
     from catenary.cases.studies.identification.task import Task
     from catenary.cases.studies.task_files import read_task
 
-    return read_task(task if isinstance(task, Mapping) else Path(task), Task)
+    if isinstance(task, Mapping):
+        return read_task(plain_value(task, "the task"), Task)
+    return read_task(path_of(task, "task", "a file, or its tables"), Task)
 
 
 def write_identified(found: Identified, folder: Path) -> list[Path]:

@@ -312,7 +312,9 @@ class AtRest:
         xarray.Dataset
             ``height`` (wire, x) [m] and ``elasticity`` (x) [m/N]; per unit of each parameter
             ``by_height`` (parameter, wire, x), ``by_elasticity`` (parameter, x) and
-            ``by_unevenness`` (parameter); ``unit`` (parameter) of its key.
+            ``by_unevenness`` (parameter), which is (max - min) / (max + min) of the elasticity
+            along the span; ``unit`` (parameter) of its key. Its attribute ``left_out`` has
+            sentences on usual parameters by which the line has no derivative.
 
         Raises
         ------
@@ -330,22 +332,35 @@ class AtRest:
         from catenary.callers import listed
         from catenary.cases.studies.sensitivity.at_rest import rest_sensitivity_of
 
-        found = rest_sensitivity_of(self._scene, listed(parameters), droppers=droppers)
-        along = {"units": "m"}
+        names = listed(parameters, "parameters")
+        found = rest_sensitivity_of(self._scene, names, droppers=droppers)
+        height = {"units": "m", "long_name": "height of the contact wire at rest above top of rail"}
+        lift = {"units": "m/N", "long_name": "elasticity"}
+
+        def per_unit(of: dict[str, str]) -> dict[str, str]:
+            name = f"change of {of['long_name']} by one unit of the parameter"
+            return {"units": f"{of['units']} per unit of the parameter", "long_name": name}
+
+        uneven = {"units": "1", "long_name": "unevenness of the elasticity"}
         return xr.Dataset(
             {
-                "height": (("wire", "x"), found.height.T, along),
-                "elasticity": ("x", found.elasticity, {"units": "m/N"}),
-                "by_height": (("parameter", "wire", "x"), found.by_height.transpose(0, 2, 1)),
-                "by_elasticity": (("parameter", "x"), found.by_elasticity),
-                "by_unevenness": ("parameter", found.by_unevenness),
+                "height": (("wire", "x"), found.height.T, height),
+                "elasticity": ("x", found.elasticity, lift),
+                "by_height": (
+                    ("parameter", "wire", "x"),
+                    found.by_height.transpose(0, 2, 1),
+                    per_unit(height),
+                ),
+                "by_elasticity": (("parameter", "x"), found.by_elasticity, per_unit(lift)),
+                "by_unevenness": ("parameter", found.by_unevenness, per_unit(uneven)),
                 "unit": ("parameter", [one.unit for one in found.parameters]),
             },
             {
                 "parameter": [one.key for one in found.parameters],
                 "wire": found.wires,
-                "x": ("x", found.x, along),
+                "x": ("x", found.x, {"units": "m", "long_name": "position along the track"}),
             },
+            {"left_out": [f"{key}: {why}" for key, why in found.left_out.items()]},
         )
 
     def __str__(self) -> str:

@@ -9,7 +9,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from catenary.base.lone_process import alone
-from catenary.callers import ending_as_python, n_at_once, say_nothing, say_on_error_stream
+from catenary.callers import (
+    ending_as_python,
+    folder_of,
+    n_at_once,
+    path_of,
+    say_nothing,
+    say_on_error_stream,
+)
 from catenary.cases.studies.optimise.task import OptimiseTask
 from catenary.cases.studies.task_files import read_task
 from catenary.cases.studies.tolerance.task import ToleranceTask
@@ -28,7 +35,7 @@ Task = str | Path | Mapping[str, Any]
 _PROGRAM = "a study of a Python program"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Optimum:
     """Result of a method of ``optimise``: the better scene, and its comparison with the given one.
 
@@ -315,7 +322,7 @@ def _made(
     from catenary.cases.studies.records import held_study
     from catenary.cases.studies.scene_sets import workers
 
-    n_jobs, folder = n_at_once(jobs), None if out is None else Path(out)
+    n_jobs, folder = n_at_once(jobs), folder_of(out)
     if folder is not None:
         refuse_table(folder / table, force)
     plan = make_plan()
@@ -331,4 +338,4 @@ def _task(task: Task, model: Any) -> Any:
     """A checked task."""
     if isinstance(task, Mapping):
         return read_task(plain_value(task, "the task"), model)
-    return read_task(Path(task), model)
+    return read_task(path_of(task, "task", "a file, or its tables"), model)

@@ -91,6 +91,11 @@ class Pictures:
     def statistics(self) -> Figure:
         """Mean, deviation and extremes of the contact force of each pantograph as bars [N].
 
+        Raises
+        ------
+        InputError
+            If there is no record to evaluate, as of all pictures.
+
         Examples
         --------
         >>> figure = run.plot.statistics()
@@ -98,6 +103,9 @@ class Pictures:
         from catenary.postproc.report.pictures import figures, force_pictures
 
         evaluated = self._evaluated()
+        complaints = [one.complaint for one in evaluated.pantographs]
+        if all(complaints):
+            raise InputError(f"the run has no picture of statistics. {complaints[0]}")
         return figures.fitted(force_pictures.force_statistics(self._results(), evaluated))
 
     def histogram(self) -> Figure:
@@ -119,7 +127,7 @@ class Pictures:
         return self("uplift")
 
     def droppers(self) -> Figure:
-        """Forces of the most loaded dropper and of one in the middle of a span; ranges of all [N].
+        """Forces of the dropper with the lowest one and of one at mid-span; ranges of all [N].
 
         Examples
         --------
@@ -128,7 +136,7 @@ class Pictures:
         return self("droppers")
 
     def at_rest(self) -> Figure:
-        """Profile of the contact wire at rest [m], and elasticity along a span [mm/N].
+        """Profile of the contact wire at rest [mm], and elasticity along a span [mm/N].
 
         Examples
         --------

@@ -12,8 +12,10 @@ from catenary.base.lone_process import alone
 from catenary.base.parallel import on_root
 from catenary.callers import (
     ending_as_python,
+    folder_of,
     listed,
     n_at_once,
+    number_of,
     say_nothing,
     say_on_error_stream,
 )
@@ -100,9 +102,15 @@ def highest_speeds(
     """
     from catenary.cases.studies.questions.highest_speed import TABLE, Speeds
 
-    speeds = Speeds(float(slowest), float(fastest), float(step), float(within))
+    speeds = Speeds(
+        number_of(slowest, "slowest"),
+        number_of(fastest, "fastest"),
+        number_of(step, "step"),
+        number_of(within, "within"),
+    )
+    names = listed(criteria, "criteria")
     with _marching(scene, out, TABLE, speeds.first, jobs, force, progress) as (marching, own):
-        return find_speeds(marching, own, speeds, listed(criteria), direction).table()
+        return find_speeds(marching, own, speeds, names, direction).table()
 
 
 def separations(
@@ -155,7 +163,9 @@ def separations(
     """
     from catenary.cases.studies.questions.separation import TABLE, Distances
 
-    distances = Distances(float(nearest), float(farthest), float(step))
+    distances = Distances(
+        number_of(nearest, "nearest"), number_of(farthest, "farthest"), number_of(step, "step")
+    )
     with _marching(scene, out, TABLE, distances.values, jobs, force, progress) as (marching, own):
         return find_separations(marching, own, distances, explained=out is not None).table()
 
@@ -177,7 +187,7 @@ def _marching(
     from catenary.cases.result_folder.output_folder import refuse_table
 
     check()
-    n_jobs, folder = n_at_once(jobs), None if out is None else Path(out)
+    n_jobs, folder = n_at_once(jobs), folder_of(out)
     if folder is not None:
         refuse_table(folder / table, force)
     given = scene_of(scene)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from copy import deepcopy
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,6 +13,7 @@ import numpy as np
 # Of what evaluates a run, each method loads its own: to open a folder takes none of it.
 from catenary.base.errors import InputError
 from catenary.base.parallel import on_root
+from catenary.callers import path_of
 from catenary.pictures import Pictures
 from catenary.postproc.files.own_files import RUN_FILE
 from catenary.postproc.read.results import Results
@@ -73,15 +75,23 @@ class Run:
         """Results that are open, or None to open those of the folder when they are asked for;
         ``told`` is how the run ended, if this process made it."""
         if results is not None:
-            self._results = results
+            self._file = results
         self._folder = folder
         self._told = told
+        self._is_closed = False
         self.plot = Pictures(lambda: self._results, lambda: self._evaluated)
 
     @cached_property
-    def _results(self) -> Results:
+    def _file(self) -> Results:
         assert self._folder is not None
         return Results(self._folder)
+
+    @property
+    def _results(self) -> Results:
+        """What tables are read from."""
+        if self._is_closed:
+            raise InputError("this run is closed; read tables before, or open its folder again")
+        return self._file
 
     @property
     def folder(self) -> Path | None:
@@ -103,7 +113,7 @@ class Run:
         >>> run.outcome
         'done'
         """
-        return self._results.outcome if self._told is None else self._told.outcome
+        return self._file.outcome if self._told is None else self._told.outcome
 
     @cached_property
     def scene(self) -> Scene:
@@ -122,8 +132,8 @@ class Run:
         from catenary.cases.scene.load import Draft
         from catenary.scenes import Scene
 
-        file = "the scene of the run" if self._folder is None else str(self._results.path)
-        return Scene(Draft(self._results.attributes["config"], file, recorded=True))
+        file = "the scene of the run" if self._folder is None else str(self._file.path)
+        return Scene(Draft(self._file.attributes["config"], file, recorded=True))
 
     @cached_property
     def _evaluated(self) -> RunStatistics:
@@ -131,15 +141,19 @@ class Run:
 
         return evaluate(self._results)
 
-    @cached_property
+    @property
     def summary(self) -> dict[str, Any]:
-        """The figures of ``summary.json`` as numbers, texts, lists and tables.
+        """The figures of ``summary.json`` as numbers, texts, lists and tables, new at each call.
 
         Examples
         --------
         >>> run.summary["case"], run.summary["speed_km_h"]
         ('en50318_2002', 250.0)
         """
+        return deepcopy(self._summary)
+
+    @cached_property
+    def _summary(self) -> dict[str, Any]:
         if self._told is not None and self._told.summary:
             return self._told.summary
         from catenary.postproc.evaluate.verdict import criteria_of
@@ -157,7 +171,7 @@ class Run:
         >>> {"equilibrium", "march"} <= set(run.phase_wall)
         True
         """
-        return self.summary["phase_wall_s"] if self._told is None else self._told.phase_wall
+        return dict(self._summary["phase_wall_s"] if self._told is None else self._told.phase_wall)
 
     @property
     def statistics(self) -> pd.DataFrame:
@@ -172,7 +186,7 @@ class Run:
         >>> bool(100 < run.statistics.loc["pantograph", "mean_N"] < 130)
         True
         """
-        return _table(self.summary["pantographs"]).set_index("name")
+        return _table(self._summary["pantographs"]).set_index("name")
 
     @property
     def verdict(self) -> pd.DataFrame:
@@ -187,7 +201,7 @@ class Run:
         >>> run.verdict.set_index("criterion").loc["mean contact force", "unit"]
         'N'
         """
-        found = _table(self.summary["acceptance"])
+        found = _table(self._summary["acceptance"])
         return found.astype({"passed": "boolean"})
 
     @property
@@ -199,7 +213,7 @@ class Run:
         >>> run.not_judged["because"].tolist()
         ['no contact wire moves sideways in this run']
         """
-        return _table(self.summary["not_judged"])
+        return _table(self._summary["not_judged"])
 
     @property
     def passed(self) -> bool | None:
@@ -210,7 +224,7 @@ class Run:
         >>> run.passed
         True
         """
-        found: bool | None = self.summary["passed"]
+        found: bool | None = self._summary["passed"]
         return found
 
     @property
@@ -222,7 +236,7 @@ class Run:
         >>> all(isinstance(sentence, str) for sentence in run.remarks)
         True
         """
-        return [*self.summary["complaints"], *self.summary["remarks"]]
+        return [*self._summary["complaints"], *self._summary["remarks"]]
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -330,7 +344,8 @@ class Run:
     def filtered_force(self) -> xr.DataArray:
         """Contact force of each pantograph below 20 Hz, (n_times, n_pantographs) [N].
 
-        Attributes ``filter``, ``cut_off_Hz`` and ``order`` name the filter. The file of a run that
+        Below 0 by some newton beside losses of contact, as the filter rings there. Attributes
+        ``filter``, ``cut_off_Hz`` and ``order`` name the filter. The file of a run that
         is done holds it; of others it is made of the record.
 
         Raises
@@ -352,7 +367,9 @@ class Run:
 
             stored = filters.low_pass(force.values, self._results.dt), dict(filters.ABOUT)
         values, about = stored
-        return force.copy(data=values).assign_attrs(about).rename("filtered_force")
+        name = f"contact force below {about['cut_off_Hz']:g} Hz"
+        named = force.copy(data=values).assign_attrs(about, long_name=name)
+        return named.rename("filtered_force")
 
     @property
     def uplift(self) -> xr.Dataset:
@@ -374,8 +391,8 @@ class Run:
         about = {"units": "m", "long_name": "largest uplift over every step"}
         recorded = {"uplift": self.channel("arm_uplift")} if self._results.has("arm_uplift") else {}
         return xr.Dataset(
-            {**recorded, "largest": (dim, found.uplift, about)},
-            {**self._columns(channels.ARM), "evaluated": (dim, found.evaluated)},
+            {**recorded, "largest": (dim, found.uplift.copy(), about)},
+            {**self._columns(channels.ARM), "evaluated": (dim, found.evaluated.copy())},
         )
 
     @property
@@ -404,23 +421,30 @@ class Run:
         names = np.array([*results.roles], dtype=str)
         upper, lower = results.dropper_wires().T
         slack = (found.lowest <= 0.0) & slackens_at_all(results)
-        of_force = {"units": "N"}
         recorded = {"force": self.channel("dropper_force")} if results.has("dropper_force") else {}
+
+        def column(values: np.ndarray, long_name: str, **unit: str) -> tuple[str, np.ndarray, Any]:
+            return dim, values.copy(), {**unit, "long_name": long_name}
+
         return xr.Dataset(
             {
                 **recorded,
-                "largest": (dim, found.highest, of_force),
-                "smallest": (dim, found.lowest, of_force),
-                "slackened": (dim, slack),
-                "force_at_rest": (dim, results.static("dropper_force"), of_force),
-                "length": (dim, results.static("dropper_length"), {"units": "m"}),
+                "largest": column(found.highest, "largest tension over every step", units="N"),
+                "smallest": column(found.lowest, "smallest tension over every step", units="N"),
+                "slackened": column(slack, "whether the dropper was slack at some time"),
+                "force_at_rest": column(
+                    results.static("dropper_force"), "tension at rest", units="N"
+                ),
+                "length": column(
+                    results.static("dropper_length"), "length unstretched, as cut", units="m"
+                ),
             },
             {
                 **self._columns(channels.DROPPER),
                 "span": (dim, results.line("dropper_span").astype(int) + 1),
                 "hangs_from": (dim, names[upper]),
                 "carries": (dim, names[lower]),
-                "evaluated": (dim, found.evaluated),
+                "evaluated": (dim, found.evaluated.copy()),
             },
         )
 
@@ -431,7 +455,15 @@ class Run:
         --------
         >>> catenary.open(folder).close()
         """
-        self._results.close()
+        self._is_closed = True
+        if "_file" in self.__dict__:
+            self._file.close()
+
+    def __reduce__(self) -> tuple[Callable[..., Run], tuple[Any, ...]]:
+        """Processes give it to each other: by its folder, or with all of its file in memory."""
+        if self._folder is None:
+            return _in_memory, (str(self._results.path), self._results.image(), self._told)
+        return Run, (None, self._folder.absolute(), self._told)
 
     def __enter__(self) -> Run:
         return self
@@ -440,7 +472,7 @@ class Run:
         self.close()
 
     def __repr__(self) -> str:
-        about = self._results.attributes
+        about = self._file.attributes
         where = "in memory" if self._folder is None else f"in {self._folder}"
         return f"<catenary.Run {about['case']}, {where}: {self.outcome}>"
 
@@ -472,7 +504,8 @@ def open(folder: str | Path) -> Run:
     """
     from catenary.postproc.read.guard import examined
 
-    results = Results(Path(folder), examined(Path(folder)))
+    path = path_of(folder, "folder")
+    results = Results(path, examined(path))
     return Run(results, results.path.parent)
 
 
@@ -485,7 +518,12 @@ def held(run: Run, comm: Any, in_memory: bool) -> Run:
     path = run.folder / RUN_FILE
     if not in_memory:
         return Run(Results(path), run.folder, run._told)
-    return Run(Results(path, image=on_root(comm, path.read_bytes)), None, run._told)
+    return _in_memory(path, on_root(comm, path.read_bytes), run._told)
+
+
+def _in_memory(path: str | Path, image: bytes, told: RunOutcome | None) -> Run:
+    """A run from the bytes of its file, which stood at ``path``."""
+    return Run(Results(path, image=image), None, told)
 
 
 def _about(channel: channels.Channel) -> dict[str, str]:

@@ -2,16 +2,27 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from catenary.base.errors import InputError, RunBroken
 from catenary.base.options import option
 from catenary.base.parallel import on_root
-from catenary.callers import communicator, progress_shown, temporary_folder
+from catenary.callers import (
+    communicator,
+    folder_of,
+    number_of,
+    path_of,
+    progress_shown,
+    temporary_folder,
+)
 from catenary.cases.process.petsc_options import options_of
+from catenary.postproc.files.own_files import RUN_FILE
 from catenary.scenes import SceneLike, checked
 
 if TYPE_CHECKING:
@@ -70,10 +81,10 @@ def run(
     >>> bool(100 < run.statistics.mean_N["pantograph"] < 130)
     True
     """
-    tables, comm = checked(scene), communicator(comm)
+    given, tables, comm = folder_of(out), checked(scene), communicator(comm)
     with _set_up(tables, progress, comm) as options:
-        if out is not None:
-            made = run_into(Path(out), tables, comm, options, force=force, only_summary=not report)
+        if given is not None:
+            made = run_into(given, tables, comm, options, force=force, only_summary=not report)
             return _returned(made, comm)
         with temporary_folder(comm, "run") as folder:
             made = run_into(folder, tables, comm, options, force=force, only_summary=True)
@@ -115,7 +126,8 @@ def restart(
     Raises
     ------
     InputError
-        If there is nothing to continue, or if the end is not later.
+        If there is nothing to continue, if a ``Run`` of this program still reads the file to
+        continue, or if the end is not later.
     RunBroken, KeyboardInterrupt
         As of ``run``.
 
@@ -127,20 +139,36 @@ def restart(
     >>> longer.outcome, bool(longer.force.position.max() > end + 9.0)
     ('done', True)
     """
-    own, comm, stretch = Path(folder), communicator(comm), None
+    own, comm, stretch = path_of(folder, "folder"), communicator(comm), None
+    until = None if until_m is None else number_of(until_m, "until_m")
     if evaluate is not None:
-        stretch = ":".join(map(str, evaluate))
+        places: Any = evaluate if np.ndim(evaluate) else [evaluate]
+        stretch = ":".join(map(str, places))
 
     def read() -> CheckedScene:
-        return scene_to_continue(own, until_m, stretch)
+        if until is None:  # the file goes on in its place
+            _refuse_open(own / RUN_FILE)
+        return scene_to_continue(own, until, stretch)
 
     tables = on_root(comm, read, takes_long=True)
     with _set_up(tables, progress, comm) as options:
-        extends = until_m is not None
+        extends = until is not None
         made = go_on(
             own, tables, comm, options, force=force, extends=extends, only_summary=not report
         )
         return _returned(made, comm)
+
+
+def _refuse_open(file: Path) -> None:
+    """Raise InputError if this process reads a file, to which HDF5 then does not write."""
+    from h5py import h5f
+
+    names = [os.fsdecode(h5f.get_name(one)) for one in h5f.get_obj_ids(types=h5f.OBJ_FILE)]
+    there = filter(os.path.exists, names) if file.exists() else ()
+    if any(os.path.samefile(name, file) for name in there):
+        raise InputError(
+            f"{file} is open in this program: close() the run that reads it, then continue it"
+        )
 
 
 def run_into(
@@ -277,13 +305,15 @@ def _set_up(scene: CheckedScene, progress: bool, comm: Any) -> Iterator[list[str
 
 
 def _returned(made: Run, comm: Any, in_memory: bool = False) -> Run:
-    """A run that ended, with its file open, or in memory on all ranks, of which only rank 0 may be
-    able to see the file. Collective. Raises what ``run`` says unless it is done."""
+    """A run that is done, with its file open, or in memory on all ranks, of which only rank 0 may
+    be able to see the file. Collective. Raises what ``run`` says unless it is done."""
     from catenary.results import held
 
     if made.outcome == "interrupted":
         raise KeyboardInterrupt
-    own = held(made, comm, in_memory)
+    # What broke is opened when it is asked for, as a file that is open cannot be continued.
+    opens = in_memory or made.outcome == "done"
+    own = held(made, comm, in_memory) if opens else made
     if own.outcome != "done":
         error = RunBroken(own.outcome)
         error.run = own

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from os import PathLike, fspath
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from catenary.base.errors import InputError
 from catenary.cases.scene.input.case_files import titles
@@ -16,6 +17,9 @@ from catenary.cases.scene.keys.keys import is_known, known_keys
 from catenary.cases.scene.load import Draft, read_draft
 from catenary.cases.scene.problem import resolved
 from catenary.cases.scene.scene import Scene as CheckedScene
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 class Scene:
@@ -32,6 +36,9 @@ class Scene:
     >>> scene.replace(train={"speed_km_h": 275})["train.speed_km_h"]
     275.0
     """
+
+    __slots__ = ("_checked", "_draft")  # what has no such name cannot be set by mistake
+    __iter__: None = None  # not from the numbers on for which ``__getitem__`` has a value
 
     def __init__(self, draft: Draft) -> None:
         self._draft = draft
@@ -59,18 +66,20 @@ class Scene:
         """
         return self._checked.case.title
 
-    def replace(self, changes: Mapping[str, Any] | None = None, /, **tables: Any) -> Scene:
+    def replace(
+        self, changes: Mapping[str, Any] | pd.Series | None = None, /, **tables: Any
+    ) -> Scene:
         """This scene with other values, checked at once. Not collective.
 
         Parameters
         ----------
-        changes : mapping, optional
+        changes : mapping or pandas.Series, optional
             Values by dotted keys, such as ``{"train.speed_km_h": 275}``. A table changes the keys
             that it names and no others; a list replaces the whole list, unless its number is part
             of the key (``train.pantographs.1.behind_m``). ``None`` takes a key away, so that its
             default holds.
         **tables : Any
-            The same by tables: ``train={"speed_km_h": 275}``.
+            The same by tables: ``train={"speed_km_h": 275}``; they hold where both name a key.
 
         Returns
         -------
@@ -92,13 +101,21 @@ class Scene:
         Traceback (most recent call last):
         catenary.base.errors.InputError: train.sped_km_h in replace() is unknown; did you mean train.speed_km_h?
         """  # noqa: E501
-        return Scene(self._draft.assigned(_values({**(changes or {}), **tables}, "in replace()")))
+        table: Any = {} if changes is None else changes
+        if hasattr(table, "to_dict"):  # a row of a table of pandas
+            table = table.to_dict()
+        if not isinstance(table, Mapping):
+            raise InputError(f"replace() has {shown(table)}; it takes a table of values by keys")
+        given = (table, tables)
+        return Scene(self._draft.assigned(v for own in given for v in _values(own, "in replace()")))
 
     def __getitem__(self, key: str) -> Any:
         """The value that holds of a dotted key, None where none does.
 
         Tables are dictionaries, and the number of an entry of a list is part of the key.
         """
+        if not isinstance(key, str):
+            raise InputError(f"{shown(key)} is no key; a key is a text, as in train.speed_km_h")
         here: Any = resolved(self._checked)
         for part in key.split("."):
             if isinstance(here, list) and part.isdigit() and int(part) < len(here):
@@ -134,14 +151,15 @@ class Scene:
 SceneLike = Scene | str | Path | Mapping[str, Any]
 
 
-def load(scene: str | Path | Mapping[str, Any], *, short: bool = False) -> Scene:
+def load(scene: SceneLike, *, short: bool = False) -> Scene:
     """Load a scene and check it. Not collective.
 
     Parameters
     ----------
-    scene : str, Path or mapping
+    scene : str, Path, mapping or Scene
         The name of a shipped case (``catenary list``), a case file or its folder, or the tables of
-        a scene as nested dictionaries. Paths in these are relative to the working directory.
+        a scene as nested dictionaries. Paths in these are relative to the working directory. A
+        scene that was loaded stands for itself.
     short : bool
         Whether to apply the ``[test]`` table of the case, which shortens its run to seconds.
 
@@ -164,14 +182,20 @@ def load(scene: str | Path | Mapping[str, Any], *, short: bool = False) -> Scene
     ...     print(len(error.faults) > 1, error.faults[0].key)
     True line.n_spans
     """
-    if isinstance(scene, Mapping):
+    if isinstance(scene, Scene):
+        draft = scene._draft
+    elif isinstance(scene, Mapping):
         raw = plain_value(scene, "the scene")
         case = raw.setdefault("case", {})
         if isinstance(case, dict):
             case.setdefault("name", "scene")
         draft = Draft(raw, "the table given to load()")
+    elif isinstance(scene, str | PathLike):
+        draft = read_draft(fspath(scene))
     else:
-        draft = read_draft(scene)
+        raise InputError(
+            f"the scene is {shown(scene)}; it must be a name, a path, its tables or a Scene"
+        )
     return Scene(draft.shortened() if short else draft)
 
 
@@ -228,13 +252,17 @@ def plain_value(value: Any, where: str, depth: int = 0) -> Any:
         return {
             str(key): plain_value(own, f"{where}.{key}", depth + 1) for key, own in value.items()
         }
-    if isinstance(value, list | tuple):
+    if hasattr(value, "to_numpy"):  # arrays of xarray, series of pandas
+        value = value.to_numpy()
+    if hasattr(value, "tolist"):  # arrays and scalars of NumPy
+        value = value.tolist()
+    if isinstance(value, list | tuple | range):
         return [plain_value(own, where, depth + 1) for own in value]
     if isinstance(value, Path):
         return str(value)
-    if hasattr(value, "tolist"):  # arrays and scalars of NumPy, series of pandas
-        return value.tolist()
     if isinstance(value, bool | int | float | str):
         return value
     kind = type(value).__name__
-    raise InputError(f"{where} is a {kind}; it must be a number, a text, a list or a table")
+    raise InputError(
+        f"{where} is of the type {kind}; it must be a number, a text, a list or a table"
+    )

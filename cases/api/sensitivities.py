@@ -51,7 +51,8 @@ def sensitivity(
     pandas.DataFrame
         A row for each parameter and pantograph, with the columns of ``sensitivity.csv``; first what
         changes the standard deviation most. Changes are those under ``change`` of the parameter, in
-        the ``unit`` of its key.
+        the ``unit`` of its key. ``table.attrs["left_out"]`` has sentences on usual parameters by
+        which the march has no derivative.
 
     Raises
     ------
@@ -69,7 +70,8 @@ def sensitivity(
     >>> row.change, row.unit, bool(0.9 < row.mean_change_N < 1.1)
     (1.0, 'N', True)
     """
-    return derivatives(scene, listed(parameters), droppers=droppers, progress=progress).table()
+    names = listed(parameters, "parameters")
+    return derivatives(scene, names, droppers=droppers, progress=progress).table()
 
 
 def derivatives(
@@ -111,7 +113,9 @@ class Derivatives:
 
         from catenary.cases.studies.sensitivity.output import table_of
 
-        return pd.DataFrame(table_of(self._own).records())
+        table = pd.DataFrame(table_of(self._own).records())
+        table.attrs["left_out"] = [f"{key}: {why}" for key, why in self._own.left_out.items()]
+        return table
 
     def write(self, folder: Path) -> list[Path]:
         """Write ``sensitivity.csv`` into a folder; returns the files. Not collective."""

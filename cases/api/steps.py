@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import operator
 import tempfile
+from hashlib import blake2b, file_digest
 from pathlib import Path
 from typing import Any
 
@@ -10,11 +12,13 @@ import numpy as np
 
 from catenary.base.errors import InputError, RunBroken
 from catenary.base.lone_process import alone
+from catenary.callers import number_of, path_of
 from catenary.cases.scene.input.faults import shown
 from catenary.scenes import SceneLike, checked
 from catenary.solver.kernels import native
 
 _SUFFIX = ".line"
+_NAME = 16  # bytes at the begin of a state that name its line
 
 
 class Simulation:
@@ -48,10 +52,12 @@ class Simulation:
     1.0
     """
 
+    __slots__ = ("_ended", "_line", "_own")  # what has no such name cannot be set by mistake
+
     def __init__(self, scene: SceneLike) -> None:
         self._ended = False
         if isinstance(scene, str | Path) and Path(scene).suffix == _SUFFIX:
-            self._own = _opened(Path(scene))
+            self._own, self._line = _opened(path_of(scene, "scene"))
             return
         own = checked(scene)
         alone()  # starts MPI as one process, before anything imports it
@@ -60,7 +66,7 @@ class Simulation:
         with tempfile.TemporaryDirectory(prefix="catenary_line_") as folder:
             path = Path(folder) / f"scene{_SUFFIX}"
             prepare_line(own, path)
-            self._own = _opened(path)
+            self._own, self._line = _opened(path)
 
     def step(self, n: int = 1) -> bool:
         """Take steps.
@@ -77,6 +83,8 @@ class Simulation:
 
         Raises
         ------
+        InputError
+            If it is no number of steps.
         RunBroken
             If the forces of a step cannot be found, or if the end had come before this call.
 
@@ -85,17 +93,21 @@ class Simulation:
         >>> sim.step(), sim.steps_left > 0
         (True, True)
         """
-        if n < 0:
-            raise InputError(f"step({n}) must take a number of steps that is not negative")
-        if self._ended and n:
+        try:
+            steps = operator.index(n)
+        except TypeError:
+            steps = -1
+        if steps < 0:
+            raise InputError(f"step({shown(n)}) must take a whole number of steps, at least 0")
+        if self._ended and steps:
             raise RunBroken(
                 f"the train is at the end of its way, after {self.time:g} s: restore() an earlier "
                 "state, or end the loop when step() returns False"
             )
         try:
-            done = self._own.step(n)
+            done = self._own.step(min(steps, self.steps_left + 1))
         except RuntimeError as error:
-            raise RunBroken(str(error)) from error
+            raise RunBroken(f"{error} after {self.time:g} s") from error
         self._ended = not done
         return done
 
@@ -112,7 +124,7 @@ class Simulation:
         >>> sim.time == before
         True
         """
-        return self._own.save()
+        return self._line + self._own.save()
 
     def restore(self, state: bytes) -> None:
         """Go back to a state of this line.
@@ -120,7 +132,8 @@ class Simulation:
         Parameters
         ----------
         state : bytes
-            What ``save`` gave, of this object or another one of the same line.
+            What ``save`` gave, of this object or another one of the same file ``*.line``. Each
+            object of a scene has prepared a line of its own.
 
         Raises
         ------
@@ -131,10 +144,18 @@ class Simulation:
         --------
         >>> sim.restore(sim.save())
         """
+        if not isinstance(state, bytes | bytearray | memoryview):
+            raise InputError(f"the state is {shown(state)}; it must be the bytes that save() gave")
+        line, own = bytes(state[:_NAME]), bytes(state[_NAME:])
         try:
-            self._own.restore(state)
+            if line != self._line:
+                raise ValueError("this is no state of this line")
+            self._own.restore(own)
         except ValueError as error:
-            raise InputError(str(error)) from error
+            raise InputError(
+                f"{error}: a state fits the Simulation that saved it, and others of the same "
+                f"{_SUFFIX} file"
+            ) from error
         self._ended = False
 
     @property
@@ -191,7 +212,8 @@ class Simulation:
 
     @speed.setter
     def speed(self, value: float) -> None:
-        if self._own.set_speed(float(value)):
+        value = number_of(value, "speed")
+        if self._own.set_speed(value):
             return
         if not (np.isfinite(value) and value >= 0.0):
             raise InputError(f"speed is {value}; it must be at least 0 [m/s]")
@@ -370,6 +392,11 @@ class Simulation:
         if not isinstance(self._own, _Closed):
             self._own = _Closed(self._own.time)  # type: ignore[assignment]
 
+    def __repr__(self) -> str:
+        closed = isinstance(self._own, _Closed)
+        left = "closed" if closed else f"{self.steps_left} steps left"
+        return f"<catenary.Simulation at {self.time:g} s, {left}>"
+
     def __enter__(self) -> Simulation:
         return self
 
@@ -402,8 +429,15 @@ class _Closed:
         raise InputError("this simulation is closed; make another one, or leave its context later")
 
 
-def _opened(path: Path) -> native.Simulation:
+def _opened(path: Path) -> tuple[native.Simulation, bytes]:
+    """The line of a file, and what names it in states.
+
+    Numbers of a state lie in the order in which the arrays of the line lay in the memory of the
+    process that prepared it, so that files of one scene differ, too.
+    """
     try:
-        return native.Simulation(str(path))
+        own = native.Simulation(str(path))
     except RuntimeError as error:
         raise InputError(str(error)) from error
+    with path.open("rb") as file:
+        return own, file_digest(file, lambda: blake2b(digest_size=_NAME)).digest()

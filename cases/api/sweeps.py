@@ -12,6 +12,7 @@ from catenary.base.errors import InputError
 from catenary.base.parallel import on_root
 from catenary.callers import (
     communicator,
+    folder_of,
     listed,
     n_at_once,
     progress_shown,
@@ -101,10 +102,10 @@ def sweep(
     >>> table["train.speed_km_h"].tolist(), bool(table.std_N[1] > table.std_N[0])
     ([200, 250], True)
     """
-    n_jobs = n_at_once(jobs)
+    n_jobs, given, kept = n_at_once(jobs), folder_of(out), listed(histories, "histories")
     from catenary.cases.studies.sweep.jobs import RunOptions, interrupted
 
-    if histories and out is None:
+    if kept and given is None:
         raise InputError("histories are kept in a file: give the folder out, too")
     draft, comm = draft_of(scene), communicator(comm)
     if sample is None:
@@ -115,22 +116,20 @@ def sweep(
         variants, sampling = samples_of(sample, draft)
     say = say_on_error_stream if progress else say_nothing
     with ExitStack() as stack:
-        folder = (
-            Path(out) if out is not None else stack.enter_context(temporary_folder(comm, "sweep"))
-        )
+        folder = given or stack.enter_context(temporary_folder(comm, "sweep"))
         made = plan_sweep(
             draft,
             variants,
             folder,
-            None if out is None else sampling,
+            None if given is None else sampling,
             only_statistics=only_statistics,
-            histories=listed(histories),
+            histories=kept,
             force=force,
         )
         options = stack.enter_context(options_of(made.own.first.petsc.given()))
         stack.enter_context(progress_shown(False, comm))
         plan = RunOptions(force, options, say if comm.rank == 0 else say_nothing, n_jobs)
-        drawn = None if out is None else ()
+        drawn = None if given is None else ()
         found = made.run(comm, plan, "a sweep of a Python program", drawn)
     if interrupted(found.ended):
         raise KeyboardInterrupt

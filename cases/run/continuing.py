@@ -51,7 +51,10 @@ def state_to_continue(result: Path, beyond_end: bool = False) -> dict[str, Any]:
         If there is no result file, if it is done, or if it is too damaged.
     """
     if not result.exists():
-        raise InputError(f"there is no {result} to continue; start the case with `catenary run`")
+        raise InputError(
+            f"there is no {result} to continue; start the case with "
+            f"{option('`catenary run`', 'catenary.run()')}"
+        )
     # Refused before anything is written.
     fields = result.with_name(FIELD_FILES[0])
     if os.path.lexists(fields) and survives(fields):

@@ -75,6 +75,11 @@ class Results(TrainOfRun):
         """Close the file."""
         self._file.close()
 
+    def image(self) -> bytes:
+        """The bytes of the file, for ``image`` of others."""
+        assert isinstance(self._file, ValidatedFile)
+        return self._file.image()
+
     # ---- what the run was -------------------------------------------------------------------
 
     @property

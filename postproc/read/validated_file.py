@@ -345,6 +345,10 @@ class ValidatedFile:
         """Close the file."""
         self._file.close()
 
+    def image(self) -> bytes:
+        """The bytes of the file."""
+        return bytes(self._file.id.get_file_image())
+
     # ---- kept twice ----------------------------------------------------------------------------
 
     def extremes(self, n_rows: int) -> dict[str, np.ndarray] | None:

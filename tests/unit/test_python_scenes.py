@@ -8,9 +8,12 @@ import pickle
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
+import xarray as xr
 from scenes import find_case, load_scene, resolved
 
 import catenary
@@ -78,6 +81,53 @@ def test_all_faults_of_a_scene_are_told(scene: catenary.Scene) -> None:
     with pytest.raises(catenary.InputError) as found:
         catenary.load("no_such_case")
     assert [(fault.key, fault.sentence) for fault in found.value.faults] == [("", str(found.value))]
+
+
+def test_tables_and_keywords_of_one_call_both_hold(scene: catenary.Scene) -> None:
+    both = scene.replace({"train": {"speed_km_h": 200}}, train={"start_m": 100})
+    assert (both["train.speed_km_h"], both["train.start_m"]) == (200.0, 100.0)
+    last = scene.replace({"train.speed_km_h": 200}, train={"speed_km_h": 210})
+    assert last["train.speed_km_h"] == 210.0
+
+
+@pytest.mark.parametrize(
+    "speed",
+    [
+        np.float32(275),
+        np.array(275),
+        xr.DataArray(275.0),
+        pd.Series([270, 275]).max(),
+        xr.DataArray([270.0, 275.0], dims="x").max(),
+    ],
+)
+def test_numbers_of_numpy_xarray_and_pandas_are_numbers(speed: Any, scene: catenary.Scene) -> None:
+    assert scene.replace(train={"speed_km_h": speed})["train.speed_km_h"] == 275.0
+
+
+def test_lists_of_numpy_xarray_and_pandas_are_lists(scene: catenary.Scene) -> None:
+    key = "line.dropper.pre_sag_mm"
+    own = list(range(9))
+    for given in (range(9), np.arange(9), pd.Series(own, dtype=object), xr.DataArray(own)):
+        assert scene.replace({key: given})[key] == own
+    row = pd.DataFrame({"train.speed_km_h": [200.0, 210.0], "train.start_m": [90, 100]}).iloc[1]
+    assert scene.replace(row)["train.speed_km_h"] == 210.0
+
+
+def test_a_scene_stands_for_itself(scene: catenary.Scene) -> None:
+    assert catenary.load(scene).to_dict() == scene.to_dict()
+    short = catenary.load(scene, short=True)
+    assert short.to_dict() == catenary.load(CASE, short=True).to_dict()
+
+
+def test_a_scene_is_no_list_and_takes_no_attribute(scene: catenary.Scene) -> None:
+    for wrong in (list, lambda own: 0 in own):
+        with pytest.raises(TypeError, match="iterable"):
+            wrong(scene)  # type: ignore[operator]
+    with pytest.raises(catenary.InputError, match="3 is no key"):
+        scene[3]  # type: ignore[index]
+    with pytest.raises(AttributeError, match="speed_km_h"):
+        scene.speed_km_h = 300.0  # type: ignore[attr-defined]
+    assert pickle.loads(pickle.dumps(scene)).to_dict() == scene.to_dict()
 
 
 @pytest.mark.parametrize("value", [object(), {1, 2}, 1j, [None]])
@@ -221,3 +271,45 @@ def test_nothing_is_printed_unless_a_program_asks() -> None:
         [sys.executable, "-c", program], capture_output=True, text=True, check=True
     )
     assert done.stdout == "" and done.stderr == "WARNING:catenary.runner:two\n"
+
+
+def test_derivatives_at_rest_say_what_they_are_and_what_is_left_out(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    from catenary.cases.studies.sensitivity import at_rest
+
+    own, tension = at_rest._derivative, "line.contact_wire.tension_N"
+
+    def derivative(parameter: Any, *rest: Any) -> np.ndarray:
+        if parameter.key == tension:
+            raise catenary.InputError("it makes a dropper slack")
+        return own(parameter, *rest)
+
+    monkeypatch.setattr(at_rest, "_derivative", derivative)
+    found = catenary.static(catenary.load("tramway", short=True)).sensitivity()
+    assert tension not in found.parameter
+    assert found.attrs["left_out"] == [f"{tension}: it makes a dropper slack"]
+    assert {name: found[name].units for name in found.data_vars if name != "unit"} == {
+        "height": "m",
+        "elasticity": "m/N",
+        "by_height": "m per unit of the parameter",
+        "by_elasticity": "m/N per unit of the parameter",
+        "by_unevenness": "1 per unit of the parameter",
+    }
+    assert all(found[name].long_name for name in (*found.data_vars, "x") if name != "unit")
+
+
+def test_derivatives_of_a_march_say_what_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    from catenary.cases.studies.sensitivity import study
+
+    own, tension = study.change_by, "line.contact_wire.tension_N"
+
+    def change_by(parameter: Any, *rest: Any) -> Any:
+        if parameter.key == tension:
+            raise catenary.InputError("it has none")
+        return own(parameter, *rest)
+
+    monkeypatch.setattr(study, "change_by", change_by)
+    table = catenary.sensitivity(catenary.load(CASE, short=True))
+    assert tension not in set(table.parameter)
+    assert table.attrs["left_out"] == [f"{tension}: it has none"]

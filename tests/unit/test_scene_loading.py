@@ -245,7 +245,7 @@ def test_a_sentence_says_whether_the_file_or_the_command_line_is_wrong(tmp_path:
 
 
 def test_the_number_of_further_problems_is_told() -> None:
-    with pytest.raises(InputError, match=r"\(and 2 more: `catenary check` lists them\)$"):
+    with pytest.raises(InputError, match=r"\(and 2 more, in the attribute faults\)$"):
         load_scene("en50318_2002", ["line.n_spans=0", "numerics.dt_s=0", "contact=3"])
 
 

@@ -6,6 +6,7 @@ import difflib
 from pathlib import Path
 
 from catenary.base.errors import InputError
+from catenary.base.options import option
 from catenary.cases.scene.input.plain_text import plain
 from catenary.cases.scene.input.toml_input import read_toml
 
@@ -40,7 +41,8 @@ def find_case(case: str) -> Path:
     known = shipped()
     if not case.strip():
         raise InputError(
-            "the case has no name: name a shipped case (`catenary list`), a case.toml or its folder"
+            "the case has no name: name a shipped case "
+            f"({option('`catenary list`', 'shipped_cases()')}), a case.toml or its folder"
         )
     if case in known:
         return known[case]

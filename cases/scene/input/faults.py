@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from catenary.base.errors import Fault, InputError
+from catenary.base.options import option
 from catenary.cases.scene.input.plain_text import escaped, plain, steers
 
 _SHOWN, _SOME, _DEEP = 60, 8, 3
@@ -84,9 +85,8 @@ class SceneError(InputError):
         self.more = more + max(0, len(faults) - MOST_TOLD)
         others = len(self.faults) - 1 + self.more
         text = self.faults[0].sentence
-        super().__init__(
-            f"{text} (and {others} more: `catenary check` lists them)" if others else text
-        )
+        listed = option(": `catenary check` lists them", ", in the attribute faults")
+        super().__init__(f"{text} (and {others} more{listed})" if others else text)
 
     def __reduce__(self) -> tuple[type[SceneError], tuple[tuple[Fault, ...], int]]:
         """Ranks send it to each other."""

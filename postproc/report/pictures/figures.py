@@ -91,6 +91,16 @@ def own_style() -> Iterator[None]:
             _in_own_style = False
 
 
+class ShownFigure(Figure):
+    """A figure that a notebook shows without pyplot, which has to be imported for others."""
+
+    def _repr_png_(self) -> bytes:
+        """The figure as it is now, which IPython asks for."""
+        stream = io.BytesIO()
+        self.savefig(stream, format="png")
+        return stream.getvalue()
+
+
 def new_figure(height: float) -> Figure:
     """An empty figure of the report's width, its layout computed when it is drawn.
 
@@ -101,7 +111,7 @@ def new_figure(height: float) -> Figure:
     height : float
         Height of the figure [inch].
     """
-    figure = Figure(figsize=(WIDTH, height), dpi=_RESOLUTION, layout="constrained")
+    figure = ShownFigure(figsize=(WIDTH, height), dpi=_RESOLUTION, layout="constrained")
     FigureCanvasAgg(figure)
     return figure
 
@@ -122,7 +132,7 @@ def stacked(height: float, n: int, *, shared: bool = False) -> tuple[Figure, lis
         Whether the panels have one x axis, whose labels stand below the last one, and one scale of
         y.
     """
-    figure = Figure(figsize=(WIDTH, height), dpi=_RESOLUTION)
+    figure = ShownFigure(figsize=(WIDTH, height), dpi=_RESOLUTION)
     FigureCanvasAgg(figure)
     gap = _SHARED_GAP if shared else _ABOVE + _BELOW
     panel = (height - _ABOVE - _BELOW - (n - 1) * gap) / n

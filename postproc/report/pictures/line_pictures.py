@@ -235,11 +235,9 @@ def _draw_elasticity(axes: Axes, results: Results) -> None:
 
 
 @own_style()
-def energies(results: Results) -> Figure | None:
-    """Energies of the line over time; None if the run did not record them."""
+def energies(results: Results) -> Figure:
+    """Energies of the line over time, of a run that recorded them."""
     recorded = results.energies()
-    if not recorded or not recorded["time"].size:
-        return None
     figure, (axes,) = stacked(3.0, 1)
     for number, name in enumerate(("kinetic", "elastic")):
         chosen = thinned(recorded[name])
@@ -252,11 +250,10 @@ def energies(results: Results) -> Figure | None:
 
 
 @own_style()
-def plan_view(results: Results) -> Figure | None:
-    """Lateral places of contact wires, and radial forces of arms; None where no wire moves so."""
+def plan_view(results: Results) -> Figure:
+    """Lateral places of contact wires, and radial forces of arms, of wires that move so."""
     registration = results.registration()
-    if registration is None or not results.has_static("contact_y"):
-        return None
+    assert registration is not None
     figure, (plan, forces) = stacked(4.6, 2)
     profiles = results.contact_profiles()
     for number, (name, wire) in enumerate(profiles.items()):

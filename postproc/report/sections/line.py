@@ -51,7 +51,8 @@ def _of_motion(run: EvaluatedRun) -> Iterator[Picture]:
     if results.n_rows("time") > 1 and statistics.droppers.x.size:
         text = "Dropper forces."
         yield Picture("droppers", text, lambda: line_pictures.dropper_force(results, statistics))
-    yield Picture("energy", "Energies of the line.", lambda: line_pictures.energies(results))
+    if any(times.size for times in results.energies().values()):
+        yield Picture("energy", "Energies of the line.", lambda: line_pictures.energies(results))
     yield from (Picture(*drawn) for drawn in channel_pictures(results))
 
 
@@ -115,10 +116,11 @@ def from_above(run: EvaluatedRun) -> Section:
     from catenary.postproc.report.pictures.line_pictures import plan_view
 
     results = run.results
-    text = "The line at rest from above, and its steady arms."
-    picture = Picture("plan_view", text, lambda: plan_view(results))
-    heading = "Line from above" if results.has_static("contact_y") else "Steady arms"
-    return Section(heading, _lateral(results), [picture], _registration(results))
+    heading, pictures = "Steady arms", []
+    if results.has_static("contact_y"):
+        heading, text = "Line from above", "The line at rest from above, and its steady arms."
+        pictures = [Picture("plan_view", text, lambda: plan_view(results))]
+    return Section(heading, _lateral(results), pictures, _registration(results))
 
 
 def _lateral(results: Results) -> Iterator[Text]:

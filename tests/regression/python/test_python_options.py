@@ -22,6 +22,7 @@ Refused = Callable[[catenary.Scene, Path], Any]
 SEVERAL = {"train.speed_km_h": [200, 250]}
 HEIGHTS = ["head_height"]
 NEWMARK = {"numerics.integrator": "newmark", "numerics.spectral_radius": 0.9}
+FAULTS = {"train.speed_km_h": -1, "line.n_spans": 0}
 REFUSALS: dict[str, tuple[Refused, list[str], str, str]] = {
     "run": (
         lambda scene, done: catenary.run(scene, done),
@@ -52,6 +53,18 @@ REFUSALS: dict[str, tuple[Refused, list[str], str, str]] = {
         ["restart", "DONE", "--evaluate", "200:220"],
         "evaluate belongs to until_m",
         "--evaluate belongs to --until-m",
+    ),
+    "restart, evaluated nowhere": (
+        lambda scene, done: catenary.restart(done, 1e3, evaluate=360),  # type: ignore[arg-type]
+        ["restart", "DONE", "--until-m", "1e3", "--evaluate", "360"],
+        "evaluate is 360, but must be two places [m], e.g. (360, 600)",
+        "--evaluate is 360, but must be two places [m] as from:to, e.g. 360:600",
+    ),
+    "several faults": (
+        lambda scene, done: scene.replace(FAULTS),
+        ["check", CASE, "--set", *(f"{key}={value}" for key, value in FAULTS.items())],
+        "(and 1 more, in the attribute faults)",
+        "line.n_spans is 0 on the command line (--set)",
     ),
     "sweep, histories": (
         lambda scene, done: catenary.sweep(scene, SEVERAL, done / "none", histories=HEIGHTS),

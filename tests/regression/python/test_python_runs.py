@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import copy
 import json
 import logging
 import os
+import pickle
 import signal
 import tempfile
 import threading
@@ -120,6 +122,60 @@ def test_thinned_records_have_times_of_their_own(scene: catenary.Scene) -> None:
     assert bool(uplift.isnull().any()) and not run.uplift.largest.isnull().any()
 
 
+def test_what_a_program_does_with_its_arrays_changes_no_run(scene: catenary.Scene) -> None:
+    run = catenary.run(scene.replace({"train.end_m": 245.0}))
+    tables = {"uplift": run.uplift, "droppers": run.droppers}
+    tables |= {"force": run.force.to_dataset(), "filtered": run.filtered_force.to_dataset()}
+    before = {name: table.copy(deep=True) for name, table in tables.items()}
+    for table in tables.values():
+        for name, array in table.variables.items():
+            if name not in table.indexes and array.dtype.kind != "U":  # copies share an index
+                array.values[...] = 0
+    run.summary["pantographs"][0]["mean_N"] = run.summary["passed"] = None
+    run.phase_wall.clear()
+    assert run.uplift.identical(before["uplift"]) and run.droppers.identical(before["droppers"])
+    assert run.force.to_dataset().identical(before["force"])
+    assert run.filtered_force.to_dataset().identical(before["filtered"])
+    assert run.statistics.mean_N.iloc[0] > 0 and run.passed is not None and run.phase_wall
+
+
+def test_every_array_of_a_run_says_what_it_is(in_memory: catenary.Run) -> None:
+    for table in (in_memory.uplift, in_memory.droppers):
+        for name, array in table.data_vars.items():
+            assert array.attrs["long_name"], name
+            assert ("units" in array.attrs) == (array.dtype.kind == "f"), name
+    assert in_memory.filtered_force.long_name == "contact force below 20 Hz"
+
+
+def test_a_closed_run_says_so(in_memory: catenary.Run, folder: Path) -> None:
+    run = catenary.open(folder)
+    run.close()
+    run.close()
+    reads = (lambda: run.force, lambda: run.uplift, lambda: run.droppers, run.plot.force)
+    for read in (*reads, lambda: run.channels, lambda: run.statistics):
+        with pytest.raises(catenary.InputError, match="this run is closed"):
+            read()
+    assert run.outcome == "done" and run.scene["train.end_m"] == 260.0 and str(folder) in repr(run)
+
+
+@pytest.mark.parametrize("kept", ["in memory", "in a folder"])
+def test_processes_give_runs_to_each_other(
+    kept: str, in_memory: catenary.Run, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As pools of ``multiprocessing`` and ``concurrent.futures`` do, and ``copy.deepcopy``."""
+    monkeypatch.chdir(folder.parent)
+    run = in_memory if kept == "in memory" else catenary.open(folder.name)
+    given = pickle.dumps(run)
+    monkeypatch.chdir("/")
+    own = pickle.loads(given)
+    assert np.array_equal(own.force, run.force) and own.droppers.identical(run.droppers)
+    assert own.outcome == "done" and own.summary == run.summary
+    assert (own.folder is None) == (kept == "in memory")
+    run = copy.deepcopy(own)
+    own.close()
+    assert run.uplift.identical(in_memory.uplift) and run.plot.force().axes
+
+
 def test_droppers_and_arms_are_those_of_the_summary(in_memory: catenary.Run) -> None:
     own, told = in_memory.droppers, in_memory.summary["droppers"]
     inside = own.where(own.evaluated, drop=True)
@@ -180,6 +236,15 @@ def test_memory_holds_all_and_the_disk_nothing(scene: catenary.Scene, temporary:
     assert run.plot.force().axes and run.folder is None and "in memory" in repr(run)
 
 
+def test_every_picture_that_is_named_can_be_drawn() -> None:
+    """Also of a line whose arms have forces and whose wires do not move sideways."""
+    scene = catenary.load("ambrosio2012", short=True)
+    run = catenary.run(scene.replace({"train.end_m": scene["evaluation.to_m"] + 1.0}))
+    assert run.plot.names
+    for name in run.plot.names:
+        assert run.plot(name).axes, name
+
+
 def test_a_refused_scene_leaves_nothing(scene: catenary.Scene, temporary: Path) -> None:
     loose = {"line.dropper.pre_sag_mid_mm": 900.0, "case.accept_unusual": True}
     with pytest.raises(catenary.InputError, match="slack"):
@@ -200,7 +265,28 @@ def test_a_run_that_breaks_says_so_and_has_what_it_recorded(
         catenary.run(scene.replace(BREAKS))
     run = broken.value.run
     assert run.outcome == str(broken.value) and run.passed is None
+    again = pickle.loads(pickle.dumps(broken.value))  # as a pool gives it to its program
+    assert str(again) == str(broken.value) and np.array_equal(again.run.force, run.force)
     assert not list(temporary.iterdir())
+
+
+def test_what_broke_is_continued_as_soon_as_no_run_reads_it(
+    scene: catenary.Scene, tmp_path: Path
+) -> None:
+    """In a notebook the error stays, and holds its run."""
+    with pytest.raises(catenary.RunBroken, match="iterations") as broken:
+        catenary.run(scene.replace(BREAKS), tmp_path / "run", report=False)
+    with pytest.raises(catenary.RunBroken, match="iterations"):  # and breaks at the same place
+        catenary.restart(tmp_path / "run", report=False)
+    run = broken.value.run
+    assert run.force.sizes["time"] == 1
+    with pytest.raises(catenary.InputError, match=r"is open in this program: close\(\) the run"):
+        catenary.restart(tmp_path / "run", report=False)
+    with pytest.raises(catenary.InputError, match="no picture of statistics. No statistics of"):
+        run.plot.statistics()
+    run.close()
+    with pytest.raises(catenary.RunBroken, match="iterations"):
+        catenary.restart(tmp_path / "run", report=False)
 
 
 @pytest.mark.parametrize("swept", [False, True])
@@ -386,6 +472,8 @@ def test_pictures_are_those_of_the_report(in_memory: catenary.Run) -> None:
     labels = {name: [axes.get_ylabel() for axes in own.axes] for name, own in made.items()}
     for name, own in labels.items():
         assert own == [axes.get_ylabel() for axes in plot(name).axes]
+    for figure in (*made.values(), plot.statistics()):  # what IPython asks for
+        assert figure._repr_png_().startswith(b"\x89PNG")  # type: ignore[attr-defined]
     force = made["contact_force"].axes[0]
     assert force.get_xlabel() == "position along the track [m]"
     assert len({str(own) for own in labels.values()}) == len(made)

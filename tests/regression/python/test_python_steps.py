@@ -104,6 +104,28 @@ def test_a_state_brings_everything_back(scene: catenary.Scene) -> None:
             sim.restore(state[:-1])
 
 
+def test_a_state_of_another_line_is_refused(scene: catenary.Scene, tmp_path: Path) -> None:
+    """Also of the same scene prepared again, whose arrays lie otherwise in memory."""
+    from catenary.cases.run.prepared import prepare_line
+    from catenary.scenes import checked
+
+    prepare_line(checked(scene), tmp_path / "a.line")
+    one, same, again = map(catenary.Simulation, (tmp_path / "a.line", tmp_path / "a.line", scene))
+    faster = catenary.Simulation(scene.replace(train={"speed_km_h": 300.0}))
+    one.step(100)
+    state = one.save()
+    same.restore(memoryview(state))
+    assert same.step(50) and one.step(50)
+    assert np.array_equal(same.contact_force, one.contact_force)
+    for other in (again, faster):
+        with pytest.raises(catenary.InputError, match="no state of this line: .* the same .line"):
+            other.restore(state)
+        assert other.time == 0.0
+    for junk in (None, "spam", b"", 3):
+        with pytest.raises(catenary.InputError, match="bytes that save|no state of this line"):
+            one.restore(junk)  # type: ignore[arg-type]
+
+
 def test_what_is_measured_stays_and_what_is_set_can_be_set_in_part() -> None:
     with catenary.Simulation(acting("overlap")) as sim:
         sim.step(50)
@@ -155,6 +177,9 @@ def test_what_cannot_be_set_is_refused(value: Any, says: str, scene: catenary.Sc
 
 def test_speeds_that_cannot_be_are_refused(scene: catenary.Scene) -> None:
     with catenary.Simulation(scene) as sim:
+        for word in ("fast", None):
+            with pytest.raises(catenary.InputError, match="speed is .*must be a number"):
+                sim.speed = word  # type: ignore[assignment]
         for speed in (-1.0, np.nan, np.inf):
             with pytest.raises(catenary.InputError, match="must be at least 0"):
                 sim.speed = speed
@@ -172,8 +197,35 @@ def test_a_loop_that_looks_at_no_answer_ends(scene: catenary.Scene) -> None:
             while sim.time < 1e6:
                 sim.step(100)
         assert sim.step(0) and sim.steps_left == 0
-        with pytest.raises(catenary.InputError, match="not negative"):
-            sim.step(-1)
+        for n in (-1, 1.0, np.float64(3), "2", None):
+            with pytest.raises(catenary.InputError, match="whole number of steps, at least 0"):
+                sim.step(n)  # type: ignore[arg-type]
+
+
+def test_any_whole_number_of_steps_can_be_asked_for(scene: catenary.Scene) -> None:
+    with catenary.Simulation(scene) as sim:
+        left = sim.steps_left
+        assert sim.step(np.int64(3)) and sim.steps_left == left - 3
+        assert not sim.step(10**30) and sim.steps_left == 0
+
+
+def test_what_a_simulation_has_not_cannot_be_set(scene: catenary.Scene) -> None:
+    with catenary.Simulation(scene) as sim:
+        with pytest.raises(AttributeError, match="lift_forse"):
+            sim.lift_forse = 5.0  # type: ignore[attr-defined]
+        assert repr(sim) == f"<catenary.Simulation at 0 s, {sim.steps_left} steps left>"
+    assert repr(sim) == "<catenary.Simulation at 0 s, closed>"
+
+
+def test_forces_that_cannot_be_found_say_when_and_a_state_goes_on(scene: catenary.Scene) -> None:
+    with catenary.Simulation(scene) as sim:
+        sim.step(100)
+        state = sim.save()
+        sim.lift_force[0] = np.nan  # not checked: a view, for loops that must be quick
+        with pytest.raises(catenary.RunBroken, match=f"found after {sim.time:g} s"):
+            sim.step()
+        sim.restore(state)
+        assert sim.step() and np.isfinite(sim.contact_force).all()
 
 
 def test_a_prepared_file_is_the_scene_that_it_was_made_of(
