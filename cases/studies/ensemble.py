@@ -10,7 +10,8 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
+from itertools import islice
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -33,7 +34,7 @@ from catenary.postproc.read.results import Results
 from catenary.postproc.record.run_watch import RunWatch, watch_cadence, watch_inputs
 from catenary.postproc.report.summary import short_summary, summarise
 from catenary.solver.ensemble.marches import SceneHistory, march_side_by_side
-from catenary.solver.ensemble.shared_line import SharedLine, why_alone
+from catenary.solver.ensemble.shared_line import N_LANES, SharedLine, why_alone
 from catenary.solver.model.model import Model
 from catenary.solver.problem.problem import Problem
 from catenary.solver.statics.changed_line.rest_with_defects import errors_of_length
@@ -43,6 +44,7 @@ from catenary.solver.time_loop.march import March
 from catenary.solver.time_loop.views import channels
 from catenary.solver.time_loop.views.observers import NEVER, Observer, Stage, StepView
 
+T = TypeVar("T")
 _OF_LINE = ("arm_uplift", "dropper_force")
 
 
@@ -191,7 +193,7 @@ class Marches:
             by_themselves.append(_alone(line, number, *own))
 
         if line.shared is not None:
-            for ended in march_side_by_side(line.shared, together()):
+            for ended in _by_lots(march_side_by_side(line.shared, together())):
                 if not isinstance(ended, SceneHistory):
                     continue  # a march by itself says why a train has no place
                 number = ended.number
@@ -328,6 +330,13 @@ class _Line:
             "line/node_points": points,
             **static_datasets(problem.line, mesh, form, at_rest.lift, lengths),
         }
+
+
+def _by_lots(items: Iterator[T]) -> Iterator[T]:
+    """Items as they come, so many as there are lanes at once: in between a march takes the caches
+    of the processor from what evaluates them."""
+    while lot := list(islice(items, N_LANES)):
+        yield from lot
 
 
 def _is_unusual(history: SceneHistory) -> bool:
