@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -159,18 +159,18 @@ class AirForces:
         self._steady = self._acting(np.zeros(1))[0] if flow.steady else None
         self._latest = (np.nan, np.zeros(3))
 
-    def at(self, times: Sequence[float]) -> np.ndarray:
+    def at(self, times: np.ndarray) -> np.ndarray:
         """Upward forces on head and on what carries it [N], and the forces on bodies in parts of
-        those at the train's speed in still air; (len(times), 3) at growing ``times`` [s]."""
+        those at the train's speed in still air; (n, 3) at growing ``times`` (n,) [s]."""
         parts = parts_of(self._part, times)[:, None]
         if self._steady is not None:
             return np.asarray(parts * self._steady)
-        return np.asarray(parts * self._acting(np.asarray(times, dtype=float)))
+        return np.asarray(parts * self._acting(times))
 
     def now(self, time: float) -> np.ndarray:
         """Forces at one ``time`` [s], (3,), as ``at`` returns them."""
         if self._latest[0] != time:
-            self._latest = time, self.at([time])[0]
+            self._latest = time, self.at(np.array([time]))[0]
         return self._latest[1]
 
     def _acting(self, times: np.ndarray) -> np.ndarray:

@@ -146,9 +146,7 @@ def raising_data(data: MultibodyData, pressing: float, nominal_height: float) ->
     the arm by ``pressing`` [N]: the static force, and what the air lifts the arm with.
     """
     from catenary.mbs.mechanism.multibody_pantograph import (
-        PITCH,
         head_lift,
-        head_turning,
         reduced,
         stand,
     )
@@ -158,7 +156,7 @@ def raising_data(data: MultibodyData, pressing: float, nominal_height: float) ->
     head = standing.head
     strips = data.strips
     if strips.number > 1:
-        strips = replace(strips, pitch=head_turning(data, PITCH))
+        strips = replace(strips, pitch=head.pitch)
     pressed = pressing / head.stiffness + strips.compression(pressing)
     arm = nominal_height + pressed - head.offset
     return RaisingData(
@@ -170,7 +168,7 @@ def raising_data(data: MultibodyData, pressing: float, nominal_height: float) ->
         head_offset=head.offset,
         base_height=arm - standing.working_height,
         strips=strips,
-        roll=data.roll,
+        roll=head.roll,
         blown_head=head_lift(data),
         laws=data.laws,
         rest=(nominal_height + strips.compression(pressing), nominal_height + pressed),

@@ -8,7 +8,7 @@ and it moves with the base.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -128,11 +128,11 @@ class LoweredPantograph:
         if not self.is_caught:
             taken.advance(contact_force)
 
-    def fill_drives(self, times: Sequence[float], drives: np.ndarray) -> None:
+    def fill_drives(self, times: np.ndarray, drives: np.ndarray) -> None:
         """Fill in what steps to ``times`` [s] depend on, see `SteppedHead`."""
         if self._base is not None:
             rows = named(drives)
-            motions = np.array([lifted(self._base, time) for time in times])
+            motions = np.array([lifted(self._base, time) for time in times.tolist()])
             rows["roof"], rows["roof_velocity"] = motions.T
         if isinstance(self.model, SteppedHead):
             self.model.fill_drives(times, drives)

@@ -5,8 +5,6 @@ Source: EN 50318, annex (two masses); the benchmark of ten codes of 2015 (three 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from scipy import linalg
 
@@ -147,16 +145,16 @@ class LumpedPantograph(SteppedHead):
         self.stepped.step(self.row)
         return self.head
 
-    def fill_drives(self, times: Sequence[float], drives: np.ndarray) -> None:
+    def fill_drives(self, times: np.ndarray, drives: np.ndarray) -> None:
         """Fill in the forces, and where the wire crosses; see `SteppedHead`."""
         rows = named(drives)
         if self._base is None:
             constant = self._base_stiffness * self._base_height
             rows["force"] = self._lift_full * parts_of(self._part, times) + constant
         else:
-            rows["force"] = [self._drive(time) for time in times]
+            rows["force"] = [self._drive(time) for time in times.tolist()]
         if self._tied and self._base is None:
-            place, velocity = self._rise(np.asarray(times))
+            place, velocity = self._rise(times)
             rows["force"] += self._base_stiffness * place + self._base_damping * velocity
             if self._laws.laws:
                 rows["base"], rows["base_velocity"] = place, velocity
@@ -165,7 +163,7 @@ class LumpedPantograph(SteppedHead):
             rows["force"] += forces[:, ON_FRAME]
             rows["head_air"] = forces[:, ON_HEAD]
         if self._laws.laws and self._base is not None:
-            motions = np.array([self._base_motion(time) for time in times])
+            motions = np.array([self._base_motion(time) for time in times.tolist()])
             rows["base"], rows["base_velocity"] = motions.T
         if self._control is not None:
             rows["part"] = parts_of(self._part, times)
@@ -189,7 +187,7 @@ class LumpedPantograph(SteppedHead):
         of it, at times (t,) [m], [m/s]."""
         way = self._started_at - self._base_height
         before, now, after = (
-            parts_of(self._part, np.maximum(times + shift, 0.0).tolist())
+            parts_of(self._part, np.maximum(times + shift, 0.0))
             for shift in (-_MOMENT, 0.0, _MOMENT)
         )
         return way * (1.0 - now), way * (before - after) / (2.0 * _MOMENT)

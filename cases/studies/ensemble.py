@@ -8,9 +8,10 @@ what their own runs write as ``summary.json``.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
+from itertools import islice
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -23,15 +24,18 @@ from catenary.cases.scene.problem import problem_of, resolved
 from catenary.cases.scene.scene import Scene
 from catenary.postproc.channels.facts import facts_of
 from catenary.postproc.channels.header import Header, static_datasets
+from catenary.postproc.evaluate import filters
 from catenary.postproc.evaluate import statistics as stats
 from catenary.postproc.evaluate.verdict import criteria_of
+from catenary.postproc.files.filtered_force import PATH as FILTERED
 from catenary.postproc.files.run_schema import DONE
 from catenary.postproc.read.marched_results import MarchedFile
 from catenary.postproc.read.results import Results
 from catenary.postproc.record.run_watch import RunWatch, watch_cadence, watch_inputs
-from catenary.postproc.report.summary import summarise
+from catenary.postproc.report.summary import short_summary, summarise
 from catenary.solver.ensemble.marches import SceneHistory, march_side_by_side
-from catenary.solver.ensemble.shared_line import SharedLine, why_alone
+from catenary.solver.ensemble.shared_line import N_LANES, SharedLine, why_alone
+from catenary.solver.model.model import Model
 from catenary.solver.problem.problem import Problem
 from catenary.solver.statics.changed_line.rest_with_defects import errors_of_length
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest, sound_line
@@ -40,6 +44,7 @@ from catenary.solver.time_loop.march import March
 from catenary.solver.time_loop.views import channels
 from catenary.solver.time_loop.views.observers import NEVER, Observer, Stage, StepView
 
+T = TypeVar("T")
 _OF_LINE = ("arm_uplift", "dropper_force")
 
 
@@ -100,29 +105,28 @@ class Marched(NamedTuple):
     ----------
     number : of the scene
     outcome : "done", or the sentence of what broke
-    summary : as its own run writes one, empty unless done
+    results : as its own run leaves them, None unless done
     tables : histories of the train by their paths in a result file, ``time`` among them, likewise
     """
 
     number: int
     outcome: str
-    summary: dict[str, Any]
+    results: Results | None = None
     tables: Mapping[str, np.ndarray] = {}
 
+    def summary(self) -> dict[str, Any]:
+        """The summary that its own run writes, empty unless done."""
+        return self._summary(summarise)
 
-# Of a summary, as much as tables of studies read.
-_IN_SHORT = (
-    *("pantographs", "histograms", "droppers"),
-    *("acceptance", "not_judged", "passed", "remarks"),
-)
+    def in_short(self) -> dict[str, Any]:
+        """As much of it as tables of studies read."""
+        return self._summary(short_summary)
 
-
-def in_short(summary: Mapping[str, Any]) -> dict[str, Any]:
-    """A summary without tables of all supports; empty if it is."""
-    kept = {name: summary[name] for name in _IN_SHORT if name in summary}
-    if "supports" in summary:
-        kept["supports"] = {"max_uplift_mm": summary["supports"]["max_uplift_mm"]}
-    return kept
+    def _summary(self, of: Callable[..., dict[str, Any]]) -> dict[str, Any]:
+        if self.results is None:
+            return {}
+        statistics = stats.evaluate(self.results)
+        return of(self.results, statistics, criteria_of(self.results, statistics))
 
 
 class Marches:
@@ -158,13 +162,13 @@ class Marches:
             try:
                 problems[number] = problem_of(scene)
             except CatenaryError as error:
-                yield Marched(number, str(error), {})
+                yield Marched(number, str(error))
         if not problems:
             return
         try:
             line = self._line_for(key, scenes, problems)
         except CatenaryError as error:
-            yield from (Marched(number, str(error), {}) for number in problems)
+            yield from (Marched(number, str(error)) for number in problems)
             return
         left, by_themselves = dict.fromkeys(problems), list[Marched]()
 
@@ -175,7 +179,7 @@ class Marches:
                     at_rest = line.rest_of(problem)
                 except CatenaryError as error:
                     del left[number]
-                    by_themselves.append(Marched(number, str(error), {}))
+                    by_themselves.append(Marched(number, str(error)))
                     continue
                 assert line.shared is not None
                 if line.shared.takes(at_rest):  # with the matrices of the shared line
@@ -189,7 +193,7 @@ class Marches:
             by_themselves.append(_alone(line, number, *own))
 
         if line.shared is not None:
-            for ended in march_side_by_side(line.shared, together()):
+            for ended in _by_lots(march_side_by_side(line.shared, together())):
                 if not isinstance(ended, SceneHistory):
                     continue  # a march by itself says why a train has no place
                 number = ended.number
@@ -198,8 +202,7 @@ class Marches:
                 else:
                     del left[number]
                     head = line.header(scenes[number], problems[number], ended.at_rest)
-                    tables, extremes = _tables(ended)
-                    yield Marched(number, DONE, _summary(head, tables, extremes, DONE), tables)
+                    yield _done(number, head, *_tables(ended))
                 yield from by_themselves
                 by_themselves.clear()
         yield from by_themselves
@@ -207,7 +210,7 @@ class Marches:
             try:
                 at_rest = line.rest_of(problems[number])
             except CatenaryError as error:
-                yield Marched(number, str(error), {})
+                yield Marched(number, str(error))
             else:
                 yield _alone(line, number, scenes[number], problems[number], at_rest)
 
@@ -254,6 +257,7 @@ class _Line:
         self._errors = problem.irregularities.lengths
         self._sound = None if self._errors is None else sound_line(problem, self._mesh)
         self._rest: LineAtRest | None = None
+        self._latest: tuple[Model, dict[str, np.ndarray]] | None = None
         at_rest = self.rest_of(problem)
         self._header = header_of(scene, problem, at_rest, ())
         # Errors of length are known without the lengths that are wrong.
@@ -297,30 +301,42 @@ class _Line:
 
     def header(self, scene: Scene, problem: Problem, at_rest: LineAtRest) -> Header:
         """The head of the results of a scene, of its problem and its line at rest."""
-        mesh, form = at_rest.mesh, at_rest.form
-        points = mesh.points.copy()
-        points[:, 2] = form.height
-        if form.lateral is not None:
-            points[:, 1] = form.lateral.y
         attributes = {
             **self._header.attributes,
             **scene_attributes(scene, problem),
             **train_attributes(scene, problem),
             "config": {},
         }
+        if self._latest is None or self._latest[0] is not at_rest.model:
+            self._latest = at_rest.model, self._datasets(problem, at_rest)
+        return Header(
+            attributes,
+            {**self._latest[1], "line/evaluation_range": np.array(problem.evaluation)},
+            facts_of(problem, at_rest.mesh, at_rest.model.dropper_lengths),
+        )
+
+    def _datasets(self, problem: Problem, at_rest: LineAtRest) -> dict[str, np.ndarray]:
+        """Datasets of the head of results, but for what depends on the train."""
+        mesh, form = at_rest.mesh, at_rest.form
+        points = mesh.points.copy()
+        points[:, 2] = form.height
+        if form.lateral is not None:
+            points[:, 1] = form.lateral.y
         lengths = self._cut + errors_of_length(problem, at_rest.model)
-        own = {
-            "line/evaluation_range": np.array(problem.evaluation),
+        return {
+            **self._header.datasets,
             "line/arm_x": mesh.x(mesh.steady_arms),
             "line/dropper_x": mesh.x(mesh.droppers[:, 1]),
             "line/node_points": points,
             **static_datasets(problem.line, mesh, form, at_rest.lift, lengths),
         }
-        return Header(
-            attributes,
-            {**self._header.datasets, **own},
-            facts_of(problem, mesh, at_rest.model.dropper_lengths),
-        )
+
+
+def _by_lots(items: Iterator[T]) -> Iterator[T]:
+    """Items as they come, so many as there are lanes at once: in between a march takes the caches
+    of the processor from what evaluates them."""
+    while lot := list(islice(items, N_LANES)):
+        yield from lot
 
 
 def _is_unusual(history: SceneHistory) -> bool:
@@ -342,6 +358,7 @@ def _tables(history: SceneHistory) -> tuple[dict[str, np.ndarray], dict[str, np.
         "channels/contact_force": history.contact_force,
         "channels/head_height": history.head_height,
         "channels/wire_height": history.wire_height,
+        FILTERED: filters.low_pass(history.contact_force, dt),
     }
     uplift = np.stack([np.full(history.uplift.size, np.nan), history.uplift])
     return tables, {"arm_uplift": uplift, "dropper_force": history.dropper_force}
@@ -355,20 +372,18 @@ def _alone(line: _Line, number: int, scene: Scene, problem: Problem, rest: LineA
             watch = RunWatch(alone(), watch_inputs(rest, True), watch_cadence(dt))
             outcome = march.run([watch, keeper])
     except CatenaryError as error:
-        return Marched(number, str(error), {})
+        return Marched(number, str(error))
     if outcome.outcome != DONE:
-        return Marched(number, outcome.outcome, {})
+        return Marched(number, outcome.outcome)
     head = line.header(scene, problem, rest)
     head = replace(head, attributes={**head.attributes, "watched": watch.facts()})
     tables = keeper.tables()
-    summary = _summary(head, tables, keeper.extremes(), outcome.outcome)
-    return Marched(number, outcome.outcome, summary, tables)
+    tables[FILTERED] = filters.low_pass(tables["channels/contact_force"], dt)
+    return _done(number, head, tables, keeper.extremes())
 
 
-def _summary(
-    head: Header, tables: dict[str, np.ndarray], extremes: dict[str, np.ndarray], outcome: str
-) -> dict[str, Any]:
-    """The summary that a run of the scene would write."""
-    results = Results.of(MarchedFile(head, tables, extremes, outcome))
-    statistics = stats.evaluate(results)
-    return summarise(results, statistics, criteria_of(results, statistics))
+def _done(
+    number: int, head: Header, tables: dict[str, np.ndarray], extremes: dict[str, np.ndarray]
+) -> Marched:
+    file = MarchedFile(head, tables, extremes, DONE, {FILTERED: filters.ABOUT})
+    return Marched(number, DONE, Results.of(file), tables)

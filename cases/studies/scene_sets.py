@@ -254,8 +254,8 @@ def evaluate(scenes: Sequence[Scene], pool: Pool[Any] | None = None) -> list[dic
     Returns
     -------
     list of dict
-        The content of ``summary.json`` of each; ``{"broke": sentence}`` of a run that ended early,
-        or of a line that cannot hang.
+        The ``short_summary`` of each; ``{"broke": sentence}`` of a run that ended early, or of a
+        line that cannot hang.
 
     Raises
     ------
@@ -302,7 +302,7 @@ def _summaries(scenes: Sequence[Scene], comm: Any = None) -> list[dict[str, Any]
     with options_of(scenes[0].petsc.given()):
         _marches = _marches or Marches()
         for one in _marches.of(scenes):
-            found[one.number] = one.summary if one.outcome == DONE else {BROKE: one.outcome}
+            found[one.number] = one.in_short() if one.outcome == DONE else {BROKE: one.outcome}
     return found
 
 
@@ -384,12 +384,9 @@ class Evaluation:
                 del new[key]
         if not new:
             return
-        from catenary.cases.studies.ensemble import in_short
-
         for key, summary in zip(new, evaluate(list(new.values()), self._pool), strict=True):
-            own = summary if BROKE in summary else in_short(summary)
-            self._known[key] = own
-            self._kept.keep(key, own)
+            self._known[key] = summary
+            self._kept.keep(key, summary)
 
 
 def identity(scene: Scene) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -147,13 +147,13 @@ class SteppedHead(ABC):
         """Accelerations (n,) of the present state without contact."""
 
     @abstractmethod
-    def fill_drives(self, times: Sequence[float], drives: np.ndarray) -> None:
+    def fill_drives(self, times: np.ndarray, drives: np.ndarray) -> None:
         """Fill in what steps to ``times`` [s] depend on besides the state, a row each.
 
         ``drives`` (len(times), `drive_width`) is what the loop of kernels steps it with.
         """
 
-    def _fill_lateral(self, times: Sequence[float], drives: np.ndarray) -> None:
+    def _fill_lateral(self, times: np.ndarray, drives: np.ndarray) -> None:
         """Fill in what is known of where wires cross the strips of a head that rolls or bends."""
         if self._lateral is not None:
             s = len(self.strip_offsets)
@@ -229,11 +229,10 @@ class Raising:
         return float(_half_cosine(time, self.raise_time))
 
 
-def parts_of(part: Callable[[float], float], times: Sequence[float]) -> np.ndarray:
-    """The parts of the lift at ``times`` [s], which grow, shape (len(times),)."""
+def parts_of(part: Callable[[float], float], times: np.ndarray) -> np.ndarray:
+    """The parts of the lift at ``times`` (n,) [s], which grow, shape (n,)."""
     if not isinstance(part, Raising):
-        return np.array([part(time) for time in times])
-    if times[0] >= part.raise_time:
-        return np.ones(len(times))
-    at = np.asarray(times)
-    return np.where(at >= part.raise_time, 1.0, _half_cosine(at, part.raise_time))
+        return np.array([part(time) for time in times.tolist()])
+    parts, n = np.ones(times.size), int(np.searchsorted(times, part.raise_time))
+    parts[:n] = _half_cosine(times[:n], part.raise_time)
+    return parts

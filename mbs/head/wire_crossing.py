@@ -30,10 +30,10 @@ class CrossingPath(ABC):
         """Put into both what is known of ``time`` [s] ahead of its step: mostly all."""
         self.move_to(time)
 
-    def fill_ahead(self, times: Sequence[float], rows: np.ndarray) -> None:
+    def fill_ahead(self, times: np.ndarray, rows: np.ndarray) -> None:
         """Fill in the same for ``times`` [s]: ``rows`` (len(times), 2 s), places then rates."""
         s = self.place.size
-        for row, time in zip(rows, times, strict=True):
+        for row, time in zip(rows, times.tolist(), strict=True):
             self.ahead(time)
             row[:s], row[s:] = self.place, self.rate
 
@@ -131,7 +131,7 @@ class FollowedPath(CrossingPath):
             self.place -= sway.place
             self.rate -= sway.velocity
 
-    def fill_ahead(self, times: Sequence[float], rows: np.ndarray) -> None:
+    def fill_ahead(self, times: np.ndarray, rows: np.ndarray) -> None:
         """See ``CrossingPath``: zeros, mostly."""
         if self._base is None:
             rows[:] = 0.0

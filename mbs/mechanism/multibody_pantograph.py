@@ -104,18 +104,21 @@ class MultibodyData:
     @property
     def roll(self) -> Turning | None:
         """Roll of the head about the track as its joints allow it, None if they do not."""
-        return head_turning(self, ROLL)
+        return stand(self).head.roll
 
 
 class Head(NamedTuple):
     """The head on its arm: ``mass`` [kg], ``stiffness`` [N/m] and ``damping`` [N s/m] of what
-    carries it, ``weight`` [N], ``offset`` [m] above the arm at rest without contact."""
+    carries it, ``weight`` [N], ``offset`` [m] above the arm at rest without contact; ``roll`` about
+    the track and ``pitch`` across it, None if its joints do not allow it."""
 
     mass: float
     stiffness: float
     damping: float
     weight: float
     offset: float
+    roll: Turning | None
+    pitch: Turning | None
 
 
 class Standing(NamedTuple):
@@ -148,14 +151,13 @@ def stand(data: MultibodyData) -> Standing:
         In one sentence: it cannot be assembled, or is no mechanism that raises a head on springs.
     """
     mechanism = _mechanism(_bodies_of(data))
-    height, system = mechanism.height, data.system
-    holder = PrescribedPoint(HOLDER, data.arm, Constant(height))
+    height, system, held = mechanism.height, mechanism.system, mechanism.held
+    holder = held.joints[-1]
     push = None
     if data.actuator is not None and data.static_force is not None:
         found = calibrate_actuator(
-            system,
+            held,
             data.actuator,
-            holder,
             mechanism.motion,
             data.static_force,
             mechanism.calibration,
@@ -175,9 +177,9 @@ def stand(data: MultibodyData) -> Standing:
                 f"its static force is {force:.4g} N at its working height of {height:g} m: its "
                 "actuators cannot raise it"
             )
-        motion = equilibrium(system.with_joints(holder), mechanism.motion).motion
+        motion = equilibrium(held, mechanism.motion).motion
     if mechanism.head is None or not _is_at(motion, mechanism.head[0]):
-        head = _head(data, system.with_joints(holder), motion)
+        head = _head(data, system, holder, motion)
         mechanism.head = motion, head, system.n_degrees_of_freedom(motion)
     _, head, n_freedoms = mechanism.head
     result = Standing(
@@ -189,11 +191,13 @@ def stand(data: MultibodyData) -> Standing:
 
 @dataclass
 class _Mechanism:
-    """A mechanism with its arm held at the ``height``, and its equilibrium for one static
-    force, which serves for others: the calibration, the head with the place where it was measured
-    and the number of freedoms there, and places of the arm."""
+    """A mechanism, also with a last joint that holds its arm at the ``height``, and its equilibrium
+    for one static force, which serves for others: the calibration, the head with the place where it
+    was measured and the number of freedoms there, and places of the arm."""
 
     missed: tuple[Miss, ...]
+    system: System
+    held: System
     height: float
     motion: Motion
     places: Places
@@ -219,13 +223,14 @@ def _mechanism(data: MultibodyData) -> _Mechanism:
         height = float(motion.position[motion.numbers[data.arm], 2])
     holder = PrescribedPoint(HOLDER, data.arm, Constant(height))
     _judge_raising(data, motion)
+    held = system.with_joints(holder)
     try:
-        motion = system.with_joints(holder).assemble(motion)
+        motion = held.assemble(motion)
     except InputError as error:
         raise InputError(
             f"its arm {data.arm!r} does not reach its working height of {height:g} m: {error}"
         ) from error
-    return _Mechanism(missed, height, motion, Places(data.actuator))
+    return _Mechanism(missed, system, held, height, motion, Places(data.actuator))
 
 
 def _bodies_of(data: MultibodyData) -> MultibodyData:
@@ -345,14 +350,14 @@ def _joined(what: Joint | Force) -> tuple[str, ...]:
 
 def _part(motion: Motion, system: System) -> Motion:
     """Motion of the bodies of a smaller system, taken from that of a larger one."""
-    kept = [motion.numbers[name] for name in system.start().numbers]
-    return replace(
-        system.start(), position=motion.position[kept], parameters=motion.parameters[kept]
-    )
+    start = system.start()
+    kept = [motion.numbers[name] for name in start.numbers]
+    return replace(start, position=motion.position[kept], parameters=motion.parameters[kept])
 
 
-def _head(data: MultibodyData, held: System, motion: Motion) -> Head:
-    """The head on its springs, measured around where it rests above the held arm."""
+def _head(data: MultibodyData, system: System, holder: Joint, motion: Motion) -> Head:
+    """The head on its springs, measured around where it rests above the arm that is held."""
+    held = system.with_joints(holder)
     number, arm = motion.numbers[data.head], motion.numbers[data.arm]
     rest = float(motion.position[number, 2])
     around = rest + TRAVEL * np.linspace(-1.0, 1.0, 5)
@@ -372,6 +377,8 @@ def _head(data: MultibodyData, held: System, motion: Motion) -> Head:
         damping=float(tables.dampings[2]),
         weight=-pull,
         offset=rest - float(motion.position[arm, 2]),
+        roll=_turning(data, system, motion, ROLL),
+        pitch=_turning(data, system, motion, PITCH),
     )
 
 
@@ -463,16 +470,13 @@ def _log(data: MultibodyData, standing: Standing) -> None:
         )
 
 
-@lru_cache(maxsize=64)
-def head_turning(data: MultibodyData, about: int) -> Turning | None:
+def _turning(data: MultibodyData, system: System, motion: Motion, about: int) -> Turning | None:
     """The head's roll or pitch, ``about`` its axis ``ROLL`` or ``PITCH``; None if its joints do not
-    allow it. Not collective.
+    allow it.
 
     Of all motions of the head with a unit turn that with the least kinetic energy is taken. Springs
     are linear; the effect of weight and of tension in them on the turn is left out.
     """
-    standing = stand(data)
-    system, motion = standing.system, standing.motion
     own = slice(6 * motion.numbers[data.head], 6 * motion.numbers[data.head] + 6)
     turn = np.zeros((1, 6))
     # Turns are counted in the head's axes.

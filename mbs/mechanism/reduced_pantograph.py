@@ -15,7 +15,6 @@ head, on the arm, and on bodies of the mechanism, whose lift is a column of the 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -104,12 +103,12 @@ class RaisingPantograph(SteppedHead):
             raise self._data.frame.left(self._raised.height, time)
         return self.head
 
-    def fill_drives(self, times: Sequence[float], drives: np.ndarray) -> None:
+    def fill_drives(self, times: np.ndarray, drives: np.ndarray) -> None:
         """Fill in lift and base, and where the wire crosses; see `SteppedHead`."""
         rows = named(drives)
         rows["part"] = parts_of(self._part, times)
         if self._base is not None:
-            motions = np.array([self._base.vertical(time) for time in times])
+            motions = np.array([self._base.vertical(time) for time in times.tolist()])
             rows["base"], rows["base_velocity"], rows["base_acceleration"] = motions.T
         if self._air is not None:
             blown = self._blowing(self._air.at(times))

@@ -8,11 +8,12 @@ of m, F and c over h hold all of it, so that a step costs a few interpolations.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from scipy.interpolate import CubicSpline
+from scipy.interpolate import CubicSpline, PPoly
 
 from catenary.base.errors import InputError, RunBroken
 from catenary.mbs.head.head_arrays import SplineTables
@@ -52,13 +53,15 @@ class ReducedMechanism:
     name: str = ""
     carried: np.ndarray | None = None
     blown: np.ndarray | None = None
-    _table: CubicSpline = field(init=False, repr=False, compare=False)
-    _slopes: CubicSpline = field(init=False, repr=False, compare=False)
 
-    def __post_init__(self) -> None:
+    @cached_property
+    def _table(self) -> CubicSpline:
         columns = np.stack([self.masses, self.lifts, self.dampings], axis=1)
-        object.__setattr__(self, "_table", CubicSpline(self.heights, columns))
-        object.__setattr__(self, "_slopes", self._table.derivative())
+        return CubicSpline(self.heights, columns)
+
+    @cached_property
+    def _slopes(self) -> PPoly:
+        return self._table.derivative()
 
     def at(self, height: float) -> tuple[np.ndarray, np.ndarray]:
         """Mass, lift and damping at a height [m], shape (3,), and their slopes, per metre.
@@ -75,12 +78,18 @@ class ReducedMechanism:
     def tables(self, carried: bool) -> SplineTables:
         """Splines of mass, lift, damping, carried mass (zero without ``carried``) and, of a
         mechanism that meets the air, the upward force of the air on its bodies."""
-        last = np.zeros_like(self.masses)
-        if carried:
-            if self.carried is None:
-                raise ValueError("nothing is known of what a moving base carries along")
-            last = self.carried
-        listed = [self.masses, self.lifts, self.dampings, last]
+        if not carried:
+            return self._tables_at_rest
+        if self.carried is None:
+            raise ValueError("nothing is known of what a moving base carries along")
+        return self._tables_with(self.carried)
+
+    @cached_property
+    def _tables_at_rest(self) -> SplineTables:
+        return self._tables_with(np.zeros_like(self.masses))
+
+    def _tables_with(self, carried: np.ndarray) -> SplineTables:
+        listed = [self.masses, self.lifts, self.dampings, carried]
         columns = np.stack(listed if self.blown is None else [*listed, self.blown], axis=1)
         spline = CubicSpline(self.heights, columns)
         return SplineTables(spline.x, np.ascontiguousarray(spline.c.transpose(1, 2, 0)))
@@ -154,7 +163,7 @@ def reduce_mechanism(
         raise InputError(f"A mechanism is reduced for at least four growing heights, not {table}.")
     # Heights are visited from the one that is nearest to the start, each from its neighbour.
     raised, more = (places or Places(None)).of(system, body, at)
-    motion = system.assemble(system.start() if start is None else start)
+    motion = raised.assembled(start)
     first = int(np.argmin(np.abs(table - point(motion, body, at).value[2])))
     found = [raised.to(table[first], motion)]
     for way in (table[first + 1 :], table[:first][::-1]):
@@ -247,6 +256,10 @@ class _Raised:
         self._gains: dict[float, float] = {}
         self._actuator, self.push = actuator, 0.0 if actuator is None else _push(actuator)
 
+    def assembled(self, start: Motion | None) -> Motion:
+        """A motion that joints allow, near by, or near the data's if None."""
+        return self._system.assemble(self._system.start() if start is None else start)
+
     def _law(self, time: float) -> Law:
         return Law(self._height, 0.0, 0.0)
 
@@ -271,6 +284,8 @@ class _Raised:
 
     def from_near(self, height: float, near: _Place) -> _Place:
         """The system at rest with the point at a height [m], from a place near by."""
+        if (found := self._places.get(float(height))) is not None:
+            return found
         try:
             return self.to(height, near.motion.moved((height - near.height) * near.way))
         except (InputError, RunBroken):  # a way that turns soon leads nowhere

@@ -118,12 +118,12 @@ def held_force(system: System, holder: Joint, start: Motion) -> float:
     ``holder``, for instance a `PrescribedPoint`, is added to the joints; the force is positive in
     the direction in which the held coordinate grows.
     """
-    return _pressed(system, holder, start)[0]
+    return _pressed(system.with_joints(holder), start)[0]
 
 
-def _pressed(system: System, holder: Joint, start: Motion) -> tuple[float, Motion]:
-    """The force of ``held_force``, and the place at rest."""
-    rest = equilibrium(system.with_joints(holder), start)
+def _pressed(held: System, start: Motion) -> tuple[float, Motion]:
+    """The force of ``held_force`` on the last joint, and the place at rest."""
+    rest = equilibrium(held, start)
     return float(rest.multipliers[-1]), rest.motion
 
 
@@ -140,9 +140,8 @@ class Calibration(NamedTuple):
 
 
 def calibrate_actuator(
-    system: System,
+    held: System,
     actuator: str,
-    holder: Joint,
     start: Motion,
     static_force: float,
     near: Calibration | None = None,
@@ -154,12 +153,10 @@ def calibrate_actuator(
 
     Parameters
     ----------
-    system : System
-        Bodies with their joints and forces.
+    held : System
+        Bodies with their forces and joints, the last of which, of one row, holds them.
     actuator : str
         Name of the actuator, whose force is constant.
-    holder : Joint
-        Joint of one row that holds the system.
     start : Motion
         Motion near the equilibrium.
     static_force : float
@@ -172,12 +169,12 @@ def calibrate_actuator(
     InputError
         The actuator does not act on what the holder holds.
     """
-    before = system.force(actuator)
+    before = held.force(actuator)
     if not isinstance(before, Actuator) or callable(before.force):
         raise InputError(f"Force {actuator!r} is no actuator with a constant force.")
 
     def pressed(push: float, start: Motion) -> tuple[float, Motion]:
-        return _pressed(system.with_force_changed(actuator, force=push), holder, start)
+        return _pressed(held.with_force_changed(actuator, force=push), start)
 
     if near is None:
         push = before.force
@@ -186,8 +183,8 @@ def calibrate_actuator(
         gain = (pressed(push + unit_force, start)[0] - had) / unit_force
         if abs(gain) < 1e-9:
             raise InputError(
-                f"Actuator {actuator!r} does not act on the {holder.name}: move its points off "
-                "what it turns about, or to other bodies."
+                f"Actuator {actuator!r} does not act on the {held.joints[-1].name}: move its "
+                "points off what it turns about, or to other bodies."
             )
         reached = had
     else:

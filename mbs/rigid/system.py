@@ -93,13 +93,15 @@ class System:
     def with_force_changed(self, name: str, **changes: Any) -> System:
         """Return this system with other values in the force of this name."""
         self.force(name)
-        return replace(
+        changed = replace(
             self,
             forces=tuple(
                 replace(force, **changes) if force.name == name else force  # type: ignore[type-var]
                 for force in self.forces
             ),
         )
+        changed.__dict__["_rows"] = self._rows  # of the same joints
+        return changed
 
     @cached_property
     def inverse_mass(self) -> np.ndarray:

@@ -156,7 +156,8 @@ def _both_ways(one: _Sections, values: np.ndarray, dt: float, slowest: float) ->
         return values.copy()
     padding = min(n - 1, int(np.ceil(_PADDING_PERIODS / (slowest * dt))))
     # Continued at both ends by the record itself, turned about its end points.
-    extended = np.empty((n + 2 * padding, *values.shape[1:]))
+    # Columns are contiguous, as SciPy filters them.
+    extended = np.empty((*values.shape[:0:-1], n + 2 * padding)).T
     extended[padding : padding + n] = values
     if padding:
         extended[:padding] = 2.0 * values[:1] - values[padding:0:-1]

@@ -17,8 +17,9 @@ class _Table:
 
     chunks = None
 
-    def __init__(self, values: np.ndarray) -> None:
-        self._values, self.shape = values, values.shape
+    def __init__(self, values: np.ndarray, attrs: Mapping[str, Any]) -> None:
+        self._values, self.attrs = values, attrs
+        self.shape, self.dtype = values.shape, values.dtype
 
     def __getitem__(self, part: Any) -> np.ndarray:
         return np.asarray(self._values[part])
@@ -37,6 +38,7 @@ class MarchedFile:
     tables : path in a result file -> array of what grows with the steps, ``time`` among them
     extremes : channel of the line -> smallest and largest values over all steps, (2, columns)
     outcome : how the march ended
+    about : path -> attributes of a table that has some
     """
 
     def __init__(
@@ -45,9 +47,11 @@ class MarchedFile:
         tables: Mapping[str, np.ndarray],
         extremes: Mapping[str, np.ndarray],
         outcome: str,
+        about: Mapping[str, Mapping[str, Any]],
     ) -> None:
         self._tables = {
-            path: _Table(values) for path, values in {**header.datasets, **tables}.items()
+            path: _Table(values, about.get(path, {}))
+            for path, values in {**header.datasets, **tables}.items()
         }
         self._extremes = dict(extremes)
         self.attrs = {"n_ranks": 1, **header.attributes, "outcome": outcome}

@@ -165,7 +165,7 @@ class Results(TrainOfRun):
 
     def n_rows(self, name: str) -> int:
         """Rows of a channel; those of the line may be fewer than the steps."""
-        return self._line_length if name in channels.line_channels() else self._length
+        return self._line_length if _is_of_line(name) else self._length
 
     def channel(self, name: str) -> np.ndarray:
         """A channel of ``CHANNELS``, shape (n, columns), read anew at each call.
@@ -223,7 +223,7 @@ class Results(TrainOfRun):
     def recorded_columns(self, name: str) -> np.ndarray:
         """Columns of a channel that its table has, (n,) int; all but of arms and droppers beyond
         the recorded stretch."""
-        if name in channels.line_channels() and name not in self.line_record.names:
+        if _is_of_line(name) and name not in self.line_record.names:
             return np.zeros(0, dtype=np.int64)
         path = f"line_columns/{name}"
         if path in self._file:
@@ -235,7 +235,7 @@ class Results(TrainOfRun):
 
         Over every step, whatever is recorded of the line; NaN if there are no steps.
         """
-        of_line = name in channels.line_channels()
+        of_line = _is_of_line(name)
         kept = (self._file.extremes(self._length) or {}) if of_line else {}
         if name in kept:
             return kept[name]
@@ -250,7 +250,7 @@ class Results(TrainOfRun):
         return self._table(name) is not None
 
     def _path(self, name: str) -> str:
-        return f"{'line_channels' if name in channels.line_channels() else 'channels'}/{name}"
+        return f"{'line_channels' if _is_of_line(name) else 'channels'}/{name}"
 
     def _table(self, name: str) -> h5py.Dataset | None:
         """The table of a channel, None if there is none that is valid."""
@@ -314,3 +314,8 @@ class Results(TrainOfRun):
         for sentence in sentences:
             logger.warning("%s", sentence)
         return state
+
+
+def _is_of_line(name: str) -> bool:
+    """Whether a channel has a column for each place on the line."""
+    return name in channels.CHANNELS and channels.CHANNELS[name].of_line

@@ -43,6 +43,7 @@ def summarise(
     """
     attributes = results.attributes
     indicators = indicate(results) if indicators is None else indicators
+    short = _short(results, statistics, criteria, indicators)
     start, end = results.evaluation
     summary = {
         "case": attributes["case"],
@@ -64,6 +65,48 @@ def summarise(
         "detour": attributes.get("detour") or None,
         "window": attributes.get("window") or None,
         "evaluation_m": [start, end],
+        "pantographs": short["pantographs"],
+        "histograms": short["histograms"],
+        "lateral": as_lateral_table(list(statistics.lateral)),
+        "supports": {**short["supports"], "per_support": _of_supports(results, statistics)},
+        "defects": attributes.get("defects", []),
+        "incidents": attributes.get("incidents", []),
+        "arrivals": attributes.get("arrivals", {}),
+        "excitation": attributes.get("excitation") or None,
+        "droppers": short["droppers"],
+        "static": _static(results),
+        "acceptance": short["acceptance"],
+        "not_judged": short["not_judged"],
+        "judged_by": judged_by(results, criteria),
+        "passed": short["passed"],
+        "indicators": as_table(indicators),
+        "complaints": statistics.complaints + results.damage,
+        "remarks": short["remarks"],
+        "watched": {k: v for k, v in attributes.get("watched", {}).items() if k != "remarks"},
+        "effects_on": [name for name, _, _ in attributes["effects_on"]],
+        "effects_off": [name for name, _, _ in attributes["effects_off"]],
+        "effects": _effects(attributes),
+        "versions": attributes["versions"],
+    }
+    return dict(plain(summary))
+
+
+def short_summary(
+    results: Results, statistics: RunStatistics, criteria: list[Criterion]
+) -> dict[str, Any]:
+    """As much of ``summarise`` as tables of studies read, without tables of all supports; its
+    parameters are those of that. Not collective."""
+    return dict(plain(_short(results, statistics, criteria, indicate(results))))
+
+
+def _short(
+    results: Results,
+    statistics: RunStatistics,
+    criteria: list[Criterion],
+    indicators: Indicators,
+) -> dict[str, Any]:
+    """Figures of ``short_summary``, not plain yet."""
+    return {
         "pantographs": [
             _pantograph(*row)
             for row in zip(
@@ -76,32 +119,17 @@ def summarise(
             )
         ],
         "histograms": [_histogram(p) for p in statistics.pantographs if not p.complaint],
-        "lateral": as_lateral_table(list(statistics.lateral)),
-        "supports": _supports(statistics, results.arm_wires()),
-        "defects": attributes.get("defects", []),
-        "incidents": attributes.get("incidents", []),
-        "arrivals": attributes.get("arrivals", {}),
-        "excitation": attributes.get("excitation") or None,
         "droppers": {
             "n_slackened": statistics.droppers.n_slackened,
             "max_force_N": statistics.droppers.maximum,
             "min_force_N": statistics.droppers.minimum,
         },
-        "static": _static(results),
         "acceptance": [_criterion(c) for c in criteria if not c.absent],
         "not_judged": [_unjudged(c) for c in criteria if c.absent],
-        "judged_by": judged_by(results, criteria),
         "passed": verdict(criteria) if results.complete else None,
-        "indicators": as_table(indicators),
-        "complaints": statistics.complaints + results.damage,
         "remarks": all_remarks(results, indicators),
-        "watched": {k: v for k, v in attributes.get("watched", {}).items() if k != "remarks"},
-        "effects_on": [name for name, _, _ in attributes["effects_on"]],
-        "effects_off": [name for name, _, _ in attributes["effects_off"]],
-        "effects": _effects(attributes),
-        "versions": attributes["versions"],
+        "supports": {"max_uplift_mm": 1e3 * statistics.supports.maximum},
     }
-    return dict(plain(summary))
 
 
 def as_json(summary: dict[str, Any]) -> str:
@@ -158,16 +186,13 @@ def _histogram(p: PantographStatistics) -> dict[str, Any]:
     return {"name": p.name, **own, "percent": p.histogram_percent}
 
 
-def _supports(statistics: RunStatistics, wires: list[str]) -> dict[str, Any]:
-    supports = statistics.supports
-    rows = zip(supports.x, supports.uplift, supports.evaluated, wires, strict=True)
-    return {
-        "max_uplift_mm": 1e3 * supports.maximum,
-        "per_support": [
-            {"x_m": x, "wire": wire, "max_uplift_mm": 1e3 * uplift, "evaluated": evaluated}
-            for x, uplift, evaluated, wire in rows
-        ],
-    }
+def _of_supports(results: Results, statistics: RunStatistics) -> list[dict[str, Any]]:
+    own = statistics.supports
+    rows = zip(own.x, own.uplift, own.evaluated, results.arm_wires(), strict=True)
+    return [
+        {"x_m": x, "wire": wire, "max_uplift_mm": 1e3 * uplift, "evaluated": evaluated}
+        for x, uplift, evaluated, wire in rows
+    ]
 
 
 def _static(results: Results) -> dict[str, Any]:

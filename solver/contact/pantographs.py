@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
@@ -311,12 +311,12 @@ class Pantographs:
             heads[-1].first = strips.start
         return heads, places
 
-    def fill_drives(self, times: Sequence[float], drives: np.ndarray) -> None:
+    def fill_drives(self, times: np.ndarray, drives: np.ndarray) -> None:
         """Fill in what ``heads_in_loop`` depend on in steps to ``times`` [s].
 
         ``drives`` (len(times), n, `drives.drive_width`).
         """
-        named(drives)["time"] = np.asarray(times)[:, None]
+        named(drives)["time"] = times[:, None]
         for number, model in enumerate(self.models):
             if isinstance(model, SteppedHead | LoweredPantograph):
                 model.fill_drives(times, drives[:, number])

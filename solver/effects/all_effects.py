@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Set
+from collections.abc import Callable, Iterable, Set
 from dataclasses import replace
+from functools import wraps
+from typing import TypeVar
 
 from catenary.solver.effects.effect import Effect, NamedWire, registered
 from catenary.solver.effects.shipped import (  # noqa: F401  (registers)
@@ -26,9 +28,28 @@ def registry() -> dict[str, Effect]:
     return registered()
 
 
-def active(problem: Problem) -> list[Effect]:
+T = TypeVar("T")
+
+
+def _of_latest(function: Callable[[Problem], T]) -> Callable[[Problem], T]:
+    """A function of a problem that keeps its result for the latest one, which several ask for."""
+    latest: list[tuple[Problem, dict[str, Effect], T]] = []
+
+    @wraps(function)
+    def of(problem: Problem) -> T:
+        effects = registry()
+        if not latest or latest[0][0] is not problem or latest[0][1] != effects:
+            latest[:] = [(problem, effects, function(problem))]
+        return latest[0][2]
+
+    return of
+
+
+@_of_latest
+def active(problem: Problem) -> tuple[Effect, ...]:
     """The effects of ``problem`` that have something to act on, in building order."""
-    return [e for e in registry().values() if e.name in problem.effects and e.applies(problem)]
+    own = problem.effects
+    return tuple(e for name, e in registry().items() if name in own and e.applies(problem))
 
 
 def needs_form(problem: Problem) -> bool:
@@ -56,6 +77,7 @@ def with_defects(problem: Problem) -> Problem:
     return problem
 
 
+@_of_latest
 def simulated(problem: Problem) -> Simulated:
     """The laws of a problem: each active effect sets its own, in building order."""
     laws = Simulated(problem.contact.without_damping())

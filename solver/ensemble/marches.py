@@ -168,7 +168,7 @@ def _steps(
     times = np.arange(1, n_steps + 1) * dt
     drives = np.zeros((n_steps, pantographs.n, drive_width(pantographs.most_contacts)))
     heads, _ = pantographs.heads_in_loop()
-    pantographs.fill_drives(times.tolist(), drives)
+    pantographs.fill_drives(times, drives)
     strips = np.zeros(2 * n * (1 + n))
     problem = coupling.inner.problem(affine(strips, n), scheme.share)
     rows = np.zeros((n_steps + 1, pantographs.outputs.size))
@@ -219,9 +219,10 @@ def _ended(
     shared: SharedLine, lane: int, march: _OnItsWay, taken: int, is_left: bool
 ) -> SceneHistory:
     """Record of a scene that is at its end, or left."""
-    n, rows = march.n, march.rows[: taken + 1]
-    extremes = shared.extremes
-    position, force, head, wire = (rows[:, k * n : (k + 1) * n] for k in range(4))
+    n, extremes = march.n, shared.extremes
+    # Each column is read as a whole.
+    columns = np.ascontiguousarray(march.rows[: taken + 1, : 4 * n].T)
+    position, force, head, wire = (columns[k * n : (k + 1) * n].T for k in range(4))
     return SceneHistory(
         march.number,
         march.at_rest,

@@ -171,7 +171,7 @@ def set_up_of(
     n_steps = steps_of(problem) if n_steps is None else n_steps
     drives = np.zeros((n_steps, pantographs.n, drive_width(pantographs.most_contacts)))
     times = np.arange(1, n_steps + 1) * problem.numerics.dt
-    pantographs.fill_drives(times.tolist(), drives)
+    pantographs.fill_drives(times, drives)
     law = law_in_steps(problem, simulated, pantographs.n_contacts)
     hertz = np.zeros(0)
     if isinstance(simulated.contact, HertzLaw):

@@ -206,7 +206,7 @@ class CompiledSteps:
         self.scheme.interaction.line.provide(float(pantographs.speed) * n_steps * self._dt)
         self._moved.end(self._first + self._done, self._done)
         self._moved.begin(step)
-        pantographs.fill_drives(times.tolist(), self._drives[:n_steps])
+        pantographs.fill_drives(times, self._drives[:n_steps])
         self._first, self._done, self._ready = step, 0, n_steps
 
     def _finish(self) -> bool:

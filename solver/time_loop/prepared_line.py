@@ -71,7 +71,7 @@ def write_line(path: Path, blocks: CompiledSteps, dt: float, steps: tuple[int, i
     first, last = steps
     models = [stepped_by_kernels(model) for model in pantographs.models]
     drives = np.zeros((last - first, len(models), drive_width(pantographs.most_contacts)))
-    pantographs.fill_drives((np.arange(first + 1, last + 1) * dt).tolist(), drives)
+    pantographs.fill_drives(np.arange(first + 1, last + 1) * dt, drives)
     end = float(scheme.interaction.contacts.wires.nodes["x"].max())
     ahead = Ahead(
         dt,

@@ -35,7 +35,9 @@ Load = Callable[[float], float]
 def calibrated(static_force: float = STATIC_FORCE) -> System:
     """The corrected pantograph, its actuator for this static force at the paper's height."""
     system = ambrosio.pantograph()
-    found = calibrate_actuator(system, ambrosio.ACTUATOR, HOLDER, system.start(), static_force)
+    found = calibrate_actuator(
+        system.with_joints(HOLDER), ambrosio.ACTUATOR, system.start(), static_force
+    )
     return system.with_force_changed(ambrosio.ACTUATOR, force=found.actuator_force)
 
 

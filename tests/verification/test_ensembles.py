@@ -94,7 +94,7 @@ def test_scenes_side_by_side_give_what_their_own_runs_give(case: str) -> None:
     changes = [{"train.speed_km_h": share * speed} for share in (1.0, 0.98, 0.96)]
     found, together = marched(scenes_of(case, changes))
     assert together and [one.outcome for one in found] == ["done"] * 3
-    assert differences(plain(found[1].summary), own_run(case, changes[1])) == []
+    assert differences(plain(found[1].summary()), own_run(case, changes[1])) == []
 
 
 def test_lanes_are_filled_again_with_trains_of_other_lengths() -> None:
@@ -109,7 +109,7 @@ def test_lanes_are_filled_again_with_trains_of_other_lengths() -> None:
     assert together
     for number in (2, 6):
         assert (
-            differences(plain(found[number].summary), own_run("en50318_2002", changes[number]))
+            differences(plain(found[number].summary()), own_run("en50318_2002", changes[number]))
             == []
         )
 
@@ -129,10 +129,10 @@ def test_lines_with_other_errors_of_dropper_lengths_share_matrices(
     ]
     found, together = marched(scenes_of(case, changes))
     assert together
-    deviations = [one.summary["pantographs"][0]["std_N"] for one in found]
+    deviations = [one.summary()["pantographs"][0]["std_N"] for one in found]
     assert len(set(deviations)) == len(changes)
     for number in (0, 4):
-        assert differences(plain(found[number].summary), own_run(case, changes[number])) == []
+        assert differences(plain(found[number].summary()), own_run(case, changes[number])) == []
 
 
 @pytest.mark.study
@@ -153,7 +153,7 @@ def test_lines_with_other_slack_droppers_at_rest_share_lanes(
     assert together
     for number, own in enumerate(slack):
         if own:
-            summary = plain(found[number].summary)
+            summary = plain(found[number].summary())
             assert differences(summary, own_run("en50318_2002", changes[number])) == []
 
 
@@ -163,7 +163,7 @@ def test_scenes_with_loads_march_one_by_one() -> None:
     changes = [{"train.speed_km_h": speed}, {"train.speed_km_h": 0.98 * speed}]
     found, together = marched(scenes_of("windy_viaduct", changes))
     assert not together
-    assert differences(plain(found[1].summary), own_run("windy_viaduct", changes[1])) == []
+    assert differences(plain(found[1].summary()), own_run("windy_viaduct", changes[1])) == []
 
 
 def test_droppers_with_a_curve_march_one_by_one() -> None:
@@ -192,7 +192,7 @@ def test_pantographs_that_python_steps_march_one_by_one(monkeypatch: pytest.Monk
     changes = [{"train.speed_km_h": 240.0}, {"train.speed_km_h": 250.0}]
     found, _ = marched(scenes_of("en50318_2002", changes))
     assert len(refused) == 2 and [one.outcome for one in found] == ["done"] * 2
-    assert all(one.summary["watched"] for one in found)
+    assert all(one.summary()["watched"] for one in found)
 
 
 @pytest.mark.study
@@ -210,7 +210,7 @@ def test_scenes_march_alike_on_all_processors() -> None:
             found, together = marched(scenes_of("en50318_2002", changes))
             assert together == (target != "baseline")
             for one, other in zip(found, expected, strict=True):
-                assert differences(plain(one.summary), plain(other.summary)) == []
+                assert differences(plain(one.summary()), plain(other.summary())) == []
     finally:
         native.set_target(best)
 
@@ -229,16 +229,16 @@ def test_a_scene_that_breaks_stops_no_other() -> None:
     assert together
     assert [one.outcome == "done" for one in found] == [True, False, True]
     assert "would have to pull" in found[1].outcome
-    assert differences(plain(found[2].summary), own_run("en50318_2002", changes[2])) == []
+    assert differences(plain(found[2].summary()), own_run("en50318_2002", changes[2])) == []
 
 
 def test_unusual_scenes_are_marched_again_under_a_watch(monkeypatch: pytest.MonkeyPatch) -> None:
     changes = [{"train.speed_km_h": 240.0}, {"train.speed_km_h": 250.0}]
     usual, _ = marched(scenes_of("en50318_2002", changes))
-    uplifts = sorted(one.summary["supports"]["max_uplift_mm"] for one in usual)
+    uplifts = sorted(one.summary()["supports"]["max_uplift_mm"] for one in usual)
     monkeypatch.setattr(scenes_on_lines, "_UPLIFT", 0.5e-3 * sum(uplifts))
     found, together = marched(scenes_of("en50318_2002", changes))
     assert together
-    assert sorted(bool(one.summary["watched"]) for one in found) == [False, True]
+    assert sorted(bool(one.summary()["watched"]) for one in found) == [False, True]
     for one, other in zip(usual, found, strict=True):
-        assert differences(plain(one.summary), plain(other.summary)) == []
+        assert differences(plain(one.summary()), plain(other.summary())) == []

@@ -87,7 +87,7 @@ def test_actuator_for_the_static_force_and_published_actuator() -> None:
     """9.89 kN for 150 N, within 1 %; 920 N leave about -348 N."""
     system = ambrosio.pantograph()
     weak = system.with_force_changed(ambrosio.ACTUATOR, force=920.0)
-    found = calibrate_actuator(weak, ambrosio.ACTUATOR, HOLDER, system.start(), 150.0)
+    found = calibrate_actuator(weak.with_joints(HOLDER), ambrosio.ACTUATOR, system.start(), 150.0)
     print(f"{found.actuator_force:.1f} N for 150 N on the wire, gain {found.gain:.5f}")
     check("actuator [N]", found.actuator_force, 9890.0, within=98.9)
     check("static force [N]", found.static_force, 150.0, within=1e-6)
@@ -127,7 +127,9 @@ def test_equivalent_mass_of_the_frame() -> None:
 
 def calibrated(static_force: float) -> System:
     system = ambrosio.pantograph()
-    found = calibrate_actuator(system, ambrosio.ACTUATOR, HOLDER, system.start(), static_force)
+    found = calibrate_actuator(
+        system.with_joints(HOLDER), ambrosio.ACTUATOR, system.start(), static_force
+    )
     return system.with_force_changed(ambrosio.ACTUATOR, force=found.actuator_force)
 
 

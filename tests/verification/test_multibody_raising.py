@@ -102,9 +102,8 @@ def test_paper_s_pantograph_let_go_rises_like_all_its_bodies() -> None:
     """Order 2 in dt; all bodies differ by the 0.1 kg of what the head carries along the track."""
     force, end = 150.0, 0.1
     system = ambrosio.pantograph()
-    push = calibrate_actuator(
-        system, ambrosio.ACTUATOR, HOLDER, system.start(), force
-    ).actuator_force
+    held = system.with_joints(HOLDER)
+    push = calibrate_actuator(held, ambrosio.ACTUATOR, system.start(), force).actuator_force
     system = system.with_force_changed(ambrosio.ACTUATOR, force=push)
     pressed = system.with_forces(PointForce("wire", HEAD, (0, 0, -force)))
     rest = equilibrium(pressed.with_joints(HOLDER), system.start()).motion

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import re
 import tomllib
 from pathlib import Path
@@ -90,8 +91,9 @@ def parse_assignment(text: str, option: str = "--set") -> tuple[str, Any]:
 def assign(raw: dict[str, Any], key: str, value: Any, where: str = COMMAND_LINE) -> None:
     """Set a dotted key in a nested table, making the tables on the way; ``REMOVED`` takes it away.
 
-    A number in the key is an index into a list; the number after the last one appends. ``where``
-    says in an error where the assignment was written.
+    A number in the key is an index into a list; the number after the last one appends. Tables below
+    ``raw`` are not changed but take the place of others. ``where`` says in an error where the
+    assignment was written.
 
     Raises
     ------
@@ -118,6 +120,7 @@ def assign(raw: dict[str, Any], key: str, value: Any, where: str = COMMAND_LINE)
                 f"{shown(key)[1:-1]} cannot be set {where}: {above} is {shown(here)} and no table"
             )
         if not last:
+            here[place] = copy.copy(here[place])
             here = here[place]
         elif value is not REMOVED:
             here[place] = value

@@ -19,9 +19,9 @@ import numpy as np
 from catenary.cases.studies.records import KeptRows
 from catenary.cases.studies.sweep.jobs import HISTORIES
 from catenary.cases.studies.sweep.variants import Variant
-from catenary.postproc.evaluate import filters
 from catenary.postproc.files.dimensions import CONVENTIONS
 from catenary.postproc.files.disk import appears_whole, opened, unwritten
+from catenary.postproc.files.filtered_force import PATH as FILTERED
 from catenary.postproc.files.hdf5.checked import HDF5_ERRORS
 from catenary.postproc.files.hdf5.self_contained import open_own
 
@@ -70,15 +70,11 @@ def piece_file(path: Path | None, names: Sequence[str]) -> Iterator[Put]:
 
 def _chosen(tables: Mapping[str, np.ndarray], names: Sequence[str]) -> dict[str, np.ndarray]:
     """Time (n_steps,), position and the histories (n_steps, n_pantographs), in single precision."""
-    time, kept = tables["time"], {}
+    kept = {}
     for name in names:
-        if name == "filtered_force":
-            force = tables["channels/contact_force"]
-            values = filters.low_pass(force, float(time[1] - time[0]))
-        else:
-            values = tables[f"channels/{name}"]
-        kept[name] = values.astype(np.float32)
-    return {_TIME: time, _POSITION: tables["channels/contact_position"], **kept}
+        path = FILTERED if name == "filtered_force" else f"channels/{name}"
+        kept[name] = tables[path].astype(np.float32)
+    return {_TIME: tables["time"], _POSITION: tables["channels/contact_position"], **kept}
 
 
 class KeptHistories(KeptRows):

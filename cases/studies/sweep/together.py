@@ -225,7 +225,7 @@ class _March:
         ----------
         work : variants, and the file of their histories
         """
-        from catenary.cases.studies.ensemble import Marches, in_short
+        from catenary.cases.studies.ensemble import Marches
         from catenary.cases.studies.sweep.histories import piece_file
 
         piece, file = work
@@ -244,7 +244,7 @@ class _March:
                 number = numbers[marched.number]
                 if marched.outcome == DONE:
                     put(number, marched.tables)
-                rows[number] = [marched.outcome, in_short(marched.summary)]
+                rows[number] = [marched.outcome, marched.in_short()]
         return rows
 
     def __getstate__(self) -> dict[str, Any]:

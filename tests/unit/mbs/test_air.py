@@ -66,8 +66,8 @@ def test_wind_adds_to_the_speed_of_the_train_as_far_as_it_counts(
 def test_forces_grow_while_the_pantograph_is_raised() -> None:
     forces = AirForces(Airflow(70.0), Uplift(DSA380, 0.7), raise_time=2.0)
     whole = forces.now(5.0)
-    check("parts", forces.at([0.0, 1.0, 2.0, 3.0]), np.outer([0, 0.5, 1, 1], whole), within=1e-12)
+    check("parts", forces.at(np.arange(4.0)), np.outer([0, 0.5, 1, 1], whole), within=1e-12)
     check("of the train's own air", whole[2], 1.0, within=0.0 + EPS)
     moved = AirForces(Airflow(70.0, 0.0, (Tunnel(70.0, 999.0, 2.0, 0.0),)), None, 0.0)
-    check("square", moved.at([0.5, 1.5])[:, 2], [1.0, 2.0], within=EPS)
-    check("alone", moved.now(1.5), moved.at([1.5])[0], within=EPS)
+    check("square", moved.at(np.array([0.5, 1.5]))[:, 2], [1.0, 2.0], within=EPS)
+    check("alone", moved.now(1.5), moved.at(np.array([1.5]))[0], within=EPS)

@@ -32,7 +32,7 @@ def test_a_pantograph_is_lowered_from_where_its_raising_was() -> None:
 
 
 def test_the_parts_of_many_steps_are_those_of_each() -> None:
-    times = [1e-3 * step for step in range(1, 700)]
+    times = 1e-3 * np.arange(1, 700)
     each = [Raising(0.5)(time) for time in times]
     # A cosine of an array may be rounded otherwise than one alone: half of 2.2e-16.
     for some in (slice(None), slice(100, 103), slice(498, None), slice(500, None)):

@@ -147,7 +147,8 @@ def test_another_static_force_has_the_tables_of_its_own_calculation() -> None:
     found, expected = stand(again), stand(alone)
     # Both are calibrated to 1e-9 of the static force.
     check("jack [N]", found.actuator_force, expected.actuator_force, within=1e-6)
-    check("head", found.head, expected.head, within=1e-6)
+    check("head", found.head[:5], expected.head[:5], within=1e-6)
+    assert found.head[5:] == expected.head[5:] == (None, None)  # slides
     assert found.static_force == pytest.approx(151.0, rel=1e-9)
     assert found.n_freedoms == expected.n_freedoms
     tables, own = reduced(again), reduced(alone)

@@ -74,7 +74,7 @@ def test_lever_presses_as_levers_do() -> None:
     system, holder = lever(), PrescribedPoint("wire", "rod", Constant(0.0), (1.0, 0, 0))
     expected = 100.0 / 4 - 3.0 * G / 2
     check("pressed [N]", held_force(system, holder, system.start()), expected, within=1e-10)
-    found = calibrate_actuator(system, "strut", holder, system.start(), 50.0)
+    found = calibrate_actuator(system.with_joints(holder), "strut", system.start(), 50.0)
     check("actuator [N]", found.actuator_force, 4 * (50.0 + 3.0 * G / 2), within=1e-6)
     check("static force [N]", found.static_force, 50.0, within=1e-6)
     check("gain", found.gain, 0.25, within=1e-9)
@@ -97,9 +97,9 @@ def test_what_has_no_answer_is_said() -> None:
         equilibrium(system, system.start())
     holder = PrescribedPoint("wire", "rod", Constant(0.0), (1.0, 0, 0))
     with pytest.raises(InputError, match="'gravity' is no actuator"):
-        calibrate_actuator(lever(), "gravity", holder, lever().start(), 50.0)
+        calibrate_actuator(lever().with_joints(holder), "gravity", lever().start(), 50.0)
     with pytest.raises(InputError, match="no force 'lift'"):
-        calibrate_actuator(lever(), "lift", holder, lever().start(), 50.0)
+        calibrate_actuator(lever().with_joints(holder), "lift", lever().start(), 50.0)
     useless = lever().with_forces(Actuator("idle", SPACE, "rod", (-1.0, 0, 0), (0, 0, 0), 1.0))
     with pytest.raises(InputError, match="'idle' does not act on the wire"):
-        calibrate_actuator(useless, "idle", holder, useless.start(), 50.0)
+        calibrate_actuator(useless.with_joints(holder), "idle", useless.start(), 50.0)

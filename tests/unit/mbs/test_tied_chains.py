@@ -56,10 +56,10 @@ def test_a_tied_chain_comes_to_the_static_force_at_its_nominal_height() -> None:
 
 def test_drives_of_many_steps_are_those_of_single_ones() -> None:
     one = pantograph()
-    times = [0.1, 0.25, 0.4, 0.5, 0.7]
+    times = np.array([0.1, 0.25, 0.4, 0.5, 0.7])
     drives = np.zeros((len(times), drive_width(1)))
     one.fill_drives(times, drives)
-    for time, row in zip(times, drives, strict=True):
+    for time, row in zip(times.tolist(), drives, strict=True):
         other = pantograph()
         other.predict(time)
         assert row == pytest.approx(other.row, rel=1e-12)
