@@ -146,9 +146,10 @@ def restart(
         stretch = ":".join(map(str, places))
 
     def read() -> CheckedScene:
+        tables = scene_to_continue(own, until, stretch)
         if until is None:  # the file goes on in its place
             _refuse_open(own / RUN_FILE)
-        return scene_to_continue(own, until, stretch)
+        return tables
 
     tables = on_root(comm, read, takes_long=True)
     with _set_up(tables, progress, comm) as options:
