@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -22,7 +21,6 @@ from catenary.callers import (
     temporary_folder,
 )
 from catenary.cases.process.petsc_options import options_of
-from catenary.postproc.files.own_files import RUN_FILE
 from catenary.scenes import SceneLike, checked
 
 if TYPE_CHECKING:
@@ -145,31 +143,13 @@ def restart(
         places: Any = evaluate if np.ndim(evaluate) else [evaluate]
         stretch = ":".join(map(str, places))
 
-    def read() -> CheckedScene:
-        tables = scene_to_continue(own, until, stretch)
-        if until is None:  # the file goes on in its place
-            _refuse_open(own / RUN_FILE)
-        return tables
-
-    tables = on_root(comm, read, takes_long=True)
+    tables = on_root(comm, lambda: scene_to_continue(own, until, stretch), takes_long=True)
     with _set_up(tables, progress, comm) as options:
         extends = until is not None
         made = go_on(
             own, tables, comm, options, force=force, extends=extends, only_summary=not report
         )
         return _returned(made, comm)
-
-
-def _refuse_open(file: Path) -> None:
-    """Raise InputError if this process reads a file, to which HDF5 then does not write."""
-    from h5py import h5f
-
-    names = [os.fsdecode(h5f.get_name(one)) for one in h5f.get_obj_ids(types=h5f.OBJ_FILE)]
-    there = filter(os.path.exists, names) if file.exists() else ()
-    if any(os.path.samefile(name, file) for name in there):
-        raise InputError(
-            f"{file} is open in this program: close() the run that reads it, then continue it"
-        )
 
 
 def run_into(

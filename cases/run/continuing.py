@@ -48,7 +48,7 @@ def state_to_continue(result: Path, beyond_end: bool = False) -> dict[str, Any]:
     Raises
     ------
     InputError
-        If there is no result file, if it is done, or if it is too damaged.
+        If there is no result file, if it is done, too damaged, or still read by this process.
     """
     if not result.exists():
         raise InputError(
@@ -77,7 +77,21 @@ def state_to_continue(result: Path, beyond_end: bool = False) -> dict[str, Any]:
         fault = fault_to_continue(result, half_before)
     if fault:
         raise _refusal(result, f"{fault}; what is valid can be reported")
+    if not beyond_end:  # the file goes on in its place
+        _refuse_open(result)
     return state
+
+
+def _refuse_open(file: Path) -> None:
+    """Raise InputError if this process reads a file, to which HDF5 then does not write."""
+    from h5py import h5f
+
+    names = [os.fsdecode(h5f.get_name(one)) for one in h5f.get_obj_ids(types=h5f.OBJ_FILE)]
+    there = filter(os.path.exists, names) if file.exists() else ()
+    if any(os.path.samefile(name, file) for name in there):
+        raise InputError(
+            f"{file} is open in this program: close() the run that reads it, then continue it"
+        )
 
 
 def refuse_other_run(
