@@ -206,7 +206,8 @@ class ModelBuilder:
         number, terms = len(self.model.blocks), (mass, stiffness, damping)
         if self._before is not None and number < len(self._before.blocks):
             same = self._before.blocks[number]
-            if same.component == component and same.is_of(dofs, terms):
+            kind = (same.component, same.of_shape, same.lateral)
+            if kind == (component, of_shape, False) and same.is_of(dofs, terms):
                 self.add_block(same)
                 return
         self.add_block(Block.of_elements(component, dofs, *terms, of_shape=of_shape))
