@@ -129,13 +129,18 @@ def _tried(part: str, program: str, remedy: str, needed: bool = False) -> Findin
 
 def _answer(command: list[str], limit: float = LIMIT) -> tuple[int, str]:
     """Exit code and last line of a command's answer; whatever it started has ended then."""
-    environment = os.environ | {
-        "OMPI_ALLOW_RUN_AS_ROOT": "1",
-        "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
-        "OMPI_MCA_rmaps_base_oversubscribe": "1",
-    }
-    # Files, not pipes: a process that is left behind would hold a pipe open.
-    with tempfile.TemporaryFile("w+", errors="replace") as stream:
+    # Files, not pipes: a process that is left behind would hold a pipe open. Their folder is their
+    # own, as a program of Open MPI that ends removes what others make in a common one.
+    with (
+        tempfile.TemporaryFile("w+", errors="replace") as stream,
+        tempfile.TemporaryDirectory(prefix="doctor", ignore_cleanup_errors=True) as folder,
+    ):
+        environment = os.environ | {
+            "OMPI_ALLOW_RUN_AS_ROOT": "1",
+            "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
+            "OMPI_MCA_rmaps_base_oversubscribe": "1",
+            "TMPDIR": folder,
+        }
         try:
             process = subprocess.Popen(
                 command,
