@@ -16,11 +16,13 @@ RUN, PANTOGRAPH = "run", "pantograph"
 
 
 class Quantity(NamedTuple):
-    """A quantity: unit in which books state its limits, meaning, and what has a value of it."""
+    """A quantity: unit in which books state its limits, meaning, what has a value of it, and
+    whether it is a number of the scene, which stands at a limit on purpose."""
 
     unit: str
     meaning: str
     per: str = RUN
+    given: bool = False
 
 
 class LimitKey(NamedTuple):
@@ -48,11 +50,11 @@ QUANTITIES: dict[str, Quantity] = {
     "strip_place": Quantity(
         "mm", "farthest place of a contact wire from the middle of the strips", PANTOGRAPH
     ),
-    "strip_half_length": Quantity("mm", "half length of the strips", PANTOGRAPH),
-    "distance_ahead": Quantity("m", "distance to the pantograph ahead", PANTOGRAPH),
+    "strip_half_length": Quantity("mm", "half length of the strips", PANTOGRAPH, given=True),
+    "distance_ahead": Quantity("m", "distance to the pantograph ahead", PANTOGRAPH, given=True),
     "arm_uplift": Quantity("mm", "largest uplift of the contact wire at a steady arm"),
-    "train_speed": Quantity("km/h", "speed of the train"),
-    "wave_speed": Quantity("km/h", "speed of the slowest wave of the contact wire"),
+    "train_speed": Quantity("km/h", "speed of the train", given=True),
+    "wave_speed": Quantity("km/h", "speed of the slowest wave of the contact wire", given=True),
     "wire_height_max": Quantity("mm", "largest height of the contact wire at rest"),
     "wire_height_min": Quantity("mm", "smallest height of the contact wire at rest"),
     "wire_gradient": Quantity(

@@ -11,7 +11,7 @@ from catenary.postproc.evaluate.verdict import Criterion, judged_by, labels
 from catenary.postproc.evaluate.wording import decimals_that_tell
 from catenary.postproc.report.sections.section import EvaluatedRun, Section, Text, number
 from catenary.postproc.report.study_table import StudyTable, texts_table
-from catenary.postproc.standards.quantities import KMH
+from catenary.postproc.standards.quantities import KMH, QUANTITIES
 
 _RELATIONS = {"<=": "≤", "<": "<", ">=": "≥", ">": ">"}
 NAN = float("nan")
@@ -116,7 +116,7 @@ def _margin(one: Criterion) -> str:
 
 
 def nearest_limit(run: EvaluatedRun) -> Iterator[str]:
-    """Sentences on the smallest margin, and on verdicts that errors and the start could turn.
+    """Sentences on the smallest margin of what the run finds, and on verdicts that errors and the start could turn.
 
     Parameters
     ----------
@@ -128,7 +128,11 @@ def nearest_limit(run: EvaluatedRun) -> Iterator[str]:
         for one, label in zip(run.criteria, labels(run.criteria), strict=True)
         if one.passed is not None
     ]
-    shares = [(one, label) for one, label in judged if one.passed and one.limit != 0.0]
+    shares = [
+        (one, label)
+        for one, label in judged
+        if one.passed and one.limit != 0.0 and not _is_given(one)
+    ]
     if shares:
         one, label = min(shares, key=lambda pair: abs(_distance(pair[0]) / pair[0].limit))
         share = 100.0 * _distance(one) / abs(one.limit)
@@ -149,6 +153,10 @@ def nearest_limit(run: EvaluatedRun) -> Iterator[str]:
             f"What the start of the run leaves in the evaluated stretch could turn the verdict on: "
             f"{left}. A longer run-in leaves less."
         )
+
+
+def _is_given(one: Criterion) -> bool:
+    return one.quantity in QUANTITIES and QUANTITIES[one.quantity].given
 
 
 def _turned(

@@ -124,6 +124,9 @@ def test_the_nearest_limit_is_the_smallest_share() -> None:
     assert told(0.1, mean, largest, zero).startswith(
         "Nearest to its limit: force_max of the run, with a margin of 3.5 N (1.0 %)."
     )
+    # A number of the scene stands at its limit on purpose.
+    speed = criterion(300.0, 300.0, "<=", "train_speed")
+    assert "train_speed" not in told(0.1, mean, speed)
     # One that failed has no margin.
     failed = criterion(150.1, 150.0, "<=", "mean_force")
     assert told(0.1, failed, largest).startswith(
