@@ -116,7 +116,8 @@ def _margin(one: Criterion) -> str:
 
 
 def nearest_limit(run: EvaluatedRun) -> Iterator[str]:
-    """Sentences on the smallest margin of what the run finds, and on verdicts that errors and the start could turn.
+    """Sentences on the smallest margin of what the run finds, and on verdicts that errors and the
+    start could turn.
 
     Parameters
     ----------
