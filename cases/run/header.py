@@ -53,6 +53,7 @@ def header_of(
     at_rest: LineAtRest,
     petsc_options: Sequence[str],
     excited: ExcitedRun | None = None,
+    with_lengths: bool = True,
 ) -> Header:
     """Header of the result file of a run. Not collective.
 
@@ -62,8 +63,11 @@ def header_of(
     at_rest : its line in equilibrium
     petsc_options : the options that PETSc was started with, for the record
     excited : excitation that sets the line into motion in place of the scene's train
+    with_lengths : whether the lengths to which droppers are cut belong to it, a form finding
     """
-    line, lengths = problem.line, lengths_to_cut(problem, at_rest.mesh)
+    line, cut = problem.line, {}
+    if with_lengths:
+        cut = {"static/dropper_length": lengths_to_cut(problem, at_rest.mesh)}
     return Header(
         attributes={
             **scene_attributes(scene, problem),
@@ -78,7 +82,8 @@ def header_of(
         },
         datasets={
             **line_datasets(line, at_rest.mesh, problem.evaluation),
-            **static_datasets(line, at_rest.mesh, at_rest.form, at_rest.lift, lengths),
+            **cut,
+            **static_datasets(line, at_rest.mesh, at_rest.form, at_rest.lift),
         },
         facts=facts_of(problem, at_rest.mesh, at_rest.model.dropper_lengths),
     )

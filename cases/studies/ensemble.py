@@ -8,7 +8,7 @@ what their own runs write as ``summary.json``.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import islice
 from typing import Any, NamedTuple, TypeVar
@@ -32,12 +32,11 @@ from catenary.postproc.files.run_schema import DONE
 from catenary.postproc.read.marched_results import MarchedFile
 from catenary.postproc.read.results import Results
 from catenary.postproc.record.run_watch import RunWatch, watch_cadence, watch_inputs
-from catenary.postproc.report.summary import short_summary, summarise
+from catenary.postproc.report.summary import short_summary
 from catenary.solver.ensemble.marches import SceneHistory, march_side_by_side
 from catenary.solver.ensemble.shared_line import N_LANES, SharedLine, why_alone
 from catenary.solver.model.model import Model
 from catenary.solver.problem.problem import Problem
-from catenary.solver.statics.changed_line.rest_with_defects import errors_of_length
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest, sound_line
 from catenary.solver.statics.stability_of_rest import refuse_lost_wire
 from catenary.solver.time_loop.march import March
@@ -54,7 +53,8 @@ class Keeper(Observer):
     def start(self, stage: Stage) -> None:
         """Forget everything."""
         self._times: list[np.ndarray] = []
-        self._rows: dict[str, list[np.ndarray]] = {}
+        self._rows: list[np.ndarray] = []
+        self._columns: dict[str, np.ndarray] = {}
         self._extremes: dict[str, np.ndarray] = {}
 
     def next_state(self, step: int) -> int:
@@ -63,29 +63,35 @@ class Keeper(Observer):
 
     def observe(self, view: StepView) -> None:
         """Keep the steps of a view."""
+        if not self._columns:
+            every = np.arange(view.rows.shape[1])
+            own = {name: every[part] for name, part in view.columns.items() if _is_of_train(name)}
+            self._columns = {name: columns for name, columns in own.items() if columns.size}
+            self._read = np.concatenate([*self._columns.values()])
         self._times.append(view.times.copy())
-        for name in view.columns:
+        self._rows.append(view.rows[:, self._read])
+        for name in _OF_LINE:
             values = view.each(name)
-            if name in _OF_LINE:
-                low, high = values.min(axis=0), values.max(axis=0)
-                kept = self._extremes.setdefault(name, np.stack([low, high]))
-                np.minimum(kept[0], low, out=kept[0])
-                np.maximum(kept[1], high, out=kept[1])
-            elif (
-                values.shape[1]
-                and name in channels.CHANNELS
-                and not channels.CHANNELS[name].of_line
-            ):
-                self._rows.setdefault(f"channels/{name}", []).append(values.copy())
+            low, high = values.min(axis=0), values.max(axis=0)
+            kept = self._extremes.setdefault(name, np.stack([low, high]))
+            np.minimum(kept[0], low, out=kept[0])
+            np.maximum(kept[1], high, out=kept[1])
 
     def tables(self) -> dict[str, np.ndarray]:
         """Histories by their paths in a result file, ``time`` among them."""
-        joined = {path: np.concatenate(parts) for path, parts in self._rows.items()}
+        rows = np.concatenate(self._rows)
+        ends = np.cumsum([columns.size for columns in self._columns.values()])[:-1]
+        parts = zip(self._columns, np.split(rows, ends, axis=1), strict=True)
+        joined = {f"channels/{name}": np.ascontiguousarray(part) for name, part in parts}
         return {"time": np.concatenate(self._times), **joined}
 
     def extremes(self) -> dict[str, np.ndarray]:
         """Smallest and largest value of each column of a channel of the line, (2, columns)."""
         return self._extremes
+
+
+def _is_of_train(name: str) -> bool:
+    return name in channels.CHANNELS and not channels.CHANNELS[name].of_line
 
 
 # Changes the line at rest, but not its matrices.
@@ -115,18 +121,11 @@ class Marched(NamedTuple):
     tables: Mapping[str, np.ndarray] = {}
 
     def summary(self) -> dict[str, Any]:
-        """The summary that its own run writes, empty unless done."""
-        return self._summary(summarise)
-
-    def in_short(self) -> dict[str, Any]:
-        """As much of it as tables of studies read."""
-        return self._summary(short_summary)
-
-    def _summary(self, of: Callable[..., dict[str, Any]]) -> dict[str, Any]:
+        """As much of the summary that its own run writes as tables read, empty unless done."""
         if self.results is None:
             return {}
         statistics = stats.evaluate(self.results)
-        return of(self.results, statistics, criteria_of(self.results, statistics))
+        return short_summary(self.results, statistics, criteria_of(self.results, statistics))
 
 
 class Marches:
@@ -259,10 +258,7 @@ class _Line:
         self._rest: LineAtRest | None = None
         self._latest: tuple[Model, dict[str, np.ndarray]] | None = None
         at_rest = self.rest_of(problem)
-        self._header = header_of(scene, problem, at_rest, ())
-        # Errors of length are known without the lengths that are wrong.
-        lengths = self._header.datasets["static/dropper_length"]
-        self._cut = lengths - errors_of_length(problem, at_rest.model)
+        self._header = header_of(scene, problem, at_rest, (), with_lengths=False)
         self._range = range_of_run
         self.shared: SharedLine | None = None
         if range_of_run is not None:
@@ -322,13 +318,12 @@ class _Line:
         points[:, 2] = form.height
         if form.lateral is not None:
             points[:, 1] = form.lateral.y
-        lengths = self._cut + errors_of_length(problem, at_rest.model)
         return {
             **self._header.datasets,
             "line/arm_x": mesh.x(mesh.steady_arms),
             "line/dropper_x": mesh.x(mesh.droppers[:, 1]),
             "line/node_points": points,
-            **static_datasets(problem.line, mesh, form, at_rest.lift, lengths),
+            **static_datasets(problem.line, mesh, form, at_rest.lift),
         }
 
 

@@ -302,7 +302,7 @@ def _summaries(scenes: Sequence[Scene], comm: Any = None) -> list[dict[str, Any]
     with options_of(scenes[0].petsc.given()):
         _marches = _marches or Marches()
         for one in _marches.of(scenes):
-            found[one.number] = one.in_short() if one.outcome == DONE else {BROKE: one.outcome}
+            found[one.number] = one.summary() if one.outcome == DONE else {BROKE: one.outcome}
     return found
 
 

@@ -104,10 +104,9 @@ def static_datasets(
     mesh: LineMesh,
     equilibrium: Equilibrium,
     elasticity: Elasticity,
-    lengths: np.ndarray,
 ) -> dict[str, np.ndarray]:
-    """Datasets of ``/static``: droppers, profiles, registration and elasticity at rest. Not
-    collective.
+    """Datasets of ``/static``: droppers, profiles, registration and elasticity at rest, but not the
+    lengths to which droppers are cut. Not collective.
 
     Parameters
     ----------
@@ -119,12 +118,9 @@ def static_datasets(
         The line at rest.
     elasticity : Elasticity
         Elasticity of the line at rest.
-    lengths : ndarray, shape (n_droppers,)
-        Lengths to which droppers are cut, which no mesh changes [m].
     """
     contact = np.concatenate([mesh.wires[wire.name] for wire in line.wires_of(Role.CONTACT)])
     return {
-        "static/dropper_length": lengths,
         "static/dropper_force": equilibrium.dropper_force,
         "static/contact_x": mesh.x(contact),
         "static/contact_height": equilibrium.height[contact],

@@ -80,7 +80,8 @@ def static_table(scene: Scene) -> dict[str, np.ndarray]:
     rest = line_at_rest(problem, mesh)
     data = {
         **line_datasets(problem.line, mesh, problem.evaluation),
-        **static_datasets(problem.line, mesh, rest.form, rest.lift, lengths_to_cut(problem, mesh)),
+        "static/dropper_length": lengths_to_cut(problem, mesh),
+        **static_datasets(problem.line, mesh, rest.form, rest.lift),
         "line/dropper_x": mesh.x(mesh.droppers[:, 1]),
         "line/arm_x": mesh.x(mesh.steady_arms),
         **installed(problem.line, mesh, rest.form.height),

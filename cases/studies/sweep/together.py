@@ -244,7 +244,7 @@ class _March:
                 number = numbers[marched.number]
                 if marched.outcome == DONE:
                     put(number, marched.tables)
-                rows[number] = [marched.outcome, marched.in_short()]
+                rows[number] = [marched.outcome, marched.summary()]
         return rows
 
     def __getstate__(self) -> dict[str, Any]:

@@ -143,7 +143,8 @@ def make_header(problem: Problem, mesh: LineMesh, **attributes: Any) -> Header:
     }
     datasets = {
         **line_datasets(line, mesh, EVALUATION),
-        **static_datasets(line, mesh, equilibrium, elasticity, equilibrium.dropper_length),
+        "static/dropper_length": equilibrium.dropper_length,
+        **static_datasets(line, mesh, equilibrium, elasticity),
     }
     return Header({**known, **attributes}, datasets, facts_of(problem, mesh, length))
 

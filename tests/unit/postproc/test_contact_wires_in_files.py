@@ -53,7 +53,8 @@ def recorded(line: Line, folder: Path, usual: dict[str, Any]) -> Path:
     rest = line_at_rest(problem, mesh_of(line, 2))
     datasets = {
         **line_datasets(line, rest.mesh, problem.evaluation),
-        **static_datasets(line, rest.mesh, rest.form, rest.lift, rest.form.dropper_length),
+        "static/dropper_length": rest.form.dropper_length,
+        **static_datasets(line, rest.mesh, rest.form, rest.lift),
     }
     told = replace(problem, damping=Damping(2e-4, 0.0, {FIRST: (5e-3, 0.0)}))
     facts = facts_of(told, rest.mesh, rest.model.dropper_lengths)
