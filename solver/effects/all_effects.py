@@ -38,9 +38,11 @@ def _of_latest(function: Callable[[Problem], T]) -> Callable[[Problem], T]:
     @wraps(function)
     def of(problem: Problem) -> T:
         effects = registry()
-        if not latest or latest[0][0] is not problem or latest[0][1] != effects:
-            latest[:] = [(problem, effects, function(problem))]
-        return latest[0][2]
+        found = latest[0] if latest else None  # as threads of a program may put others there
+        if found is None or found[0] is not problem or found[1] != effects:
+            found = problem, effects, function(problem)
+            latest[:] = [found]
+        return found[2]
 
     return of
 
