@@ -194,23 +194,18 @@ class ModelBuilder:
         self._n_terms += len(load.unknowns)
 
     def add_elements(
-        self,
-        component: str,
-        dofs: np.ndarray,
-        mass: np.ndarray | None = None,
-        stiffness: np.ndarray | None = None,
-        damping: np.ndarray | None = None,
-        of_shape: bool = False,
+        self, component: str, dofs: np.ndarray, of_shape: bool = False, **terms: np.ndarray
     ) -> None:
-        """Add elements, each with matrices of its own, as ``Block.of_elements`` takes them."""
-        number, terms = len(self.model.blocks), (mass, stiffness, damping)
+        """Add elements, each with matrices of its own, as ``Block.of_elements`` takes them; those
+        of the model before are taken over where they are the same."""
+        number = len(self.model.blocks)
         if self._before is not None and number < len(self._before.blocks):
             same = self._before.blocks[number]
             kind = (same.component, same.of_shape, same.lateral)
             if kind == (component, of_shape, False) and same.is_of(dofs, terms):
                 self.add_block(same)
                 return
-        self.add_block(Block.of_elements(component, dofs, *terms, of_shape=of_shape))
+        self.add_block(Block.of_elements(component, dofs, of_shape=of_shape, **terms))
 
     def add_block(self, block: Block) -> None:
         """Element matrices of any kind; masses carry no weight."""

@@ -6,7 +6,7 @@ by the effects, each of which adds its own through a ``ModelBuilder``.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
@@ -76,13 +76,15 @@ class Block:
         mass, stiffness, damping = (None if term is None else term[first] for term in terms)
         return cls(component, dofs, kind, mass, stiffness, damping, of_shape)
 
-    def is_of(self, dofs: np.ndarray, terms: Sequence[np.ndarray | None]) -> bool:
-        """Whether it has elements with unknowns ``dofs`` (n, m) and these ``terms``, each (n, m, m)
-        or None: matrices of mass, stiffness and damping."""
-        own = (self.mass, self.stiffness, self.damping)
-        return np.array_equal(self.dofs, dofs) and all(
-            term is mine if term is None or mine is None else np.array_equal(mine[self.kind], term)
-            for mine, term in zip(own, terms, strict=True)
+    def is_of(self, dofs: np.ndarray, terms: Mapping[str, np.ndarray]) -> bool:
+        """Whether it has elements with unknowns ``dofs`` (n, m) and just these ``terms``, each
+        (n, m, m): its ``mass``, ``stiffness`` and ``damping``, by these names."""
+        own = {"mass": self.mass, "stiffness": self.stiffness, "damping": self.damping}
+        there = {name: term for name, term in own.items() if term is not None}
+        return (
+            there.keys() == terms.keys()
+            and np.array_equal(self.dofs, dofs)
+            and all(np.array_equal(there[name][self.kind], terms[name]) for name in there)
         )
 
     def near(self, first: int, last: int) -> slice | np.ndarray:

@@ -182,9 +182,10 @@ def _seen_from(model: Model, x_from: float, x_to: float) -> tuple[int, np.ndarra
     bands of Cholesky's factor."""
     numbering, width, reach = model.numbering, model.numbering.width, _FIRST_REACH
     first, last = numbering.within(x_from, x_to)
+    stiffness = OperatorBands(model, (0.0, 1.0, 0.0))
     while True:
         low, high = numbering.within(x_from - reach, x_to + reach)
-        bands = OperatorBands(model, (0.0, 1.0, 0.0)).between(low, high)
+        bands = stiffness.between(low, high)
         # So wide that nothing before it is joined to anything behind it.
         more = len(bands)
         begin = first - more if first - low > 2 * more else low
