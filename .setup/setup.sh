@@ -60,6 +60,7 @@ clean_up() {
     rm -rf "$work"
 }
 trap clean_up EXIT
+trap 'exit 130' INT # pip catches it, and would pass for one that lacks a version
 
 fail() {
     say "setup: $*"
