@@ -20,8 +20,8 @@ def name_of(requirement: str) -> str:
 
 
 def main() -> None:
-    """Print one requirement a line: those to ``build`` with, or ``all``, which are also those of the
-    program, films, tables, reports, site and tests."""
+    """Print one requirement a line: those to ``build`` with, or ``all``, with those of the program,
+    films, tables, reports, site and tests."""
     with open("pyproject.toml", "rb") as file:
         settings = tomllib.load(file)
     project = settings["project"]

@@ -53,10 +53,19 @@ def test_ranks_agree_on_hard_cases(tmp_path: Path) -> None:
     assert compared == list(IN_PARALLEL)
 
 
+def test_patterns_choose_hard_cases_in_the_order_of_the_words() -> None:
+    found = [case.name for case in hard_cases(["four", "twin_messenger_*", "twin_*_head", "four"])]
+    assert found[0] == "four"
+    assert found[1:] == [
+        case.name for case in hard_cases() if case.name.startswith("twin_messenger_")
+    ] + ["twin_light_head"]
+
+
 def test_names_and_folders_that_cannot_be_are_refused(tmp_path: Path) -> None:
     (tmp_path / "hard.csv").write_text("mine")
     for words, said in (
-        (["no_such"], "there is no hard case no_such"),
+        (["no_such"], 'there is no hard case "no_such"; there are speed_0.7, '),
+        (["twin_undampt"], '"twin_undampt"; did you mean twin_undamped or '),
         (["undamped_line", "-o", str(tmp_path)], "is there already"),
     ):
         done = catenary("hard", *words, cwd=tmp_path)

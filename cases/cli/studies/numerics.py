@@ -115,7 +115,10 @@ TABLES = ("hard.csv", "hard.md")
 )
 def hard(
     names: Annotated[
-        list[str] | None, typer.Argument(metavar="NAME", help="Only the hard cases named.")
+        list[str] | None,
+        typer.Argument(
+            metavar="NAME", help="Only these hard cases; with * and ? all that fit: 'twin_*'."
+        ),
     ] = None,
     out: Annotated[
         Path | None, folder_option("Folder for the table as hard.csv and hard.md.")
@@ -140,6 +143,7 @@ def hard(
     from catenary.cases.process.workers import at_once
     from catenary.cases.studies.hard import checks
     from catenary.cases.studies.records import held_study
+    from catenary.cases.terminal.runs_bar import RunsBar
     from catenary.postproc.report.study_table import Content, remark_lines, write_files
 
     if comm.size > 1 and runs.n_jobs != 1:
@@ -153,11 +157,13 @@ def hard(
         checked = checks.check_cases(
             cases, comm, shortened, kept, at_once(runs.n_jobs, comm), petsc
         )
-        for number, case in enumerate(cases, start=1):
-            console.say(f"[{number}/{len(cases)}] {case.name}: {case.what}")
-            rows, remarks_of[case.name] = next(checked)
-            console.say("\n".join(checks.line(row) for row in rows))
-            found += rows
+        with RunsBar(len(cases) if console.speaks() else 0, console.say, what="hard cases") as bar:
+            for number, case in enumerate(cases, start=1):
+                bar.say(f"[{number}/{len(cases)}] {case.name}: {case.what}")
+                rows, remarks_of[case.name] = next(checked)
+                bar.say("\n".join(checks.line(row) for row in rows))
+                bar.ended()
+                found += rows
         table, page = TABLES
         content: dict[str, Content] = {table: checks.criteria(found, remarks_of)}
         content[page] = checks.page(cases, found, remarks_of)

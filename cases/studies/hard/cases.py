@@ -7,6 +7,8 @@ that follow from round-off and from the methods stand in `hard/checks.py`.
 
 from __future__ import annotations
 
+import difflib
+import fnmatch
 from functools import cache
 from itertools import product
 from pathlib import Path
@@ -175,15 +177,20 @@ def collection() -> Collection:
 
 
 def hard_cases(names: list[str] | None = None) -> list[HardCase]:
-    """All hard cases, or those named.
+    """All hard cases, or those named, also by patterns with ``*`` and ``?``.
 
     Raises
     ------
     InputError
-        If there is none of such a name.
+        If a name or pattern fits none.
     """
     cases = {case.name: case for case in collection().all_cases()}
-    for name in names or []:
-        if name not in cases:
-            raise InputError(f"there is no hard case {name}; there are {', '.join(cases)}")
-    return [cases[name] for name in names] if names else list(cases.values())
+    wanted: dict[str, HardCase] = {}
+    for name in names or cases:
+        found = fnmatch.filter(cases, name)
+        if not found:
+            near = difflib.get_close_matches(name, cases, n=3)
+            hint = f"did you mean {' or '.join(near)}?" if near else f"there are {', '.join(cases)}"
+            raise InputError(f'there is no hard case "{name}"; {hint}')
+        wanted |= {one: cases[one] for one in found}
+    return list(wanted.values())

@@ -32,6 +32,7 @@ from catenary.cases.studies.stability.by_marching import (
     STEPS,
     Bench,
 )
+from catenary.cases.terminal.runs_bar import RunsBar
 from catenary.mbs.lumped_data import LumpedData
 from catenary.postproc.report.pictures import figures
 from catenary.solver.contact.contact_wire import ContactWires
@@ -194,15 +195,18 @@ def make_map(
         return {"scene": config, "stiffness": pair[0], "head_mass": pair[1]}
 
     lost: list[WorkerLost] = []
-    for outcome in kept.each(find_all, pairs, depends_on, n_at_once, comm):
-        if isinstance(outcome.error, WorkerLost):
-            lost.append(outcome.error)
-            continue
-        found = [Limit(*row) for row in outcome.get()]
-        limits += found
-        words = ", ".join(f"{one.coupling} {in_ms(one.marched)}" for one in found)
-        stiffness, mass = pairs[outcome.number]
-        tell(f"[{outcome.number + 1}/{len(pairs)}] {stiffness:g} N/m, {mass:g} kg: {words} ms")
+    with RunsBar(len(pairs), tell, what="points") as bar:
+        for outcome in kept.each(find_all, pairs, depends_on, n_at_once, comm):
+            bar.ended()
+            if isinstance(outcome.error, WorkerLost):
+                lost.append(outcome.error)
+                continue
+            found = [Limit(*row) for row in outcome.get()]
+            limits += found
+            words = ", ".join(f"{one.coupling} {in_ms(one.marched)}" for one in found)
+            stiffness, mass = pairs[outcome.number]
+            place = f"[{outcome.number + 1}/{len(pairs)}] {stiffness:g} N/m, {mass:g} kg"
+            bar.say(f"{place}: {words} ms")
     if lost:  # the others are kept
         raise lost[0]
     linear = own.contact.law == "linear"
