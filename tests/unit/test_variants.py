@@ -42,6 +42,7 @@ def test_values_are_cut_at_outer_commas(text: str, values: tuple[str, ...]) -> N
         ("=1,2", "must have the form"),
         ("a.b=1,,2", "must have the form"),
         ("a.b=1,2,1", "names 1 twice"),
+        ("a.b=200,2,2e2", "names 2e2 after 200, which is the same"),
         ("petsc.ksp_type=cg,gmres", "when the program starts"),
     ],
 )

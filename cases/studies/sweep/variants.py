@@ -6,7 +6,6 @@ import hashlib
 import itertools
 import json
 import re
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -114,10 +113,23 @@ def varied_key(key: str, values: tuple[str, ...], option: str = "--vary") -> Var
     for text in (key, *values):
         if any(steers(letter) for letter in text):
             raise InputError(f"{option} {shown(text)} holds a control character")
-    value, times = Counter(values).most_common(1)[0]
-    if times > 1:
-        raise InputError(f"{option} {shown(key)[1:-1]} names {shown(value)[1:-1]} twice")
+    first: dict[str | float, str] = {}
+    for value in values:
+        number = _number_of(value)
+        if number in first:
+            earlier, again = shown(first[number])[1:-1], shown(value)[1:-1]
+            how = "twice" if again == earlier else f"after {earlier}, which is the same"
+            raise InputError(f"{option} {shown(key)[1:-1]} names {again} {how}")
+        first[number] = value
     return VariedKey(key, values)
+
+
+def _number_of(text: str) -> str | float:
+    """The number that a text stands for, or the text."""
+    try:
+        return float(text)
+    except ValueError:
+        return text
 
 
 def text_of(value: Any) -> str:
