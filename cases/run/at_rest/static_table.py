@@ -25,6 +25,7 @@ from catenary.postproc.channels.header import line_datasets, static_datasets
 from catenary.postproc.evaluate.wording import counted
 from catenary.postproc.files.csv_text import csv_text
 from catenary.postproc.read.registration import Registration
+from catenary.solver.effects.all_effects import with_defects
 from catenary.solver.model.rest_shape import Equilibrium
 from catenary.solver.statics.form_finding.equilibrium import lengths_to_cut
 from catenary.solver.statics.line_at_rest import line_at_rest, stable_form
@@ -81,7 +82,7 @@ def static_table(scene: Scene) -> dict[str, np.ndarray]:
     data = {
         **line_datasets(problem.line, mesh, problem.evaluation),
         "static/dropper_length": lengths_to_cut(problem, mesh),
-        **static_datasets(problem.line, mesh, rest.form, rest.lift),
+        **static_datasets(rest.problem.line, mesh, rest.form, rest.lift),
         "line/dropper_x": mesh.x(mesh.droppers[:, 1]),
         "line/arm_x": mesh.x(mesh.steady_arms),
         **installed(problem.line, mesh, rest.form.height),
@@ -96,7 +97,7 @@ def rest_text(scene: Scene, table: Mapping[str, np.ndarray]) -> str:
     defects = [fact["says"] for fact in defect_facts(scene, problem)]
     strips = [scene.pantographs[place.name].strips.length_m for place in scene.train.pantographs]
     half_head = min((0.5 * length for length in strips if length is not None), default=None)
-    lines = [*defects, static_text(table, problem.line, half_head)]
+    lines = [*defects, static_text(table, with_defects(problem).line, half_head)]
     if problem.along.warmer and {"axial_motion", "temperature"} <= problem.effects:
         lines += ["", temperatures(scene, [problem.along.warmer], None)]
     return "\n".join(lines)
