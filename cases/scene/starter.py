@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 import re
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
@@ -14,7 +15,7 @@ from catenary.cases.scene.input.case_files import CASE_FILE, find_case
 from catenary.cases.scene.input.csv_files import span_table
 from catenary.cases.scene.input.plain_text import plain, read_text, read_whole
 from catenary.cases.scene.input.toml_input import read_toml
-from catenary.cases.scene.keys.usual_values import USUAL, Usual
+from catenary.cases.scene.keys.usual_values import USUAL, Usual, usual_range
 from catenary.cases.scene.load import load_scene
 
 
@@ -172,9 +173,12 @@ def _with_usual_values(body: str) -> str:
         heading = re.match(r"\[+([\w.]+)\]+", line)
         if heading:
             table = re.sub(r"^pantographs\.\w+", "pantographs.*", heading[1])
-        key = re.match(r"(\w+) =", line)
-        usual = USUAL.get(f"{table}.{key[1]}", Usual()).words if key else ""
-        if usual:
+        key = re.match(r"(\w+) =\s*([\d.e+-]*)", line)
+        name = f"{table}.{key[1]}" if key else ""
+        # What wires usually have says nothing of a rail, whose values are far from it.
+        low, high = usual_range(name) or (-math.inf, math.inf)
+        usual = USUAL.get(name, Usual()).words
+        if usual and not (key and key[2] and not low <= float(key[2]) <= high):
             lines.append(f"# usual: {usual}")
         lines.append(line)
     return "\n".join(lines) + "\n"

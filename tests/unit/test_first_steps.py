@@ -48,6 +48,10 @@ def test_a_new_case_names_usual_values_of_the_key_below(tmp_path: Path) -> None:
     lines = write_case(tmp_path / "a", "simple").read_text().splitlines()
     at = lines.index("tension_N = 22000.0")
     assert lines[at - 1] == "# usual: 10000 to 20000, high speed 20000 to 31500"
+    rail = write_case(tmp_path / "b", "conductor_rail").read_text().splitlines()
+    for value in ("tension_N = 100.0", "mass_kg_per_m = 7.1", "span_m = 8.5"):
+        at = next(i for i, line in enumerate(rail) if line.startswith(value))
+        assert not rail[at - 1].startswith("# usual"), "what wires have is not usual of a rail"
 
 
 @pytest.mark.parametrize("case", shipped())

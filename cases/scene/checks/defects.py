@@ -96,8 +96,10 @@ def _irregularities(scene: Scene, line: Line) -> Iterator[Fault]:
             why = f"it must be at least {(end - start) / MOST_WAVES:.3g} m on {end - start:g} m"
             yield scene.refused(f"{key}.shortest_m", why)
     lengths = scene.irregularities.dropper_lengths
+    seen: dict[tuple[object, ...], str] = {}
     for i, (span, dropper, _) in enumerate((lengths and lengths.by_dropper) or []):
         entry = f"irregularities.dropper_lengths.by_dropper.{i}"
+        yield from _twice(scene, seen, f"{entry}.1", (span, dropper))
         yield from dropper_faults(scene, line, entry, int(span), int(dropper), (".0", ".1"))
 
 
