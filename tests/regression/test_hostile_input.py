@@ -120,6 +120,10 @@ REPORTED = {
         "by_dropper.2.1 is 4 on the command line (--set); irregularities.dropper_lengths.by_dropper"
         ".0 has this already",
     ),
+    "took milliseconds of a damping for seconds": (
+        ["line.damping.alpha_s=1"],
+        "usual are 1e-05 to 0.03 s: is it 1 ms? write 0.001",
+    ),
     "told milliseconds as a bound alone": (["numerics.dt_s=1"], "is it 1 ms? write 0.001"),
     "told grams as a bound alone": (
         ["line.contact_wire.mass_kg_per_m=1350"],

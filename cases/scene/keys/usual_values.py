@@ -78,6 +78,7 @@ USUAL: dict[str, Usual] = {
     "line.links.*.positions_m": Usual("", 1, 80),
     "line.links.*.pre_sag_mm": Usual("", 5, 150),
     "line.links.*.pre_sag_mid_mm": Usual("", 5, 150),
+    "line.damping.per_component.*.alpha_s": Usual("", 1e-5, 0.03),
     "line.twin.spacing_m": Usual("0.04 to 0.1", 0.02, 0.5),
     "line.bridle.tension_N": Usual("1000 to 3000", 500, 6e3),
     "line.bridle.mass_kg_per_m": Usual("bronze strand of 35 mm2 0.31", 0.1, 1),
@@ -113,10 +114,12 @@ USUAL: dict[str, Usual] = {
     "line.fittings.*.at_m": Usual("in the middle of a span, between droppers"),
     "line.fittings.*.mass_kg": Usual("section insulators 6 to 20, splices 0.5 to 1.5", 0.2, 50),
     "line.damping.alpha_s": Usual(
-        "0.0001 (en50318_2002, ac_simple); 0.0275 and 0.00275 (Ambrosio et al., 2012)"
+        "0.0001 (en50318_2002, ac_simple); 0.0275 and 0.00275 (Ambrosio et al., 2012)",
+        1e-5,
+        0.03,
     ),
     "line.damping.beta_per_s": Usual("0.0125 (en50318_2002, ac_simple); 0 (Ambrosio et al., 2012)"),
-    "line.damping.lateral.alpha_s": Usual("0 (assumed; none was measured)"),
+    "line.damping.lateral.alpha_s": Usual("0 (assumed; none was measured)", 1e-5, 0.03),
     "line.damping.lateral.beta_per_s": Usual(
         "0.003 (wires alone) to 0.9 (a ratio of 0.05 at 1.4 Hz, as measured on vertical motion)"
     ),
