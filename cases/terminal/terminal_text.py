@@ -237,23 +237,28 @@ def _sag_text(
 ) -> list[str]:
     """Sentence on heights (n,) [m] of a wire at places (n,) [m] and on its sag below the straight
     line between two supports at ``masts``; none without ``spans``, which count from 0."""
-    held, lowest, sags = [], [], []
+    at_supports, within, sags = [], [], []
     for span in spans:
-        start, end = masts[span], masts[span + 1]
-        at_ends = np.interp([start, end], x, height)
-        inside = (x >= start) & (x <= end)
-        held += at_ends.tolist()
-        lowest.append(height[inside].min())
-        sags.append((np.interp(x[inside], [start, end], at_ends) - height[inside]).max())
-    if not held:
+        ends = masts[span : span + 2]
+        held = np.interp(ends, x, height)
+        inside = (x >= ends[0]) & (x <= ends[1])
+        at_supports += held.tolist()
+        within += height[inside].tolist()
+        sags.append(float((np.interp(x[inside], ends, held) - height[inside]).max()))
+    if not spans:
         return []
-    low, high = f"{min(held):.4f}", f"{max(held):.4f}"
     most = int(np.argmax(np.round(sags, 5)))
     return [
-        f"{wire} at rest in {_span_words(spans)}: {low if low == high else f'{low} to {high}'} m "
-        f"at the supports, {min(lowest):.4f} m at its lowest; largest sag between two supports "
+        f"{wire} at rest in {_span_words(spans)}: {_from_to(within)} m above the rail, "
+        f"{_from_to(at_supports)} m at the supports; largest sag between two supports "
         f"{1e3 * sags[most]:.1f} mm, in span {spans[most] + 1}"
     ]
+
+
+def _from_to(heights: Sequence[float]) -> str:
+    """Smallest and largest of heights [m], or the one that both are to a tenth of a millimetre."""
+    low, high = f"{min(heights):.4f}", f"{max(heights):.4f}"
+    return low if low == high else f"{low} to {high}"
 
 
 def _span_words(spans: Sequence[int]) -> str:
