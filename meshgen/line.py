@@ -9,12 +9,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 
 from catenary.meshgen.hardware import Clamps, Droppers, Fittings, SteadyArms, Supports
 from catenary.meshgen.track import Curve, Spans, read_only
-from catenary.meshgen.wires import End, Profile, Role, Wire
+from catenary.meshgen.wires import SAME_PLACE, End, Profile, Role, Wire
 
 
 @dataclass(frozen=True)
@@ -108,6 +109,30 @@ class Line(Spans):
         masts, x = self.support_positions, self.dropper_x
         first = np.searchsorted(x, masts[span], side="right")
         return x[first : np.searchsorted(x, masts[span + 1])]
+
+    def running_spans(self, wire: Wire) -> list[int]:
+        """Spans in which trains run on a wire, from support to support; they count from 0.
+
+        Those in which it rises to an end of its section do not count. Those at an end of the wire,
+        which is held otherwise than at a support, count only if there are no others.
+        """
+        sections = wire.profile.sections if wire.profile is not None else ()
+        level = [own.running for own in sections] or [self.running_range]
+        there, inner = [], []
+        for span, (start, end) in enumerate(pairwise(self.support_positions.tolist())):
+            within = [
+                piece
+                for piece in wire.pieces
+                for low, high in level
+                if max(low, piece.x[0]) < start + SAME_PLACE
+                and end - SAME_PLACE < min(high, piece.x[-1])
+            ]
+            there += [span] * bool(within)
+            inner += [span] * any(
+                piece.x[0] < start - SAME_PLACE and end + SAME_PLACE < piece.x[-1]
+                for piece in within
+            )
+        return inner or there
 
     def with_shares(self, shares: Mapping[str, float]) -> Line:
         """The line with the tensions of some wires multiplied by ``shares`` [-], by name.

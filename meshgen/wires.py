@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 
 # Places closer than this along the track are one [m].
-_SAME_PLACE = 1e-6
+SAME_PLACE = 1e-6
 
 
 class Role(StrEnum):
@@ -147,7 +147,7 @@ class Profile:
             np.array([getattr(own, name) for own in self.sections])
             for name in ("ends", "running", "rise")
         )
-        which = np.searchsorted(ends[:, 0], x + _SAME_PLACE, side="right") - 1
+        which = np.searchsorted(ends[:, 0], x + SAME_PLACE, side="right") - 1
         which = np.clip(which, 0, None)
         height = self.base(x)
         for side, sign in enumerate((-1.0, 1.0)):
@@ -249,8 +249,8 @@ class Wire(Conductor):
         for piece in self.pieces:
             at, y, _ = piece.course
             kink = np.pad(np.diff(np.diff(y) / np.diff(at)), 1)
-            nearest = np.clip(np.searchsorted(at, x - _SAME_PLACE), None, at.size - 1)
-            here = np.abs(at[nearest] - x) < _SAME_PLACE
+            nearest = np.clip(np.searchsorted(at, x - SAME_PLACE), None, at.size - 1)
+            here = np.abs(at[nearest] - x) < SAME_PLACE
             force[here] = -self.tension_at(x[here]) * kink[nearest[here]]
         return force
 

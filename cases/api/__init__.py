@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from catenary.runs import restart, run
     from catenary.scenes import Scene, load, shipped_cases
     from catenary.sensitivities import sensitivity
-    from catenary.steps import Simulation
+    from catenary.steps import Simulation, prepare
     from catenary.sweeps import sweep
 
 __all__ = [
@@ -54,6 +54,7 @@ __all__ = [
     "open",
     "optimise",
     "plan",
+    "prepare",
     "restart",
     "run",
     "sensitivity",
@@ -77,7 +78,7 @@ _FILES = {
     "scenes": ("Scene", "load", "shipped_cases"),
     "sensitivities": ("sensitivity",),
     "base.errors": ("CatenaryError", "Fault", "InputError", "RunBroken"),
-    "steps": ("Simulation",),
+    "steps": ("Simulation", "prepare"),
     "sweeps": ("sweep",),
 }
 _FILE_OF = {name: file for file, names in _FILES.items() for name in names}

@@ -13,12 +13,52 @@ import numpy as np
 from catenary.base.errors import InputError, RunBroken
 from catenary.base.lone_process import alone
 from catenary.callers import number_of, path_of
+from catenary.cases.result_folder.output_folder import new_file
 from catenary.cases.scene.input.faults import shown
+from catenary.cases.scene.scene import Scene
 from catenary.scenes import SceneLike, checked
 from catenary.solver.kernels import native
 
 _SUFFIX = ".line"
 _NAME = 16  # bytes at the begin of a state that name its line
+
+
+def prepare(scene: SceneLike, out: str | Path, *, force: bool = False) -> Path:
+    """Write a line and its pantographs for steps from outside. Not collective.
+
+    C programs step the file by the library of the kernels, Python programs by ``Simulation``:
+    mesh, equilibrium and factors, which it holds, are not found again.
+
+    Parameters
+    ----------
+    scene : Scene, str, Path or mapping
+        The scene, or whatever ``load`` takes for one.
+    out : str or Path
+        The file, whose name ends in ``.line``.
+    force : bool, optional
+        Replace a file that is there.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    InputError
+        If the scene is wrong, if its steps need what a prepared line has not (``docs/embedding.md``
+        lists it), or if the file is there, or cannot be written.
+
+    Examples
+    --------
+    >>> with catenary.Simulation(catenary.prepare(scene, folder / "short.line")) as line:
+    ...     line.step(10), line.steps_left > 0
+    (True, True)
+    """
+    own, path = checked(scene), path_of(out, "out")
+    new_file(path, (_SUFFIX,), force)
+    _write(own, path)
+    return path
 
 
 class Simulation:
@@ -31,8 +71,8 @@ class Simulation:
     ----------
     scene : Scene, str, Path or mapping
         The scene, or whatever ``load`` takes for one; its line is meshed, hung and factored first.
-        A file ``*.line`` that ``catenary prepare`` wrote is ready for steps. Its indices are not
-        checked: open files from people you trust alone.
+        A file ``*.line`` that ``prepare`` wrote is ready for steps. Its indices are not checked:
+        open files from people you trust alone.
 
     Raises
     ------
@@ -60,12 +100,9 @@ class Simulation:
             self._own, self._line = _opened(path_of(scene, "scene"))
             return
         own = checked(scene)
-        alone()  # starts MPI as one process, before anything imports it
-        from catenary.cases.run.prepared import prepare_line
-
         with tempfile.TemporaryDirectory(prefix="catenary_line_") as folder:
             path = Path(folder) / f"scene{_SUFFIX}"
-            prepare_line(own, path)
+            _write(own, path)
             self._own, self._line = _opened(path)
 
     def step(self, n: int = 1) -> bool:
@@ -427,6 +464,14 @@ class _Closed:
 
     def __getattr__(self, name: str) -> Any:
         raise InputError("this simulation is closed; make another one, or leave its context later")
+
+
+def _write(scene: Scene, path: Path) -> None:
+    """Write the line of a scene, ready for steps. Not collective."""
+    alone()  # starts MPI as one process, before anything imports it
+    from catenary.cases.run.prepared import prepare_line
+
+    prepare_line(scene, path)
 
 
 def _opened(path: Path) -> tuple[native.Simulation, bytes]:

@@ -134,13 +134,12 @@ def prepare(
     force: Force = False,
 ) -> None:
     """Serial."""
-    scene = words.load()
-    new_file(out, (".line",), force)
-    from catenary.cases.run.prepared import HEADER, LIBRARY, prepare_line
+    path = catenary.prepare(words.scene(), out, force=force)
+    from catenary.cases.run.prepared import HEADER, LIBRARY
 
-    n_steps = prepare_line(scene, out)
+    with catenary.Simulation(path) as line:
+        steps = f"{line.steps_left} steps of {line.dt * 1e3:g} ms"
     console.say(
-        f"{out}: {n_steps} steps of {scene.numerics.dt_s * 1e3:g} ms, "
-        f"{out.stat().st_size / 1e6:.0f} MB\n"
+        f"{out}: {steps}, {out.stat().st_size / 1e6:.0f} MB\n"
         f"C programs include {HEADER} and link {LIBRARY}; Python has catenary.Simulation"
     )

@@ -257,15 +257,16 @@ def volume(n_bytes: float) -> str:
 def new_file(path: Path, suffixes: tuple[str, ...], force: bool) -> None:
     """Make the folder of a file; raise ``InputError`` unless ``path`` can be written with one of
     ``suffixes``."""
+    out = option("-o", "out")
     if path.suffix not in suffixes:
-        raise InputError(f"-o {path} must have a name that ends in {' or '.join(suffixes)}")
+        raise InputError(f"{out} {path} must have a name that ends in {' or '.join(suffixes)}")
     if path.is_dir():
-        raise InputError(f"-o {path} is a folder; name a file")
+        raise InputError(f"{out} {path} is a folder; name a file")
     if path.exists() and not force:
-        raise InputError(f"-o {path} exists already; give --force to replace it")
+        raise InputError(f"{out} {path} exists already; give {force_option()} to replace it")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise InputError(f"-o {path} cannot be written: {error.strerror}") from error
+        raise InputError(f"{out} {path} cannot be written: {error.strerror}") from error
     if not os.access(path if path.exists() else path.parent, os.W_OK):
-        raise InputError(f"-o {path} cannot be written: permission denied")
+        raise InputError(f"{out} {path} cannot be written: permission denied")

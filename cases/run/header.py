@@ -83,7 +83,7 @@ def header_of(
         datasets={
             **line_datasets(line, at_rest.mesh, problem.evaluation),
             **cut,
-            **static_datasets(line, at_rest.mesh, at_rest.form, at_rest.lift),
+            **static_datasets(at_rest.problem.line, at_rest.mesh, at_rest.form, at_rest.lift),
         },
         facts=facts_of(problem, at_rest.mesh, at_rest.model.dropper_lengths),
     )

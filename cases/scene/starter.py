@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 import re
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
@@ -14,7 +15,7 @@ from catenary.cases.scene.input.case_files import CASE_FILE, find_case
 from catenary.cases.scene.input.csv_files import span_table
 from catenary.cases.scene.input.plain_text import plain, read_text, read_whole
 from catenary.cases.scene.input.toml_input import read_toml
-from catenary.cases.scene.keys.usual_values import USUAL, Usual
+from catenary.cases.scene.keys.usual_values import USUAL, Usual, usual_range
 from catenary.cases.scene.load import load_scene
 
 
@@ -108,6 +109,8 @@ def write_case(
             sentence = str(error)
             for name, path in copied.items():
                 sentence = sentence.replace(str(inner / name), str(path))
+            if spans is not None and droppers is None and "line.dropper" in sentence:
+                sentence += ", or a planner's table by --droppers"
             raise InputError(sentence.replace(str(inner), str(folder))) from error
         inner.rename(folder)
     return folder / CASE_FILE
@@ -148,15 +151,16 @@ def starting_text(kind: str, name: str, spans: Sequence[float] = (), droppers: b
         raise InputError(f"{path} has no table [line] to begin with")
     if spans:
         body = _with_files(body, spans, droppers)
+    origin = path.parent.name if path.name == CASE_FILE else path.stem
     head = (
-        f"# {plain(name)}: a new case, begun from {path.parent.name}. Change what differs\n"
+        f"# {plain(name)}: a new case, begun from {origin}. Change what differs\n"
         "# on your line. `catenary list --keys WORD` explains keys.\n"
         '# Behind "usual" stands what other lines have, in the unit of the key.\n\n'
     )
     case = (
         f'[case]\ntitle = "{_quoted(name)}"\n'
-        f'description = "Begun from {_quoted(path.parent.name)}."\n'
-        f'source = "to be replaced; values of {_quoted(path.parent.name)}: {_quoted(source)}"\n\n'
+        f'description = "Begun from {_quoted(origin)}."\n'
+        f'source = "to be replaced; values of {_quoted(origin)}: {_quoted(source)}"\n\n'
     )
     return head + case + _with_usual_values(body)
 
@@ -172,9 +176,12 @@ def _with_usual_values(body: str) -> str:
         heading = re.match(r"\[+([\w.]+)\]+", line)
         if heading:
             table = re.sub(r"^pantographs\.\w+", "pantographs.*", heading[1])
-        key = re.match(r"(\w+) =", line)
-        usual = USUAL.get(f"{table}.{key[1]}", Usual()).words if key else ""
-        if usual:
+        key = re.match(r"(\w+) =\s*([\d.e+-]*)", line)
+        name = f"{table}.{key[1]}" if key else ""
+        # What wires usually have says nothing of a rail, whose values are far from it.
+        low, high = usual_range(name) or (-math.inf, math.inf)
+        usual = USUAL.get(name, Usual()).words
+        if usual and not (key and key[2] and not low <= float(key[2]) <= high):
             lines.append(f"# usual: {usual}")
         lines.append(line)
     return "\n".join(lines) + "\n"
@@ -187,6 +194,8 @@ def _with_files(body: str, spans: Sequence[float], droppers: bool) -> str:
     if n < least:
         raise InputError(f"a new case needs {least} spans to run in, judge and run out, not {n}")
     body = _edited(body, "line", {"n_spans": None, "span_m": None, "spans_file": f'"{SPANS_FILE}"'})
+    if "\n[line.transition]" in body:  # the file has their lengths, too
+        body = _edited(body, "line.transition", {"span_m": None})
     if droppers:
         own = dict.fromkeys(("positions_m", "pre_sag_mm", "pre_sag_mid_mm", "count", "spacing_m"))
         body = _edited(body, "line.dropper", {**own, "patterns_file": f'"{DROPPERS_FILE}"'})

@@ -323,7 +323,7 @@ class _Line:
             "line/arm_x": mesh.x(mesh.steady_arms),
             "line/dropper_x": mesh.x(mesh.droppers[:, 1]),
             "line/node_points": points,
-            **static_datasets(problem.line, mesh, form, at_rest.lift),
+            **static_datasets(at_rest.problem.line, mesh, form, at_rest.lift),
         }
 
 

@@ -209,29 +209,64 @@ def _dropper_table(data: Mapping[str, np.ndarray], line: Line) -> list[str]:
 def _contact_wires_text(
     data: Mapping[str, np.ndarray], line: Line, half_head: float | None
 ) -> list[str]:
-    """Sentences on height, sag and stagger of the contact wires in the running spans."""
+    """Sentences on height, sag and stagger of the contact wires where trains run on them."""
     lines: list[str] = []
     first, last = line.running_range
-    wires = [wire.name for wire in line.wires_of(Role.CONTACT)]
+    contact = line.wires_of(Role.CONTACT)
+    wires = [one.name for one in contact]
     ends = np.cumsum([data[f"wires/{name}"].size for name in wires])[:-1]
     chains_x, heights = (np.split(data[f"contact_{own}"], ends) for own in ("x", "height"))
-    for name, at, height in zip(wires, chains_x, heights, strict=True):
-        running = height[(at >= first) & (at <= last)]
-        wire = "Contact wire" if len(wires) == 1 else name
-        lines.append(
-            f"{wire} at rest: {running.max():.4f} m at its highest and {running.min():.4f} m at "
-            f"its lowest in the running spans; sag {1e3 * (running.max() - running.min()):.1f} mm"
-        )
+    for own, at, height in zip(contact, chains_x, heights, strict=True):
+        name = "Contact wire" if len(wires) == 1 else own.name
+        lines += _sag_text(name, line.support_positions, line.running_spans(own), at, height)
     if "contact_y" in data:
         for name, at, y in zip(wires, chains_x, np.split(data["contact_y"], ends), strict=True):
-            own = y[(at >= first) & (at <= last)]
+            there = y[(at >= first) & (at <= last)]
             wire = "Contact wire" if len(wires) == 1 else name
-            text = f"{wire} at rest: {fixed(own.min(), 4)} to {fixed(own.max(), 4)} m to the left"
+            low, high = fixed(there.min(), 4), fixed(there.max(), 4)
+            text = f"{wire} at rest: {low} to {high} m to the left"
             if half_head is not None:
-                within = "within" if np.abs(own).max() <= half_head else "BEYOND"
+                within = "within" if np.abs(there).max() <= half_head else "BEYOND"
                 text += f", {within} the {half_head:g} m of the shortest strip to either side"
             lines.append(text)
     return lines
+
+
+def _sag_text(
+    wire: str, masts: np.ndarray, spans: Sequence[int], x: np.ndarray, height: np.ndarray
+) -> list[str]:
+    """Sentence on heights (n,) [m] of a wire at places (n,) [m] and on its sag below the straight
+    line between two supports at ``masts``; none without ``spans``, which count from 0."""
+    at_supports, within, sags = [], [], []
+    for span in spans:
+        ends = masts[span : span + 2]
+        held = np.interp(ends, x, height)
+        inside = (x >= ends[0]) & (x <= ends[1])
+        at_supports += held.tolist()
+        within += height[inside].tolist()
+        sags.append(float((np.interp(x[inside], ends, held) - height[inside]).max()))
+    if not spans:
+        return []
+    most = int(np.argmax(np.round(sags, 5)))
+    return [
+        f"{wire} at rest in {_span_words(spans)}: {_from_to(within)} m above the rail, "
+        f"{_from_to(at_supports)} m at the supports; largest sag between two supports "
+        f"{1e3 * sags[most]:.1f} mm, in span {spans[most] + 1}"
+    ]
+
+
+def _from_to(heights: Sequence[float]) -> str:
+    """Smallest and largest of heights [m], or the one that both are to a tenth of a millimetre."""
+    low, high = f"{min(heights):.4f}", f"{max(heights):.4f}"
+    return low if low == high else f"{low} to {high}"
+
+
+def _span_words(spans: Sequence[int]) -> str:
+    """Words on spans, counted from 0, by stretches."""
+    breaks = np.flatnonzero(np.diff(spans) > 1) + 1
+    parts = [(own[0] + 1, own[-1] + 1) for own in np.split(np.asarray(spans), breaks)]
+    texts = [f"{first}" if first == last else f"{first} to {last}" for first, last in parts]
+    return ("spans " if len(spans) > 1 else "span ") + ", ".join(texts)
 
 
 def _registration_text(data: Mapping[str, np.ndarray], wires: Sequence[str]) -> list[str]:

@@ -103,6 +103,27 @@ REPORTED = {
         ["line.contact_height_m=5080"],
         "usual are 4 to 7 m: is it 5080 mm? write 5.08",
     ),
+    "took metres of a diameter for millimetres": (
+        ["line.contact_wire.diameter_mm=0.0144"],
+        "usual are 5 to 40 mm: is it 0.0144 m? write 14.4",
+    ),
+    "took kilonewtons of an axial stiffness for newtons": (
+        ["line.contact_wire.axial_stiffness_N=15000"],
+        "is it 15000 kN? write 15000000",
+    ),
+    "took grams of a clamp for kilograms": (
+        ["line.dropper.contact_clamp_kg=50"],
+        "is it 50 g? write 0.05",
+    ),
+    "added up two errors of one dropper": (
+        ["irregularities.dropper_lengths.by_dropper=[[7,4,3],[6,4,3],[7,4,-10]]"],
+        "by_dropper.2.1 is 4 on the command line (--set); irregularities.dropper_lengths.by_dropper"
+        ".0 has this already",
+    ),
+    "took milliseconds of a damping for seconds": (
+        ["line.damping.alpha_s=1"],
+        "usual are 1e-05 to 0.03 s: is it 1 ms? write 0.001",
+    ),
     "told milliseconds as a bound alone": (["numerics.dt_s=1"], "is it 1 ms? write 0.001"),
     "told grams as a bound alone": (
         ["line.contact_wire.mass_kg_per_m=1350"],

@@ -19,11 +19,13 @@ def put_defects(rng: random.Random, words: Words, droppers: list[int], length: f
     if rng.random() < 0.5 and any(droppers):
         words["irregularities.dropper_lengths.standard_deviation_mm"] = 10 ** rng.uniform(-1, 1.5)
         words["irregularities.dropper_lengths.seed"] = rng.randrange(2**31)
-    for name, shortest in (("contact_wire_height", 10.0), ("running_surface", 0.3)):
+    # Heights below a tenth of a millimetre are taken for metres, but for those of a surface.
+    kinds = (("contact_wire_height", 10.0, -1.0), ("running_surface", 0.3, -2.0))
+    for name, shortest, lowest in kinds:
         if rng.random() < 0.4:
             least = rng.uniform(1.0, 3.0) * shortest
             key = f"irregularities.{name}"
-            words[f"{key}.standard_deviation_mm"] = 10 ** rng.uniform(-2.0, 1.0)
+            words[f"{key}.standard_deviation_mm"] = 10 ** rng.uniform(lowest, 1.0)
             words[f"{key}.exponent"] = rng.uniform(0.0, 4.0)
             words[f"{key}.shortest_m"], words[f"{key}.longest_m"] = least, 8.0 * least
             words[f"{key}.seed"] = rng.randrange(2**31)

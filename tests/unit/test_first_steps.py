@@ -48,6 +48,10 @@ def test_a_new_case_names_usual_values_of_the_key_below(tmp_path: Path) -> None:
     lines = write_case(tmp_path / "a", "simple").read_text().splitlines()
     at = lines.index("tension_N = 22000.0")
     assert lines[at - 1] == "# usual: 10000 to 20000, high speed 20000 to 31500"
+    rail = write_case(tmp_path / "b", "conductor_rail").read_text().splitlines()
+    for value in ("tension_N = 100.0", "mass_kg_per_m = 7.1", "span_m = 8.5"):
+        at = next(i for i, line in enumerate(rail) if line.startswith(value))
+        assert not rail[at - 1].startswith("# usual"), "what wires have is not usual of a rail"
 
 
 @pytest.mark.parametrize("case", shipped())
@@ -122,6 +126,21 @@ def test_a_case_of_ones_own_may_be_a_beginning(tmp_path: Path) -> None:
     assert load_scene(again).line == scene.line
 
 
+def test_spans_of_a_table_are_those_of_transitions_too(tmp_path: Path) -> None:
+    """Of ``ambrosio2012`` the end spans have a length of their own."""
+    spans, droppers = tables(tmp_path, 20)
+    scene = load_scene(write_case(tmp_path / "a", "ambrosio2012", spans, droppers))
+    assert scene.line.transition.n_spans_start > 0
+    lengths = tuple(map(float, spans.read_text().splitlines()[1:]))
+    assert line_data_of(scene).span_lengths == lengths
+
+
+def test_a_case_of_another_file_is_named_by_it(tmp_path: Path) -> None:
+    example = Path(__file__).parents[2] / "docs/examples/two_messengers.toml"
+    text = write_case(tmp_path / "a", str(example)).read_text()
+    assert "begun from two_messengers." in text and "values of two_messengers: assumed" in text
+
+
 def test_a_line_without_droppers_takes_spans_alone(tmp_path: Path) -> None:
     spans, _ = tables(tmp_path, 20)
     assert load_scene(write_case(tmp_path / "a", "tramway", spans)).line.n_spans == 20
@@ -134,7 +153,7 @@ def test_a_line_without_droppers_takes_spans_alone(tmp_path: Path) -> None:
         (["--droppers", "hung.csv"], "--droppers needs --spans too"),
         (["--spans", "none.csv"], "none.csv cannot be read: no such file"),
         (["--spans", "few.csv", "--droppers", "hung.csv"], "a new case needs 12 spans"),
-        (["--spans", "line 7.csv"], "line.dropper.positions_m"),
+        (["--spans", "line 7.csv"], "spacing_m, or a planner's table by --droppers"),
         (["--spans", "hung.csv"], "the table of spans is"),
         (["--spans", "line 7.csv", "--droppers", "typed.csv"], "droppers is typed.csv; its line 5"),
         (

@@ -192,7 +192,6 @@ TAKEN_BY_BOTH = {
     "catenary.cases.studies.sweep.variants.check_keys",
     "catenary.cases.studies.sweep.variants.product",
     "catenary.cases.run.planning.plan.make_plan",  # submit: two figures, no table
-    "catenary.cases.run.prepared.prepare_line",  # prepare: a file, no steps
     "catenary.cases.studies.records.held_study",  # numerics: studies that the face has not
 }
 

@@ -143,6 +143,11 @@ def test_files_beside_a_case_are_found_from_anywhere(tmp_path: Path) -> None:
             "its line 3 must have a position greater than the 5 m of the dropper before it",
         ),
         ("droppers.csv", "span,position_m,length_m\n1,5,1.1\n", "it takes no length_m"),
+        (
+            "droppers.csv",
+            "span,position_m,pre_sag_mm\n1,5,0\n1,20,0.05\n1,45,0.01\n",
+            "its largest pre_sag_mm is 0.05: is it 0.05 m? write 50",
+        ),
         ("droppers.csv", "span,position_m\n1,5\n", "has no entry for span 2; it has 1 span"),
         (
             "droppers.csv",

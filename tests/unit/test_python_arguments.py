@@ -42,6 +42,8 @@ WRONG: dict[str, tuple[Callable[..., Any], tuple[Any, ...], dict[str, Any], str]
     "tolerance": (catenary.tolerance, (CASE, 3), {}, f"task is 3; {FILE}"),
     "identify": (catenary.identify, (CASE, pd.DataFrame(), 3), {}, f"task is 3; {FILE}"),
     "uncertainty": (catenary.uncertainty, ("",), {}, f'table is ""; {PATH}'),
+    "prepare": (catenary.prepare, (CASE, 3), {}, f"out is 3; {PATH}"),
+    "prepare, other name": (catenary.prepare, (CASE, "a.h5"), {}, "out a.h5 must have a name that"),
     "Simulation": (catenary.Simulation, ([CASE],), {}, LOADED),
 }
 

@@ -75,6 +75,7 @@ def test_a_tensioner_has_all_that_the_scene_gives() -> None:
             [*TENSIONED, "line.ends.start.along=tensioner"],
             "from 0 to 1320 m would have tensioners at both ends .* line.mid_points_m",
         ),
+        ([*WHOLE, "line.mid_points_m=[660, 660]"], "mid_points_m.1 is 660 m .* listed twice"),
         ([*WHOLE, "line.mid_points_m=[650]"], "stands at a mast .* such as 660 m"),
         ([*TENSIONED, "line.tensioner.ratio=0.5"], "it must be at least 1"),
         ([*TENSIONED, "line.tensioner.efficiency=1.1"], "it must be at most 1"),

@@ -8,6 +8,7 @@ from free_tables import as_free
 from scenes import line_data_of, load_scene, problem_of, scene_from
 
 from catenary import InputError
+from catenary.cases.run.at_rest.static_table import static_table
 from catenary.cases.run.planning.plan import effect_rows
 from catenary.cases.scene.input.faults import Origin
 from catenary.solver.effects.all_effects import active
@@ -140,3 +141,10 @@ def test_arms_of_a_free_line_are_checked_too() -> None:
     raw["effects"].pop("lateral_motion")
     with pytest.raises(InputError, match=rf"links.{number}.inclination_deg is 9 .*acts only with"):
         scene_from(raw, Origin("case.toml", recorded=True))
+
+
+def test_a_tight_curve_names_the_arms_that_lift_the_wire() -> None:
+    """Arms of 10 degrees lift by 22 kN 55 m / 300 m tan 10 deg, 711 N: more than droppers carry."""
+    scene = load_scene("ac_simple_3d", ["line.curve.radius_m=300"], shortened=True)
+    with pytest.raises(InputError, match="slack at rest .* inclination of the steady arms, which"):
+        static_table(scene)

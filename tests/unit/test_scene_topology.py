@@ -209,3 +209,21 @@ def test_tables_of_lines_without_droppers_or_with_two_wires(case: str) -> None:
     lower = {wire.name for wire in line_of(scene).wires_of(Role.CONTACT)}
     assert set(table["dropper_lower"]) == (lower if case == TWIN else set())
     assert static_text(table, line_of(scene)).count("tension ") == len(line_of(scene).wires)
+
+
+def test_sags_are_told_between_supports_where_trains_run() -> None:
+    """Neither the height of a fixed end nor the rise in an overlap counts as sag.
+
+    In the spans of a wire alone the closed form is m g L^2 / 8 T; bending takes EI's boundary layer
+    off, P r / 2 T with the force P on an arm and r = (EI / T)^(1/2), 1.5 of 105 mm.
+    """
+    scene = load_scene(TRAM, shortened=True)
+    text = static_text(static_table(scene), line_of(scene))
+    told = re.search(r"in spans 2 to 23: .*, 5.5000 m at the supports.* supports ([\d.]+) mm", text)
+    assert told is not None
+    check("sag [mm]", float(told[1]), 104.8 - 1.5, within=0.5)
+    scene = load_scene(OVERLAP, shortened=True)
+    text = static_text(static_table(scene), line_of(scene))
+    first, second = re.findall(r"in spans (\d+) to (\d+): .* supports ([\d.]+) mm", text)
+    assert first[0] == "2" and int(second[0]) == int(first[1]) + 1
+    assert 49.0 < float(first[2]) == float(second[2]) < 55.0

@@ -7,7 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from measuring import check
+from scenes import load_scene
 from verb_runner import invoke
+
+from catenary.cases.run.at_rest.static_table import rest_text, static_table
 
 SHORT = ["line.n_spans=5", "train.start_m=60", "evaluation.from_m=110", "evaluation.to_m=165"]
 RUN = [word for change in SHORT for word in ("--set", change)]
@@ -64,3 +68,28 @@ def test_what_has_no_registration_is_refused(
     result = invoke("static", *words)
     assert result.exit_code == 2 and sentence in result.stderr
     assert not list(tmp_path.iterdir())
+
+
+def test_arms_without_length_take_the_wind_of_their_spans() -> None:
+    """A wind pulls at each arm by its load on a span, to the side it blows to."""
+    blown = ["line.contact_wire.diameter_mm=12", "wind={speed_m_per_s=20, height_m=10}"]
+    still, windy = (
+        static_table(load_scene("tramway", [*own, "effects.lateral_motion=true"], shortened=True))
+        for own in (blown[:1], blown)
+    )
+    change = (windy["arm_force"] - still["arm_force"])[:, 0]
+    on_a_span = 0.5 * 1.225 * 20.0**2 * 0.012 * 1.2 * 30.0
+    # The first and last arms lie beside ends that turn freely: they take 1 % more, by bending.
+    check("radial force [N]", change[1:-1], -on_a_span, within=1e-3 * on_a_span)
+    assert still["arm_force"][:, 0].min() < -350.0
+
+
+def test_arms_pull_with_the_tension_that_a_wire_hangs_with() -> None:
+    slack = ['defects=[{type="wrong_tension", wire="contact_wire", factor=0.5}]']
+    sound, wrong = (
+        static_table(load_scene("ac_simple", own, shortened=True)) for own in ([], slack)
+    )
+    check("radial force [N]", wrong["arm_force"], 0.5 * sound["arm_force"], within=1e-9)
+    assert np.abs(sound["arm_force"]).max() > 300.0
+    text = rest_text(load_scene("ac_simple", slack, shortened=True), wrong)
+    assert "contact_wire: tension 11000 N" in text

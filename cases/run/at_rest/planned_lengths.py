@@ -11,7 +11,11 @@ from scipy.optimize import root
 
 from catenary.base.errors import InputError
 from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.input.csv_files import DROPPER_COLUMNS, dropper_table
+from catenary.cases.scene.input.csv_files import (
+    DROPPER_COLUMNS,
+    LEAST_PRE_SAG,
+    dropper_table,
+)
 from catenary.cases.scene.input.toml_input import REMOVED
 from catenary.cases.scene.load import read_draft
 from catenary.cases.scene.problem import problem_of
@@ -81,6 +85,8 @@ def take_in_lengths(folder: Path) -> float | None:
     if not found.success:
         raise InputError(f"{where}; no pre-sag was found that gives its lengths")
     pre_sag = np.round(found.x, 3)
+    if np.abs(pre_sag).max() < LEAST_PRE_SAG:  # what is left of rounded lengths
+        pre_sag = np.zeros(pre_sag.size)
     lines = [
         f"{span},{row['position_m']:g},{sag:.3f}"
         for (span, row), sag in zip(rows, pre_sag, strict=True)

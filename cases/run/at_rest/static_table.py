@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from catenary.base.errors import InputError, RunBroken
+from catenary.base.options import option
 from catenary.cases.run.at_rest.temperatures import temperatures
 from catenary.cases.run.describe.arrivals import arrival_facts
 from catenary.cases.run.describe.defects import defect_facts
@@ -25,7 +26,10 @@ from catenary.postproc.channels.header import line_datasets, static_datasets
 from catenary.postproc.evaluate.wording import counted
 from catenary.postproc.files.csv_text import csv_text
 from catenary.postproc.read.registration import Registration
+from catenary.solver.effects.all_effects import with_defects
+from catenary.solver.model.model import Model
 from catenary.solver.model.rest_shape import Equilibrium
+from catenary.solver.model.wire_ends import at_stop, tensioned_ends
 from catenary.solver.statics.form_finding.equilibrium import lengths_to_cut
 from catenary.solver.statics.line_at_rest import line_at_rest, stable_form
 from catenary.solver.statics.stability_of_rest import refuse_lost_wire
@@ -81,7 +85,7 @@ def static_table(scene: Scene) -> dict[str, np.ndarray]:
     data = {
         **line_datasets(problem.line, mesh, problem.evaluation),
         "static/dropper_length": lengths_to_cut(problem, mesh),
-        **static_datasets(problem.line, mesh, rest.form, rest.lift),
+        **static_datasets(rest.problem.line, mesh, rest.form, rest.lift),
         "line/dropper_x": mesh.x(mesh.droppers[:, 1]),
         "line/arm_x": mesh.x(mesh.steady_arms),
         **installed(problem.line, mesh, rest.form.height),
@@ -96,7 +100,7 @@ def rest_text(scene: Scene, table: Mapping[str, np.ndarray]) -> str:
     defects = [fact["says"] for fact in defect_facts(scene, problem)]
     strips = [scene.pantographs[place.name].strips.length_m for place in scene.train.pantographs]
     half_head = min((0.5 * length for length in strips if length is not None), default=None)
-    lines = [*defects, static_text(table, problem.line, half_head)]
+    lines = [*defects, static_text(table, with_defects(problem).line, half_head)]
     if problem.along.warmer and {"axial_motion", "temperature"} <= problem.effects:
         lines += ["", temperatures(scene, [problem.along.warmer], None)]
     return "\n".join(lines)
@@ -134,7 +138,23 @@ def check_line(scene: Scene) -> Checked:
         f"ends: {'; '.join(waves['ends'])}",
         *(fact["says"] for fact in waves["pantographs"]),
     ]
-    return Checked(sentences, [*waves["warnings"], *([] if arms is None else arms.warnings())])
+    pushed = [] if arms is None else arms.warnings()
+    return Checked(sentences, [*waves["warnings"], *pushed, *_at_stops(model)])
+
+
+def _at_stops(model: Model) -> list[str]:
+    """A sentence if stops hold tensioners at rest, none if not."""
+    ends = tensioned_ends(model)
+    stopped = [end for end in ends if at_stop(model, end)]
+    if not stopped:
+        return []
+    first = stopped[0]
+    return [
+        f"At rest stops hold {len(stopped)} of {counted(len(ends), 'tensioner')}, that of "
+        f"{first.wire} at {model.mesh.points[first.node, 0]:g} m among them: these wires have not "
+        f"the tension of their weights, see {option('`catenary static`', 'catenary.static')}. Take "
+        "a larger line.tensioner.travel_m, or a shorter section."
+    ]
 
 
 def write_static(path: Path, table: Mapping[str, Any], registration: bool = False) -> None:

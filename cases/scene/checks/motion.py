@@ -187,6 +187,8 @@ def _mid_points(scene: Scene, line: LineData) -> Iterator[Fault]:
             near = f", such as {masts[np.abs(masts - x).argmin()]:g} m" if masts.size else ""
             why = f"a mid-point anchor stands at a mast between two spans{near}"
             yield scene.refused(f"line.mid_points_m.{i}", why)
+        elif any(abs(x - other) < _AT_MAST for other in scene.line.mid_points_m[:i]):
+            yield scene.refused(f"line.mid_points_m.{i}", "it is listed twice; take one away")
 
 
 def _weights(scene: Scene, line: LineData) -> Iterator[Fault]:

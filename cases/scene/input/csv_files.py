@@ -23,6 +23,8 @@ from catenary.cases.scene.input.toml_input import read_toml
 from catenary.postproc.standards.book import book_of
 
 _LONGEST_NAME = 1000
+# A line whose largest pre-sag is smaller has none: such a table was written in metres [mm].
+LEAST_PRE_SAG = 0.2
 
 
 def take_in_files(
@@ -203,6 +205,12 @@ def _patterns(path: Path, where: str, raw: dict[str, Any]) -> list[dict[str, Any
     n = raw["line"].get("n_spans")
     most = n if isinstance(n, int) else max(hung)
     like: dict[tuple[tuple[float, ...], ...], list[int]] = {}
+    most_sag = max(abs(row.get("pre_sag_mm", 0.0)) for own in hung.values() for row in own)
+    if 0.0 < most_sag < LEAST_PRE_SAG:
+        raise InputError(
+            f"{where}; its largest pre_sag_mm is {most_sag:g}: is it {most_sag:g} m? write "
+            f"{1e3 * most_sag:g}"
+        )
     first = next(iter(hung.values()))[0]
     names = [name for name in ("position_m", "pre_sag_mm") if name in first]
     for span, own in hung.items():

@@ -30,7 +30,7 @@ USUAL: dict[str, Usual] = {
     "line.n_spans": Usual(
         "12 to 30: the evaluated spans, and on either side enough for no reflection"
     ),
-    "line.span_m": Usual("40 to 65", 20, 80),
+    "line.span_m": Usual("40 to 65, of tramways 25 to 40", 20, 80),
     "line.encumbrance_m": Usual("1.2 to 1.8", 0.3, 3),
     "line.contact_height_m": Usual("", 4, 7),
     "line.stagger_m": Usual("", 0.05, 0.6),
@@ -42,13 +42,13 @@ USUAL: dict[str, Usual] = {
     "line.contact_wire.bending_stiffness_N_m2": Usual(
         "E A^2 / (4 pi) of a round copper wire: 107 mm2 110, 120 mm2 140, 150 mm2 215", 30, 600
     ),
-    "line.contact_wire.diameter_mm": Usual("14.4 (150 mm2), 12.9 (120 mm2)"),
+    "line.contact_wire.diameter_mm": Usual("14.4 (150 mm2), 12.9 (120 mm2)", 5, 40),
     "line.messenger_wire.tension_N": Usual("10000 to 20000, high speed up to 28000", 3e3, 4e4),
     "line.messenger_wire.mass_kg_per_m": Usual("bronze strand of 65 mm2 0.6, 120 mm2 1.07", 0.3, 3),
     "line.messenger_wire.bending_stiffness_N_m2": Usual(
         "45 (65 mm2) to 130 (120 mm2); a strand has less than a solid wire"
     ),
-    "line.messenger_wire.diameter_mm": Usual("14 (117 mm2), 10.5 (70 mm2), 9 (50 mm2)"),
+    "line.messenger_wire.diameter_mm": Usual("14 (117 mm2), 10.5 (70 mm2), 9 (50 mm2)", 5, 40),
     "line.auxiliary_wire.tension_N": Usual("9800 to 14700 (Shinkansen)", 3e3, 4e4),
     "line.auxiliary_wire.mass_kg_per_m": Usual("copper of 150 mm2 1.375", 0.3, 3),
     "line.auxiliary_wire.bending_stiffness_N_m2": Usual(
@@ -78,6 +78,7 @@ USUAL: dict[str, Usual] = {
     "line.links.*.positions_m": Usual("", 1, 80),
     "line.links.*.pre_sag_mm": Usual("", 5, 150),
     "line.links.*.pre_sag_mid_mm": Usual("", 5, 150),
+    "line.damping.per_component.*.alpha_s": Usual("", 1e-5, 0.03),
     "line.twin.spacing_m": Usual("0.04 to 0.1", 0.02, 0.5),
     "line.bridle.tension_N": Usual("1000 to 3000", 500, 6e3),
     "line.bridle.mass_kg_per_m": Usual("bronze strand of 35 mm2 0.31", 0.1, 1),
@@ -105,15 +106,20 @@ USUAL: dict[str, Usual] = {
     "line.dropper.pre_sag_mid_mm": Usual("0 to 1/1000 of the span, 55 for 55 m", 5, 150),
     "line.dropper.positions_m": Usual("", 1, 80),
     "line.dropper.pre_sag_mm": Usual("", 5, 150),
-    "line.steady_arm.length_m": Usual("1 to 1.3"),
+    "line.steady_arm.length_m": Usual("1 to 1.3", 0.3, 3),
+    "line.steady_arm.mass_kg_per_m": Usual("", 0.2, 3),
+    "line.steady_arm.clamp_kg": Usual("", 0.05, 2),
+    "line.steady_arm.stiffness_N_per_m": Usual("", 50, 2e3),
     "line.fittings.*.kind": Usual("section_insulator"),
     "line.fittings.*.at_m": Usual("in the middle of a span, between droppers"),
-    "line.fittings.*.mass_kg": Usual("section insulators 6 to 20, splices 0.5 to 1.5"),
+    "line.fittings.*.mass_kg": Usual("section insulators 6 to 20, splices 0.5 to 1.5", 0.2, 50),
     "line.damping.alpha_s": Usual(
-        "0.0001 (en50318_2002, ac_simple); 0.0275 and 0.00275 (Ambrosio et al., 2012)"
+        "0.0001 (en50318_2002, ac_simple); 0.0275 and 0.00275 (Ambrosio et al., 2012)",
+        1e-5,
+        0.03,
     ),
     "line.damping.beta_per_s": Usual("0.0125 (en50318_2002, ac_simple); 0 (Ambrosio et al., 2012)"),
-    "line.damping.lateral.alpha_s": Usual("0 (assumed; none was measured)"),
+    "line.damping.lateral.alpha_s": Usual("0 (assumed; none was measured)", 1e-5, 0.03),
     "line.damping.lateral.beta_per_s": Usual(
         "0.003 (wires alone) to 0.9 (a ratio of 0.05 at 1.4 Hz, as measured on vertical motion)"
     ),
@@ -143,6 +149,22 @@ USUAL: dict[str, Usual] = {
     "line.auxiliary_wire.dropper.stiffness_N_per_m": Usual("", 1e4, 1e6),
     "line.support.stiffness_N_per_m": Usual("", 1e4, 1e7),
     "line.transition.span_m": Usual("", 20, 80),
+    "line.transition.rise_m": Usual("", 0.1, 2),
+    "irregularities.contact_wire_height.standard_deviation_mm": Usual("", 1, 50),
+    "irregularities.dropper_lengths.standard_deviation_mm": Usual("", 1, 50),
+}
+_WIRES = ("contact_wire", "messenger_wire", "auxiliary_wire", "stitch_wire", "bridle", "wires.*")
+USUAL |= {f"line.{wire}.axial_stiffness_N": Usual("", 1e6, 1e8) for wire in _WIRES}
+USUAL |= {f"line.{wire}.diameter_mm": Usual("", 5, 40) for wire in _WIRES[2:]}
+_CLAMPED = ("line.stitch_wire", "line.bridle", "line.wires.*")
+USUAL |= {f"{wire}.clamp_kg": Usual("", 0.05, 2) for wire in _CLAMPED}
+_DROPPERS = ("line.dropper", "line.auxiliary_wire.dropper", "line.links.*")
+USUAL |= {f"{one}.messenger_clamp_kg": Usual("", 0.02, 2) for one in _DROPPERS}
+USUAL |= {f"{one}.mass_kg_per_m": Usual("", 0.02, 2) for one in _DROPPERS}
+USUAL |= {
+    "line.dropper.contact_clamp_kg": Usual("", 0.02, 2),
+    "line.auxiliary_wire.dropper.auxiliary_clamp_kg": Usual("", 0.02, 2),
+    "line.links.*.contact_clamp_kg": Usual("", 0.02, 2),
 }
 _SIGNED = ("stagger_m", "messenger_stagger_m", "pre_sag")
 _MARGIN = 10.0  # beyond a usual range without a question

@@ -53,10 +53,10 @@ class WireTable(Table):
         None, gt=0, le=1e10, description="axial stiffness EA; acts with effects.axial_motion"
     )
     section_mm2: float | None = Field(
-        None, gt=0, le=1e4, description="cross-section, in place of axial_stiffness_N"
+        None, ge=1, le=1e4, description="cross-section, in place of axial_stiffness_N"
     )
     youngs_modulus_GPa: float | None = Field(
-        None, gt=0, le=1000, description="Young's modulus, with section_mm2"
+        None, ge=1, le=1000, description="Young's modulus, with section_mm2"
     )
     expansion_per_K: float = Field(
         EXPANSION_OF_COPPER,

@@ -311,7 +311,7 @@ def draw_temperatures(rests: Sequence[LineAtTemperature], path: Path) -> None:
         for rest in found:
             wire = next(own for own in rest.wires if own.name == name)
             share = (rest.warmer - low) / max(high - low, 1e-12)
-            label = f"{rest.warmer:+g} K"
+            label = f"{rest.warmer:+g} K" if rest.warmer else "0 K"
             axes.plot(wire.x, 100 * wire.change, color=warmth(share), lw=1.3, label=label)
         worst = max((np.abs(axes.get_ylim()).max(), 1.0))
         if worst > 0.7 * _ALLOWED:

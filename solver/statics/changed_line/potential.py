@@ -113,6 +113,22 @@ class Potential:
             np.add.at(total, arm.unknowns, arm.was - arm.force(moved)[:, : arm.unknowns.shape[1]])
         return total
 
+    def with_forces_that_hold(
+        self, form: Equilibrium, moved: np.ndarray, carried: np.ndarray, load: np.ndarray
+    ) -> Equilibrium:
+        """The rest ``form`` with the forces by which arms without length hold their wires sideways:
+        what balances there the loads of the line less those of the known one, ``load`` (n_dofs,)
+        [N]; other parameters as of ``pull``."""
+        kinds = self.model.problem.line.steady_arms
+        pinned = [number for number, arms in enumerate(kinds) if arms.kind.length == 0.0]
+        mine = np.flatnonzero(np.isin(self.model.mesh.arm_group, pinned))
+        if form.lateral is None or mine.size == 0:
+            return form
+        at = self.model.dofs(self.model.mesh.steady_arms[mine], "v")
+        force = form.lateral.arm_force.copy()
+        force[mine, 0] += (self.pull(moved, form, carried) - load)[at]
+        return replace(form, lateral=replace(form.lateral, arm_force=force))
+
     def _pulls(self, form: Equilibrium, tension: np.ndarray) -> np.ndarray:
         """Forces of droppers on their upper ends, downwards and so on, (n_droppers, 3) [N]."""
         vectors = form.dropper_vectors(self.model.mesh.droppers)

@@ -190,8 +190,9 @@ class RestNearby:
             slack = slack ^ (chosen & wrong)
         gap = np.where(slack, -model.dropper_slopes.stretch_under(reserve), 0.0)
         force = np.where(np.abs(reserve) < _NO_FORCE, 0.0, reserve)
-        rest = replace(form, dropper_force=self._carried(force, slack))
-        return Rest(rest, moved, reserve, gap)
+        carried = self._carried(force, slack)
+        held = potential.with_forces_that_hold(form, moved, carried, self._load)
+        return Rest(replace(held, dropper_force=carried), moved, reserve, gap)
 
     def _carried(self, reserve: np.ndarray, slack: np.ndarray) -> np.ndarray:
         return np.where(slack, (1.0 - self._lost) * reserve, reserve)

@@ -136,7 +136,8 @@ def _cut(
         model = build(problem, mesh, length, before=model, apart=True)
         hanging = hanging or _HangingWires(model, exact)
         form = hanging.at_rest(model, lateral)
-        _check(problem.line, mesh, form, pushing)
+        lifted = lateral is not None and bool(lateral.arm_force[:, 1].any())
+        _check(problem.line, mesh, form, pushing, lifted)
         still_lifted, before = 0.0, lateral
         if model.simulated.lateral:
             form = _with_lateral(model, form, hanging.moments)
@@ -351,7 +352,9 @@ def _wanted(model: Model, wire: Wire, nodes: np.ndarray) -> np.ndarray:
     return model.simulated.target_height(wire, model.mesh.x(nodes))
 
 
-def _check(line: Line, mesh: LineMesh, form: Equilibrium, pushing: bool) -> None:
+def _check(line: Line, mesh: LineMesh, form: Equilibrium, pushing: bool, lifted: bool) -> None:
+    """Refuse droppers without length, and slack ones unless they may be ``pushing``; ``lifted``
+    says whether steady arms lift the wires."""
     length = form.height[mesh.droppers[:, 0]] - form.height[mesh.droppers[:, 1]]
     _refuse(line, mesh, length <= 0, lambda i: f"would have a length of {length[i] + 0.0:.3g} m")
     cut, force = form.dropper_length, form.dropper_force
@@ -369,10 +372,17 @@ def _check(line: Line, mesh: LineMesh, form: Equilibrium, pushing: bool) -> None
         slack,
         # Digits as they matter, so that a small force is not rounded to a zero with a sign.
         lambda i: f"would be slack at rest (force {form.dropper_force[i] + 0.0:.3g} N)",
+        ", or the inclination of the steady arms, which lift the wire" if lifted else "",
     )
 
 
-def _refuse(line: Line, mesh: LineMesh, bad: np.ndarray, what: Callable[[int], str]) -> None:
+def _refuse(
+    line: Line,
+    mesh: LineMesh,
+    bad: np.ndarray,
+    what: Callable[[int], str],
+    more_to_change: str = "",
+) -> None:
     found = np.flatnonzero(bad)
     if found.size == 0:
         return
@@ -384,4 +394,5 @@ def _refuse(line: Line, mesh: LineMesh, bad: np.ndarray, what: Callable[[int], s
     raise InputError(
         f"the dropper in {place} {what(int(found[0]))}{more}: change line.dropper.pre_sag_mm, the "
         "dropper positions, line.encumbrance_m, the tensions or the droppers' stiffness"
+        + more_to_change
     )

@@ -106,10 +106,7 @@ def test_a_state_brings_everything_back(scene: catenary.Scene) -> None:
 
 def test_a_state_of_another_line_is_refused(scene: catenary.Scene, tmp_path: Path) -> None:
     """Also of the same scene prepared again, whose arrays lie otherwise in memory."""
-    from catenary.cases.run.prepared import prepare_line
-    from catenary.scenes import checked
-
-    prepare_line(checked(scene), tmp_path / "a.line")
+    catenary.prepare(scene, tmp_path / "a.line")
     one, same, again = map(catenary.Simulation, (tmp_path / "a.line", tmp_path / "a.line", scene))
     faster = catenary.Simulation(scene.replace(train={"speed_km_h": 300.0}))
     one.step(100)
@@ -231,10 +228,10 @@ def test_forces_that_cannot_be_found_say_when_and_a_state_goes_on(scene: catenar
 def test_a_prepared_file_is_the_scene_that_it_was_made_of(
     scene: catenary.Scene, tmp_path: Path
 ) -> None:
-    from catenary.cases.run.prepared import prepare_line
-    from catenary.scenes import checked
-
-    prepare_line(checked(scene), tmp_path / "a.line")
+    file = catenary.prepare(scene, str(tmp_path / "a.line"))
+    assert file == tmp_path / "a.line"
+    with pytest.raises(catenary.InputError, match="exists already; give force=True to replace it"):
+        catenary.prepare(scene, file)
     with catenary.Simulation(tmp_path / "a.line") as sim, catenary.Simulation(scene) as other:
         sim.step(100)
         other.step(100)
