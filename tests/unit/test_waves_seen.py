@@ -8,11 +8,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 from program import catenary
+from scenes import load_scene, mesh_of, problem_of
 
 from catenary.cases.studies.waves import pictures
 from catenary.cases.studies.waves.seen import WavesSeen
 from catenary.cases.studies.waves.study import as_rows
-from catenary.cases.studies.waves.theory import MOST_SPEEDS, WaveTheory
+from catenary.cases.studies.waves.theory import (
+    MOST_SPEEDS,
+    WaveTheory,
+    reflection_rows,
+    reflections_of,
+    wave_theory,
+)
+from catenary.solver.statics.line_at_rest import line_at_rest
 from catenary.solver.waves.bloch import BlochWaves
 
 pytestmark = pytest.mark.study
@@ -75,6 +83,30 @@ def test_a_line_of_many_wires_has_a_line_of_speed_for_each() -> None:
     assert "doppler_factor" in names and "amplification" not in names
 
 
+@pytest.mark.parametrize(("wave_speed", "side"), [(100.0, 1.0), (30.0, -1.0)])
+def test_waves_that_the_train_outruns_fall_behind_it(wave_speed: float, side: float) -> None:
+    theory = WaveTheory(SPEED, wave_speed, (), 0.4, np.nan, np.nan, None, "")
+    axes = pictures.train_frame(travelling(0.3, 2.0), theory, 30.0, 20.0, "train").axes[0]
+    for line, speed in zip(axes.get_lines(), (wave_speed, -wave_speed), strict=True):
+        (x, t), (from_x, from_t) = line.get_xydata()[1], line.get_xydata()[0]
+        assert from_x == 0.0 and t > from_t
+        assert x / (t - from_t) == pytest.approx(speed - SPEED)
+    assert np.sign(axes.get_lines()[0].get_xdata()[1]) == side
+
+
+def test_no_echo_reaches_a_train_that_no_wave_outruns() -> None:
+    faster = ("train.speed_km_h=450", "effects.supercritical_speed=true")
+    scene = load_scene("en50318_2002", faster, shortened=True)
+    rest = line_at_rest(problem_of(scene), mesh_of(scene))
+    theory = wave_theory(rest.problem, rest)
+    assert theory.speed > theory.wave_speed
+    rows = [*as_rows(theory), *reflection_rows(reflections_of(rest), theory.speed)]
+    names = [row["name"] for row in rows]
+    assert "dropper_reflection" in names
+    for name in ("doppler_factor", "amplification", "largest_reflection_end"):
+        assert name not in names
+
+
 def test_without_a_train_nothing_is_drawn_that_moves_with_it() -> None:
     theory = WaveTheory(SPEED, 100.0, (("contact_wire", 100.0),), 0.4, np.nan, np.nan, None, "")
     with_train = travelling(0.5, 7.5)
@@ -92,7 +124,7 @@ def test_the_verb_runs_a_case_and_reads_a_run(tmp_path: Path) -> None:
     out = tmp_path / "waves"
     done = catenary("waves", "en50318_2002", "--short", "-o", str(out), cwd=tmp_path, pictures=True)
     assert done.code == 0, done.stderr
-    assert "sqrt(T/m) of the contact wire: 121.7 m/s" in done.stdout
+    assert "slowest wave of the contact wire, sqrt(T / m): 121.7 m/s\n" in done.stdout
     names = ("space_time.png", "train_frame.png", "wavenumbers.png", "waves.csv", "pass_bands.csv",
              "energy.png", "energy.csv",
              "end_reflection.png", "end_reflection.csv")  # fmt: skip

@@ -75,17 +75,17 @@ def train_frame(
     axes = figure.add_subplot()
     relative, velocity = seen.in_the_train(behind, ahead)
     _velocity(figure, axes, relative, seen.time, velocity)
-    ahead_of = np.array([0.0, ahead])
     when = seen.time[0] + 0.3 * np.ptp(seen.time)
-    axes.plot(
-        ahead_of, when + ahead_of / (theory.wave_speed - theory.speed), "--", color=figures.GREY,
-        linewidth=1.0, label="wave speed of the contact wire, ahead and behind",
-    )  # fmt: skip
-    behind_it = np.array([0.0, behind])
-    axes.plot(
-        -behind_it, when + behind_it / (theory.wave_speed + theory.speed), "--",
-        color=figures.GREY, linewidth=1.0,
-    )  # fmt: skip
+    label = "waves of the contact wire that run ahead, and back"
+    # What runs ahead more slowly than the train falls behind it, too.
+    for speed in (theory.wave_speed - theory.speed, -theory.wave_speed - theory.speed):
+        end = ahead if speed > 0.0 else -behind
+        later = end / speed if speed else np.inf
+        axes.plot(
+            [0.0, end], [when, when + later], "--", color=figures.GREY, linewidth=1.0,
+            label=label,
+        )  # fmt: skip
+        label = ""
     axes.set_xlim(-behind, ahead)
     axes.set_ylim(seen.time[0], seen.time[-1])
     figures.tidy(axes, f"distance from the {what} [m]", "time [s]")
