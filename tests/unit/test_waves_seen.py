@@ -10,7 +10,7 @@ import pytest
 from program import catenary
 from scenes import load_scene, mesh_of, problem_of
 
-from catenary.cases.studies.waves import pictures
+from catenary.cases.studies.waves import obstacles, pictures
 from catenary.cases.studies.waves.seen import WavesSeen
 from catenary.cases.studies.waves.study import as_rows
 from catenary.cases.studies.waves.theory import (
@@ -168,6 +168,18 @@ def test_the_verb_excites_a_line_without_its_train(kind: str, tmp_path: Path) ->
     assert read.code == 0, read.stderr
     once_more = np.genfromtxt(struck / "energy.csv", delimiter=",", names=True)
     assert np.abs(once_more["total_J"] - rows["total_J"]).max() < 1e-4 * rows["total_J"].max()
+
+
+def test_shares_of_obstacles_are_told_apart_by_marks_and_stand_clear_of_the_axis() -> None:
+    frequency = np.linspace(2.0, 20.0, 19)
+    shares = np.full((2, 19, 2, 2), 0.4, dtype=complex)
+    result = obstacles.Result("droppers", ("contact_wire", "messenger_wire"), frequency, shares,
+                              1e-4 * shares)  # fmt: skip
+    axes = obstacles.picture([result]).axes[0]
+    named = [line for line in axes.get_lines() if not str(line.get_label()).startswith("_")]
+    marks = [str(line.get_marker()) for line in named]
+    assert len(set(marks)) == len(marks) == 6
+    assert axes.get_ylim()[0] < 0.0
 
 
 @pytest.mark.process
