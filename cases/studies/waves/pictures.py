@@ -17,6 +17,7 @@ _COVERED, _DECADES = 0.995, 4.0
 _DASHES = ("--", "-.", ":", (0, (6, 1, 1, 1, 1, 1)))
 # Distance from the moving load up to which the mean energy is drawn [m].
 _AROUND = 400.0
+_MOST_SUPPORTS = 100
 # Wavenumbers that are drawn [rad/m]; most places and times in a picture.
 _WIDEST, _MOST = 1.2, 1600
 
@@ -49,7 +50,8 @@ def space_time(
                 linestyle=_DASHES[number], color="black", linewidth=1.0,
                 label=label if end == seen.x[-1] else None,
             )  # fmt: skip
-    for x in supports.tolist():
+    # So many that a picture of a long line would be grey are left out.
+    for x in supports.tolist() if supports.size <= _MOST_SUPPORTS else ():
         axes.axvline(x, color=figures.LIGHT, linewidth=0.6, zorder=1)
     axes.set_xlim(seen.x[0], seen.x[-1])
     axes.set_ylim(seen.time[0], seen.time[-1])

@@ -85,12 +85,17 @@ def study_waves(folder: Path) -> tuple[str, list[Path]]:
                 numbers[nodes] = data.wires[name]
             energy = EnergyMotion(rest, numbers)
             seen = waves_seen(data, snapshots, [energy])
+            ends = np.array([snapshots.moving(n) for n in range(snapshots.times.size)])
+            moving = np.column_stack(
+                [np.maximum(ends[1:, 0], ends[:-1, 0]), np.minimum(ends[1:, 1], ends[:-1, 1])]
+            )
         remarks = all_remarks(results, indicate(results))
     theory = wave_theory(problem, rest)
     what = "train"
     if data.excitation is not None:
         what = "force" if isinstance(data.excitation, MovingForce) else "blow"
-    return _write(folder, theory, rest, seen, energy.seen(), data.supports, what, remarks)
+    waves = energy.seen().within(moving)
+    return _write(folder, theory, rest, seen, waves, data.supports, what, remarks)
 
 
 def study_excited(
