@@ -219,7 +219,8 @@ def _about_contact(results: Results) -> list[str]:
         return ["The contact is kinematic: head and wire do not part, so that loss cannot occur."]
     found: dict[str, None] = {}
     for mass, stiffness in zip(results.facts_of("touching_mass"), stiffnesses, strict=True):
-        if math.isfinite(mass) and math.isfinite(stiffness):
+        # Without a train nothing touches the line.
+        if math.isfinite(mass) and math.isfinite(stiffness) and stiffness > 0.0:
             head = _Contact(float(mass), float(stiffness), results.fact("shortest_step"))
             found |= dict.fromkeys(_about_head(head))
     return list(found)

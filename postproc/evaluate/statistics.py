@@ -249,6 +249,10 @@ def histogram(force: np.ndarray, width: float = HISTOGRAM_BIN) -> tuple[np.ndarr
 
 def _pantograph(name: str, number: int, results: Results) -> PantographStatistics:
     """Statistics of a pantograph; its histories are read one after the other."""
+    if results.attributes.get("excitation"):
+        return PantographStatistics(
+            name, complaint="No statistics of contact forces: the line is excited without a train."
+        )
     start, end = results.evaluation
     position = results.column("contact_position", number)
     if not covers(position, (start, end)):

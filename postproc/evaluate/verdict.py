@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import operator
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from catenary.base.errors import InputError
 from catenary.postproc.evaluate.observations import Observation, observe
@@ -228,6 +228,7 @@ class _Judge:
         return row.share(of), other.note
 
 
+_NO_TRAIN = "the line is excited without a train"
 _STOPS = "uplift_stops"  # the effect by which steady arms have stops
 
 
@@ -248,13 +249,21 @@ def books_of(results: Results) -> list[RuleBook]:
 
 
 def criteria_of(results: Results, statistics: RunStatistics) -> list[Criterion]:
-    """All criteria of a run's rule books. Not collective."""
+    """All criteria of a run's rule books; of a line that is excited without a train none is judged.
+    Not collective."""
     books, about = books_of(results), results.attributes
     stops = any(name == _STOPS for name, *_ in about["effects_on"])
     conditions = Conditions(KMH * results.fact("speed"), about["system"], stops)
     observations = observe(quantities_of(books), results, statistics)
     names = [p.name for p in statistics.pantographs]
-    return judge(books, observations, conditions, about.get("limits") or {}, names)
+    found = judge(books, observations, conditions, about.get("limits") or {}, names)
+    if not about.get("excitation"):
+        return found
+    nan = math.nan
+    return [
+        one if one.absent else replace(one, value=nan, limit=nan, passed=None, because=_NO_TRAIN)
+        for one in found
+    ]
 
 
 def judged_by(results: Results, criteria: list[Criterion]) -> str:

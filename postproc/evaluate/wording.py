@@ -16,6 +16,12 @@ def fixed(value: float, digits: int) -> str:
     return text.removeprefix("-") if not text.strip("-0.") else text
 
 
+def of_digits(value: float, digits: int) -> str:
+    """``value`` to so many digits, large ones without powers of ten: ``12600``, ``0.0087``."""
+    text = f"{value:.{digits}g}"
+    return f"{float(text):.0f}" if "e+" in text else text
+
+
 def stiffness_words(value: float) -> str:
     """A stiffness [N/m] with its unit, without powers of ten: ``433 N/m``, ``82.3 kN/m``."""
     return f"{value:g} N/m" if value < 1e4 else f"{1e-3 * value:.9g} kN/m"

@@ -168,11 +168,21 @@ class Snapshots:
         return self._blocks[name]
 
     def shown(self, number: int) -> tuple[float, float]:
-        """From and to of the wires that move in snapshot ``number``, as far as each reaches [m]."""
+        """From and to of the wires that are known in snapshot ``number``, as far as each reaches
+        [m]."""
+        return self._ends(number, at_rest=True)
+
+    def moving(self, number: int) -> tuple[float, float]:
+        """The same without what is known to rest beyond a window."""
+        return self._ends(number, at_rest=False)
+
+    def _ends(self, number: int, at_rest: bool) -> tuple[float, float]:
         ends = []
         for wire in self._wires.values():
-            first, count = (0, len(wire.block.points)) if wire.rests else wire.shown(number)
-            ends.append(wire.block.points[[first, first + count - 1], 0])
+            whole = wire.rests and at_rest
+            first, count = (0, len(wire.block.points)) if whole else wire.shown(number)
+            if count:
+                ends.append(wire.block.points[[first, first + count - 1], 0])
         low, high = np.array(ends).reshape(-1, 2).T
         return float(low.min(initial=np.inf)), float(high.max(initial=-np.inf))
 

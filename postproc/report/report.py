@@ -33,6 +33,7 @@ from catenary.postproc.report.sections.section import (
     Picture,
     Section,
     SectionEntry,
+    has_train,
     number,
 )
 from catenary.postproc.report.summary import as_json, summarise
@@ -44,9 +45,9 @@ logger = logging.getLogger("catenary.report")
 # The sections of a report in their order.
 SECTIONS: list[SectionEntry] = [
     SectionEntry("verdict", acceptance_section.status),
-    SectionEntry("acceptance", acceptance_section.section),
+    SectionEntry("acceptance", acceptance_section.section, has_train),
     SectionEntry("checks", run_facts.checks),
-    SectionEntry("force", contact_force.section),
+    SectionEntry("force", contact_force.section, has_train),
     SectionEntry("spectrum", dynamics.section, dynamics.has_statistics, full=True),
     SectionEntry("motion", line.in_motion),
     SectionEntry("places", dynamics.places, dynamics.has_places, full=True),
@@ -248,9 +249,10 @@ def _page(
     results = run.results
     start, end = (number(place, 0) for place in results.evaluation)
     program, version = next(iter(results.attributes["versions"].items()))
+    speed = number(KMH * results.fact("speed"), 0)
+    moves = run.excitation or f"{speed} km/h, {counted(results.n_pantographs, 'pantograph')}"
     lead = (
-        f"Case {results.attributes['case']}: {number(KMH * results.fact('speed'), 0)} km/h, "
-        f"{counted(results.n_pantographs, 'pantograph')}, evaluated from {start} to {end} m. "
+        f"Case {results.attributes['case']}: {moves}, evaluated from {start} to {end} m. "
         f"Simulated on {str(results.attributes['created'])[:10]} by {program} {version}."
     )
     title = results.attributes["title"]

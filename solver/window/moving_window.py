@@ -210,6 +210,20 @@ class MovingWindow:
         if not self._is_covered(begin - _AROUND, end + _AROUND):
             self._cover(begin, end)
 
+    def first_of_spans(self, contacts: np.ndarray) -> int:
+        """First station of a window of spans around ``contacts`` (n,) [m], which moves and has not
+        been left behind; 0 where the motion decides."""
+        arrays = self.arrays
+        if arrays.by_motion > 0.0:
+            return 0
+        masts, numbers = arrays.masts, np.arange(arrays.masts.size)
+        last = float(contacts.min())
+        span = float(np.interp(last, masts, numbers)) - arrays.spans_behind
+        if span <= 0.0:
+            return 0
+        behind = min(float(np.interp(span, numbers, masts)), float(arrays.loaded[0]))
+        return int(np.searchsorted(arrays.high, behind))
+
     def provide_rows(self, begin: int, end: int) -> None:
         """Have products with the rows of stations from ``begin`` to before ``end``."""
         if not self.has_rows(begin, end):

@@ -20,6 +20,7 @@ from catenary.cases.run.excited_run import ExcitedRun
 from catenary.cases.run.runner import run_case
 from catenary.cases.studies.waves.excited import Settings, Watch, excitation_of, without_train
 from catenary.cases.studies.waves.seen import WavesSeen, WireMotion, course_of, waves_seen
+from catenary.postproc.evaluate.statistics import evaluate
 from catenary.postproc.files.run_schema import RunAttributes
 from catenary.postproc.film import animate
 from catenary.postproc.film.chart import RingingChart
@@ -29,6 +30,7 @@ from catenary.postproc.film.scenery import Scenery
 from catenary.postproc.film.snapshots import Snapshots
 from catenary.postproc.paraview import open_in_paraview
 from catenary.postproc.read.results import Results
+from catenary.postproc.report.pictures import line_pictures
 from catenary.postproc.report.report import write_report
 from catenary.solver.statics.line_at_rest import LineAtRest
 from catenary.solver.waves.excitation import Blow, MovingForce, as_facts, excitation_of_facts
@@ -127,9 +129,18 @@ def test_a_film_shows_how_the_wire_rings_where_it_was_struck(
 def test_report_and_film_of_a_blow_have_no_train(struck: tuple[Path, WavesSeen]) -> None:
     folder, _ = struck
     report = write_report(folder, folder)
-    assert "excited by a hammer" in (folder / "report.html").read_text()
+    page, _, _ = (folder / "report.html").read_text().partition("Full configuration")
+    assert "Nothing is judged" in page and "a hammer of 5 N s at 160 m" in page
+    # Neither of a train that stands still, nor of a contact without stiffness.
+    for word in ("km/h", "Contact force", "Acceptance", "resonance"):
+        assert word not in page, word
     assert report.verdict is None
+    assert {one.passed for one in report.criteria} == {None}
     with Results(folder) as results:
+        passing, _ = line_pictures.arm_uplift(results, evaluate(results), np.nan).axes
+        assert passing.get_xlabel() == "time [s]"
+        drawn = max(np.nanmax(line.get_ydata()) for line in passing.get_lines())
+        check("uplift [mm]", drawn, 1e3 * evaluate(results).supports.maximum, within=1e-9)
         data = film_data(results)
         with Snapshots(folder, len(data.points)) as snapshots:
             made = animate.Pictures(

@@ -116,6 +116,17 @@ def test_a_period_is_found_in_a_decaying_curve(period: float) -> None:
     assert f"A period of {period:.0f} m explains" in as_text(study, found)
 
 
+def test_a_period_that_chance_explains_is_none() -> None:
+    """A fit of six numbers to 13 without a period, of which some 60 % are explained."""
+    d, rng = np.linspace(50.0, 110.0, 13), np.random.default_rng(3)
+    found = [period_of(d, 40.0 + 8.0 * rng.normal(size=d.size), theory(), SPAN) for _ in range(20)]
+    # One of 20 is expected by chance, with a standard deviation of one.
+    assert sum(np.isfinite(one.fitted) for one in found) <= 4
+    none = next(one for one in found if np.isnan(one.fitted))
+    study = SeparationStudy("case", "kind", 250.0, [pair(None, 1.0, None), pair(30, 1.0, 2.0)])
+    assert "No period from 10 to 30 m, which these distances can show" in as_text(study, none)
+
+
 @pytest.mark.study
 def test_the_command_agrees_with_runs_by_hand(tmp_path: Path) -> None:
     """300 m is refused there: the leading one would start in the evaluated stretch."""

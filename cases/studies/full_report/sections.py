@@ -126,8 +126,12 @@ def _waves(scene: SceneOfRun, run: EvaluatedRun) -> Section:
     except InputError as error:
         return Section(heading, [Text(f"There is no picture: {error}.")])
     supports = results.line("support_x")
-    text = "Velocity of the lowest contact wire in space and time, and the pantographs' courses."
-    picture = Picture("space_time", text, lambda: pictures.space_time(seen, theory, supports))
+    text = "Velocity of the lowest contact wire in space and time"
+    moving = "force" if run.excitation else "pantographs"
+    if seen.position.shape[1]:
+        text += f", and the course of the {moving}"
+    drawn = partial(pictures.space_time, seen, theory, supports, moving)
+    picture = Picture("space_time", f"{text}.", drawn)
     return Section(heading, [], [picture])
 
 

@@ -439,9 +439,10 @@ def draw(study: SpeedStudy) -> Figure | None:
         for places in _limits(study, criterion):
             axes.plot(*zip(*places, strict=True), "--", color=figures.LIMIT, linewidth=1.0)
         figures.tidy(axes, "", STATISTICS[statistic].meaning.replace(", ", ",\n"))
+    panels[0].fill_between([], [], color=figures.SHADE, label="all criteria hold")
     if any(_limits(study, criterion) for _, criterion in _PANELS):
         panels[0].plot([], [], "--", color=figures.LIMIT, linewidth=1.0, label="limit")
-    figures.legend_above(panels[0], columns=min(len(names) * len(looks) + 1, 4))
+    figures.legend_above(panels[0], columns=min(len(names) * len(looks) + 2, 4))
     panels[-1].set_xlabel("train speed [km/h]")
     return figure
 

@@ -56,6 +56,8 @@ _OF_BOTH = (
 )
 _MOST_ROWS, _MOST_REMARKS = 40, 4  # on a terminal; files have all
 _LEAST_FOR_PERIOD = 12  # distances from which a period can be read
+# Curves with the deviations in another order, of which so many may be explained as well.
+_SHUFFLED, _AS_WELL = 99, 4
 
 
 class Distances(NamedTuple):
@@ -181,7 +183,8 @@ def _row(separation: float | None, one: Ended) -> Row:
 
 
 class Period(NamedTuple):
-    """Periods that explain good and bad distances, all [m]; NaN where there is no answer.
+    """Periods that explain good and bad distances, all [m]; NaN where there is no answer, or one
+    that is no better than chance.
 
     Attributes
     ----------
@@ -189,12 +192,14 @@ class Period(NamedTuple):
     explains : share of its variance that the fit explains [-]
     ringing : (2,) v / f at the ends of the lowest pass band
     travel : L (c + v) / c
+    tried : shortest and longest period that the distances can show
     """
 
     fitted: float
     explains: float
     ringing: np.ndarray
     travel: float
+    tried: tuple[float, float] = (np.nan, np.nan)
 
 
 def period_in(study: SeparationStudy, scene: Scene) -> Period:
@@ -234,15 +239,24 @@ def period_of(d: np.ndarray, sigma: np.ndarray, theory: WaveTheory, span: float)
         return Period(np.nan, np.nan, ringing, travel)
     # Shorter ones than two distances cannot be seen, longer ones not be told from a trend.
     shortest, longest = 2.0 * float(np.median(np.diff(d))), 0.5 * float(np.ptp(d))
-    best = (np.inf, np.nan)
+    # A fit so free explains much of any few numbers: it has to explain more than of most curves
+    # with the same deviations in another order.
+    rng, off = np.random.default_rng(1), sigma - sigma.mean()
+    curves = np.stack([off, *(rng.permutation(off) for _ in range(_SHUFFLED))], axis=1)
+    most, fitted = np.zeros(_SHUFFLED + 1), np.nan
     for period in np.linspace(shortest, longest, 400).tolist():
         for reach in np.ptp(d) * np.array([0.25, 0.5, 1.0, 2.0, 10.0]):
             fade, phase = np.exp(-d / reach), 2 * np.pi * d / period
             basis = np.stack([np.ones_like(d), fade, fade * np.cos(phase), fade * np.sin(phase)], 1)
-            weights, *_ = np.linalg.lstsq(basis, sigma, rcond=None)
-            best = min(best, (float(((sigma - basis @ weights) ** 2).sum()), period))
-    whole = float(((sigma - sigma.mean()) ** 2).sum())
-    return Period(best[1], 1.0 - best[0] / max(whole, 1e-300), ringing, travel)
+            directions, sizes, _ = np.linalg.svd(basis, full_matrices=False)
+            found = ((directions[:, sizes > 1e-9 * sizes[0]].T @ curves) ** 2).sum(axis=0)
+            if found[0] > most[0]:
+                fitted = period
+            most = np.maximum(most, found)
+    tried = shortest, longest
+    if np.count_nonzero(most[1:] >= most[0]) > _AS_WELL:
+        return Period(np.nan, np.nan, ringing, travel, tried)
+    return Period(fitted, float(most[0] / (off @ off)), ringing, travel, tried)
 
 
 def as_text(study: SeparationStudy, period: Period) -> str:
@@ -294,6 +308,11 @@ def _explained(period: Period) -> str:
     """Sentence on the period of the deviation, and on the periods that theory offers."""
     low, high = period.ringing
     found = f"No period is found in fewer than {_LEAST_FOR_PERIOD} distances"
+    if np.isfinite(period.tried).all():
+        found = (
+            "No period from {:.0f} to {:.0f} m, which these distances can show, explains more of "
+            "the trailing one's deviation than chance"
+        ).format(*period.tried)
     if np.isfinite(period.fitted):
         share = 100 * period.explains
         found = (
@@ -353,9 +372,11 @@ def draw(study: SeparationStudy, period: Period) -> Figure | None:
         for number, name in enumerate(names):
             y = np.array([row[name] for row in done], dtype=float)
             of = PLACES[number] if len(names) > 1 else "both"
-            figures.curve(axes, x, y, number if len(names) > 1 else 2, of, ".-")
+            # The second one is dashed, for print in black.
+            look = ".--" if number else ".-"
+            figures.curve(axes, x, y, number if len(names) > 1 else 2, of, look)
         if (alone := study.rows[0][names[0]]) is not None:
-            axes.axhline(alone, color=figures.GREY, linestyle="--", label="one alone")
+            axes.axhline(alone, color=figures.GREY, linestyle=":", label="one alone")
         if np.isfinite(period.ringing).all():
             for n in range(1, int(x[-1] / period.ringing[0]) + 1):
                 low, high = np.clip(n * period.ringing, x[0], x[-1])

@@ -293,7 +293,7 @@ def draw_forces(a: Results, b: Results) -> Figure | None:
         )
         for p, name in enumerate(names)
     ]
-    return overlays.forces(panels, a.evaluation)
+    return overlays.forces(panels, a.evaluation, f"{filters.CUT_OFF:g} Hz")
 
 
 def _force(run: Results, pantograph: int) -> np.ndarray:

@@ -97,8 +97,10 @@ def measured_rows(
     way_back = float(seen.struck + seen.x[columns[0]] - 2.0 * seen.x[0])
     rows = []
     if spectrum is not None:
-        meaning = "share of what has come so far that lies in the pass bands of the periodic line"
-        note = f"{meaning}, {distance:.0f} m on"
+        note = (
+            f"share of the energy that has come {distance:.0f} m further which lies in the pass "
+            "bands of the periodic line"
+        )
         rows.append(row_of("energy_in_pass_bands", spectrum.inside, "-", note))
     for number, highest in enumerate(_UP_TO, start=1):
         frequency, velocity = branch_of_fastest(waves, highest)
@@ -111,11 +113,11 @@ def measured_rows(
         if way_back < velocity.max() * record:
             continue
         found = arrived(seen.time, first, second, distance, float(at), width)
-        what = f"of energy around {at:.1f} Hz over {distance:.0f} m"
+        what = f"around {at:.1f} Hz over {distance:.0f} m"
         name, theirs = f"group_velocity_{number}", found.expected(frequency, velocity)
         rows += [
-            row_of(name, found.velocity, "m/s", f"measured, {what}"),
-            row_of(f"{name}_theory", theirs, "m/s", f"of the periodic line, {what}"),
+            row_of(name, found.velocity, "m/s", f"group velocity measured {what}"),
+            row_of(f"{name}_theory", theirs, "m/s", f"group velocity of the periodic line {what}"),
         ]
     return rows
 

@@ -351,22 +351,30 @@ def as_rows(results: list[Result]) -> list[dict[str, Any]]:
     return rows
 
 
+_MARKS = "o^svxD"
+
+
 @figures.own_style()
 def picture(results: list[Result]) -> Figure:
-    """Sizes of the shares over frequency: theory as lines, what is measured as dots."""
+    """Sizes of the shares over frequency: theory as lines, what is measured as marks."""
     figure = figures.new_figure(2.0 + 2.4 * ((len(results) + 1) // 2))
     panels = figure.subplots((len(results) + 1) // 2, 2, squeeze=False).ravel()
     for result, axes in zip(results, panels, strict=False):
         for number, (label, shares) in enumerate(_curves(result)):
-            colour = figures.COLOURS[number % len(figures.COLOURS)]
+            # Marks tell curves apart in black and white, too.
+            how: Any = {"color": figures.COLOURS[number % len(figures.COLOURS)], "linewidth": 1.0}
+            how |= {"marker": _MARKS[number % len(_MARKS)], "markersize": 4.0, "markevery": 2}
             seen, expected = np.abs(shares)
-            axes.plot(result.frequency, expected, color=colour, linewidth=1.0, label=label)
-            axes.plot(result.frequency, seen, ".", color=colour, markersize=4.0)
+            axes.plot(result.frequency, expected, **(how | {"marker": ""}))
+            axes.plot(result.frequency, seen, **(how | {"linestyle": ""}))
+            axes.plot([], [], label=label, **how)
         figures.tidy(
-            axes, "frequency [Hz]; dots measured, lines theory", "share of the amplitude",
+            axes, "frequency [Hz]; marks measured, lines theory", "share of the amplitude",
             result.name.replace("_", " "),
         )  # fmt: skip
-        axes.set_ylim(0.0, 1.05 * max(1e-3, axes.get_ylim()[1]))
+        # What nearly nothing passes stands clear of the axis.
+        highest = 1.05 * max(1e-3, axes.get_ylim()[1])
+        axes.set_ylim(-0.03 * highest, highest)
         axes.legend(frameon=False, fontsize="x-small", ncols=2)
     for axes in panels[len(results) :]:
         axes.set_visible(False)

@@ -17,6 +17,7 @@ _COVERED, _DECADES = 0.995, 4.0
 _DASHES = ("--", "-.", ":", (0, (6, 1, 1, 1, 1, 1)))
 # Distance from the moving load up to which the mean energy is drawn [m].
 _AROUND = 400.0
+_MOST_SUPPORTS = 100
 # Wavenumbers that are drawn [rad/m]; most places and times in a picture.
 _WIDEST, _MOST = 1.2, 1600
 
@@ -49,7 +50,8 @@ def space_time(
                 linestyle=_DASHES[number], color="black", linewidth=1.0,
                 label=label if end == seen.x[-1] else None,
             )  # fmt: skip
-    for x in supports.tolist():
+    # So many that a picture of a long line would be grey are left out.
+    for x in supports.tolist() if supports.size <= _MOST_SUPPORTS else ():
         axes.axvline(x, color=figures.LIGHT, linewidth=0.6, zorder=1)
     axes.set_xlim(seen.x[0], seen.x[-1])
     axes.set_ylim(seen.time[0], seen.time[-1])
@@ -75,17 +77,17 @@ def train_frame(
     axes = figure.add_subplot()
     relative, velocity = seen.in_the_train(behind, ahead)
     _velocity(figure, axes, relative, seen.time, velocity)
-    ahead_of = np.array([0.0, ahead])
     when = seen.time[0] + 0.3 * np.ptp(seen.time)
-    axes.plot(
-        ahead_of, when + ahead_of / (theory.wave_speed - theory.speed), "--", color=figures.GREY,
-        linewidth=1.0, label="wave speed of the contact wire, ahead and behind",
-    )  # fmt: skip
-    behind_it = np.array([0.0, behind])
-    axes.plot(
-        -behind_it, when + behind_it / (theory.wave_speed + theory.speed), "--",
-        color=figures.GREY, linewidth=1.0,
-    )  # fmt: skip
+    label = "waves of the contact wire that run ahead, and back"
+    # What runs ahead more slowly than the train falls behind it, too.
+    for speed in (theory.wave_speed - theory.speed, -theory.wave_speed - theory.speed):
+        end = ahead if speed > 0.0 else -behind
+        later = end / speed if speed else np.inf
+        axes.plot(
+            [0.0, end], [when, when + later], "--", color=figures.GREY, linewidth=1.0,
+            label=label,
+        )  # fmt: skip
+        label = ""
     axes.set_xlim(-behind, ahead)
     axes.set_ylim(seen.time[0], seen.time[-1])
     figures.tidy(axes, f"distance from the {what} [m]", "time [s]")

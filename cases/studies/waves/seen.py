@@ -4,7 +4,7 @@ the line ahead of its train, under it and behind it. Both are found from snapsho
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -165,6 +165,8 @@ def course_of(excitation: Excitation) -> tuple[Callable[[np.ndarray], np.ndarray
 
 # Length of the stretches of line that energy is summed over [m].
 STRETCH = 2.0
+# Length beside an end of a window in which a spline still swings after the step there [m].
+_FROM_END = 4.0
 
 
 @dataclass(frozen=True)
@@ -202,6 +204,23 @@ class EnergySeen:
         return (
             behind * STRETCH, (before - behind) * STRETCH, (up_to[:, -1] - before) * STRETCH,
         )  # fmt: skip
+
+    def within(self, moving: np.ndarray) -> EnergySeen:
+        """The energy without that at the ends of a window, beyond which a line rests.
+
+        It is held there where it was when the window went on, and snapshots show it at rest: the
+        step between has no energy of waves.
+
+        Parameters
+        ----------
+        moving : ndarray, shape (t, 2)
+            From and to of what moves at each time [m].
+        """
+        left, right = self.x - 0.5 * STRETCH, self.x + 0.5 * STRETCH
+        begin, end = moving[:, :1], moving[:, 1:]
+        behind = (left < begin + _FROM_END) & (begin > left[0])
+        ahead = (right > end - _FROM_END) & (end < right[-1] - STRETCH)
+        return replace(self, density=np.where(behind | ahead, 0.0, self.density))
 
     def around(self, place: np.ndarray, reach: float) -> tuple[np.ndarray, np.ndarray]:
         """Distances from a place that moves (t,) [m], up to ``reach``, and the mean over time of

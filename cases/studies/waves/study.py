@@ -85,12 +85,17 @@ def study_waves(folder: Path) -> tuple[str, list[Path]]:
                 numbers[nodes] = data.wires[name]
             energy = EnergyMotion(rest, numbers)
             seen = waves_seen(data, snapshots, [energy])
+            ends = np.array([snapshots.moving(n) for n in range(snapshots.times.size)])
+            moving = np.column_stack(
+                [np.maximum(ends[1:, 0], ends[:-1, 0]), np.minimum(ends[1:, 1], ends[:-1, 1])]
+            )
         remarks = all_remarks(results, indicate(results))
     theory = wave_theory(problem, rest)
     what = "train"
     if data.excitation is not None:
         what = "force" if isinstance(data.excitation, MovingForce) else "blow"
-    return _write(folder, theory, rest, seen, energy.seen(), data.supports, what, remarks)
+    waves = energy.seen().within(moving)
+    return _write(folder, theory, rest, seen, waves, data.supports, what, remarks)
 
 
 def study_excited(
@@ -218,19 +223,36 @@ def energy_rows(energy: EnergySeen, seen: WavesSeen) -> list[Row]:
 
 def as_rows(theory: WaveTheory) -> list[Row]:
     """Figures with unit and meaning; those that the line does not have are left out."""
-    slowest = "slowest wave" if theory.by_bending else "sqrt(T/m)"
+    of_string = "" if theory.by_bending else ", sqrt(T / m)"
+    doppler = "Doppler factor of an echo from ahead, (c - v) / (c + v)"
+    sent_back = (
+        "share of a wave on the contact wire that a stiff dropper sends back, Z_m / (Z_c + Z_m)"
+    )
+    grows = (
+        "growth of a wave between head and dropper with each return, that share / Doppler factor"
+    )
     rows = [
         ("train_speed", theory.speed, "m/s", "speed of the train"),
-        ("wave_speed", theory.wave_speed, "m/s", f"{slowest} of the contact wire"),
-        ("doppler_factor", theory.doppler, "-", "(c - v) / (c + v)"),
-        ("dropper_reflection", theory.reflection, "-", "Z_m / (Z_c + Z_m), stiff dropper"),
-        ("amplification", theory.amplification, "-", "reflection / Doppler factor"),
+        ("wave_speed", theory.wave_speed, "m/s", f"slowest wave of the contact wire{of_string}"),
+        ("doppler_factor", theory.doppler, "-", doppler),
+        ("dropper_reflection", theory.reflection, "-", sent_back),
+        ("amplification", theory.amplification, "-", grows),
     ]
     if theory.bloch is not None:
         speed, at = theory.bloch.fastest(20.0)
         rows += [
-            ("fastest_group_velocity", speed, "m/s", "of the periodic line up to 20 Hz"),
-            ("frequency_of_the_fastest", at, "Hz", "of that wave"),
+            (
+                "fastest_group_velocity",
+                speed,
+                "m/s",
+                "greatest group velocity of the periodic line up to 20 Hz",
+            ),
+            (
+                "frequency_of_the_fastest",
+                at,
+                "Hz",
+                "frequency of the wave with the greatest group velocity",
+            ),
         ]
     return [row_of(*row) for row in rows if np.isfinite(row[1])]
 
@@ -249,7 +271,11 @@ def as_text(theory: WaveTheory, measured: list[Row], remarks: Sequence[str]) -> 
     """Figures of theory and ``measured`` ones for a terminal, and ``remarks`` on the run that shows
     the waves."""
     rows = [*as_rows(theory), *measured]
-    lines = [f"{row['meaning']}: {row['value']:.4g} {row['unit']}" for row in rows]
+    units = {"-": ""}
+    lines = [
+        f"{row['meaning']}: {row['value']:.4g} {units.get(row['unit'], row['unit'])}".rstrip()
+        for row in rows
+    ]
     for what, bands in (("Pass bands", theory.bands()), ("Outrun the train", theory.outrunning())):
         text = ", ".join(f"{low:.2f}-{high:.2f}" for low, high in bands)
         if text:

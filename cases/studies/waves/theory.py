@@ -38,7 +38,8 @@ class WaveTheory:
     speed : of the train [m/s]
     wave_speed : slowest wave of the contact wire, sqrt(T / m) of a string [m/s]
     wires : name and slowest wave of all wires, sqrt(T / m) of strings [m/s]
-    doppler : (c - v) / (c + v) [-]: an echo from ahead comes back with its frequency over this
+    doppler : (c - v) / (c + v) [-]: an echo from ahead comes back with its frequency over this; NaN
+        for a train that no wave of the wire outruns
     reflection : share of a wave on the contact wire that a stiff dropper sends back,
         Z_m / (Z_c + Z_m) with impedances sqrt(T m); NaN for lines of more than two wires [-]
     amplification : reflection / doppler, by which an echo grows with each return [-]
@@ -108,7 +109,7 @@ def wave_theory(problem: Problem, rest: LineAtRest) -> WaveTheory:
     if len(carriers) == 1:
         z_m, z_c = (np.sqrt(wire.tension * wire.mass_per_length) for wire in (carriers[0], contact))
         reflection = float(z_m / (z_m + z_c))
-    doppler = (c - v) / (c + v)
+    doppler = (c - v) / (c + v) if c > v else np.nan
     waves, why_not = None, ""
     try:
         waves = bloch_waves(period_of(rest.model, *middle_span(problem.line)), HIGHEST)
@@ -157,7 +158,7 @@ def reflections_of(rest: LineAtRest) -> list[EndReflection]:
 
 
 def reflection_rows(found: list[EndReflection], speed: float) -> list[dict[str, Any]]:
-    """Figures of waves that outrun a train [m/s]."""
+    """Figures of waves that outrun a train [m/s], none where no wave does."""
     rows = []
     for side, end in zip(SIDES, found, strict=False):
         of_what = f"the {side} of the line sends back of waves that outrun the train"
@@ -170,6 +171,7 @@ def reflection_rows(found: list[EndReflection], speed: float) -> list[dict[str, 
                 ("largest_energy", energy[0], "largest share of the energy"),
                 ("mean_energy", energy[1], "mean share of the energy"),
             )
+            if np.isfinite(value)
         ]
     return rows
 

@@ -122,7 +122,7 @@ def table_of(curves: Sequence[Curve]) -> StudyTable:
         Column("spans_behind", "behind", "g"),
         Column("history_percent_of_std", "history [% of sigma]", ".2g"),
         Column("std_percent", "sigma [%]", "+.2g"),
-        Column("estimated_percent", "history, estimated", ".2g"),
+        Column("estimated_percent", "history, estimated [% of sigma]", ".2g"),
         Column("default"),
         Column("chosen", " ", in_files=False),
         Column("remarks"),

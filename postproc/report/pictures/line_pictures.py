@@ -29,6 +29,7 @@ from catenary.postproc.report.pictures.figures import (
     uprights,
 )
 from catenary.postproc.report.pictures.marks import mark_line, mark_static, still_marks, with_margin
+from catenary.solver.waves.excitation import Blow, excitation_of_facts
 
 if TYPE_CHECKING:
     from catenary.solver.statics.tension_along import LineAtTemperature
@@ -42,7 +43,8 @@ _MOST_ARMS = 60
 
 @own_style()
 def arm_uplift(results: Results, statistics: RunStatistics, limit: float) -> Figure:
-    """Uplift at the evaluated arms as the train passes, and the largest uplift of every arm.
+    """Uplift at the evaluated arms as the train passes, or over time after a blow, and the largest
+    uplift of every arm.
 
     Parameters
     ----------
@@ -77,21 +79,33 @@ def arm_uplift(results: Results, statistics: RunStatistics, limit: float) -> Fig
 
 
 def _passing_train(axes: Axes, results: Results, statistics: RunStatistics) -> None:
-    """Uplift of evaluated arms over the position of the leading pantograph relative to each."""
+    """Uplift of evaluated arms over the position of the leading pantograph, or of a force in its
+    place, relative to each; of a line that a blow excites over time."""
+    facts = results.attributes.get("excitation")
+    excited = excitation_of_facts(facts) if facts else None
     supports = statistics.supports
     evaluated = np.flatnonzero(supports.evaluated & np.isfinite(supports.uplift))
     first = results.first_position
     leader = int(np.argmax(first))
     behind = first[leader] - first
-    before, after = -60.0, float(behind.max()) + 140.0
-    position = results.column("contact_position", leader)[:: results.line_record.every]
+    names = [excited.kind] if excited else results.pantograph_names()
+    if isinstance(excited, Blow):
+        names, over = [], "time [s]"
+        abscissa, zero = results.line_time, np.zeros_like(supports.x)
+        before, after = 0.0, float(abscissa[-1])
+    else:
+        who = "leading pantograph" if len(names) > 1 else names[0]
+        over = f"position of the {who} relative to the arm [m]"
+        abscissa = results.column("contact_position", leader)[:: results.line_record.every]
+        zero = supports.x
+        before, after = -60.0, float(behind.max()) + 140.0
 
     def curve(arm: int) -> tuple[np.ndarray, np.ndarray]:
-        from_to = np.searchsorted(position, supports.x[arm] + np.array([before, after]))
+        from_to = np.searchsorted(abscissa, zero[arm] + np.array([before, after]))
         rows = slice(*np.clip(from_to, 0, results.n_rows("arm_uplift")).tolist())
         uplift = results.column("arm_uplift", arm, rows)
         chosen = thinned(uplift)
-        return position[rows][chosen] - supports.x[arm], 1e3 * uplift[chosen]
+        return abscissa[rows][chosen] - zero[arm], 1e3 * uplift[chosen]
 
     worst = int(evaluated[np.argmax(supports.uplift[evaluated])]) if evaluated.size else None
     others = evaluated[evaluated != worst]
@@ -109,13 +123,12 @@ def _passing_train(axes: Axes, results: Results, statistics: RunStatistics) -> N
             linewidth=1.6,
             label=f"largest uplift, arm at {supports.x[worst]:.1f} m",
         )
-    for p, name in enumerate(results.pantograph_names()):
+    for p, name in enumerate(names):
         axes.axvline(
             behind[p], color=colour(p), linestyle="--", linewidth=1.1, label=f"{name} passes"
         )
     axes.set_xlim(before, after)
-    who = "leading pantograph" if results.n_pantographs > 1 else "pantograph"
-    tidy(axes, f"position of the {who} relative to the arm [m]", "uplift [mm]", "Evaluated arms")
+    tidy(axes, over, "uplift [mm]", "Evaluated arms")
     legend_above(axes)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from catenary.postproc.report.pictures import figures
@@ -13,11 +14,15 @@ from catenary.postproc.report.pictures.envelope import thinned
 _PLACE = "position along the track [m]"
 # Label, places along the track (n,) [m], and values (n,) there.
 Curve = tuple[str, np.ndarray, np.ndarray]
+# Curves and marks of a panel, told apart in black and white too.
+_LINES, _MARKS = ("-", "--", ":", "-."), ("o", "x", "^", "s")
 
 
 @figures.own_style()
 def forces(
-    panels: Sequence[tuple[str, Sequence[Curve]]], evaluated: tuple[float, float] | None = None
+    panels: Sequence[tuple[str, Sequence[Curve]]],
+    evaluated: tuple[float, float] | None = None,
+    below: str = "",
 ) -> Figure | None:
     """Contact forces along the track, a panel for each pantograph; None without pantographs.
 
@@ -26,7 +31,9 @@ def forces(
     panels : sequence of tuple
         Name of each pantograph, and its curves of forces [N].
     evaluated : tuple of float, optional
-        From and to of the stretch that is shaded [m].
+        From and to of the evaluation stretch, which is shaded [m].
+    below : str, optional
+        Cut-off of forces that are filtered, with its unit.
     """
     if not panels:
         return None
@@ -35,10 +42,11 @@ def forces(
     for own, (name, curves) in zip(axes, panels, strict=True):
         for number, (label, place, force) in enumerate(curves):
             chosen = thinned(force)
-            figures.curve(own, place[chosen], force[chosen], number, label)
-        if evaluated is not None:
-            own.axvspan(*evaluated, color=figures.SHADE, zorder=0)
-        figures.tidy(own, "", "contact force [N]", name.capitalize())
+            look = _LINES[number % len(_LINES)]
+            figures.curve(own, place[chosen], force[chosen], number, label, look)
+        _shade(own, evaluated)
+        force_of = f"contact force, {below} [N]" if below else "contact force [N]"
+        figures.tidy(own, "", force_of, name.capitalize())
         figures.legend_above(own)
     axes[-1].set_xlabel(_PLACE)
     return figure
@@ -53,15 +61,20 @@ def uplifts(curves: Sequence[Curve], evaluated: tuple[float, float] | None = Non
     curves : sequence of Curve
         Curves of uplifts, positive upward [m].
     evaluated : tuple of float, optional
-        From and to of the stretch that is shaded [m].
+        From and to of the evaluation stretch, which is shaded [m].
     """
     if not curves:
         return None
     figure, (axes,) = figures.stacked(3.2, 1)
     for number, (label, place, uplift) in enumerate(curves):
-        figures.curve(axes, place, 1e3 * uplift, number, label, "o")
-    if evaluated is not None:
-        axes.axvspan(*evaluated, color=figures.SHADE, zorder=0)
+        look = _MARKS[number % len(_MARKS)]
+        figures.curve(axes, place, 1e3 * uplift, number, label, look)
+    _shade(axes, evaluated)
     figures.tidy(axes, _PLACE, "largest uplift [mm]")
     figures.legend_above(axes)
     return figure
+
+
+def _shade(axes: Axes, evaluated: tuple[float, float] | None) -> None:
+    if evaluated is not None:
+        axes.axvspan(*evaluated, color=figures.SHADE, zorder=0, label="evaluation stretch")

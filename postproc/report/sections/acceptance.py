@@ -42,6 +42,9 @@ def _status(run: EvaluatedRun) -> Iterator[Text]:
             "open",
             "This run is not complete.",
         )
+    if run.excitation:
+        yield Text("Something other than a train excites the line.", "open", "Nothing is judged.")
+        return
     by = judged_by(results, list(run.criteria))
     if run.verdict is None:
         yield Text(

@@ -138,7 +138,8 @@ def _tables(run: EvaluatedRun) -> Iterator[StudyTable]:
     several = len(set(carried)) > 1
     # The least force of all that slacken is zero.
     slackened = bool(np.any(slack[droppers.evaluated] > 0.0))
-    least = {"longest slack": slack} if slackened else {"least force": -droppers.lowest}
+    longest = np.where(slack > 0.0, slack, np.nan)
+    least = {"longest slack": longest} if slackened else {"least force": -droppers.lowest}
     kinds = {"largest force": droppers.highest, **least}
     allowed = run.limit("dropper_force_max")
     chosen = _extremes(droppers.evaluated, kinds, droppers.highest > allowed)

@@ -12,9 +12,16 @@ import numpy as np
 from catenary.postproc.channels.line_record import record_words
 from catenary.postproc.evaluate.error_indicators import Indicators
 from catenary.postproc.evaluate.remarks import all_remarks
-from catenary.postproc.evaluate.wording import counted
+from catenary.postproc.evaluate.wording import counted, of_digits
 from catenary.postproc.read.results import Results
-from catenary.postproc.report.sections.section import EvaluatedRun, Folded, Section, Text, number
+from catenary.postproc.report.sections.section import (
+    EvaluatedRun,
+    Folded,
+    Section,
+    Text,
+    has_train,
+    number,
+)
 from catenary.postproc.report.study_table import StudyTable, texts_table
 from catenary.postproc.report.summary import real_time_factor
 
@@ -34,11 +41,11 @@ def _checks(run: EvaluatedRun) -> Iterator[Text | StudyTable]:
     if "contact_work_J" in watched:
         made, work = watched["energy_made_J"], watched["contact_work_J"]
         rows += [
-            ["work of the contact forces on the line", f"{work:.3g}", "J", ""],
-            ["energy of the line at the end", f"{watched['line_energy_J']:.3g}", "J",
-             f"largest {watched['most_line_energy_J']:.3g} J"],
-            ["energy made by the time integration", f"{made:.3g}", "J",
-             f"{100.0 * made / work:.2g} % of that work" if work > 0.0 else ""],
+            ["work of the contact forces on the line", of_digits(work, 3), "J", ""],
+            ["energy of the line at the end", of_digits(watched["line_energy_J"], 3), "J",
+             f"largest {of_digits(watched['most_line_energy_J'], 3)} J"],
+            ["energy made by the time integration", of_digits(made, 3), "J",
+             f"{of_digits(100.0 * made / work, 2)} % of that work" if work > 0.0 else ""],
         ]  # fmt: skip
     if "largest_rotation_rad" in watched:
         rotation = f"{watched['largest_rotation_rad']:.3g}"
@@ -123,24 +130,28 @@ def signatures(text: str | None, run: EvaluatedRun) -> Section:
 def section(run: EvaluatedRun) -> Section:
     """Facts on the run, and its whole configuration."""
     about = run.results.attributes
-    rows = [*_facts(run.results), *_of_mesh(run.indicators), *_of_program(run.results)]
+    mesh = _of_mesh(run.indicators, has_train(run))
+    rows = [*_facts(run.results), *mesh, *_of_program(run.results)]
     config = json.dumps(about["config"], indent=2, ensure_ascii=False)
     folded = Folded("Full configuration, defaults included", Text(config, "code"))
     return Section("The run", [texts_table(["", ""], rows)], folded=[folded])
 
 
-def _of_mesh(found: Indicators) -> list[tuple[str, str]]:
-    """The shortest waves of the mesh beside the shortest waves that matter."""
+def _of_mesh(found: Indicators, with_train: bool) -> list[tuple[str, str]]:
+    """The shortest waves of the mesh, beside the shortest that matter ahead of a train."""
     if np.isnan(found.resolved_frequency):
         return []
+    carried = f"up to {found.resolved_frequency:.0f} Hz"
     required = (
         f"{found.required_frequency:.0f} Hz" if np.isfinite(found.required_frequency) else "–"
     )
     return [
         (
             "waves on the contact wire that the mesh carries within 1 %",
-            f"up to {found.resolved_frequency:.0f} Hz; waves that 20 Hz at the pantograph excite "
-            f"ahead of the train are as short as those of {required}",
+            f"{carried}; waves that 20 Hz at the pantograph excite ahead of the train are as short "
+            f"as those of {required}"
+            if with_train
+            else carried,
         )
     ]
 
@@ -154,6 +165,8 @@ def _facts(results: Results) -> list[tuple[str, str]]:
     for name, words in zip(names, results.pantograph_words(), strict=True):
         if words:
             kinds.setdefault(f"{words['kind']}, {words['description']}", []).append(name)
+    if about.get("excitation"):
+        kinds = {about["excitation"]["says"]: ["excitation"]}
     met = [fact["says"].partition(": ")[2] for fact in arrivals.get("pantographs", [])]
     of = [f", {name}" if len(names) > 1 else "" for name in names]
     return [

@@ -35,6 +35,11 @@ class EvaluatedRun:
     measured: Mapping[str, float] = field(default_factory=dict)
     measured_by: str = ""
 
+    @property
+    def excitation(self) -> str:
+        """What excites the line in place of a train, in words; empty with a train."""
+        return str((self.results.attributes.get("excitation") or {}).get("says", ""))
+
     @cached_property
     def indicators(self) -> Indicators:
         """Estimates of its errors."""
@@ -117,6 +122,11 @@ class SectionEntry(NamedTuple):
     make: Callable[[EvaluatedRun], Section]
     applies: Callable[[EvaluatedRun], bool] = lambda run: True
     full: bool = False
+
+
+def has_train(run: EvaluatedRun) -> bool:
+    """Whether pantographs run along the line, and not an excitation without a train."""
+    return not run.excitation
 
 
 def number(value: Any, digits: int = 1) -> str:

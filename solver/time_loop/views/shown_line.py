@@ -102,7 +102,9 @@ _STATIONS, _LINKS = 128, 256
 class LineEnergy:
     """Kinetic and elastic energy of a rank's part of a line.
 
-    What rests adds what it has added before. Collective, as its methods.
+    What rests adds what it has added before. Only what a window of spans has left adds nothing: it
+    is held where it was when the window went on, with the elastic energy of a motion that on a line
+    without a window would have faded. Collective, as its methods.
 
     Parameters
     ----------
@@ -125,7 +127,7 @@ class LineEnergy:
         self._links_size = _LINKS if in_parts else max(1, n_links)
         # Begins of the parts, and the end of the last one.
         self._edges = np.append(np.arange(0, columns.n_stations, self._size), columns.n_stations)
-        self._starts = columns.starts[self._edges]
+        self._starts, self._station_starts = columns.starts[self._edges], columns.starts
         # Without a window the line is one station, of which a product has many rows.
         self._rows = self._edges
         if not in_parts and self._products is not None:
@@ -135,23 +137,28 @@ class LineEnergy:
         self._force = np.zeros(n)
         self._sums = np.zeros((2, self._edges.size - 1))
         self._switched = np.zeros(-(-n_links // self._links_size))
+        # What adds energy begins with this station, and with this link.
+        self._first = self._first_link = 0
 
     @property
     def pad(self) -> int:
         """Zeros that ``padded`` of a motion needs at either end."""
         return 0 if self._products is None else self._products[2]
 
-    def parts(self, motion: ShownMotion) -> np.ndarray:
+    def parts(self, motion: ShownMotion, contacts: np.ndarray) -> np.ndarray:
         """This rank's share of kinetic and elastic energy, the latter relative to rest without
-        loads, links switched as they are [J], shape (2,)."""
+        loads, links switched as they are [J], shape (2,); ``contacts`` (n,) are where those of the
+        train are [m]."""
         begin, end = motion.take_changes()
         displacement, velocity = motion.displacement, motion.velocity
+        self._leave(contacts)
+        begin = max(begin, self._first)
         if self._products is None:
             parts = self._line.energy_parts(displacement, velocity)
         else:
             if begin < end:
                 # Rows that join two stations change with either.
-                changed = max(0, begin - 1), min(int(self._edges[-1]), end + 1)
+                changed = max(self._first, begin - 1), min(int(self._edges[-1]), end + 1)
                 self._sum_stations(motion.padded, (displacement, velocity), *changed)
             parts = 0.5 * np.add.reduce(self._sums, axis=1)
         if begin < end:
@@ -160,6 +167,18 @@ class LineEnergy:
         if self._loaded.size:
             parts[1] -= self._load @ displacement[self._loaded]
         return parts
+
+    def _leave(self, contacts: np.ndarray) -> None:
+        """Take away what the window has left. The part with its first station has always changed,
+        as stations move there."""
+        window = self._line.window
+        # A load that stays moves a line away from rest for good, wherever the train is.
+        if window is None or self._loaded.size:
+            return
+        self._first = window.first_of_spans(contacts)
+        self._sums[:, : np.searchsorted(self._edges, self._first, side="right") - 1] = 0.0
+        self._first_link = int(self._of_links.first[self._first, 0])
+        self._switched[: self._first_link // self._links_size] = 0.0
 
     def _sum_stations(
         self,
@@ -172,6 +191,7 @@ class LineEnergy:
         if self._edges.size == 2:
             for row, product in enumerate(self._products[:2]):
                 product.multiply_rows(0, int(self._rows[1]), padded[1 - row], self._force)
+                self._force[: int(self._station_starts[self._first])] = 0.0
                 self._sums[row, 0] = self._force @ motion[1 - row]
             return
         assert self._line.window is not None
@@ -206,6 +226,7 @@ class LineEnergy:
             factor, values = padded[1 - row], motion[1 - row][own]
             product.multiply_rows(begin, end, factor, self._force)
             force = self._force[own]
+            force[: max(0, int(self._station_starts[self._first]) - own.start)] = 0.0
             if last == first + 1:
                 self._sums[row, first] = force @ values
             else:
@@ -216,5 +237,8 @@ class LineEnergy:
         first, last = int(self._of_links.first[begin, 0]), int(self._of_links.last[end, 0])
         size = self._links_size
         for part in range(first // size, -(-last // size) if first < last else 0):
-            own = size * part, min(size * (part + 1), self._links.numbers.size)
+            own = (
+                max(size * part, self._first_link),
+                min(size * (part + 1), self._links.numbers.size),
+            )
             self._switched[part] = self._links.energy_of_switching(displacement, *own)

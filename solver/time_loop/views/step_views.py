@@ -332,7 +332,8 @@ class Showing:
 
         Collective. After an incident it is that of what is left of the line; see `after_incidents`.
         """
-        parts = self._energy.parts(self._moved)
+        contacts = self._view.row[self.layout.columns["contact_position"]]
+        parts = self._energy.parts(self._moved, contacts)
         kinetic, elastic = total(self._comm, parts).tolist()
         return kinetic, elastic + self._changed.energy if self._unbalanced else elastic
 

@@ -200,6 +200,18 @@ def test_tables_of_supports_and_droppers(run_folder: Path) -> None:
         assert row[5]
 
 
+def test_what_was_never_slack_is_not_among_the_longest(
+    run_folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with Results(run_folder) as results:
+        x = results.line("dropper_x")
+        slack = np.where(np.isin(np.arange(x.size), np.flatnonzero(x > 300.0)[:2]), 0.02, 0.0)
+        monkeypatch.setattr(dynamics, "slack_times", lambda _: slack)
+        _, droppers = dynamics.places(evaluated(results)).blocks
+    told = [float(row[4]) for row in droppers.texts() if "longest slack" in row[5]]
+    assert told == [0.02, 0.02]
+
+
 def test_the_limit_of_the_uplift_is_in_its_picture(run_folder: Path) -> None:
     """One that is less than twenty times the uplift of 61.6 mm, which others would shrink to."""
     with Results(run_folder) as results:

@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from catenary.postproc.evaluate.wording import counted, duration, fixed
+from catenary.postproc.evaluate.wording import counted, duration, fixed, of_digits
 
 
 @pytest.mark.parametrize(
@@ -36,3 +36,8 @@ def test_one_is_singular() -> None:
 )
 def test_times_have_two_digits(seconds: float, said: str) -> None:
     assert duration(seconds) == said
+
+
+def test_large_numbers_have_no_powers_of_ten() -> None:
+    given = (12614.0, 1100.4, 342.4, 0.00874, 0.0)
+    assert [of_digits(value, 3) for value in given] == ["12600", "1100", "342", "0.00874", "0"]
