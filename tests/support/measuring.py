@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -183,6 +183,34 @@ def march(
         run.destroy()
     assert history.outcome.outcome == "done", history.outcome.outcome
     return history
+
+
+def order_of_march(
+    problem: Problem, mesh: LineMesh, n_steps: int, since: float = 0.0
+) -> tuple[float, float]:
+    """Observed order in the step of the contact force, and the one expected of a method of order 2.
+
+    Steps halve from 1 ms on, ``n_steps`` of them down to 1/8 ms; the force is
+    compared every 4 ms from the time ``since`` [s] on with that of steps of 1/32 ms.
+    """
+
+    def force(dt: float) -> np.ndarray:
+        own = replace(problem, numerics=replace(problem.numerics, dt=dt))
+        found = march(own, mesh)["contact_force"][:, 0]
+        return found[:: round(4e-3 / dt)][round(since / 4e-3) :]
+
+    steps = [1e-3 / 2**k for k in range(4 - n_steps, 4)]
+    reference = force(1e-3 / 32)
+    errors = [float(np.sqrt(((force(dt) - reference) ** 2).mean())) for dt in steps]
+    observed = print_table(
+        "rms error of the contact force [N], expected order 2",
+        [f"{1e3 * dt:g} ms" for dt in steps],
+        errors,
+    )
+    # The reference has an error of its own, (1/4)^2 of that of the finest step, which all errors
+    # lack.
+    expected = orders([1 / 4**2 - 1 / 32**2, 1 / 8**2 - 1 / 32**2])[0]
+    return float(observed[-1]), float(expected)
 
 
 @contextmanager
