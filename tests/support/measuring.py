@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -173,16 +173,40 @@ def march(
     mesh: LineMesh,
     watch: Callable[[StepView], Any] | None = None,
     change_form: Callable[[Equilibrium], Equilibrium] = lambda f: f,
+    since: Mapping[str, Any] | None = None,
 ) -> History:
-    """March to the end and return what was seen; what ``watch`` returns of each step is kept."""
+    """March to the end, from a state or the start, and return what was seen; what ``watch`` returns
+    of each step is kept."""
     run, _ = start_march(problem, mesh, change_form)
     history = History(watch)
     try:
+        if since is not None:
+            run.restore({name: np.array(value) for name, value in since.items()})
         history.outcome = run.run([history])
     finally:
         run.destroy()
     assert history.outcome.outcome == "done", history.outcome.outcome
     return history
+
+
+def continued(problem: Problem, mesh: LineMesh, at: int) -> tuple[History, History]:
+    """A march, which keeps its state of step ``at``, and one that goes on from that state.
+
+    Fails unless steps, times and number of states of the second are those of the first from there.
+    """
+    whole = march(problem, mesh, lambda view: view.checkpoint() if view.step == at else None)
+    rest = march(problem, mesh, since=whole.watched[at])
+    assert len(rest.time) == len(whole.time) - at > 1
+    check("times [s]", rest.time, whole.time[at:], within=1e-15)
+    return whole, rest
+
+
+def check_continued(whole: History, rest: History, at: int, *channels: str) -> None:
+    """Compare channels of marches of ``continued``: the same operations on the same numbers, each
+    relative to its largest."""
+    for channel in channels:
+        expected = whole[channel][at:]
+        check(channel, rest[channel], expected, within=1e-12 * np.abs(expected).max())
 
 
 def order_of_march(

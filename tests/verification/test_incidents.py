@@ -7,7 +7,15 @@ from typing import Any
 
 import numpy as np
 import pytest
-from measuring import COMM, History, check, free_matrices, march, order_of_march, start_march
+from measuring import (
+    COMM,
+    check,
+    check_continued,
+    continued,
+    free_matrices,
+    march,
+    order_of_march,
+)
 from scipy import linalg
 from small_lines import (
     FREE_MASS,
@@ -276,28 +284,10 @@ def test_a_continued_run_is_the_uninterrupted_one(own: dict[str, Any], at: int) 
         numerics=numerics(1e-3, **own),
         incidents=(DropperBreak(0.2, 126.5 - 6.5), TensionLoss(0.3, MESSENGER_WIRE, 0.8)),
     )
-    kept: dict[int, Any] = {}
-
-    def keep(view: Any) -> None:
-        if view.step == at:
-            kept[at] = view.checkpoint()
-
-    whole, rest = History(keep), History()
-    run, _ = start_march(problem, mesh)
-    run.run([whole])
-    run.destroy()
-    again, _ = start_march(problem, mesh)
-    again.restore({name: np.array(value) for name, value in kept[at].items()})
-    outcome = again.run([rest])
-    again.destroy()
-    assert outcome.outcome == "done"
+    whole, rest = continued(problem, mesh, at)
     assert len(whole.time) == 401
-    check("times [s]", whole.time, 1e-3 * np.arange(401), within=1e-15)
-    check("times [s]", rest.time, whole.time[at:], within=1e-15)
-    for channel in ("contact_force", "head_height", "wire_height", "dropper_force", "arm_uplift"):
-        expected = whole[channel][at:]
-        # The same operations on the same numbers; relative to the largest of each.
-        check(channel, rest[channel], expected, within=1e-12 * np.abs(expected).max())
+    channels = ("contact_force", "head_height", "wire_height", "dropper_force", "arm_uplift")
+    check_continued(whole, rest, at, *channels)
 
 
 HERTZ = HertzLaw(9e5, 1.5, 0.5, 0.1)

@@ -6,15 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 from measuring import (
-    History,
     check,
+    check_continued,
+    continued,
     free_matrices,
     line_alone,
     march,
     matrix_of,
     release,
     solve_free,
-    start_march,
     step,
 )
 from scipy.sparse import linalg as sparse_linalg
@@ -117,23 +117,8 @@ def test_energy_of_leaning_droppers_and_inclined_arms_stays() -> None:
 def test_a_continued_lateral_run_is_the_uninterrupted_one() -> None:
     line = ac_simple_line(4)
     problem = problem_of(line, WHOLE | LATERAL, train=train(70.0, 60.0, 80.0, raise_time=0.1))
-    mesh, at = mesh_of(line, 3), 150
-    kept = {}
-
-    def keep(view: object) -> None:
-        if view.step == at:
-            kept.update(view.checkpoint())
-
-    whole, rest = History(keep), History()
-    for history in (whole, rest):
-        run, _ = start_march(problem, mesh)
-        if history is rest:
-            run.restore({name: np.array(value) for name, value in kept.items()})
-        run.run([history])
-        run.destroy()
-    for name in ("contact_force", "dropper_force", "arm_uplift"):
-        expected = whole[name][at:]
-        check(name, rest[name], expected, within=1e-12 * np.abs(expected).max())
+    whole, rest = continued(problem, mesh_of(line, 3), 150)
+    check_continued(whole, rest, 150, "contact_force", "dropper_force", "arm_uplift")
 
 
 def test_a_push_upwards_at_an_inclined_arm_moves_the_wire_along_its_bar() -> None:
