@@ -170,7 +170,7 @@ def make_map(
     draft: Draft,
     comm: Any,
     grid: Grid,
-    tell: Callable[[str], None] = lambda line: None,
+    say: Callable[[str], None] = lambda line: None,
     kept: KeptRows = NOTHING_KEPT,
     n_at_once: int = 1,
 ) -> StabilityMap:
@@ -181,7 +181,7 @@ def make_map(
     draft : of the case
     comm : of this process alone
     grid : stiffnesses and masses of the map
-    tell : called with a line on each point that is done
+    say : called with a line on each point that is done
     kept : limits that were found before; without it all are found anew
     n_at_once : points of the map that are tried at the same time, each in a process of its own
     """
@@ -202,7 +202,7 @@ def make_map(
         limits += found
         words = ", ".join(f"{one.coupling} {in_ms(one.marched)}" for one in found)
         stiffness, mass = pairs[outcome.number]
-        tell(f"[{outcome.number + 1}/{len(pairs)}] {stiffness:g} N/m, {mass:g} kg: {words} ms")
+        say(f"[{outcome.number + 1}/{len(pairs)}] {stiffness:g} N/m, {mass:g} kg: {words} ms")
     if lost:  # the others are kept
         raise lost[0]
     linear = own.contact.law == "linear"
