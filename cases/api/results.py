@@ -88,7 +88,7 @@ class Run:
 
     @property
     def _results(self) -> Results:
-        """What tables are read from."""
+        """The opened results of the run."""
         if self._is_closed:
             raise InputError("this run is closed; read tables before, or open its folder again")
         return self._file

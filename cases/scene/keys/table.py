@@ -38,7 +38,7 @@ def not_with(key: str, why: str) -> ValueError:
 
 
 def given(table: Table, *names: str) -> list[str]:
-    """Those of the keys ``names`` that have a value."""
+    """The keys among ``names`` that have a value."""
     return [name for name in names if getattr(table, name) is not None]
 
 

@@ -240,7 +240,7 @@ class ChangedScenes:
         return Parameter(key, tuple(map(float, values)))
 
     def _instead(self, parts: Sequence[str]) -> str:
-        """What the scene has where the parts of a key lead nowhere, for the end of a sentence."""
+        """The pantographs or entries that a wrong key could name, for the end of a sentence."""
         if parts[0] == "pantographs" and parts[1] not in self._raw["pantographs"]:
             return f"; its pantographs are {', '.join(self._raw['pantographs'])}"
         holder = value_at(self._raw, ".".join(parts[:-1]))

@@ -54,7 +54,7 @@ def margins_of(summary: Mapping[str, Any], criteria: Sequence[BoundTable]) -> Ma
 
 
 def _judged(summary: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """What the standard has judged of a run."""
+    """Criteria by which the rule books have judged a run."""
     return [row for row in summary["acceptance"] if row["passed"] is not None]
 
 
